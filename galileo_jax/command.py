@@ -1,0 +1,61 @@
+"""What every command shares: one-line errors, exit codes, progress."""
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from typing import NoReturn
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from galileo_jax.errors import InputError
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line (an `InputError`), without the usage."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{self.prog}: {message}; see --help")
+
+
+def console() -> Console:
+    """Progress and notes go to stderr; stdout is for results."""
+    return Console(stderr=True, highlight=False)
+
+
+def progress() -> Progress:
+    """A progress bar on stderr; silent when stderr is not a terminal."""
+    shown = console()
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=shown,
+        disable=not shown.is_terminal,
+        transient=True,
+    )
+
+
+def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None = None) -> int:
+    """Runs `main(argv)` and returns the exit code.
+
+    0: done. 2: the input or the call is wrong (one line on stderr, no traceback).
+    130: stopped with Ctrl-C. Any other exception is a bug: traceback, exit code 1.
+    """
+    try:
+        return main(sys.argv[1:] if argv is None else argv) or 0
+    except InputError as error:
+        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("stopped; what was finished is kept", file=sys.stderr)
+        return 130

@@ -1,0 +1,33 @@
+"""A track: where each object was in every frame, in pixels, with an error."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Track:
+    """Pixel positions of the objects in every frame.
+
+    The only thing that tracking hands on; pixels end in `observation`.
+
+    Attributes:
+      names: the objects' names, in the clip's order.
+      times_s: `[frame]`, seconds since the first frame (frame / fps).
+      position_px: `[object, frame, 2]`, x right and y down. The point followed is the one
+        the clip declares (`point_px`), or the object's centre when it declares none;
+        NaN where not visible.
+      covariance_px2: `[object, frame, 2, 2]`, the error's covariance of each point.
+      angle_rad: `[object, frame]`, rotation in the image since the first frame,
+        clockwise positive (x right, y down).
+      is_visible: `[object, frame]`, False where the object is hidden or was lost.
+      frame_size_px: (width, height).
+    """
+
+    names: tuple[str, ...]
+    times_s: np.ndarray
+    position_px: np.ndarray
+    covariance_px2: np.ndarray
+    angle_rad: np.ndarray
+    is_visible: np.ndarray
+    frame_size_px: tuple[int, int]
