@@ -1,0 +1,57 @@
+"""The `galileo` console script: `galileo VERB ...` is `python -m galileo_jax.VERB ...`."""
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from galileo_jax import __version__, command
+from galileo_jax.errors import InputError
+
+VERBS = (
+    ("fit", "estimate masses and friction from clips"),
+    ("track", "follow the objects of a clip; csv and an overlay to check by eye"),
+    ("label", "write points and scale into a clip's yaml"),
+    ("simulate", "make a clip with known truth"),
+    ("predict", "continue a fitted scene beyond its clip"),
+)
+
+USAGE = "usage: galileo VERB ..., galileo VERB --help, galileo --version"
+
+
+def main(argv: Sequence[str]) -> int | None:
+    """Hands the arguments after the verb to that verb's module, imported only now.
+
+    Raises:
+      InputError: no verb, or one that there is not.
+    """
+    if not argv:
+        raise InputError(f"no verb given; {_known()}; see galileo --help")
+    verb, *rest = argv
+    if verb in ("-h", "--help"):
+        print(_help())
+        return 0
+    if verb == "--version":
+        print(f"galileo {__version__}")
+        return 0
+    if verb not in dict(VERBS):
+        raise InputError(f"unknown verb {verb!r}; {_known()}")
+    return import_module(f"galileo_jax.{verb}").main(rest)
+
+
+def _known() -> str:
+    return "known: " + ", ".join(verb for verb, _ in VERBS)
+
+
+def _help() -> str:
+    width = max(len(verb) for verb, _ in VERBS)
+    lines = [f"  {verb:<{width}}  {summary}" for verb, summary in VERBS]
+    return "\n".join([USAGE, "", *lines])
+
+
+def cli() -> None:
+    """The console script's entry point."""
+    sys.exit(command.run(main))
+
+
+if __name__ == "__main__":
+    cli()

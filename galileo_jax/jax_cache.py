@@ -1,0 +1,46 @@
+"""JAX's persistent compilation cache: what was compiled once starts fast the next time."""
+
+import os
+from pathlib import Path
+
+import platformdirs
+
+SWITCH = "GALILEO_JAX_CACHE"
+
+
+def cache_folder() -> Path | None:
+    """Returns the folder for compiled programs; None where the cache is switched off.
+
+    By default ``jax`` in the user's cache folder (``~/.cache/galileo_jax`` on Linux). The
+    environment variable ``GALILEO_JAX_CACHE`` overrides it: ``off``, or another folder.
+    """
+    setting = os.environ.get(SWITCH, "")
+    if setting.lower() == "off":
+        return None
+    if setting:
+        return Path(setting).expanduser()
+    return Path(platformdirs.user_cache_dir("galileo_jax", appauthor=False)) / "jax"
+
+
+def enable() -> Path | None:
+    """Turns the cache on for this process; commands call it, importing the package does not.
+
+    A folder already set for JAX (``JAX_COMPILATION_CACHE_DIR``) is left as it is. The cache
+    can be deleted at any time.
+
+    Returns:
+      The folder in use, or None where the cache is switched off.
+    """
+    import jax
+
+    folder = cache_folder()
+    if folder is None:
+        jax.config.update("jax_enable_compilation_cache", False)
+        return None
+    configured = jax.config.read("jax_compilation_cache_dir")
+    if configured:
+        return Path(configured)
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    # Half a second is where reading from disk is certainly faster than compiling again.
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+    return folder
