@@ -1,0 +1,197 @@
+"""Can the objects stand where the clip says they stand?
+
+Marked points are clicked by eye and the declared angle and scale may be a little off (that
+is for the fit to find out), so only what no such error explains is called wrong.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip, ClipObject
+
+MIN_TOLERANCE_M = 0.005
+"""Nobody clicks a centre better than this on a blurred or textured object."""
+
+TOLERANCE_PX = 4.0
+"""How far a clicked point is easily off."""
+
+TOLERANCE_PER_SIZE = 0.25
+"""A point meant as the centre lies in the middle half of the object."""
+
+TOLERANCE_PER_DISTANCE = 0.08
+"""Error of height per metre from the foot: an angle off by 4.5 degrees or a scale by 8 %."""
+
+MIN_SIZE_PX = 2.0
+"""An object that would appear smaller cannot be followed: its size or the scale is wrong."""
+
+
+@dataclass(frozen=True)
+class Outline:
+    """An object seen from the side: a box, or a disc that surely fits into it.
+
+    Attributes:
+      name: the object's.
+      centre_m: `[2]`, x along the travel, y up.
+      half_sides_m: (along, across) for a box; None for a disc.
+      angle_rad: of the box against the table, positive where it points downhill.
+      height_m: (smallest, largest) height it can have, resting in any of its ways.
+    """
+
+    name: str
+    centre_m: np.ndarray
+    half_sides_m: tuple[float, float] | None
+    angle_rad: float
+    height_m: tuple[float, float]
+
+    def axes(self) -> list[np.ndarray]:
+        """The directions of its sides."""
+        if self.half_sides_m is None:
+            return []
+        c, s = math.cos(self.angle_rad), math.sin(self.angle_rad)
+        return [np.array([c, -s]), np.array([s, c])]
+
+    def half_width(self, direction: np.ndarray) -> float:
+        """Half its extent along a unit vector, m."""
+        if self.half_sides_m is None:
+            return self.height_m[0] / 2
+        sides = zip(self.half_sides_m, self.axes(), strict=True)
+        return sum(half * abs(float(axis @ direction)) for half, axis in sides)
+
+
+def centres_from_pixels(clip: Clip) -> dict[str, np.ndarray]:
+    """The marked points in metres, x along the travel, y up.
+
+    The origin is `origin_px`, or without one the frame's corner. Empty without a scale.
+    """
+    if clip.pixels_per_metre is None:
+        return {}
+    origin = clip.origin_px or (0.0, 0.0)
+    along = 1.0 if clip.direction == "right" else -1.0
+    return {
+        item.name: np.array([along * (item.point_px[0] - origin[0]), origin[1] - item.point_px[1]])
+        / clip.pixels_per_metre
+        for item in clip.objects
+        if item.point_px is not None
+    }
+
+
+def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str, str] | None:
+    """(key, what is wrong) of the first object that cannot stand there, or None.
+
+    Looks at the objects whose size and centre are known: does one reach into the ramp or
+    the table, hang in the air above them, or reach into another object?
+
+    Args:
+      clip: the clip.
+      centres_m: name to `[2]`, m; x along the travel, y up, origin at the foot of the ramp.
+    """
+    pixel_m = 1 / clip.pixels_per_metre if clip.pixels_per_metre and clip.video else 0.0
+    has_origin = clip.track is not None or clip.origin_px is not None
+    is_on_ramp = SCENARIOS[clip.scenario].has_ramp and has_origin
+    angle = math.radians(clip.ramp_angle_deg or 0.0)
+    placed = [
+        (index, item, _outline(item, centres_m[item.name], angle if is_on_ramp else 0.0))
+        for index, item in enumerate(clip.objects)
+        if item.size_m is not None and item.name in centres_m
+    ]
+    if is_on_ramp:
+        has_table = clip.scenario != "incline"
+        for index, _, outline in placed:
+            problem = _against_surfaces(outline, angle, has_table, pixel_m)
+            if problem:
+                return f"objects[{index}] ({outline.name})", problem
+    for (_, first, a), (index, second, b) in itertools.combinations(placed, 2):
+        if first.first_frame != second.first_frame:
+            continue
+        depth = _penetration_m(a, b) - _tolerance_m(a, pixel_m) - _tolerance_m(b, pixel_m)
+        if depth > 0:
+            return (
+                f"objects[{index}] ({b.name})",
+                f"reaches into {a.name} by about {1000 * _penetration_m(a, b):.0f} mm at the start; "
+                "mend point_px, size_m or pixels_per_metre",
+            )
+    return None
+
+
+def find_odd_size(clip: Clip) -> tuple[str, str] | None:
+    """(key, what is wrong) of the first object too large or small for the frame, or None."""
+    if clip.frame_size_px is None or clip.pixels_per_metre is None:
+        return None
+    for index, item in enumerate(clip.objects):
+        if item.size_m is None:
+            continue
+        size_px = max(_seen_sides(item)) * clip.pixels_per_metre
+        if not MIN_SIZE_PX <= size_px <= max(clip.frame_size_px):
+            width, height = clip.frame_size_px
+            return (
+                f"objects[{index}].size_m ({item.name})",
+                f"{list(item.size_m)} m would be {size_px:.3g} px at {clip.pixels_per_metre:g} "
+                f"pixels per metre, in a frame of {width} x {height}; mend size_m or "
+                "pixels_per_metre",
+            )
+    return None
+
+
+def _seen_sides(item: ClipObject) -> Sequence[float]:
+    assert item.size_m is not None
+    match item.shape:
+        case "box":
+            return (item.size_m[0], item.size_m[2])
+        case "sphere":
+            return (2 * item.size_m[0],)
+        case "cylinder":
+            return (2 * item.size_m[0], item.size_m[1])
+        case "torus":
+            return (2 * (item.size_m[0] + item.size_m[1]), 2 * item.size_m[1])
+
+
+def _outline(item: ClipObject, centre_m: np.ndarray, ramp_angle_rad: float) -> Outline:
+    sides = _seen_sides(item)
+    is_box = item.shape == "box"
+    return Outline(
+        name=item.name,
+        centre_m=centre_m,
+        half_sides_m=(sides[0] / 2, sides[1] / 2) if is_box else None,
+        angle_rad=ramp_angle_rad if centre_m[0] < 0 else 0.0,
+        height_m=(sides[1], sides[1]) if is_box else (min(sides), max(sides)),
+    )
+
+
+def _tolerance_m(outline: Outline, pixel_m: float) -> float:
+    by_size = TOLERANCE_PER_SIZE * min(outline.half_sides_m or outline.height_m)
+    return max(MIN_TOLERANCE_M, TOLERANCE_PX * pixel_m, by_size)
+
+
+def _against_surfaces(
+    outline: Outline, angle_rad: float, has_table: bool, pixel_m: float
+) -> str | None:
+    x, y = (float(value) for value in outline.centre_m)
+    above_ramp = y * math.cos(angle_rad) + x * math.sin(angle_rad)
+    surface = "table" if has_table and y < above_ramp else "ramp"
+    clearance = min(above_ramp, y) if has_table else above_ramp
+    tolerance = _tolerance_m(outline, pixel_m) + TOLERANCE_PER_DISTANCE * math.hypot(x, y)
+    smallest, largest = outline.height_m
+    mend = "mend point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre"
+    if clearance < smallest / 2 - tolerance:
+        depth_mm = 1000 * (smallest / 2 - clearance)
+        return f"stands {depth_mm:.0f} mm inside the {surface} at the start; {mend}"
+    if clearance > largest + tolerance:
+        gap_mm = 1000 * (clearance - largest / 2)
+        return f"hangs {gap_mm:.0f} mm above the {surface} at the start; {mend}"
+    return None
+
+
+def _penetration_m(a: Outline, b: Outline) -> float:
+    """How deep two outlines overlap, m; negative when apart (separating axes)."""
+    between = b.centre_m - a.centre_m
+    distance = float(np.linalg.norm(between))
+    axes = [*a.axes(), *b.axes()]
+    axes.append(between / distance if distance > 0 else np.array([1.0, 0.0]))
+    return min(
+        a.half_width(axis) + b.half_width(axis) - abs(float(between @ axis)) for axis in axes
+    )

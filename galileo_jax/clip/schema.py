@@ -1,0 +1,216 @@
+"""The clip: a video or csv track and what is declared about it (DESIGN.md 2.1).
+
+`ClipFile` is what stands in the yaml; `Clip` adds what loading found out. Each value is
+checked for its type, its range and the usual mistakes of units. What takes several values
+or the video to judge is checked in `load` and `placement`.
+"""
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from galileo_jax.clip.scenarios import SCENARIOS
+
+Shape = Literal["box", "cylinder", "torus", "sphere"]
+Direction = Literal["right", "left"]
+
+SIZE_MEANING: dict[str, str] = {
+    "box": "[length along travel, depth, height]",
+    "cylinder": "[radius, length]",
+    "torus": "[ring radius, tube radius]",
+    "sphere": "[radius]",
+}
+
+MIN_SIZE_M, MAX_SIZE_M = 0.001, 2.0
+MIN_SCALE_PX_PER_M, MAX_SCALE_PX_PER_M = 5.0, 100_000.0
+MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
+MIN_FPS, MAX_FPS = 1.0, 1_000_000.0
+MIN_RAMP_ANGLE_DEG = 1.0  # below it nothing slides; it is an angle in radians
+
+
+def wrong(message: str) -> PydanticCustomError:
+    """A validation error whose text reaches the user as it stands."""
+    return PydanticCustomError("clip", "{text}", {"text": message})
+
+
+def _suggestion(value: float, *factors_and_units: tuple[float, str]) -> str:
+    """' did you mean 0.06 (60 mm)?' for the first (factor, unit) that is given."""
+    factor, unit = factors_and_units[0]
+    return f"did you mean {value * factor:g} ({value:g} {unit})?"
+
+
+def _metres(value: float) -> float:
+    if value <= 0:
+        raise wrong(f"{value:g} is not a length; metres above 0 expected")
+    if value > MAX_SIZE_M:
+        hint = _suggestion(value, (0.01, "cm") if value < 20 else (0.001, "mm"))
+        raise wrong(f"{value:g} m is too large for an object; metres expected; {hint}")
+    if value < MIN_SIZE_M:
+        raise wrong(f"{value:g} m is smaller than a millimetre; metres expected")
+    return value
+
+
+def _pixels_per_metre(value: float) -> float:
+    if value <= 0:
+        raise wrong(f"{value:g} is not a scale; pixels per metre above 0, or null, expected")
+    if value < MIN_SCALE_PX_PER_M:
+        hint = (
+            f"did you mean {1 / value:.4g} ({value:g} metres per pixel)?"
+            if value < 0.05
+            else _suggestion(value, (1000, "pixels per millimetre"))
+        )
+        raise wrong(f"{value:g} is too small; pixels per metre expected; {hint}")
+    if value > MAX_SCALE_PX_PER_M:
+        raise wrong(
+            f"{value:g} is too large; pixels per metre expected; did you mean {value / 1000:g}?"
+        )
+    return value
+
+
+def _gravity(value: float) -> float:
+    if value <= 0:
+        hint = f"; did you mean {-value:g}?" if MIN_GRAVITY <= -value <= MAX_GRAVITY else ""
+        raise wrong(f"{value:g} is not above 0; the size of gravity in m/s^2 expected{hint}")
+    if value > MAX_GRAVITY:
+        raise wrong(f"{value:g} is too large; m/s^2 expected; " + _suggestion(value, (0.01, "cm/s^2")))
+    if value < MIN_GRAVITY:
+        raise wrong(f"{value:g} is too small; m/s^2 expected (9.81 on earth)")
+    return value
+
+
+def _fps(value: float) -> float:
+    if value <= 0:
+        raise wrong(f"{value:g} is not above 0; frames per second expected")
+    if value < MIN_FPS:
+        hint = f"did you mean {1 / value:.4g} ({value:g} seconds per frame)?"
+        raise wrong(f"{value:g} is too small; frames per second expected; {hint}")
+    if value > MAX_FPS:
+        raise wrong(f"{value:g} is too large; frames per second expected")
+    return value
+
+
+def _ramp_angle_deg(value: float) -> float:
+    if not 0 < value < 90:
+        raise wrong(f"{value:g} is outside (0, 90) degrees")
+    if value < MIN_RAMP_ANGLE_DEG:
+        degrees = math.degrees(value)
+        raise wrong(
+            f"{value:g} is too flat to slide; degrees expected; "
+            f"did you mean {degrees:.4g} ({value:g} radians)?"
+        )
+    return value
+
+
+def _point_px(value: tuple[float, float]) -> tuple[float, float]:
+    if all(0 < coordinate < 1 for coordinate in value):
+        raise wrong(f"{list(value)} are fractions of the frame; pixels expected")
+    return value
+
+
+def _name(value: str) -> str:
+    if not value.isidentifier():
+        raise wrong(f"{value!r} is no name; letters, digits and _ expected, such as object1")
+    return value
+
+
+def _path(value: Any) -> Any:
+    if isinstance(value, str) and value and "\0" not in value:
+        return Path(value)
+    if isinstance(value, Path) or value is None:
+        return value
+    raise wrong(f"{value!r} is not a file name")
+
+
+def _one_of(known: tuple[str, ...]) -> BeforeValidator:
+    """Refuses anything but the `known` words and lists them."""
+
+    def check(value: Any) -> Any:
+        if not isinstance(value, str) or value not in known:
+            raise wrong(f"unknown value {short(value)}; known: {', '.join(known)}")
+        return value
+
+    return BeforeValidator(check)
+
+
+def short(value: Any) -> str:
+    """A value as the user wrote it, cut to 60 characters, on one line."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer with more digits than Python prints
+        text = "a number of thousands of digits"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Metres = Annotated[Number, AfterValidator(_metres)]
+Point = tuple[Number, Number]
+File = Annotated[Path | None, BeforeValidator(_path)]
+
+
+class ClipObject(BaseModel):
+    """One object in the clip.
+
+    Attributes:
+      name: unique in the clip; also the prefix of its columns in a csv track.
+      shape: box, cylinder, torus or sphere.
+      size_m: box (length along travel, depth, height), cylinder (radius, length), torus
+        (ring radius, tube radius), sphere (radius), m; None = not known.
+      point_px: its centre as marked by eye, pixels (x right, y down), in `first_frame`;
+        None = to be found.
+      first_frame: the first frame in which the object moves by itself; frames before are
+        not used for it.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: Annotated[str, Field(strict=True), AfterValidator(_name)]
+    shape: Annotated[Shape, _one_of(get_args(Shape))]
+    size_m: tuple[Metres, ...] | None = None
+    point_px: Annotated[Point, AfterValidator(_point_px)] | None = None
+    first_frame: Annotated[int, Field(strict=True, ge=0)] = 0
+
+
+class ClipFile(BaseModel):
+    """The keys of a clip yaml; see `Clip` for their meaning."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    video: File = None
+    track: File = None
+    scenario: Annotated[str, _one_of(tuple(SCENARIOS))]
+    fps: Annotated[Number, AfterValidator(_fps)]
+    ramp_angle_deg: Annotated[Number, AfterValidator(_ramp_angle_deg)] | None = None
+    direction: Annotated[Direction, _one_of(get_args(Direction))] = "right"
+    pixels_per_metre: Annotated[Number, AfterValidator(_pixels_per_metre)] | None = None
+    origin_px: Point | None = None
+    gravity: Annotated[Number, AfterValidator(_gravity)] = 9.81
+    objects: tuple[ClipObject, ...]
+
+
+class Clip(ClipFile):
+    """A loaded and checked clip.
+
+    Attributes:
+      path: the yaml.
+      video: the video file; None for a csv track.
+      track: the csv track in metres; None for a video.
+      scenario: a name in `SCENARIOS`.
+      fps: true frames per second; declared, or for a csv track without it 1 / median step.
+      ramp_angle_deg: in [1, 90) degrees; None where the scenario has no ramp.
+      direction: which way object 1 travels in the image.
+      pixels_per_metre: None = unknown.
+      origin_px: foot of the ramp at table level, pixels, x right, y down; None = unknown.
+      gravity: m/s^2.
+      objects: at least one, names unique.
+      frame_count: frames that decode, or rows of the csv track.
+      frame_size_px: (width, height); None for a csv track.
+      warnings: doubts found while loading, one line each; commands print them.
+    """
+
+    path: Path
+    frame_count: int
+    frame_size_px: tuple[int, int] | None = None
+    warnings: tuple[str, ...] = ()
