@@ -37,8 +37,7 @@ def enable() -> Path | None:
     if folder is None:
         jax.config.update("jax_enable_compilation_cache", False)
         return None
-    configured = jax.config.read("jax_compilation_cache_dir")
-    if configured:
+    if configured := os.environ.get("JAX_COMPILATION_CACHE_DIR"):
         return Path(configured)
     jax.config.update("jax_compilation_cache_dir", str(folder))
     # Half a second is where reading from disk is certainly faster than compiling again.
