@@ -20,11 +20,11 @@ MIN_TOLERANCE_M = 0.005
 TOLERANCE_PX = 4.0
 """How far a clicked point is easily off."""
 
-TOLERANCE_PER_SIZE = 0.25
-"""A point meant as the centre lies in the middle half of the object."""
+TOLERANCE_PER_SIZE = 0.125
+"""A point meant as the centre lies in the middle quarter of the object."""
 
-TOLERANCE_PER_DISTANCE = 0.08
-"""Error of height per metre from the foot: an angle off by 4.5 degrees or a scale by 8 %."""
+TOLERANCE_PER_DISTANCE = 0.06
+"""Error of height per metre from the foot: a declared angle that is off by 3.4 degrees."""
 
 MIN_SIZE_PX = 2.0
 """An object that would appear smaller cannot be followed: its size or the scale is wrong."""
@@ -108,11 +108,11 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
     for (_, first, a), (index, second, b) in itertools.combinations(placed, 2):
         if first.first_frame != second.first_frame:
             continue
-        depth = _penetration_m(a, b) - _tolerance_m(a, pixel_m) - _tolerance_m(b, pixel_m)
-        if depth > 0:
+        depth_m = _penetration_m(a, b)
+        if depth_m > _tolerance_m(a, pixel_m) + _tolerance_m(b, pixel_m):
             return (
                 f"objects[{index}] ({b.name})",
-                f"reaches into {a.name} by about {1000 * _penetration_m(a, b):.0f} mm at the start; "
+                f"reaches into {a.name} by about {1000 * depth_m:.0f} mm at the start; "
                 "mend point_px, size_m or pixels_per_metre",
             )
     return None
@@ -163,7 +163,8 @@ def _outline(item: ClipObject, centre_m: np.ndarray, ramp_angle_rad: float) -> O
 
 
 def _tolerance_m(outline: Outline, pixel_m: float) -> float:
-    by_size = TOLERANCE_PER_SIZE * min(outline.half_sides_m or outline.height_m)
+    sides_m = [2 * half for half in outline.half_sides_m or ()] or outline.height_m
+    by_size = TOLERANCE_PER_SIZE * min(sides_m)
     return max(MIN_TOLERANCE_M, TOLERANCE_PX * pixel_m, by_size)
 
 

@@ -75,7 +75,9 @@ def _gravity(value: float) -> float:
         hint = f"; did you mean {-value:g}?" if MIN_GRAVITY <= -value <= MAX_GRAVITY else ""
         raise wrong(f"{value:g} is not above 0; the size of gravity in m/s^2 expected{hint}")
     if value > MAX_GRAVITY:
-        raise wrong(f"{value:g} is too large; m/s^2 expected; " + _suggestion(value, (0.01, "cm/s^2")))
+        raise wrong(
+            f"{value:g} is too large; m/s^2 expected; " + _suggestion(value, (0.01, "cm/s^2"))
+        )
     if value < MIN_GRAVITY:
         raise wrong(f"{value:g} is too small; m/s^2 expected (9.81 on earth)")
     return value
@@ -112,16 +114,16 @@ def _point_px(value: tuple[float, float]) -> tuple[float, float]:
 
 def _name(value: str) -> str:
     if not value.isidentifier():
-        raise wrong(f"{value!r} is no name; letters, digits and _ expected, such as object1")
+        raise wrong(f"{short(value)} is no name; letters, digits and _ expected, such as object1")
     return value
 
 
 def _path(value: Any) -> Any:
-    if isinstance(value, str) and value and "\0" not in value:
+    if isinstance(value, str) and 0 < len(value) < 256 and value.isprintable():
         return Path(value)
     if isinstance(value, Path) or value is None:
         return value
-    raise wrong(f"{value!r} is not a file name")
+    raise wrong(f"{short(value)} is not a file name")
 
 
 def _one_of(known: tuple[str, ...]) -> BeforeValidator:

@@ -127,7 +127,8 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
     try:
         if not capture.isOpened():
             raise InputError(
-                f"{path}: cannot be decoded: not a video, without frames, or cut off before its index"
+                f"{path}: cannot be decoded: not a video, without frames, or cut off before "
+                "its index"
             )
         yield capture
     finally:
@@ -146,7 +147,7 @@ def _check_even_spacing(path: Path, times_ms: np.ndarray) -> None:
     intervals = np.diff(times_ms)
     worst = int(np.argmax(np.abs(intervals - np.median(intervals))))
     raise InputError(
-        f"{path}: variable frame rate: frames are {intervals.min():.4g} to {intervals.max():.4g} ms "
-        f"apart (worst after frame {worst}), so frame number / fps is not the time; "
-        "record at a constant rate, or cut to an evenly spaced part"
+        f"{path}: variable frame rate: frames are {intervals.min():.4g} to "
+        f"{intervals.max():.4g} ms apart (worst after frame {worst}), so frame number / fps is "
+        "not the time; record at a constant rate, or cut to an evenly spaced part"
     )

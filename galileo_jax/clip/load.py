@@ -1,0 +1,338 @@
+"""Loading a clip: every problem is one line that names the file, the key and the remedy."""
+
+import difflib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from galileo_jax.clip import placement
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import SIZE_MEANING, Clip, ClipFile, ClipObject, short
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.errors import InputError
+from galileo_jax.observation import Observation
+from galileo_jax.video import decode
+
+YAML_SUFFIXES = (".yaml", ".yml")
+
+EXAMPLES: dict[str, str] = {
+    "scenario": "scenario: ramp",
+    "fps": "fps: 30.0",
+    "objects": "objects: with one entry per object",
+    "name": "name: object1",
+    "shape": "shape: box",
+}
+"""What to write for the keys that have no default."""
+
+
+def load_clip(path: str | Path, **overrides: Any) -> Clip:
+    """Loads and checks a clip.
+
+    Args:
+      path: the video or the csv track (the yaml beside it, same name), or the yaml.
+      **overrides: values for yaml keys that win over the file (`pixels_per_metre=490.0`,
+        `fps=240.0`, ...); None leaves the file's value.
+
+    Returns:
+      the checked clip; doubts are in `Clip.warnings`.
+
+    Raises:
+      InputError: one line, for whatever is wrong with the yaml, the video or the csv track.
+
+    The video is decoded once from end to end (at about a hundred times real time for
+    640 x 360), because a header's frame count and rate cannot be trusted.
+    """
+    path = Path(path)
+    yaml_path = find_yaml(path)
+    content = read_mapping(yaml_path)
+    if path.suffix.lower() == ".csv":
+        content = {key: value for key, value in content.items() if key != "video"}
+        content.setdefault("track", path.name)
+    given = {key: value for key, value in overrides.items() if value is not None}
+    clip = check_clip(yaml_path, content | given, overridden=frozenset(given))
+    source = clip.video or clip.track
+    if source is not None and path != yaml_path and not _is_same(source, path):
+        key = "video" if clip.video else "track"
+        raise InputError(
+            f"{yaml_path}: {key}: {source.name} is not {path.name}, beside which it lies; "
+            f"write {key}: {path.name}"
+        )
+    return clip
+
+
+def find_yaml(path: Path) -> Path:
+    """The yaml that belongs to a video, csv track or yaml. Raises `InputError` if none is there."""
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if path.is_dir():
+        raise InputError(f"{path}: a folder; a video, a yaml or a csv track expected")
+    if path.suffix.lower() in YAML_SUFFIXES:
+        return path
+    for suffix in YAML_SUFFIXES:
+        if path.with_suffix(suffix).is_file():
+            return path.with_suffix(suffix)
+    raise InputError(
+        f"{path}: no {path.with_suffix('.yaml').name} beside it; "
+        f"write one: python -m galileo_jax.label {path} --help"
+    )
+
+
+def check_clip(
+    path: Path, content: Mapping[str, Any], overridden: frozenset[str] = frozenset()
+) -> Clip:
+    """Checks the content of a clip yaml and the video or csv track that it names.
+
+    Args:
+      path: the yaml; files are looked for beside it, and it is named in errors. It need not
+        exist.
+      content: its keys and values.
+      overridden: the keys whose value does not stand in the file.
+    """
+    path = Path(path)
+
+    def fail(key: str, problem: str) -> NoReturn:
+        note = " (given in the call)" if key.split(".")[0].split("[")[0] in overridden else ""
+        raise InputError(f"{path}: {key}{note}: {problem}")
+
+    content = dict(content)
+    if (content.get("video") is None) == (content.get("track") is None):
+        _fail_for_unknown_key(content, fail)
+        problem = "both given" if content.get("video") is not None else "missing"
+        fail("video, track", f"{problem}; one of them expected, such as video: {path.stem}.mp4")
+
+    is_timed = content.get("track") is not None and "fps" not in content
+    if is_timed:
+        content["fps"] = 1.0  # holds the place until the track's own times are read
+    try:
+        file = ClipFile.model_validate(content)
+    except ValidationError as error:
+        fail(*_first_problem(error))
+    observation = None
+    if file.track is not None:
+        if file.track.suffix.lower() != ".csv":
+            fail("track", f"{file.track} is not a .csv file")
+        observation = read_observation_csv(path.parent / file.track)
+        if is_timed:
+            file = file.model_copy(update={"fps": _frame_rate(observation)})
+
+    _check_objects(file, fail)
+    found = _observed(path, file, observation) if observation else _filmed(path, file)
+    clip = Clip.model_validate({**dict(file), "path": path, **found})
+    _check_against_source(clip, observation, fail)
+    return clip
+
+
+def _fail_for_unknown_key(content: Mapping[str, Any], fail: Any) -> None:
+    for key in content:
+        if key not in ClipFile.model_fields:
+            fail(short(key).strip("'"), _unknown_key(key, ClipFile))
+
+
+def _first_problem(error: ValidationError) -> tuple[str, str]:
+    """(key, problem) of the most telling of pydantic's errors.
+
+    An unknown key comes first: it is often the misspelt form of one that is 'missing'.
+    """
+    errors = error.errors(include_url=False)
+    first = next((e for e in errors if e["type"] in ("extra_forbidden", "invalid_key")), errors[0])
+    return _key(first["loc"]), _problem(first)
+
+
+def _key(loc: tuple[int | str, ...]) -> str:
+    """('objects', 0, 'size_m', 2) -> 'objects[0].size_m[2]'."""
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc)
+    return " ".join(text.removeprefix(".").split())[:80] or "(top level)"
+
+
+def _problem(error: ErrorDetails) -> str:
+    loc, value = error["loc"], error["input"]
+    found = short(value)
+    model = ClipObject if loc and loc[0] == "objects" else ClipFile
+    match error["type"]:
+        case "clip":
+            return error["msg"]
+        case "extra_forbidden" | "invalid_key":
+            return _unknown_key(loc[-1], model)
+        case "missing":
+            example = EXAMPLES.get(str(loc[-1]))
+            is_in_pair = isinstance(loc[-1], int)
+            return "a second number is missing" if is_in_pair else f"missing; write {example}"
+        case "too_long":
+            return f"{found} has too many values; [x, y] expected"
+        case "tuple_type":
+            return f"{found} is not a list; {_expected_list(loc)} expected"
+        case "model_type" | "dict_type" | "model_attributes_type":
+            return f"{found} is not a mapping; name, shape, size_m, point_px expected"
+        case "string_type":
+            return f"{found} is not text"
+        case "int_type" | "int_from_float":
+            return f"{found} is not a whole number"
+        case "greater_than_equal":
+            return f"{found} is negative; 0 or more expected"
+        case "finite_number":
+            return f"{found} is not finite; a number expected"
+        case "float_type":
+            hint = "; in yaml write 1.0e+3, not 1e3" if _is_number_text(value) else ""
+            return f"{found} is not a number{hint}"
+        case _:
+            return f"{found}: {error['msg']}"
+
+
+def _expected_list(loc: tuple[int | str, ...]) -> str:
+    match loc[-1]:
+        case "objects":
+            return "a list with one entry per object"
+        case "size_m":
+            return "a list of metres, such as [0.06, 0.06, 0.06], or null"
+        case _:
+            return "[x, y] in pixels"
+
+
+def _is_number_text(value: Any) -> bool:
+    if not isinstance(value, str):
+        return False
+    try:
+        float(value)
+    except ValueError:
+        return False
+    return True
+
+
+def _unknown_key(key: Any, model: type[BaseModel]) -> str:
+    known = list(model.model_fields)
+    close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.6)
+    return (
+        f"unknown key; did you mean {close[0]}?"
+        if close
+        else (f"unknown key; known: {', '.join(known)}")
+    )
+
+
+def _check_objects(file: ClipFile, fail: Any) -> None:
+    """What takes several values of the yaml to judge."""
+    scenario = SCENARIOS[file.scenario]
+    if scenario.has_ramp and file.ramp_angle_deg is None:
+        fail("ramp_angle_deg", f"missing; scenario {file.scenario} needs it, in degrees")
+    fewest, most = scenario.num_objects
+    count = len(file.objects)
+    if count < fewest:
+        fail("objects", "empty; at least one object expected")
+    if most is not None and count > most:
+        fail(
+            "objects",
+            f"{count} objects; scenario {file.scenario} ({scenario.meaning}) "
+            f"has at most {most}; did you mean scenario: multi?",
+        )
+    names: dict[str, int] = {}
+    for index, item in enumerate(file.objects):
+        if item.name in names:
+            fail(
+                f"objects[{index}].name",
+                f"{item.name!r} is also the name of objects[{names[item.name]}]; names must differ",
+            )
+        names[item.name] = index
+        if item.size_m is None:
+            continue
+        meaning = SIZE_MEANING[item.shape]
+        if len(item.size_m) != meaning.count(",") + 1:
+            fail(
+                f"objects[{index}].size_m",
+                f"{list(item.size_m)} has {len(item.size_m)} values; "
+                f"a {item.shape} has {meaning}, in metres",
+            )
+        if item.shape == "torus" and item.size_m[1] >= item.size_m[0]:
+            fail(
+                f"objects[{index}].size_m",
+                f"{list(item.size_m)}: the tube is thicker than the ring; {meaning} expected",
+            )
+
+
+def _filmed(path: Path, file: ClipFile) -> dict[str, Any]:
+    assert file.video is not None
+    video = path.parent / file.video
+    if not video.exists():
+        raise InputError(f"{path}: video: {video}: no such file")
+    info = decode.probe(video, file.fps)
+    return {
+        "video": video,
+        "frame_count": info.frame_count,
+        "frame_size_px": info.size_px,
+        "warnings": info.warnings,
+    }
+
+
+def _observed(path: Path, file: ClipFile, observation: Observation) -> dict[str, Any]:
+    assert file.track is not None
+    track = path.parent / file.track
+    declared = [item.name for item in file.objects]
+    if tuple(declared) != observation.names:
+        raise InputError(
+            f"{path}: objects: {', '.join(declared)} declared, but {track.name} has "
+            f"{', '.join(observation.names)}; the same names in the same order expected"
+        )
+    fps = _frame_rate(observation)
+    warnings = ()
+    if abs(file.fps / fps - 1) > 0.01:
+        warnings = (
+            f"{path}: fps: {file.fps:g} declared, the times in {track.name} say {fps:.4g}; "
+            "the times are used",
+        )
+    return {"track": track, "frame_count": len(observation.times_s), "warnings": warnings}
+
+
+def _check_against_source(clip: Clip, observation: Observation | None, fail: Any) -> None:
+    """What takes the video or the csv track to judge."""
+    for index, item in enumerate(clip.objects):
+        key = f"objects[{index}]"
+        if item.first_frame >= clip.frame_count:
+            fail(
+                f"{key}.first_frame",
+                f"{item.first_frame} is beyond the end; the clip has "
+                f"{clip.frame_count} frames (0 to {clip.frame_count - 1})",
+            )
+        if item.point_px is not None and clip.frame_size_px is not None:
+            _check_in_frame(f"{key}.point_px", item.point_px, clip.frame_size_px, 0, fail)
+    if clip.origin_px is not None and clip.frame_size_px is not None:
+        # The foot may lie outside the picture, but not by more than its own size.
+        _check_in_frame("origin_px", clip.origin_px, clip.frame_size_px, 1, fail)
+    centres_m = (
+        _first_positions(observation) if observation else placement.centres_from_pixels(clip)
+    )
+    for problem in (placement.find_odd_size(clip), placement.find_misplacement(clip, centres_m)):
+        if problem:
+            fail(*problem)
+
+
+def _check_in_frame(
+    key: str, point: tuple[float, float], size_px: tuple[int, int], margin: int, fail: Any
+) -> None:
+    width, height = size_px
+    x, y = point
+    is_inside = (
+        -margin * width <= x < (1 + margin) * width
+        and -margin * height <= y < (1 + margin) * height
+    )
+    if not is_inside:
+        far = "far " if margin else ""
+        fail(key, f"{list(point)} is {far}outside the frame of {width} x {height} pixels")
+
+
+def _frame_rate(observation: Observation) -> float:
+    return float(1 / np.median(np.diff(observation.times_s)))
+
+
+def _first_positions(observation: Observation) -> dict[str, np.ndarray]:
+    first = observation.mask.argmax(axis=1)
+    return {
+        name: observation.position_m[index, :, first[index]]
+        for index, name in enumerate(observation.names)
+    }
+
+
+def _is_same(a: Path, b: Path) -> bool:
+    return a.exists() and b.exists() and a.samefile(b)

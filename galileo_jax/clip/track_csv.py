@@ -1,0 +1,271 @@
+"""Tracks in metres as csv: `time_s, object1_x_m, object1_y_m[, object1_sd_m], object2_x_m, ...`.
+
+Axes as in `Observation`: x along the travel, y up, origin at the foot of the ramp. An empty
+cell means that the object was not visible. The error of a point is either one standard
+deviation for both axes (`object1_sd_m`) or a full covariance (`object1_sd_x_m`,
+`object1_sd_y_m`, `object1_correlation`); without either it is estimated from the positions.
+"""
+
+import csv
+import difflib
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax.errors import InputError
+from galileo_jax.files import write_text
+from galileo_jax.observation import Observation
+
+TIME = "time_s"
+MIN_ROWS = 4
+"""Three differences: the fewest that show whether a speed changes."""
+
+MIN_NOISE_WINDOWS = 8
+"""Fewer third differences give a standard deviation that is off by a third or more."""
+
+MIN_SD_M = 1e-5
+"""No camera sees less than ten micrometres; also what is taken for positions without noise."""
+
+MAX_POSITION_M = 100.0
+MAX_SD_M = 1.0
+MAX_STEP_S = 1.0
+
+_ISOTROPIC = ("sd_m",)
+_COVARIANCE = ("sd_x_m", "sd_y_m", "correlation")
+_FIELDS = ("x_m", "y_m", *_ISOTROPIC, *_COVARIANCE)
+
+
+def read_observation_csv(path: Path) -> Observation:
+    """Reads a csv track in metres.
+
+    Raises `InputError`, one line, naming the file and the column or line that is wrong.
+    """
+    path = Path(path)
+    header, rows = _read_table(path)
+    names, columns = _find_columns(path, header)
+    if len(rows) < MIN_ROWS:
+        raise InputError(f"{path}: {len(rows)} rows; at least {MIN_ROWS} expected")
+    table = _parse(path, header, rows)
+    times = table[:, header.index(TIME)]
+    _check_times(path, times, [line for line, _ in rows])
+
+    position = np.empty((len(names), 2, len(times)))
+    covariance = np.empty((len(names), 2, 2, len(times)))
+    for index, name in enumerate(names):
+        column = {field: table[:, at] for field, at in columns[name].items()}
+        position[index] = _positions(path, name, column["x_m"], column["y_m"])
+        is_visible = np.isfinite(position[index, 0])
+        covariance[index] = _covariance(path, name, column, times, position[index])
+        covariance[index][:, :, ~is_visible] = np.nan
+    return Observation(names, times, position, covariance, np.isfinite(position[:, 0]))
+
+
+def write_observation_csv(path: Path, observation: Observation) -> None:
+    """Writes a csv track that `read_observation_csv` reads back.
+
+    Positions and times come back to the last digit, covariances to rounding.
+    """
+    covariance = observation.covariance_m2
+    sd = np.sqrt(np.stack([covariance[:, 0, 0], covariance[:, 1, 1]], axis=1))
+    correlation = covariance[:, 0, 1] / (sd[:, 0] * sd[:, 1])
+    header: list[str] = [TIME]
+    columns: list[np.ndarray] = [observation.times_s]
+    for index, name in enumerate(observation.names):
+        seen = observation.mask[index]
+        is_isotropic = np.array_equal(sd[index, 0][seen], sd[index, 1][seen]) and not np.any(
+            correlation[index][seen]
+        )
+        fields = {"x_m": observation.position_m[index, 0], "y_m": observation.position_m[index, 1]}
+        if is_isotropic:
+            fields["sd_m"] = sd[index, 0]
+        else:
+            fields["sd_x_m"], fields["sd_y_m"] = sd[index]
+            fields["correlation"] = correlation[index]
+        for field, values in fields.items():
+            header.append(f"{name}_{field}")
+            columns.append(np.where(seen, values, np.nan))
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    for row in zip(*columns, strict=True):
+        writer.writerow("" if math.isnan(value) else repr(float(value)) for value in row)
+    write_text(path, text.getvalue())
+
+
+def position_noise_m(times_s: np.ndarray, position_m: np.ndarray) -> float:
+    """The standard deviation of one coordinate's error, estimated from its roughness, m.
+
+    Over every four consecutive visible points the third divided difference
+    `sum_j w_j x_j, w_j = 1 / prod_{k != j} (t_j - t_k)` cancels any motion of constant
+    acceleration; divided by `sqrt(sum w_j^2)` it is a draw of the error alone. The median of
+    its absolute value times 1.4826 is the standard deviation, and is not moved by the few
+    points at an impact. Not below `MIN_SD_M`.
+
+    Args:
+      times_s: `[frame]`, s, increasing; need not be evenly spaced.
+      position_m: `[frame]`, m; NaN where not visible.
+
+    Returns:
+      the standard deviation; NaN if fewer than `MIN_NOISE_WINDOWS` windows are visible.
+
+    Limits: assumes errors independent between frames. Motion that changes within three
+    frames for most of the clip counts as noise.
+    """
+    t = np.lib.stride_tricks.sliding_window_view(times_s, 4)
+    x = np.lib.stride_tricks.sliding_window_view(position_m, 4)
+    is_whole = np.isfinite(x).all(axis=1)
+    if is_whole.sum() < MIN_NOISE_WINDOWS:
+        return math.nan
+    t, x = t[is_whole], x[is_whole]
+    gaps = t[:, :, None] - t[:, None, :] + np.eye(4)
+    weights = 1 / gaps.prod(axis=2)
+    draws = (weights * x).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
+    return max(1.4826 * float(np.median(np.abs(draws))), MIN_SD_M)
+
+
+def _read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The header and the rows, each with its line number; blank lines are skipped."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: not a text file in UTF-8; a csv track expected") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    reader = csv.reader(io.StringIO(text))
+    try:
+        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
+    except csv.Error as error:
+        raise InputError(f"{path}: not csv: line {reader.line_num}: {error}") from None
+    rows = [(line, row) for line, row in rows if any(row)]
+    if not rows:
+        raise InputError(f"{path}: empty; a header with {TIME}, object1_x_m, object1_y_m expected")
+    (_, header), *rest = rows
+    if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
+        raise InputError(f"{path}: columns are not separated by commas")
+    return header, rest
+
+
+def _find_columns(
+    path: Path, header: list[str]
+) -> tuple[tuple[str, ...], dict[str, dict[str, int]]]:
+    """The objects' names in order, and for each the place of its columns by field."""
+    repeated = next((name for name in header if header.count(name) > 1), None)
+    if repeated is not None:
+        raise InputError(f"{path}: column {repeated!r}: given twice; keep one")
+    columns: dict[str, dict[str, int]] = {}
+    for at, title in enumerate(header):
+        if title == TIME:
+            continue
+        field = next((f for f in _FIELDS if title.endswith(f"_{f}") and title != f"_{f}"), None)
+        if field is None:
+            wanted = [TIME, *(f"object{n}_{f}" for n in (1, 2) for f in _FIELDS)]
+            close = difflib.get_close_matches(title, wanted, n=1)
+            hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(wanted[:4])}, ..."
+            raise InputError(f"{path}: column {title[:40]!r}: unknown; {hint}")
+        columns.setdefault(title.removesuffix(f"_{field}"), {})[field] = at
+    if TIME not in header:
+        raise InputError(f"{path}: column {TIME!r}: missing")
+    if not columns:
+        raise InputError(f"{path}: column 'object1_x_m': missing; no object in the header")
+    for name, fields in columns.items():
+        has_sd, has_covariance = "sd_m" in fields, any(f in fields for f in _COVARIANCE)
+        if has_sd and has_covariance:
+            raise InputError(f"{path}: column '{name}_sd_m': give it or the covariance, not both")
+        required = ("x_m", "y_m", *(_COVARIANCE if has_covariance else ()))
+        missing = next((field for field in required if field not in fields), None)
+        if missing:
+            raise InputError(f"{path}: column '{name}_{missing}': missing")
+    return tuple(columns), columns
+
+
+def _parse(path: Path, header: list[str], rows: list[tuple[int, list[str]]]) -> np.ndarray:
+    """`[row, column]`; NaN for an empty cell."""
+    table = np.full((len(rows), len(header)), np.nan)
+    for index, (line, row) in enumerate(rows):
+        if len(row) != len(header):
+            raise InputError(
+                f"{path}: line {line}: {len(row)} cells; {len(header)} expected as in the header"
+            )
+        for at, cell in enumerate(row):
+            if not cell:
+                continue
+            try:
+                table[index, at] = float(cell)
+            except ValueError:
+                table[index, at] = math.nan
+            if not math.isfinite(table[index, at]):
+                raise InputError(
+                    f"{path}: line {line}: {header[at]}: {cell[:40]!r} is not a number; "
+                    "leave the cell empty where nothing was seen"
+                )
+    return table
+
+
+def _check_times(path: Path, times: np.ndarray, lines: list[int]) -> None:
+    if np.isnan(times).any():
+        line = lines[int(np.isnan(times).argmax())]
+        raise InputError(f"{path}: line {line}: {TIME}: empty; seconds expected")
+    steps = np.diff(times)
+    if (steps <= 0).any():
+        at = int((steps <= 0).argmax()) + 1
+        raise InputError(
+            f"{path}: line {lines[at]}: {TIME}: {times[at]:g} is not after {times[at - 1]:g}; "
+            "times must increase"
+        )
+    if np.median(steps) > MAX_STEP_S:
+        raise InputError(
+            f"{path}: {TIME}: rows are {np.median(steps):g} s apart; seconds expected; "
+            "are these milliseconds or frame numbers?"
+        )
+
+
+def _positions(path: Path, name: str, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    if (np.isnan(x) != np.isnan(y)).any():
+        at = int((np.isnan(x) != np.isnan(y)).argmax())
+        raise InputError(f"{path}: row {at + 1}: {name}: only one of x and y is given")
+    if np.isfinite(x).sum() < MIN_ROWS:
+        raise InputError(
+            f"{path}: {name}: visible in {np.isfinite(x).sum()} rows; at least {MIN_ROWS} expected"
+        )
+    position = np.stack([x, y])
+    largest = float(np.nanmax(np.abs(position)))
+    if largest > MAX_POSITION_M:
+        raise InputError(
+            f"{path}: {name}: a position of {largest:g} m; metres expected; "
+            "are these pixels or millimetres?"
+        )
+    return position
+
+
+def _covariance(
+    path: Path, name: str, column: dict[str, np.ndarray], times: np.ndarray, position: np.ndarray
+) -> np.ndarray:
+    """`[2, 2, row]`, m^2, from the columns or else from the positions' roughness."""
+    correlation = np.zeros(len(times))
+    if "sd_m" in column:
+        sd = np.stack([column["sd_m"], column["sd_m"]])
+    elif "sd_x_m" in column:
+        sd = np.stack([column["sd_x_m"], column["sd_y_m"]])
+        correlation = column["correlation"]
+    else:
+        estimates = [position_noise_m(times, coordinate) for coordinate in position]
+        if any(map(math.isnan, estimates)):
+            raise InputError(
+                f"{path}: column '{name}_sd_m': missing, and too few consecutive rows "
+                f"({MIN_NOISE_WINDOWS + 3} expected) to estimate it; give the error in metres"
+            )
+        sd = np.outer(estimates, np.ones(len(times)))
+    is_visible = np.isfinite(position[0])
+    is_right = (sd > 0).all(axis=0) & (sd <= MAX_SD_M).all(axis=0) & (np.abs(correlation) < 1)
+    if not is_right[is_visible].all():
+        at = int((is_visible & ~is_right).argmax())
+        raise InputError(
+            f"{path}: row {at + 1}: {name}: standard deviation {sd[0, at]:g} m; more than 0 and at "
+            f"most {MAX_SD_M:g} expected, correlation between -1 and 1"
+        )
+    shared = correlation * sd[0] * sd[1]
+    return np.array([[sd[0] ** 2, shared], [shared, sd[1] ** 2]])

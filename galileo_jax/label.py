@@ -1,0 +1,243 @@
+"""`galileo label`: write what is known about a clip into the yaml beside it."""
+
+import copy
+import math
+from argparse import Namespace
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from galileo_jax import command
+from galileo_jax.clip.load import YAML_SUFFIXES, check_clip, find_yaml
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.yaml_edit import Key, dump, edited
+from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.errors import InputError
+from galileo_jax.files import write_text
+from galileo_jax.video.decode import probe
+
+KEY_ORDER = (
+    "video",
+    "track",
+    "scenario",
+    "fps",
+    "ramp_angle_deg",
+    "direction",
+    "pixels_per_metre",
+    "origin_px",
+    "gravity",
+    "objects",
+)
+
+
+def main(argv: Sequence[str]) -> int | None:
+    """Creates or updates the yaml beside a clip; writes nothing unless the result is valid."""
+    arguments = _parser().parse_args(argv)
+    clip_path: Path = arguments.clip
+    yaml_path = _yaml_path(clip_path)
+    is_new = not yaml_path.exists()
+    old = {} if is_new else read_mapping(yaml_path)
+    defaults = _defaults(clip_path, arguments) if is_new else {}
+    changes = _changes(arguments, old)
+    if not changes:
+        raise InputError(f"{clip_path}: nothing to write; see galileo label --help")
+
+    content = _applied(old, changes | defaults)
+    clip = check_clip(yaml_path, content)
+    if is_new:
+        text, is_kept = dump({key: content[key] for key in KEY_ORDER if key in content}), True
+    else:
+        text, is_kept = edited(yaml_path.read_text(encoding="utf-8-sig"), changes, content)
+    write_text(yaml_path, text)
+
+    for warning in clip.warnings:
+        _say(f"warning: {warning}")
+    if not is_kept:
+        _say(f"note: {yaml_path} was written afresh; its comments are lost")
+    print(yaml_path)
+    return None
+
+
+def _say(line: str) -> None:
+    command.console().print(line, soft_wrap=True, markup=False)
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(
+        prog="galileo label",
+        description="Write what is known about a clip into the yaml beside it. Pixels: x right, "
+        "y down, as any image viewer shows them.",
+    )
+    parser.add_argument("clip", type=Path, metavar="CLIP", help="video, csv track or yaml")
+    parser.add_argument("--scenario", help=f"one of {', '.join(SCENARIOS)}")
+    parser.add_argument("--fps", type=float, help="true frames per second; default: the video's")
+    objects = parser.add_argument_group("objects (repeat for each; a new NAME adds an object)")
+    objects.add_argument(
+        "--point",
+        nargs=3,
+        action="append",
+        default=[],
+        metavar=("NAME", "X", "Y"),
+        help="its centre in its first frame, pixels",
+    )
+    objects.add_argument(
+        "--size",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar=("NAME", "METRES"),
+        help="box: length depth height; cylinder: radius length; torus: radii; sphere: radius",
+    )
+    objects.add_argument(
+        "--shape",
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("NAME", "SHAPE"),
+        help="box (default), cylinder, torus or sphere",
+    )
+    objects.add_argument(
+        "--first-frame",
+        nargs=2,
+        action="append",
+        default=[],
+        metavar=("NAME", "FRAME"),
+        help="first frame in which it moves by itself, from 0",
+    )
+    scale = parser.add_mutually_exclusive_group()
+    scale.add_argument("--pixels-per-metre", type=float)
+    scale.add_argument(
+        "--scale",
+        nargs=5,
+        type=float,
+        metavar=("X1", "Y1", "X2", "Y2", "METRES"),
+        help="two pixels and the distance between them",
+    )
+    ramp = parser.add_mutually_exclusive_group()
+    ramp.add_argument("--ramp-angle", type=float, metavar="DEG", dest="ramp_angle_deg")
+    ramp.add_argument(
+        "--ramp",
+        nargs=4,
+        type=float,
+        metavar=("X1", "Y1", "X2", "Y2"),
+        help="two pixels on the ramp: its angle and direction",
+    )
+    parser.add_argument("--direction", help="which way the objects travel: right or left")
+    parser.add_argument(
+        "--origin", nargs=2, type=float, metavar=("X", "Y"), help="foot of the ramp, pixels"
+    )
+    parser.add_argument("--gravity", type=float, help="m/s^2")
+    return parser
+
+
+def _yaml_path(clip_path: Path) -> Path:
+    """The clip's yaml: the one that is there, or the one to create."""
+    is_source = clip_path.is_file() and clip_path.suffix.lower() not in YAML_SUFFIXES
+    has_yaml = any(clip_path.with_suffix(suffix).exists() for suffix in YAML_SUFFIXES)
+    return clip_path.with_suffix(".yaml") if is_source and not has_yaml else find_yaml(clip_path)
+
+
+def _defaults(clip_path: Path, arguments: Namespace) -> dict[Key, Any]:
+    """What a new yaml takes from the file beside it."""
+    if clip_path.suffix.lower() == ".csv":
+        return {("track",): clip_path.name}
+    defaults: dict[Key, Any] = {("video",): clip_path.name}
+    if arguments.fps is None:
+        fps = round(probe(clip_path).fps, 4)
+        _say(f"note: fps: {fps:g} taken from the container; slow-motion clips often lie about it")
+        defaults["fps",] = fps
+    return defaults
+
+
+def _changes(arguments: Namespace, old: dict[str, Any]) -> dict[Key, Any]:
+    """The values to write, by their place in the yaml."""
+    changes: dict[Key, Any] = {}
+    if arguments.ramp is not None:
+        x1, y1, x2, y2 = arguments.ramp
+        (high_x, high_y), (low_x, low_y) = sorted([(x1, y1), (x2, y2)], key=lambda point: point[1])
+        changes["ramp_angle_deg",] = _ramp_angle_deg(low_x - high_x, low_y - high_y)
+        changes["direction",] = "right" if low_x > high_x else "left"
+    if arguments.scale is not None:
+        changes["pixels_per_metre",] = _pixels_per_metre(*arguments.scale)
+    if arguments.origin is not None:
+        changes["origin_px",] = arguments.origin
+    for key in ("scenario", "fps", "ramp_angle_deg", "direction", "pixels_per_metre", "gravity"):
+        value = getattr(arguments, key)
+        if value is not None:
+            changes[key,] = value
+    return changes | _object_changes(arguments, old)
+
+
+def _object_changes(arguments: Namespace, old: dict[str, Any]) -> dict[Key, Any]:
+    given: dict[str, dict[str, Any]] = {}
+    for name, shape in arguments.shape:
+        given.setdefault(name, {})["shape"] = shape
+    for name, *size in arguments.size:
+        given.setdefault(name, {})["size_m"] = _numbers("--size", name, size)
+    for name, *point in arguments.point:
+        given.setdefault(name, {})["point_px"] = _numbers("--point", name, point)
+    for name, frame in arguments.first_frame:
+        if not frame.isdecimal():
+            raise InputError(f"--first-frame {name}: {frame!r} is not a frame number from 0")
+        given.setdefault(name, {})["first_frame"] = int(frame)
+
+    listed = old.get("objects")
+    names = [
+        item.get("name") if isinstance(item, dict) else None
+        for item in (listed if isinstance(listed, list) else [])
+    ]
+    changes: dict[Key, Any] = {}
+    for name, values in given.items():
+        if name in names:
+            index = names.index(name)
+            changes |= {("objects", index, key): value for key, value in values.items()}
+        else:
+            changes["objects", len(names)] = {"name": name, "shape": "box"} | values
+            names.append(name)
+    return changes
+
+
+def _applied(old: dict[str, Any], changes: dict[Key, Any]) -> dict[str, Any]:
+    content = copy.deepcopy(old)
+    for key, value in changes.items():
+        if key[0] == "objects" and not isinstance(content.get("objects"), list):
+            content["objects"] = []
+        match key:
+            case ("objects", int(index)):
+                content["objects"].insert(index, value)
+            case ("objects", int(index), str(field)):
+                content["objects"][index][field] = value
+            case (str(field),):
+                content[field] = value
+    return content
+
+
+def _numbers(option: str, name: str, texts: Sequence[str]) -> list[float]:
+    numbers = []
+    for text in texts:
+        try:
+            numbers.append(float(text))
+        except ValueError:
+            raise InputError(f"{option} {name}: {text!r} is not a number") from None
+    return numbers
+
+
+def _ramp_angle_deg(dx: float, dy: float) -> float:
+    if not (math.isfinite(dx) and math.isfinite(dy)) or dx == 0 or dy == 0:
+        raise InputError(
+            f"--ramp: the two pixels differ by {dx:g} and {dy:g}; a sloping line expected"
+        )
+    return round(math.degrees(math.atan2(abs(dy), abs(dx))), 3)
+
+
+def _pixels_per_metre(x1: float, y1: float, x2: float, y2: float, metres: float) -> float:
+    distance = math.hypot(x2 - x1, y2 - y1)
+    if not (math.isfinite(distance) and distance > 0):
+        raise InputError("--scale: the two pixels are the same or not finite")
+    if not (math.isfinite(metres) and metres > 0):
+        raise InputError(f"--scale: {metres:g} is not a distance; metres above 0 expected")
+    return round(distance / metres, 3)
+
+
+if __name__ == "__main__":
+    raise SystemExit(command.run(main))
