@@ -1,0 +1,11 @@
+"""Nuisances: always free, with tight priors, never a verdict while inside them.
+
+They are effects like any other; only their parameters' role differs (DESIGN.md 2.6).
+"""
+
+from galileo_jax.effects.effect import Effect
+from galileo_jax.effects.nuisances.foot_transition import FootTransition
+from galileo_jax.effects.nuisances.release_instant import ReleaseInstant
+from galileo_jax.effects.nuisances.start_offset import StartOffset
+
+NUISANCES: tuple[Effect, ...] = (StartOffset(), FootTransition(), ReleaseInstant())

@@ -1,0 +1,131 @@
+"""Parameters: a name, a unit, a prior; and the space in which they are searched.
+
+Inference works in `z`, where every prior is a standard normal: `theta = forward(z)` with
+`z ~ N(0, 1)`. Bounds are then kept by construction, the log-prior is `-z.z / 2` for every
+parameter, and a posterior standard deviation in `z` says directly how much of the prior's
+ignorance the data have taken away.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.scipy.special import ndtr, ndtri
+
+Role = Literal["main", "nuisance", "effect"]
+
+
+class Prior(Protocol):
+    """A distribution of one number, as a map from the standard normal."""
+
+    def forward(self, z: jax.Array) -> jax.Array:
+        """Maps `z ~ N(0, 1)` to the parameter; monotonic and differentiable."""
+        ...
+
+    def inverse(self, theta: jax.Array) -> jax.Array:
+        """Maps the parameter to `z`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Normal:
+    """A normal prior."""
+
+    mean: float
+    sd: float
+
+    def forward(self, z: jax.Array) -> jax.Array:
+        """`mean + sd z`."""
+        return self.mean + self.sd * z
+
+    def inverse(self, theta: jax.Array) -> jax.Array:
+        """`(theta - mean) / sd`."""
+        return (theta - self.mean) / self.sd
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """A positive number known up to a factor of about `exp(sd)`."""
+
+    median: float
+    sd: float
+
+    def forward(self, z: jax.Array) -> jax.Array:
+        """`median exp(sd z)`."""
+        return self.median * jnp.exp(self.sd * z)
+
+    def inverse(self, theta: jax.Array) -> jax.Array:
+        """`log(theta / median) / sd`."""
+        return jnp.log(theta / self.median) / self.sd
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """A uniform prior on `[low, high]`."""
+
+    low: float
+    high: float
+
+    def forward(self, z: jax.Array) -> jax.Array:
+        """`low + (high - low) Phi(z)`."""
+        return self.low + (self.high - self.low) * ndtr(z)
+
+    def inverse(self, theta: jax.Array) -> jax.Array:
+        """`Phi^-1((theta - low) / (high - low))`, finite at the ends."""
+        share = (theta - self.low) / (self.high - self.low)
+        return ndtri(jnp.clip(share, 1e-9, 1 - 1e-9))
+
+
+@dataclass(frozen=True)
+class HalfNormal:
+    """A non-negative number, most likely 0, of the size of `sd` at most."""
+
+    sd: float
+
+    def forward(self, z: jax.Array) -> jax.Array:
+        """`sd Phi^-1((1 + Phi(z)) / 2)`."""
+        return self.sd * ndtri(0.5 + 0.5 * jnp.clip(ndtr(z), 0.0, 1 - 1e-12))
+
+    def inverse(self, theta: jax.Array) -> jax.Array:
+        """The `z` of `theta`, finite at 0."""
+        return ndtri(jnp.clip(2 * ndtr(theta / self.sd) - 1, 1e-9, 1 - 1e-9))
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One unknown of the model.
+
+    Attributes:
+      name: as it stands in result.json.
+      unit: SI; "1" for a pure number.
+      prior: what is known before the data.
+      absent: the value at which what the parameter stands for is not there.
+      role: "main" (what the user asks for), "nuisance" or "effect".
+      step: a coarse step in `z` for the first finite differences, before the scale of the
+        posterior is known.
+    """
+
+    name: str
+    unit: str
+    prior: Prior
+    absent: float
+    role: Role = "main"
+    step: float = 0.02
+
+
+def forward(parameters: Sequence[Parameter], z: jax.Array) -> jax.Array:
+    """Maps `z` `[..., parameter]` to `theta` of the same shape, in the parameters' units."""
+    return jnp.stack([p.prior.forward(z[..., i]) for i, p in enumerate(parameters)], axis=-1)
+
+
+def inverse(parameters: Sequence[Parameter], theta: jax.Array) -> jax.Array:
+    """Maps `theta` `[..., parameter]` to `z`."""
+    return jnp.stack([p.prior.inverse(theta[..., i]) for i, p in enumerate(parameters)], axis=-1)
+
+
+def absent(parameters: Sequence[Parameter]) -> np.ndarray:
+    """The vector `[parameter]` at which nothing but the scene is there."""
+    return np.array([p.absent for p in parameters])

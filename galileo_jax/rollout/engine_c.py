@@ -1,0 +1,106 @@
+"""The C engine: MuJoCo's own batch of simulations, stepped on all cores."""
+
+from functools import lru_cache
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from galileo_jax.effects.effect import State
+from galileo_jax.rollout.model import SUBSTEPS, Model
+from galileo_jax.rollout.motion import along_path, forces, set_up
+
+# Slower than this and no longer changing: at rest (contacts creep at 0.2 mm/s).
+REST_SPEED_M_S, REST_CHANGE_M_S = 1e-3, 1e-5
+
+
+class EngineC:
+    """Simulates batches of parameter vectors; results do not depend on the batch."""
+
+    name = "c"
+
+    def __init__(self, model: Model):
+        self.model = model
+        self._batch = lru_cache(maxsize=4)(self._new_batch)
+
+    def _new_batch(self, size: int) -> Batch:
+        return Batch(self.model.scene.model, nsim=size)
+
+    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rolls the scene out for each parameter vector.
+
+        Args:
+          theta: `[batch, parameter]`, in the model's units.
+
+        Returns:
+          Centres (m) and their velocities (m/s), each `[batch, object, 2, record + 1]`,
+          every `record_dt_s` from the release on. Entries of a rollout with non-finite
+          parameters or one that MuJoCo gave up are NaN.
+        """
+        theta = np.asarray(theta, float)
+        is_good = np.isfinite(theta).all(axis=1)
+        usable = np.where(is_good[:, None], theta, 0.5)
+        named = self.model.by_name(usable)
+        batch = self._batch(len(theta))
+        self._write(batch, usable)
+        qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
+        applied = batch.bind("qfrc_applied")
+        home = self.model.scene.model.body_pos[1:][:, [0, 2]]
+        shape = (len(theta), len(home), 2)
+        positions = np.empty((self.model.num_records + 1, *shape))
+        velocities = np.empty_like(positions)
+        dt = float(self.model.scene.model.opt.timestep)
+        previous = np.full(shape, np.inf)
+        for record in range(len(positions)):
+            position, velocity = qpos.reshape(shape) + home, qvel.reshape(shape)
+            # Semi-implicit Euler is second order in x - dt v / 2 (leapfrog), first order in x.
+            positions[record] = position - 0.5 * dt * velocity
+            velocities[record] = velocity
+            if (
+                np.abs(velocity).max() < REST_SPEED_M_S
+                and np.abs(velocity - previous).max() < REST_CHANGE_M_S
+            ):
+                positions[record:] = positions[record]
+                velocities[record:] = 0.0
+                break
+            if record == len(positions) - 1:
+                break
+            previous = velocity.copy()
+            state = State(position, velocity, np.asarray(record * SUBSTEPS * dt))
+            total = forces(self.model, state, named)
+            applied[:] = np.broadcast_to(total, shape).reshape(len(theta), -1)
+            batch.step(nstep=SUBSTEPS)
+        if batch.warning.any() or not np.isfinite(positions).all():
+            is_good &= ~batch.warning.reshape(len(theta), -1).any(axis=1)
+        path, speed = along_path(positions, velocities, self.model.scene.surroundings)
+        path[:, ~is_good] = np.nan
+        speed[:, ~is_good] = np.nan
+        return np.moveaxis(path, 0, -1), np.moveaxis(speed, 0, -1)
+
+    def _write(self, batch: Batch, theta: np.ndarray) -> None:
+        """Writes masses, frictions and the start into the batch."""
+        compiled = self.model.scene.model
+        named = self.model.by_name(theta)
+        fields = set_up(self.model, named, np)
+        batch.state[:] = 0.0
+        mass, inertia = batch.expand("body_mass"), batch.expand("body_inertia")
+        friction, solref = batch.expand("pair_friction"), batch.expand("pair_solref")
+        mass[:, 1:] = fields.mass
+        inertia[:, 1:] = compiled.body_inertia[1:] * (
+            fields.mass / compiled.body_mass[1:]
+        )[..., None]
+        for i in range(compiled.npair):
+            name = compiled.pair(i).name
+            if name == "object1_object2":
+                solref[:, i] = fields.bumper
+            else:
+                which = int(name[len("object") : name.index("_")]) - 1
+                friction[:, i, :2] = fields.friction[:, which, None]
+        batch.set_const()
+        batch.bind("qpos")[:] = fields.qpos
+        batch.warning[...] = 0
+
+
+def describe() -> str:
+    """The engine and its version, for results."""
+    return f"c (mujoco {mujoco.__version__})"

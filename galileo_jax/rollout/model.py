@@ -1,0 +1,74 @@
+"""The model: a scene and the effects in it, as one function of its parameters."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from galileo_jax.effects.effect import Effect
+from galileo_jax.effects.nuisances import NUISANCES
+from galileo_jax.parameters import LogNormal, Parameter, Uniform
+from galileo_jax.scene.scene import Scene
+
+SUBSTEPS = 4  # solver steps per recorded step: forces of effects are held constant for these
+
+# A hand-sized object; only mass ratios are visible, so that the prior decides the sum.
+MASS_PRIOR = LogNormal(median=0.4, sd=0.7)
+FRICTION_PRIOR = Uniform(0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A scene with effects; `theta` vectors follow the order of `parameters`.
+
+    Attributes:
+      scene: the compiled scene.
+      duration_s: how long rollouts last.
+      effects: physical effects that are part of the hypothesis (none is the base model).
+      nuisances: always there.
+    """
+
+    scene: Scene
+    duration_s: float
+    effects: tuple[Effect, ...] = ()
+    nuisances: tuple[Effect, ...] = field(default=NUISANCES)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Masses and frictions, then the effects' parameters, then the nuisances."""
+        found: list[Parameter] = []
+        for i in range(len(self.scene.names)):
+            found.append(Parameter(f"m{i + 1}", "kg", MASS_PRIOR, 0.4, "main", 0.1))
+            found.append(Parameter(f"k{i + 1}", "1", FRICTION_PRIOR, 0.0, "main", 0.02))
+        for effect in self.effects + self.nuisances:
+            found.extend(effect.parameters(self.scene.surroundings))
+        return tuple(found)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The parameters' names, in order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def record_dt_s(self) -> float:
+        """Time between recorded steps, s."""
+        return SUBSTEPS * float(self.scene.model.opt.timestep)
+
+    @property
+    def num_records(self) -> int:
+        """Recorded steps of a rollout, its start not counted."""
+        return max(1, int(self.duration_s / self.record_dt_s) + 2)
+
+    def by_name(self, theta: Any) -> Mapping[str, Any]:
+        """`theta` `[..., parameter]` as a mapping from name to `[...]`."""
+        return {name: theta[..., i] for i, name in enumerate(self.names)}
+
+    def index(self, name: str) -> int:
+        """Where `name` stands in `theta`; ValueError with the known names otherwise."""
+        if name not in self.names:
+            raise ValueError(f"unknown parameter {name!r}; known: {', '.join(self.names)}")
+        return self.names.index(name)
+
+    def with_effects(self, effects: Sequence[Effect]) -> "Model":
+        """The same scene under another hypothesis."""
+        return Model(self.scene, self.duration_s, tuple(effects), self.nuisances)

@@ -1,0 +1,132 @@
+"""What both engines share: set-up from the parameters, forces, the path, the pitch.
+
+Written in the array standard, so that the same lines run in NumPy (C engine) and in JAX.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from galileo_jax.effects.effect import State, Surroundings
+from galileo_jax.rollout.model import Model
+
+Array = Any
+
+# Contacts penetrate by a fraction of a millimetre; the path is that of the rigid surfaces.
+BUMPER_STIFFNESS, BUMPER_DAMPING = 300.0, 600.0  # of the base model, as in scenes/ramp.xml
+
+
+class SetUp(NamedTuple):
+    """What one rollout's parameters change in the compiled model; leading axes `[...]`.
+
+    Attributes:
+      mass: `[..., object]`, kg.
+      friction: `[..., object]`.
+      qpos: `[..., dof]`, x and z of each object's centre relative to its body's place.
+      bumper: `[..., 2]`, (-stiffness, -damping) between objects, MuJoCo's direct solref.
+    """
+
+    mass: Array
+    friction: Array
+    qpos: Array
+    bumper: Array
+
+
+def set_up(model: Model, theta: Mapping[str, Array], xp: Any) -> SetUp:
+    """Maps parameters (each `[...]`) to the model's fields."""
+    surroundings = model.scene.surroundings
+    count = len(surroundings.names)
+    mass = xp.stack([theta[f"m{i + 1}"] for i in range(count)], axis=-1)
+    friction = xp.stack([theta[f"k{i + 1}"] for i in range(count)], axis=-1)
+    start = xp.asarray(surroundings.start_m)
+    moved = xp.broadcast_to(start, (*mass.shape, 2))
+    restitution = xp.zeros(mass.shape[:-1])
+    for effect in model.effects + model.nuisances:
+        moved = effect.start(moved, theta, surroundings)
+        given = effect.restitution(theta, surroundings)
+        restitution = restitution if given is None else restitution + given
+    qpos = (moved - start).reshape(*mass.shape[:-1], 2 * count)
+    return SetUp(mass, friction, qpos, bumper_solref(restitution, xp))
+
+
+def bumper_solref(restitution: Array, xp: Any) -> Array:
+    """The bumpers' (-stiffness, -damping) for a coefficient of restitution.
+
+    A spring and damper that can push but not pull returns
+    e = exp(-z/r (pi - atan2(2 z r, 2 z^2 - 1)...)): the damping stays, the stiffness grows
+    with e from the base model's. Base: overdamped 17 times, e < 0.002.
+    """
+    flat = xp.ones_like(restitution)
+    return xp.stack([-BUMPER_STIFFNESS * flat, -BUMPER_DAMPING * flat], axis=-1)
+
+
+def forces(model: Model, state: State, theta: Mapping[str, Array]) -> Array:
+    """The sum of all effects' forces, `[..., object, 2]`, N; 0.0 when there is none."""
+    total: Array = 0.0
+    for effect in model.effects + model.nuisances:
+        force = effect.force(state, theta, model.scene.surroundings)
+        total = total if force is None else total + force
+    return total
+
+
+def along_path(
+    position: Array, velocity: Array, surroundings: Surroundings
+) -> tuple[Array, Array]:
+    """Takes the contacts' penetration out of simulated centres.
+
+    Every centre runs parallel to ramp and table at the object's half height. A point is
+    put onto that path at the same distance along the surface it is on.
+
+    Args:
+      position: `[..., object, 2]`, m.
+      velocity: `[..., object, 2]`, m/s.
+      surroundings: the scene's geometry.
+
+    Returns:
+      The same shapes.
+    """
+    xp = position.__array_namespace__()
+    cos, sin = math.cos(surroundings.angle_rad), math.sin(surroundings.angle_rad)
+    height = xp.asarray(surroundings.half_height_m)
+    has_table = math.isfinite(surroundings.corner_m[0])
+    corner = xp.asarray(surroundings.corner_m if has_table else np.zeros(height.shape))
+    x, y = position[..., 0] - corner, position[..., 1] - height
+    u, w = velocity[..., 0], velocity[..., 1]
+    ramp, ramp_speed = x * cos - y * sin, u * cos - w * sin
+    if not has_table:
+        # `height` above the surface at x = 0 is not the start's; keep the start's own line.
+        start = xp.asarray(surroundings.start_m)
+        gone = (position[..., 0] - start[:, 0]) * cos - (position[..., 1] - start[:, 1]) * sin
+        path = xp.stack([start[:, 0] + gone * cos, start[:, 1] - gone * sin], axis=-1)
+        return path, xp.stack([ramp_speed * cos, -ramp_speed * sin], axis=-1)
+    is_above = ramp < 0
+    table = xp.where(is_above, x, xp.maximum(x, 0.0))
+    path = xp.stack(
+        [
+            corner + xp.where(is_above, ramp * cos, table),
+            height + xp.where(is_above, -ramp * sin, 0.0),
+        ],
+        axis=-1,
+    )
+    speed = xp.stack(
+        [xp.where(is_above, ramp_speed * cos, u), xp.where(is_above, -ramp_speed * sin, 0.0)],
+        axis=-1,
+    )
+    return path, speed
+
+
+def pitch(position: Array, surroundings: Surroundings) -> Array:
+    """How far each drawn object is turned, rad: -angle on the ramp, 0 on the table.
+
+    While an object's length spans the foot it turns evenly per metre. `position`:
+    `[..., object, 2]`; returns `[..., object]`.
+    """
+    xp = position.__array_namespace__()
+    if not math.isfinite(surroundings.corner_m[0]):
+        return xp.full(position.shape[:-1], -surroundings.angle_rad)
+    half = xp.asarray(surroundings.half_length_m)
+    corner = xp.asarray(surroundings.corner_m)
+    share = xp.clip((position[..., 0] - corner + half) / (2 * half), 0.0, 1.0)
+    return -surroundings.angle_rad * (1 - share)

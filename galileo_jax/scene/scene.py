@@ -1,0 +1,161 @@
+"""The scene: a clip's geometry as a MuJoCo model, set up through `mujoco.MjSpec`."""
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.data_files import scene_path
+from galileo_jax.effects.effect import Surroundings
+from galileo_jax.errors import InputError
+from galileo_jax.observation import Observation
+
+# Where nothing else is declared; an incline's dynamics do not depend on it.
+UNKNOWN_SIZE_M = (0.04, 0.04, 0.04)
+BUMPER_RADIUS_M = 0.05
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A compiled scene; what the rollouts need besides the parameters.
+
+    Attributes:
+      spec: the MjSpec the model was compiled from (for pictures and the viewer).
+      model: the compiled model, its masses and frictions still the file's.
+      surroundings: names, geometry and start, as effects see them.
+    """
+
+    spec: mujoco.MjSpec
+    model: mujoco.MjModel
+    surroundings: Surroundings
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The objects' names."""
+        return self.surroundings.names
+
+    @property
+    def has_table(self) -> bool:
+        """Whether the ramp ends on a table."""
+        return math.isfinite(self.surroundings.corner_m[0])
+
+
+def extents(declared: ClipObject) -> tuple[float, float]:
+    """Half the length along the travel and half the height of an object, m.
+
+    A cylinder stands upright, a torus lies flat: they slide on their base.
+    """
+    size = declared.size_m
+    if size is None:
+        size = UNKNOWN_SIZE_M if declared.shape == "box" else (0.02, 0.01)
+    match declared.shape:
+        case "box":
+            return size[0] / 2, size[2] / 2
+        case "cylinder":
+            return size[0], size[1] / 2
+        case "torus":
+            return size[0] + size[1], size[1]
+        case _:
+            return size[0], size[0]
+
+
+def build_scene(clip: Clip, observation: Observation) -> Scene:
+    """Sets `scenes/ramp.xml` to the clip: angle, sizes, start positions, gravity.
+
+    Object 1 starts on the ramp where it is first seen (projected onto the surface), every
+    other object on the table. `incline` is the same scene without the table.
+
+    Raises:
+      InputError: the scenario has no scene here, or an object is never seen.
+    """
+    if clip.scenario not in ("ramp", "incline"):
+        raise InputError(
+            f"{clip.path}: scenario: {clip.scenario!r} cannot be simulated yet; "
+            "known: ramp, incline"
+        )
+    assert clip.ramp_angle_deg is not None  # the clip's own validation
+    angle = math.radians(clip.ramp_angle_deg)
+    has_table = clip.scenario == "ramp"
+    half = [extents(declared) for declared in clip.objects]
+    starts = []
+    for i, (name, (_, height)) in enumerate(zip(observation.names, half, strict=True)):
+        seen = np.flatnonzero(observation.mask[i])
+        if not seen.size:
+            raise InputError(f"{clip.path}: {name} is not seen in any frame")
+        x, y = observation.position_m[i, :, seen[0]]
+        if i == 0:
+            along = x * math.cos(angle) - y * math.sin(angle)
+            starts.append(_on_ramp(along, height, angle))
+        else:
+            starts.append((float(x), height))
+    corner = tuple(h * math.tan(angle / 2) if has_table else math.inf for _, h in half)
+    surroundings = Surroundings(
+        names=observation.names,
+        angle_rad=angle,
+        gravity=clip.gravity,
+        half_length_m=tuple(length for length, _ in half),
+        half_height_m=tuple(height for _, height in half),
+        corner_m=corner,
+        start_m=tuple(starts),
+    )
+    return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
+
+
+def _on_ramp(along: float, height: float, angle: float) -> tuple[float, float]:
+    """The centre of an object that stands `along` metres past the foot, on the ramp."""
+    return (
+        along * math.cos(angle) + height * math.sin(angle),
+        -along * math.sin(angle) + height * math.cos(angle),
+    )
+
+
+def compile_scene(
+    surroundings: Surroundings, shapes: list[str], declared: tuple[ClipObject, ...]
+) -> Scene:
+    """Compiles the MuJoCo model of the given surroundings."""
+    spec = mujoco.MjSpec.from_file(str(scene_path("ramp.xml")))
+    spec.option.gravity = [0, 0, -surroundings.gravity]
+    has_table = math.isfinite(surroundings.corner_m[0])
+    spec.geom("ramp").alt.euler = [0, math.degrees(surroundings.angle_rad), 0]
+    for i, name in enumerate(("object1", "object2")):
+        if i >= len(surroundings.names):
+            spec.delete(spec.body(name))
+            continue
+        length, height = surroundings.half_length_m[i], surroundings.half_height_m[i]
+        x, y = surroundings.start_m[i]
+        spec.body(name).pos = [x, 0, y]
+        spec.geom(f"{name}_sled").size = [height, 0, 0]
+        forward = 1 if i == 0 else -1
+        # Bumpers meet at the height of object 1's centre, so that a push has no lift.
+        lift = surroundings.half_height_m[0] - height
+        spec.geom(f"{name}_bumper").size = [BUMPER_RADIUS_M, 0, 0]
+        spec.geom(f"{name}_bumper").pos = [forward * (length - BUMPER_RADIUS_M), 0, lift]
+        shape = spec.geom(f"{name}_shape")
+        _draw(shape, shapes[i], declared[i], length, height)
+    if len(surroundings.names) < 2 or not has_table:
+        for pair in list(spec.pairs):
+            touched = {pair.geomname1, pair.geomname2}
+            gone = not has_table and "table" in touched
+            if gone or (len(surroundings.names) < 2 and any("object2" in g for g in touched)):
+                spec.delete(pair)
+    if not has_table:
+        spec.delete(spec.geom("table"))
+    return Scene(spec=spec, model=spec.compile(), surroundings=surroundings)
+
+
+def _draw(
+    geom: mujoco.MjsGeom, shape: str, declared: ClipObject, length: float, height: float
+) -> None:
+    """Sets the drawn (not touching) geom to the declared shape; a torus is drawn as a disc."""
+    depth = length
+    if shape == "box" and declared.size_m is not None:
+        depth = declared.size_m[1] / 2
+    match shape:
+        case "box":
+            geom.type, geom.size = mujoco.mjtGeom.mjGEOM_BOX, [length, depth, height]
+        case "sphere":
+            geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, [length, 0, 0]
+        case _:
+            geom.type, geom.size = mujoco.mjtGeom.mjGEOM_CYLINDER, [length, height, 0]
