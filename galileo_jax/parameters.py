@@ -105,7 +105,7 @@ class Parameter:
       absent: the value at which what the parameter stands for is not there.
       role: "main" (what the user asks for), "nuisance" or "effect".
       step: a coarse step in `z` for the first finite differences, before the scale of the
-        posterior is known.
+        posterior is known; None: no rollout depends on it (clock, camera).
     """
 
     name: str
@@ -113,7 +113,7 @@ class Parameter:
     prior: Prior
     absent: float
     role: Role = "main"
-    step: float = 0.02
+    step: float | None = 0.02
 
 
 def forward(parameters: Sequence[Parameter], z: jax.Array) -> jax.Array:

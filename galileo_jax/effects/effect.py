@@ -42,6 +42,8 @@ class Surroundings:
       half_length_m, half_height_m: `[object]`, along the travel and across it.
       corner_m: `[object]`, x at which each centre's path bends from ramp to table.
       start_m: `[object, 2]`, the centres at the release.
+      release_s: when the release was, after the first frame: expected, and its standard
+        deviation.
     """
 
     names: tuple[str, ...]
@@ -51,6 +53,7 @@ class Surroundings:
     half_height_m: tuple[float, ...]
     corner_m: tuple[float, ...]
     start_m: tuple[tuple[float, float], ...]
+    release_s: tuple[float, float] = (0.0, 0.01)
 
     def mass(self, theta: Theta) -> list[Array]:
         """The objects' masses, kg, each `[...]`."""

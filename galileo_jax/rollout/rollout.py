@@ -1,0 +1,123 @@
+"""One function from parameters to motion, for both engines, with derivatives that hold.
+
+    rollout(z, steps) -> Trajectory
+
+`z` is the search space of `parameters`. The function can be jitted, vmapped (one call of
+the engine for the whole batch) and differentiated in forward mode. Its derivative is the
+central difference
+
+    d/dz_i  =  (rollout(z + h_i e_i) - rollout(z - h_i e_i)) / (2 h_i),    h = steps,
+
+all 2 P rollouts in the same engine call as the primal. Stiff contacts make the exact
+derivative of a simulator meaningless (docs/contact.md): what inference needs is the slope
+at the scale of the posterior, and `steps` says that scale. Parameters that no rollout
+depends on (clock, camera) cost none and are differentiated exactly by JAX.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.parameters import forward
+from galileo_jax.rollout.model import Model
+from galileo_jax.rollout.motion import pitch
+from galileo_jax.rollout.trajectory import Trajectory
+
+Rollout = Callable[[jax.Array, jax.Array], Trajectory]
+
+
+class Engine(Protocol):
+    """Something that rolls out a batch of parameter vectors."""
+
+    name: str
+    model: Model
+
+    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`[batch, parameter]` to centres and velocities `[batch, object, 2, record + 1]`."""
+        ...
+
+
+def make_rollout(engine: Engine) -> Rollout:
+    """Returns `rollout(z, steps)`; `z`, `steps`: `[parameter]`.
+
+    Rollouts that failed are NaN. `steps` are in `z`; entries of parameters that are not
+    simulated are ignored.
+    """
+    model = engine.model
+    parameters = model.parameters
+    simulated = np.array([i for i, p in enumerate(parameters) if p.step is not None], int)
+    shape = (len(model.scene.names), 2, model.num_records + 1)
+
+    def host(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        theta = np.asarray(theta)
+        position, velocity = engine.simulate(theta.reshape(-1, theta.shape[-1]))
+        lead = theta.shape[:-1]
+        return position.reshape(*lead, *shape), velocity.reshape(*lead, *shape)
+
+    def call(zs: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """`[batch, parameter]` to the two `[batch, object, 2, record + 1]`."""
+        theta = forward(parameters, zs)
+        result = jax.ShapeDtypeStruct((zs.shape[0], *shape), theta.dtype)
+        return jax.pure_callback(host, (result, result), theta, vmap_method="broadcast_all")
+
+    @jax.custom_jvp
+    def motion(z: jax.Array, steps: jax.Array) -> tuple[jax.Array, jax.Array]:
+        position, velocity = call(z[None])
+        return position[0], velocity[0]
+
+    @motion.defjvp
+    def _(primals, tangents):  # pyright: ignore
+        z, steps = primals
+        dz, _ = tangents
+        h = steps[simulated]
+        offsets = jnp.zeros((len(simulated), z.shape[0])).at[
+            jnp.arange(len(simulated)), simulated
+        ].set(h)
+        batch = jnp.concatenate([z[None], z + offsets, z - offsets])
+        out = call(batch)
+        count = len(simulated)
+
+        def slope(values: jax.Array) -> jax.Array:
+            difference = values[1 : 1 + count] - values[1 + count :]
+            jacobian = difference / (2 * h).reshape(-1, 1, 1, 1)
+            return jnp.tensordot(dz[simulated], jacobian, axes=1)
+
+        return (out[0][0], out[1][0]), (slope(out[0]), slope(out[1]))
+
+    times = jnp.arange(shape[-1]) * model.record_dt_s
+
+    def rollout(z: jax.Array, steps: jax.Array) -> Trajectory:
+        position, velocity = motion(z, steps)
+        turned = pitch(jnp.moveaxis(position, -1, 0), model.scene.surroundings)
+        return Trajectory(times, position, velocity, jnp.moveaxis(turned, 0, -1))
+
+    return rollout
+
+
+def at_times(trajectory: Trajectory, times_s: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Centres and velocities at any times, by cubic Hermite interpolation.
+
+    Args:
+      trajectory: of one rollout.
+      times_s: `[frame]`, s since the release; before it the objects stand at their start,
+        after the end they keep their last place.
+
+    Returns:
+      positions (m) and velocities (m/s), each `[object, 2, frame]`.
+    """
+    dt = trajectory.times_s[1]
+    last = trajectory.times_s.shape[0] - 2
+    u = jnp.clip(times_s / dt, 0.0, last + 1.0)
+    i = jnp.clip(jnp.floor(u).astype(int), 0, last)
+    s = u - i
+    x0, x1 = trajectory.position_m[..., i], trajectory.position_m[..., i + 1]
+    v0, v1 = trajectory.velocity_m_s[..., i] * dt, trajectory.velocity_m_s[..., i + 1] * dt
+    a = 2 * (x0 - x1) + v0 + v1
+    b = 3 * (x1 - x0) - 2 * v0 - v1
+    position = ((a * s + b) * s + v0) * s + x0
+    velocity = ((3 * a * s + 2 * b) * s + v0) / dt
+    inside = (times_s > 0) & (times_s < trajectory.times_s[-1])
+    return position, jnp.where(inside, velocity, 0.0)

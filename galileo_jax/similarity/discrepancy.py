@@ -1,0 +1,77 @@
+"""What is known to be imperfect in every measurement of this kind, as covariance.
+
+A camera is never quite square to the scene, a marked point never quite the centre, and a box
+crosses the foot of the ramp on its edges, which a point does not. Each such imperfection is a
+known pattern ("mode") in the measured positions with an unknown small amplitude; with a
+normal prior on the amplitude it is marginalised exactly by adding sd^2 u u^T to the
+covariance. Intervals then contain it, and no residual of this shape is taken for physics.
+"""
+
+import math
+
+import numpy as np
+
+from galileo_jax.effects.effect import Surroundings
+from galileo_jax.observation import Observation
+
+POINT_SD_M = 0.003  # how far a marked point is from the centre
+OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table
+KEYSTONE_SD = 0.006  # 1/m; half a degree of yaw or tilt, 1.5 m away
+ROLL_SD_RAD = 0.002
+SCALE_SD = 0.001
+
+
+def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
+    """The patterns times their standard deviations, `[mode, object, 2, frame]`, m.
+
+    Offsets of each object and axis; keystone about either axis, roll and scale of the
+    camera, common to all objects; and, for what comes down a ramp, the step that an
+    off-centre point and a box's length make when the object turns at the foot.
+    """
+    position = np.nan_to_num(observation.position_m)
+    count, _, frames = position.shape
+    found = []
+    for i in range(count):
+        for axis in range(2):
+            offset = np.zeros((count, 2, frames))
+            offset[i, axis] = OFFSET_SD_M
+            found.append(offset)
+    x, y = position[:, 0], position[:, 1]
+    found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
+    found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
+    found.append(ROLL_SD_RAD * np.stack([-y, x], axis=1))
+    found.append(SCALE_SD * position)
+    for i, corner in enumerate(scene.corner_m):
+        if math.isfinite(corner) and scene.start_m[i][0] < corner:
+            share = _share_past_foot(position[i, 0], scene, i)
+            cos, sin = math.cos(scene.angle_rad), math.sin(scene.angle_rad)
+            edge = scene.half_length_m[i] / 2 * (1 - cos)
+            along = math.hypot(POINT_SD_M * sin, edge)
+            across = math.hypot(POINT_SD_M * (1 - cos), edge)
+            for axis, sd in ((0, along), (1, across)):
+                step = np.zeros((count, 2, frames))
+                step[i, axis] = sd * share
+                found.append(step)
+    return np.stack(found)
+
+
+def crossing_sd_m(observation: Observation, scene: Surroundings) -> np.ndarray:
+    """Extra error `[object, frame]`, m, while an object lies across the foot.
+
+    A box then rests on two edges, its centre above the point mass's path by up to
+    (length / 4) sin(angle); half of that is taken as the standard deviation.
+    """
+    position = np.nan_to_num(observation.position_m)
+    extra = np.zeros((position.shape[0], position.shape[2]))
+    for i, corner in enumerate(scene.corner_m):
+        if math.isfinite(corner) and scene.start_m[i][0] < corner:
+            share = _share_past_foot(position[i, 0], scene, i)
+            size = scene.half_length_m[i] / 4 * math.sin(scene.angle_rad)
+            extra[i] = size * np.where((share > 0) & (share < 1), 1.0, 0.0)
+    return extra
+
+
+def _share_past_foot(x: np.ndarray, scene: Surroundings, i: int) -> np.ndarray:
+    """Which share of object i's length is past the foot, `[frame]`."""
+    half = scene.half_length_m[i] * 1.2  # a frame's blur and a point off the centre
+    return np.clip((x - scene.corner_m[i] + half) / (2 * half), 0.0, 1.0)

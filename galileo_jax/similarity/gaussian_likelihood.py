@@ -1,0 +1,87 @@
+"""The Gaussian likelihood of measured positions, with the exact covariance.
+
+    r = observed - predicted,     C = s^2 D + U U^T
+
+D: the tracker's covariance of every frame (2 x 2 blocks); s: the noise scale; U: modes of
+`discrepancy`. Among the modes is a wide offset for each object and axis, so that only
+displacements count: for independent tracking errors that is the likelihood of the velocity
+profile with its exact (tridiagonal) covariance, without losing the first frame's noise.
+"""
+
+from typing import ClassVar, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.effects.effect import Surroundings
+from galileo_jax.observation import Observation
+from galileo_jax.similarity.discrepancy import crossing_sd_m, modes
+
+
+class Whitening(NamedTuple):
+    """The covariance, decomposed once per clip.
+
+    With D = L L^T and L^-1 U = Q diag(gain) V^T,
+    C^-1/2 r = (y - Q (1 - s / sqrt(s^2 + gain^2)) Q^T y) / s,   y = L^-1 r.
+
+    Attributes:
+      observed_m: `[object, 2, frame]`, 0 where masked.
+      inverse_root: `[object, 2, 2, frame]`, L^-1; 0 where masked.
+      basis: `[mode, object, 2, frame]`, orthonormal.
+      gain: `[mode]`.
+      num_values: how many numbers were measured.
+    """
+
+    observed_m: jax.Array
+    inverse_root: jax.Array
+    basis: jax.Array
+    gain: jax.Array
+    num_values: jax.Array
+
+
+class GaussianLikelihood:
+    """A normalised log-likelihood of positions; see the module."""
+
+    name: ClassVar[str] = "gaussian"
+    is_log_likelihood: ClassVar[bool] = True
+
+    @staticmethod
+    def prepare(observation: Observation, scene: Surroundings) -> Whitening:
+        """Decomposes the covariance of an observation in a scene."""
+        mask = observation.mask
+        covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
+        extra = crossing_sd_m(observation, scene) ** 2
+        covariance += extra[:, :, None, None] * np.eye(2)
+        covariance[~mask] = np.eye(2)
+        inverse_root = np.linalg.inv(np.linalg.cholesky(covariance)) * mask[..., None, None]
+        inverse_root = np.moveaxis(inverse_root, 1, -1)
+        patterns = np.einsum("oijt,mojt->moit", inverse_root, modes(observation, scene))
+        flat = patterns.reshape(len(patterns), -1)
+        _, gain, basis = np.linalg.svd(flat, full_matrices=False)
+        return Whitening(
+            jnp.asarray(np.where(mask[:, None], observation.position_m, 0.0)),
+            jnp.asarray(inverse_root),
+            jnp.asarray(basis.reshape(patterns.shape)),
+            jnp.asarray(gain),
+            jnp.asarray(float(2 * mask.sum())),
+        )
+
+    @staticmethod
+    def whiten(difference_m: jax.Array, noise_scale: jax.Array, data: Whitening) -> jax.Array:
+        """C^-1/2 r for `difference_m` `[object, 2, frame]`; unit normal if the model is right."""
+        y = jnp.einsum("oijt,ojt->oit", data.inverse_root, difference_m)
+        amplitude = jnp.einsum("moit,oit->m", data.basis, y)
+        shrink = 1 - noise_scale / jnp.sqrt(noise_scale**2 + data.gain**2)
+        return (y - jnp.einsum("moit,m->oit", data.basis, shrink * amplitude)) / noise_scale
+
+    @staticmethod
+    def log_density(
+        predicted_m: jax.Array, noise_scale: jax.Array, data: Whitening
+    ) -> jax.Array:
+        """log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
+        white = GaussianLikelihood.whiten(data.observed_m - predicted_m, noise_scale, data)
+        log_determinant = data.num_values * jnp.log(noise_scale**2) + jnp.sum(
+            jnp.log1p((data.gain / noise_scale) ** 2)
+        )
+        return -0.5 * (jnp.sum(white**2) + log_determinant)
