@@ -1,0 +1,46 @@
+"""How long the shutter is open, learned from how much moving objects are smeared."""
+
+import numpy as np
+
+from galileo_jax.tracking.pose import rotation
+from galileo_jax.tracking.refine import FINE_PX, align
+from galileo_jax.tracking.template import Template
+
+SHARES = np.arange(0.0, 1.01, 0.1)
+MIN_SPEED_PX = 3.0
+"""Slower than this per frame, the smear is too short to measure."""
+FIRST_GUESS = 0.25
+
+
+def own_motion(velocity: np.ndarray, angle_rad: float) -> np.ndarray:
+    """A pose's change per frame `(dx, dy, dangle)`, its shift turned into the object's axes."""
+    return np.array([*(rotation(angle_rad).T @ velocity[:2]), velocity[2]])
+
+
+class Exposure:
+    """The open share of a frame's time, 0 to 1, from the misfit summed over moving frames."""
+
+    def __init__(self) -> None:
+        self.misfit = np.zeros(len(SHARES))
+
+    @property
+    def share(self) -> float:
+        """The share with the least misfit, interpolated by a parabola."""
+        if not self.misfit.any():
+            return FIRST_GUESS
+        i = int(np.clip(np.argmin(self.misfit), 1, len(SHARES) - 2))
+        low, middle, high = self.misfit[i - 1 : i + 2]
+        bend = low - 2 * middle + high
+        offset = 0.5 * (low - high) / bend if bend > 0 else np.sign(low - high)
+        return float(np.clip(SHARES[i] + offset * (SHARES[1] - SHARES[0]), 0, 1))
+
+    def add(
+        self, image: np.ndarray, template: Template, pose: np.ndarray, velocity: np.ndarray
+    ) -> None:
+        """Counts one frame in, where the object stands at `pose` and moves by `velocity`."""
+        if np.hypot(*velocity[:2]) < MIN_SPEED_PX:
+            return
+        motion = own_motion(velocity, pose[2])
+        for i, share in enumerate(SHARES):
+            fit = align(image, template.target(share * motion, FINE_PX), pose, steps=2)
+            self.misfit[i] += 1 - fit.correlation**2

@@ -1,0 +1,78 @@
+"""Poses of a rigid object in the image, and the patch an object fills at a pose.
+
+A pose is an array `(x, y, angle)`: the place of the followed point in pixels (x right, y
+down) and the rotation since the template was taken, radians, clockwise positive. A patch is
+the image seen in the object's own axes: its centre pixel is the followed point.
+"""
+
+import cv2
+import numpy as np
+
+SUBPIXELS = 32
+"""OpenCV samples at multiples of 1/32 px; poses are rounded to them before sampling, so that
+the sampled place is known exactly and no quantisation error enters."""
+
+
+def rotation(angle_rad: float) -> np.ndarray:
+    """The `[2, 2]` matrix that turns image vectors clockwise (x right, y down)."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    return np.array([[c, -s], [s, c]])
+
+
+def compose(pose: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """`pose` followed by `motion`, a small pose given in the object's own axes."""
+    return np.array([*(pose[:2] + rotation(pose[2]) @ motion[:2]), pose[2] + motion[2]])
+
+
+def on_sampling_grid(pose: np.ndarray) -> np.ndarray:
+    """`pose` with its place rounded to the multiples of 1/32 px that OpenCV samples at."""
+    return np.array([*(np.round(pose[:2] * SUBPIXELS) / SUBPIXELS), pose[2]])
+
+
+def patch_at(image: np.ndarray, pose: np.ndarray, radius: int) -> np.ndarray:
+    """The float32 patch `[2 radius + 1, 2 radius + 1]` of a grey `image` at `pose` (bicubic).
+
+    Beyond the border the image is continued by its last pixels.
+    """
+    turn = rotation(pose[2])
+    shift = pose[:2] - turn @ (radius, radius)
+    # Only the square around the object is converted and sampled: time per object, not per frame.
+    reach = int(np.ceil(radius * 1.5)) + 3
+    x0, y0 = (int(np.floor(c)) - reach for c in pose[:2])
+    x1, y1 = x0 + 2 * reach + 1, y0 + 2 * reach + 1
+    height, width = image.shape[:2]
+    left, top = min(max(x0, 0), width - 1), min(max(y0, 0), height - 1)
+    crop = image[top : max(min(y1, height), top + 1), left : max(min(x1, width), left + 1)]
+    return cv2.warpAffine(
+        crop.astype(np.float32),
+        np.column_stack([turn, shift - (left, top)]),
+        (2 * radius + 1, 2 * radius + 1),
+        flags=cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
+
+
+def smear(image: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """A patch as seen while the object moves by `motion` (own axes) during the exposure.
+
+    The mean of the patch over the poses from `-motion / 2` to `+motion / 2`: the blur of a
+    constant velocity and turn, centred on the pose itself.
+    """
+    radius = (image.shape[0] - 1) / 2
+    length = np.hypot(*motion[:2]) + abs(motion[2]) * radius / 2
+    if length < 0.1:
+        return image
+    samples = int(np.ceil(length)) + 1
+    total = np.zeros_like(image)
+    for share in (np.arange(samples) + 0.5) / samples - 0.5:
+        turn = rotation(share * motion[2])
+        centre = np.array([radius, radius])
+        shift = centre + share * motion[:2] - turn @ centre
+        total += cv2.warpAffine(
+            image,
+            np.column_stack([turn, shift]),
+            image.shape[::-1],
+            flags=cv2.INTER_LINEAR,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+    return total / samples

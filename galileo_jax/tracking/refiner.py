@@ -1,0 +1,66 @@
+"""Second pass: every pose again, against one clean template, with the smear of the motion."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from galileo_jax.tracking.exposure import own_motion
+from galileo_jax.tracking.refine import FINE_PX, Fit, align
+from galileo_jax.tracking.template import Template
+
+SAME_MOTION_PX = 0.3
+"""Motions during the exposure that differ by less are not tried separately."""
+
+
+@dataclass(frozen=True)
+class Velocities:
+    """Changes of the pose per frame around one frame, `[3]` each: into it and out of it."""
+
+    before: np.ndarray
+    after: np.ndarray
+
+    @property
+    def jump(self) -> np.ndarray:
+        """How much the velocity changes at this frame."""
+        return self.after - self.before
+
+
+def velocities_at(poses: np.ndarray, frame: int) -> Velocities:
+    """The velocities around a frame of `poses` `[frame, 3]`; gaps are bridged."""
+    known = np.flatnonzero(np.isfinite(poses[:, 0]))
+    earlier, later = known[known < frame], known[known > frame]
+    before = after = None
+    if len(earlier):
+        before = (poses[frame] - poses[earlier[-1]]) / (frame - earlier[-1])
+    if len(later):
+        after = (poses[later[0]] - poses[frame]) / (later[0] - frame)
+    if before is None:
+        before = after if after is not None else np.zeros(3)
+    return Velocities(before, before if after is None else after)
+
+
+def refine_pose(
+    image: np.ndarray, template: Template, pose: np.ndarray, velocities: Velocities, share: float
+) -> Fit:
+    """The pose aligned with `template`, smeared by the motion that fits best.
+
+    In a blow the motion during the exposure is that before, that after, or some of both:
+    the mean, the earlier and the later velocity are tried, where they differ.
+    """
+    middle = (velocities.before + velocities.after) / 2
+    best: Fit | None = None
+    tried: list[np.ndarray] = []
+    for velocity in (middle, velocities.before, velocities.after):
+        motion = share * own_motion(velocity, pose[2])
+        if any(_distance(motion - other, template.radius) < SAME_MOTION_PX for other in tried):
+            continue
+        tried.append(motion)
+        fit = align(image, template.target(motion, FINE_PX), pose)
+        if best is None or fit.correlation > best.correlation:
+            best = fit
+    assert best is not None
+    return best
+
+
+def _distance(motion: np.ndarray, radius: int) -> float:
+    return float(np.hypot(*motion[:2]) + abs(motion[2]) * radius / 2)

@@ -1,0 +1,65 @@
+"""Finding an object in a frame when it is known roughly, or hardly, where it is."""
+
+import cv2
+import numpy as np
+
+from galileo_jax.tracking.pose import rotation
+from galileo_jax.tracking.refine import COARSE_PX, FINE_PX, Fit, align
+from galileo_jax.tracking.template import Template
+
+SURE = 0.85
+"""A fit that correlates better than this ends the search for others."""
+TURNS_RAD = (0.0, 0.17, -0.17, 0.35, -0.35)
+"""Turns tried in a wide search: the alignment reaches 5 degrees to each side of them."""
+MAX_PEAKS = 4
+
+
+def best_fit(
+    image: np.ndarray, template: Template, guesses: list[tuple[np.ndarray, np.ndarray]]
+) -> Fit:
+    """The best alignment over guesses, each a pose and a motion during the exposure.
+
+    Coarse, then fine; stops at the first sure one.
+    """
+    best: Fit | None = None
+    for pose, motion in guesses:
+        coarse = align(image, template.target(motion, COARSE_PX), pose, steps=6, robust=False)
+        fit = align(image, template.target(motion, FINE_PX), coarse.pose)
+        if best is None or fit.correlation > best.correlation:
+            best = fit
+        if best.correlation > SURE:
+            break
+    assert best is not None, "best_fit needs a guess"
+    return best
+
+
+def candidate_poses(
+    image: np.ndarray, template: Template, pose: np.ndarray, reach_px: float
+) -> list[np.ndarray]:
+    """Poses within `reach_px` of `pose` where the template, turned several ways, correlates."""
+    height, width = image.shape
+    margin = int(reach_px) + template.radius
+    left, top = (int(np.clip(c - margin, 0, n - 1)) for c, n in zip(pose, (width, height)))
+    right, bottom = (int(np.clip(c + margin + 1, 1, n)) for c, n in zip(pose, (width, height)))
+    size = 2 * template.radius + 1
+    if right - left < size or bottom - top < size:
+        return []
+    window = cv2.GaussianBlur(image[top:bottom, left:right], (0, 0), 1.0).astype(np.float32)
+    centre = np.array([template.radius, template.radius])
+    found: list[tuple[float, np.ndarray]] = []
+    for turn in TURNS_RAD:
+        angle = pose[2] + turn
+        matrix = rotation(angle)
+        warp = np.column_stack([matrix, centre - matrix @ centre])
+        turned = cv2.warpAffine(
+            template.image, warp, (size, size), borderMode=cv2.BORDER_REPLICATE
+        )
+        mask = cv2.warpAffine(template.region.astype(np.float32), warp, (size, size))
+        score = cv2.matchTemplate(window, turned, cv2.TM_CCOEFF_NORMED, mask=mask)
+        score[~np.isfinite(score)] = -1
+        for _ in range(MAX_PEAKS):
+            _, peak, _, (x, y) = cv2.minMaxLoc(score)
+            found.append((peak, np.array([*(centre + (left + x, top + y)), angle])))
+            cv2.circle(score, (x, y), 3, -1, -1)
+    found.sort(key=lambda item: -item[0])
+    return [pose for _, pose in found[: 2 * MAX_PEAKS]]

@@ -1,0 +1,93 @@
+"""An object's template: its patch, the region that belongs to it, and its smeared versions."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from galileo_jax.tracking.pose import patch_at, rotation, smear
+from galileo_jax.tracking.refine import Target
+
+CORE_SHARE = 0.88
+"""Only this share of the declared size is compared: the rim shows background when the scale
+is a few percent off, and is what another object touches."""
+WINDOW_PX = 21
+"""Side of the region when the size is unknown: the object and some of what is around it."""
+MIN_REGION_SHARE = 0.3
+"""A smeared region never shrinks below this share of the sharp one."""
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The rectangle (or disc) an object fills in the image.
+
+    Attributes:
+      size_px: (width, height) in the object's own axes; None if unknown.
+      angle_rad: how much those axes are turned in the template's frame.
+      is_round: a disc or ring seen from the side of its axis.
+    """
+
+    size_px: tuple[float, float] | None
+    angle_rad: float = 0.0
+    is_round: bool = False
+
+
+@dataclass(frozen=True)
+class Template:
+    """`image` `[size, size]` float32, and `region` (bool), the pixels that are compared."""
+
+    image: np.ndarray
+    region: np.ndarray
+
+    @property
+    def radius(self) -> int:
+        """Pixels from the centre, the followed point, to the patch's border."""
+        return (self.image.shape[0] - 1) // 2
+
+    def target(self, motion: np.ndarray, width_px: float) -> Target:
+        """What a patch looks like that moves by `motion` (own axes) during the exposure."""
+        share = smear(self.region.astype(np.float32), motion)
+        least = np.quantile(share, 1 - MIN_REGION_SHARE * self.region.mean())
+        return Target(smear(self.image, motion), share >= min(0.99, least), width_px)
+
+
+def template_at(image: np.ndarray, point_px: np.ndarray, outline: Outline) -> Template:
+    """The template of the object at `point_px` in the grey `image`."""
+    region = region_of(outline)
+    pose = np.array([*point_px, 0.0])
+    return Template(patch_at(image, pose, (region.shape[0] - 1) // 2), region)
+
+
+def region_of(outline: Outline) -> np.ndarray:
+    """The compared pixels of an object, `[size, size]` (bool), size odd."""
+    if outline.size_px is None:
+        half = np.array([WINDOW_PX, WINDOW_PX]) / 2
+    else:
+        half = np.array(outline.size_px) * CORE_SHARE / 2
+    radius = int(np.ceil(np.hypot(*half))) + 2
+    grid = np.arange(-radius, radius + 1, dtype=float)
+    x, y = np.meshgrid(grid, grid)
+    own = np.stack([x, y], axis=-1) @ rotation(outline.angle_rad)
+    if outline.is_round:
+        return np.hypot(own[..., 0] / half[0], own[..., 1] / half[1]) <= 1
+    return (np.abs(own[..., 0]) <= half[0]) & (np.abs(own[..., 1]) <= half[1])
+
+
+def median_template(patches: list[np.ndarray], region: np.ndarray) -> Template:
+    """The pixelwise median of aligned patches: less noise, and no hand that was there a while.
+
+    Each patch is first brought to the common brightness (gain and offset by its median and
+    spread in the region).
+    """
+    stack = np.stack(patches)
+    inside = stack[:, region]
+    middle = np.median(inside, axis=1)
+    spread = np.median(np.abs(inside - middle[:, None]), axis=1) + 1e-3
+    scaled = (stack - middle[:, None, None]) / spread[:, None, None]
+    scaled = scaled * np.median(spread) + np.median(middle)
+    return Template(np.median(scaled, axis=0).astype(np.float32), region)
+
+
+def grey(frame: np.ndarray) -> np.ndarray:
+    """The grey uint8 picture of a BGR frame."""
+    return cv2.cvtColor(frame, cv2.COLOR_BGR2GRAY) if frame.ndim == 3 else frame
