@@ -1,0 +1,54 @@
+"""Have the chains converged, and how many independent draws are they worth? Through ArviZ."""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Of one quantity.
+
+    Attributes:
+      rhat: rank-normalized split R-hat; 1 is agreement, above 1.01 the chains disagree.
+        NaN where nothing moved.
+      ess_bulk: effective draws for the mean.
+      ess_tail: effective draws for the 5 % and 95 % quantiles.
+
+    Source: Vehtari, Gelman, Simpson, Carpenter, Buerkner, Rank-normalization, folding, and
+    localization: an improved R-hat, Bayesian Analysis 16 (2021), 10.1214/20-BA1221.
+    """
+
+    rhat: float
+    ess_bulk: float
+    ess_tail: float
+
+
+def arviz() -> ModuleType:
+    """ArviZ, imported when first used (two seconds) and without its notice of migration."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import arviz as module
+
+    return module
+
+
+def convergence(draws: np.ndarray) -> Convergence:
+    """R-hat and effective sample sizes of `draws` `[chain, draw]`."""
+    az = arviz()
+    draws = np.asarray(draws, np.float64)
+    if np.ptp(draws) == 0 or not np.all(np.isfinite(draws)) or draws.shape[1] < 4:
+        return Convergence(np.nan, np.nan, np.nan)
+    return Convergence(
+        rhat=float(az.rhat(draws)),
+        ess_bulk=float(az.ess(draws, method="bulk")),
+        ess_tail=float(az.ess(draws, method="tail")),
+    )
+
+
+def convergences(quantities: Mapping[str, np.ndarray]) -> dict[str, Convergence]:
+    """`convergence` of each of the named quantities `[chain, draw]`."""
+    return {name: convergence(draws) for name, draws in quantities.items()}

@@ -1,0 +1,174 @@
+"""A posterior: draws with their names, where they came from and whether to trust them."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from galileo_jax.errors import InputError
+from galileo_jax.files import replacing
+from galileo_jax.inference.convergence import arviz, convergence
+
+if TYPE_CHECKING:
+    from arviz import InferenceData
+
+
+class Status(StrEnum):
+    """How a sampling ended; the value is the sentence for the user."""
+
+    CONVERGED = "R-hat and effective sample size reached what was asked for"
+    STEP_LIMIT = "the step limit came before convergence; allow more steps or fix parameters"
+    STUCK_CHAIN = "a chain never moved; check its start and the scale of the proposals"
+    FIXED_LENGTH = "ran its fixed number of steps; convergence was not asked for"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One parameter in numbers, in its own unit; `rhat` and `ess_*` as in `Convergence`."""
+
+    mean: float
+    sd: float
+    q025: float
+    q975: float
+    rhat: float
+    ess_bulk: float
+    ess_tail: float
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Draws of named parameters.
+
+    Attributes:
+      names: the parameters' names.
+      draws: `[chain, draw, parameter]`.
+      log_density: `[chain, draw]`, unnormalized, in the space that was sampled.
+      status: how the sampling ended.
+      stats: numbers about the sampling (steps, evaluations, acceptance rate).
+      provenance: settings, seed and versions; anything that JSON can hold.
+    """
+
+    names: tuple[str, ...]
+    draws: np.ndarray
+    log_density: np.ndarray
+    status: Status
+    stats: Mapping[str, float] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.draws.ndim != 3 or self.draws.shape[2] != len(self.names):
+            raise ValueError(f"draws {self.draws.shape} are not [chain, draw, {len(self.names)}]")
+        if self.log_density.shape != self.draws.shape[:2]:
+            raise ValueError(
+                f"log_density {self.log_density.shape} does not match draws {self.draws.shape}"
+            )
+
+    @property
+    def is_converged(self) -> bool:
+        """True where R-hat and effective sample size reached what was asked for."""
+        return self.status is Status.CONVERGED
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """The draws `[chain, draw]` of one parameter."""
+        if name not in self.names:
+            raise ValueError(f"unknown parameter {name!r}; known: {', '.join(self.names)}")
+        return self.draws[:, :, self.names.index(name)]
+
+    def flat(self) -> np.ndarray:
+        """All draws `[chain * draw, parameter]`, chain after chain."""
+        return self.draws.reshape(-1, len(self.names))
+
+    def mapped(self, function: Callable[[np.ndarray], np.ndarray], names: tuple[str, ...]) -> Self:
+        """The posterior of `function` of the parameters (such as z to theta).
+
+        Arguments:
+          function: `[..., parameter]` to `[..., len(names)]`.
+          names: of the new parameters.
+        """
+        return replace(self, draws=np.asarray(function(self.draws)), names=tuple(names))
+
+    def summary(self) -> dict[str, Summary]:
+        """Mean, standard deviation, central 95 % interval and convergence, by name."""
+        table = {}
+        for name in self.names:
+            draws = self[name].astype(np.float64)
+            low, high = np.quantile(draws, [0.025, 0.975])
+            state = convergence(draws)
+            table[name] = Summary(
+                mean=float(draws.mean()),
+                sd=float(draws.std(ddof=1)),
+                q025=float(low),
+                q975=float(high),
+                rhat=state.rhat,
+                ess_bulk=state.ess_bulk,
+                ess_tail=state.ess_tail,
+            )
+        return table
+
+    def to_inference_data(self) -> "InferenceData":
+        """As ArviZ's InferenceData: groups `posterior` and `sample_stats` (`lp`)."""
+        notes = {
+            "names": list(self.names),
+            "status": self.status.name,
+            "stats": dict(self.stats),
+            "provenance": dict(self.provenance),
+        }
+        return arviz().from_dict(
+            posterior={name: self[name] for name in self.names},
+            sample_stats={"lp": self.log_density},
+            posterior_attrs={"galileo_jax": json.dumps(notes)},
+        )
+
+    @classmethod
+    def from_inference_data(cls, data: "InferenceData") -> Self:
+        """The inverse of `to_inference_data`.
+
+        Raises:
+          InputError: the data were not written by `to_inference_data`.
+        """
+        groups = set(data.groups())
+        if not {"posterior", "sample_stats"} <= groups:
+            raise InputError(
+                f"no groups posterior and sample_stats, but {', '.join(sorted(groups)) or 'none'}"
+            )
+        posterior = data["posterior"]
+        if "galileo_jax" not in posterior.attrs:
+            raise InputError("the posterior group has no attribute galileo_jax: not ours")
+        notes = json.loads(posterior.attrs["galileo_jax"])
+        names = tuple(notes["names"])
+        return cls(
+            names=names,
+            draws=np.stack([posterior[name].values for name in names], axis=-1),
+            log_density=data["sample_stats"]["lp"].values,
+            status=Status[notes["status"]],
+            stats=notes["stats"],
+            provenance=notes["provenance"],
+        )
+
+    def to_netcdf(self, path: Path) -> None:
+        """Writes the InferenceData to `path`, in one step."""
+        with replacing(path) as temporary:
+            self.to_inference_data().to_netcdf(str(temporary), engine="h5netcdf")
+
+    @classmethod
+    def from_netcdf(cls, path: Path) -> Self:
+        """Reads what `to_netcdf` wrote.
+
+        Raises:
+          InputError: missing, unreadable, or of another origin; names the file.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+        try:
+            data = arviz().from_netcdf(str(path), engine="h5netcdf")
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{path}: not a netCDF file of draws ({error})") from error
+        try:
+            return cls.from_inference_data(data)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error

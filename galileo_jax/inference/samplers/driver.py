@@ -1,0 +1,357 @@
+"""The one loop that drives every sampler: chains, warm-up, stopping, checkpoints."""
+
+import dataclasses
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.inference.convergence import Convergence, convergence, convergences
+from galileo_jax.inference.posterior import Posterior, Status
+from galileo_jax.inference.samplers import checkpoint as checkpoints
+from galileo_jax.inference.samplers.checkpoint import History
+from galileo_jax.inference.samplers.sampler import (
+    AbstractSampler,
+    AbstractTunedSampler,
+    LogDensity,
+)
+
+GAIN_EXPONENT = 0.6
+"""Robbins-Monro gains (t + 1)^-0.6: slow enough to get there, fast enough to settle."""
+
+PRIOR_DRAWS_PER_DIMENSION = 5
+"""What the covariance before a refit weighs against the effective draws of the window."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How long to sample.
+
+    Attributes:
+      warmup_steps: per chain, discarded; the sampler is tuned after each block of them.
+      block_steps: per chain, between two looks at convergence, two checkpoints and two
+        reports; a Ctrl-C takes effect at the end of a block.
+      max_steps: per chain, after the warm-up, where convergence does not come before.
+      thin: every `thin`-th draw is kept.
+      max_rhat: stop when R-hat of every monitored quantity is below.
+      min_ess: and its bulk effective sample size is at least this.
+      stops_early: False runs `max_steps`, whatever the diagnostics say.
+    """
+
+    warmup_steps: int = 100
+    block_steps: int = 25
+    max_steps: int = 4000
+    thin: int = 1
+    max_rhat: float = 1.01
+    min_ess: float = 400.0
+    stops_early: bool = True
+
+    def __post_init__(self) -> None:
+        for name in ("block_steps", "max_steps", "thin"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
+        for name in ("warmup_steps", "max_steps"):
+            if getattr(self, name) % self.block_steps:
+                raise ValueError(
+                    f"{name} is {getattr(self, name)}, not a multiple of "
+                    f"block_steps {self.block_steps}"
+                )
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a progress bar needs, after each block.
+
+    Attributes:
+      num_steps: per chain, warm-up included; `max_steps` likewise.
+      is_warmup: True while the sampler is still being tuned.
+      acceptance_rate: of the latest block.
+      convergence: of the monitored quantities; empty during the warm-up.
+    """
+
+    num_steps: int
+    max_steps: int
+    is_warmup: bool
+    acceptance_rate: float
+    convergence: Mapping[str, Convergence]
+
+
+def dispersed_starts(
+    key: jax.Array, mean: jax.Array, covariance: jax.Array, num_chains: int
+) -> jax.Array:
+    """Starting positions `[chain, dim]` ~ N(mean, 2 covariance).
+
+    Wider than the posterior, so that R-hat can see chains that have not yet met.
+    """
+    mean = jnp.asarray(mean)
+    cholesky = jnp.linalg.cholesky(jnp.asarray(covariance, mean.dtype))
+    noise = jax.random.normal(key, (num_chains, *mean.shape), mean.dtype)
+    return mean + jnp.sqrt(2.0).astype(mean.dtype) * noise @ cholesky.T
+
+
+def sample(
+    key: jax.Array,
+    sampler: AbstractSampler,
+    log_density: LogDensity,
+    start: jax.Array,
+    names: Sequence[str],
+    *,
+    settings: Settings = Settings(),
+    monitor: Callable[[np.ndarray], Mapping[str, np.ndarray]] | None = None,
+    on_block: Callable[[Progress], None] | None = None,
+    checkpoint: Path | None = None,
+    identity: str = "",
+) -> Posterior:
+    """Draws from exp(log_density) until converged.
+
+        warm-up blocks: Robbins-Monro on the scale within a block; after it, mean and
+            covariance from the newer half of the warm-up, pooled over the chains and
+            shrunk towards those before
+        sampling blocks: the sampler is frozen; stop when every monitored quantity has
+            R-hat < max_rhat and bulk ESS >= min_ess, or after max_steps
+
+    The number of evaluations is exactly chains x (1 + steps). With m split chains R-hat - 1
+    is about m / (2 ESS) even in equilibrium, so that many chains make R-hat < 1.01 dear:
+    eight chains need about 800 effective draws.
+
+    Arguments:
+      key: the only source of randomness; the same key gives the same draws.
+      sampler: tuned in the warm-up where it is an `AbstractTunedSampler`.
+      log_density: `[dim] -> []`, vmapped over the chains (one call per step for all).
+      start: `[chain, dim]`; see `dispersed_starts`.
+      names: of the `dim` coordinates.
+      settings: how long; immutable, so the default is safe.
+      monitor: draws `[chain, draw, dim]` to the quantities `[chain, draw]` that must
+        converge: the identified ones. Default: every coordinate.
+      on_block: called after each block.
+      checkpoint: a file, written after each block; where it exists already the run goes
+        on from there and ends with the draws of an undisturbed run. Left in place.
+      identity: what the log density stands for (clips, effects, options); a checkpoint
+        of another identity is refused.
+
+    Returns:
+      The posterior; `status` says whether it converged.
+
+    Raises:
+      ValueError: shapes do not fit, or the log density is not finite at a start.
+      InputError: the checkpoint belongs to another run, or is damaged.
+    """
+    start = jnp.asarray(start)
+    if start.ndim != 2 or start.shape[1] != len(names):
+        raise ValueError(f"start {start.shape} is not [chain, {len(names)}]")
+    monitor = monitor or (lambda draws: dict(zip(names, np.moveaxis(draws, -1, 0), strict=True)))
+    digest = checkpoints.fingerprint(
+        [
+            np.asarray(jax.random.key_data(key)),
+            *(np.asarray(leaf) for leaf in jax.tree.leaves(sampler)),
+            np.asarray(start),
+            sampler.name,
+            tuple(names),
+            (settings.warmup_steps, settings.block_steps),
+            identity,
+        ]
+    )
+
+    if checkpoint is not None and Path(checkpoint).exists():
+        # What the file must look like follows from shapes alone, without an evaluation.
+        shapes = eqx.filter_eval_shape(_initial_states, sampler, log_density, start)
+        (states, sampler), history = checkpoints.load(checkpoint, digest, (shapes, sampler))
+    else:
+        states = _initial_states(sampler, log_density, start)
+        _check_finite(np.asarray(states.log_density))
+        history = _empty_history(states)
+
+    total = settings.warmup_steps + settings.max_steps
+    state = _diagnose(history, settings, monitor)
+    while history.num_steps < total and not _is_enough(state, settings):
+        with _interrupt_deferred():
+            is_warmup = history.num_steps < settings.warmup_steps
+            states, sampler, record = _run_block(
+                key,
+                sampler,
+                log_density,
+                states,
+                jnp.arange(history.num_steps, history.num_steps + settings.block_steps),
+                _gains(settings.block_steps) * (1.0 if is_warmup else 0.0),
+            )
+            block = History(*(np.asarray(leaf) for leaf in record))
+            history = history.extended(block)
+            if is_warmup and isinstance(sampler, AbstractTunedSampler):
+                sampler = _refitted(sampler, history)
+            if checkpoint is not None:
+                checkpoints.save(Path(checkpoint), digest, (states, sampler), history)
+        state = _diagnose(history, settings, monitor)
+        if on_block is not None:
+            on_block(
+                Progress(
+                    num_steps=history.num_steps,
+                    max_steps=total,
+                    is_warmup=is_warmup,
+                    acceptance_rate=float(block.is_accepted.mean()),
+                    convergence=state,
+                )
+            )
+    return _posterior(key, sampler, history, names, settings, state)
+
+
+@eqx.filter_jit
+def _initial_states(sampler: AbstractSampler, log_density: LogDensity, start: jax.Array) -> Any:
+    return jax.vmap(lambda position: sampler.init(position, log_density))(start)
+
+
+@eqx.filter_jit
+def _run_block(
+    key: jax.Array,
+    sampler: AbstractSampler,
+    log_density: LogDensity,
+    states: Any,
+    steps: jax.Array,
+    gains: jax.Array,
+) -> tuple[Any, AbstractSampler, tuple[jax.Array, ...]]:
+    """One block of all chains, compiled once: in the sampling phase the gains are zero.
+
+    Returns the states, the sampler and the leaves of the block's `History`.
+    """
+    num_chains = states.log_density.shape[0]
+
+    def body(carry, step_and_gain):
+        states, sampler = carry
+        step, gain = step_and_gain
+        # Keys follow from the step's number, so that a resumed run needs no stored key.
+        keys = jax.random.split(jax.random.fold_in(key, step), num_chains)
+        states, info = jax.vmap(lambda k, s: sampler.step(k, s, log_density))(keys, states)
+        if isinstance(sampler, AbstractTunedSampler):
+            sampler = sampler.rescaled(info, gain)
+        return (states, sampler), (states.position, states.log_density, info.is_accepted)
+
+    (states, sampler), record = jax.lax.scan(body, (states, sampler), (steps, gains))
+    return states, sampler, tuple(jnp.moveaxis(leaf, 0, 1) for leaf in record)
+
+
+def _gains(num_steps: int) -> jax.Array:
+    return (jnp.arange(num_steps) + 1.0) ** -GAIN_EXPONENT
+
+
+def _check_finite(log_density: np.ndarray) -> None:
+    bad = np.flatnonzero(~np.isfinite(log_density))
+    if bad.size:
+        raise ValueError(
+            f"the log density is {log_density[bad[0]]} at the start of chain {bad[0]} "
+            f"({bad.size} of {log_density.size} chains); start where it is finite"
+        )
+
+
+def _empty_history(states: Any) -> History:
+    num_chains, dim = states.position.shape
+    return History(
+        position=np.zeros((num_chains, 0, dim), states.position.dtype),
+        log_density=np.zeros((num_chains, 0), states.log_density.dtype),
+        is_accepted=np.zeros((num_chains, 0), bool),
+    )
+
+
+def _refitted(sampler: AbstractTunedSampler, history: History) -> AbstractTunedSampler:
+    """Mean and covariance of the newer half, shrunk towards the sampler's own covariance.
+
+    The window counts with its effective draws, the covariance before it with five per
+    dimension: a window of one stuck chain changes nothing, a good one nearly everything.
+    """
+    window = history.position[:, history.num_steps // 2 :].astype(np.float64)
+    dim = window.shape[-1]
+    effective = min(convergence(window[..., i]).ess_bulk for i in range(dim))
+    if not np.isfinite(effective):
+        return sampler
+    flat = window.reshape(-1, dim)
+    prior = PRIOR_DRAWS_PER_DIMENSION * dim
+    before = np.asarray(sampler.covariance, np.float64)
+    covariance = (prior * before + effective * np.cov(flat, rowvar=False)) / (prior + effective)
+    return sampler.fitted(jnp.asarray(flat.mean(axis=0)), jnp.asarray(covariance))
+
+
+def _kept(history: History, settings: Settings) -> History:
+    first = settings.warmup_steps + settings.thin - 1
+    return History(*(leaf[:, first :: settings.thin] for leaf in history))
+
+
+def _diagnose(
+    history: History,
+    settings: Settings,
+    monitor: Callable[[np.ndarray], Mapping[str, np.ndarray]],
+) -> dict[str, Convergence]:
+    if not settings.stops_early or history.num_steps <= settings.warmup_steps:
+        return {}
+    return convergences(monitor(_kept(history, settings).position))
+
+
+def _is_enough(state: Mapping[str, Convergence], settings: Settings) -> bool:
+    # Written so that a NaN (nothing moved) is not enough.
+    return bool(state) and all(
+        c.rhat < settings.max_rhat and c.ess_bulk >= settings.min_ess for c in state.values()
+    )
+
+
+def _posterior(
+    key: jax.Array,
+    sampler: AbstractSampler,
+    history: History,
+    names: Sequence[str],
+    settings: Settings,
+    state: Mapping[str, Convergence],
+) -> Posterior:
+    kept = _kept(history, settings)
+    sampled = history.is_accepted[:, settings.warmup_steps :]
+    if not settings.stops_early:
+        status = Status.FIXED_LENGTH
+    elif _is_enough(state, settings):
+        status = Status.CONVERGED
+    elif not sampled.any(axis=1).all():
+        status = Status.STUCK_CHAIN
+    else:
+        status = Status.STEP_LIMIT
+    num_chains = history.position.shape[0]
+    return Posterior(
+        names=tuple(names),
+        draws=kept.position,
+        log_density=kept.log_density,
+        status=status,
+        stats={
+            "num_chains": num_chains,
+            "num_steps": history.num_steps,
+            "num_evaluations": num_chains * (1 + history.num_steps),
+            "acceptance_rate": float(sampled.mean()),
+        },
+        provenance={
+            "sampler": sampler.name,
+            "settings": dataclasses.asdict(settings),
+            "key": np.asarray(jax.random.key_data(key)).tolist(),
+            "jax": jax.__version__,
+        },
+    )
+
+
+@contextmanager
+def _interrupt_deferred() -> Iterator[None]:
+    """Holds a Ctrl-C back until the block and its checkpoint are done.
+
+    A KeyboardInterrupt inside a compiled loop or its callback would come back as a runtime
+    error of XLA. Outside the main thread there is nothing to hold back.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    received = []
+    before = signal.signal(signal.SIGINT, lambda *_: received.append(True))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if received:
+        raise KeyboardInterrupt

@@ -1,0 +1,73 @@
+"""What a sampler is: a kernel with `init` and `step`, and what the driver may tune in it.
+
+A sampler is an immutable pytree, so that what the warm-up learns (scale, covariance) is a
+traced value and never compiles anything anew. It owns no loop, no key and no output.
+"""
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple, Self
+
+import equinox as eqx
+import jax
+
+LogDensity = Callable[[jax.Array], jax.Array]
+"""`[dim] -> []`, up to a constant. -inf and NaN are never accepted."""
+
+
+class State(NamedTuple):
+    """Where a chain is: `position` `[dim]` and the `log_density` `[]` there."""
+
+    position: jax.Array
+    log_density: jax.Array
+
+
+class Info(NamedTuple):
+    """What one step did: the probability `[]` to accept the proposal, and whether it was."""
+
+    acceptance_rate: jax.Array
+    is_accepted: jax.Array
+
+
+class AbstractSampler(eqx.Module):
+    """A Markov kernel as two pure functions; each `step` costs exactly one log density.
+
+    A sampler may carry more in its state and info than `State` and `Info` do, but not less.
+    """
+
+    name: ClassVar[str]
+
+    def init(self, position: jax.Array, log_density: LogDensity) -> Any:
+        """The state at `position` `[dim]`; one evaluation."""
+        return State(position, log_density(position))
+
+    @abstractmethod
+    def step(self, key: jax.Array, state: Any, log_density: LogDensity) -> tuple[Any, Any]:
+        """One step of one chain: `(state, info)`; one evaluation, at the proposal."""
+
+
+class AbstractTunedSampler(AbstractSampler):
+    """A sampler whose proposals have a Gaussian shape that a warm-up can learn."""
+
+    @classmethod
+    @abstractmethod
+    def from_gaussian(cls, mean: jax.Array, covariance: jax.Array) -> Self:
+        """The sampler for a density near N(mean, covariance): a Laplace fit, or a guess."""
+
+    @abstractmethod
+    def fitted(self, mean: jax.Array, covariance: jax.Array) -> Self:
+        """The same sampler with a new mean and covariance; its learned scale is kept."""
+
+    @property
+    @abstractmethod
+    def covariance(self) -> jax.Array:
+        """The density's covariance `[dim, dim]` as believed now."""
+
+    @abstractmethod
+    def rescaled(self, info: Any, gain: jax.Array) -> Self:
+        """One Robbins-Monro step of the scale: log s += gain (acceptance - target).
+
+        Arguments:
+          info: of one step of all chains (leading axis `chain`).
+          gain: 0 leaves the sampler exactly as it is.
+        """
