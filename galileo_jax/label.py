@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax import command
-from galileo_jax.clip.load import YAML_SUFFIXES, check_clip, find_yaml
+from galileo_jax.clip.load import YAML_SUFFIXES, check_belongs, check_clip, find_yaml
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.yaml_edit import Key, dump, edited
 from galileo_jax.clip.yaml_file import read_mapping
@@ -38,21 +38,23 @@ def main(argv: Sequence[str]) -> int | None:
     is_new = not yaml_path.exists()
     old = {} if is_new else read_mapping(yaml_path)
     defaults = _defaults(clip_path, arguments) if is_new else {}
-    changes = _changes(arguments, old)
+    changes = _changes(arguments, yaml_path, old)
     if not changes:
         raise InputError(f"{clip_path}: nothing to write; see galileo label --help")
 
     content = _applied(old, changes | defaults)
     clip = check_clip(yaml_path, content)
+    check_belongs(clip, clip_path)
+    old_text = "" if is_new else yaml_path.read_text(encoding="utf-8-sig")
     if is_new:
         text, is_kept = dump({key: content[key] for key in KEY_ORDER if key in content}), True
     else:
-        text, is_kept = edited(yaml_path.read_text(encoding="utf-8-sig"), changes, content)
+        text, is_kept = edited(old_text, changes, content)
     write_text(yaml_path, text)
 
     for warning in clip.warnings:
         _say(f"warning: {warning}")
-    if not is_kept:
+    if not is_kept and "#" in old_text:
         _say(f"note: {yaml_path} was written afresh; its comments are lost")
     print(yaml_path)
     return None
@@ -149,7 +151,7 @@ def _defaults(clip_path: Path, arguments: Namespace) -> dict[Key, Any]:
     return defaults
 
 
-def _changes(arguments: Namespace, old: dict[str, Any]) -> dict[Key, Any]:
+def _changes(arguments: Namespace, yaml_path: Path, old: dict[str, Any]) -> dict[Key, Any]:
     """The values to write, by their place in the yaml."""
     changes: dict[Key, Any] = {}
     if arguments.ramp is not None:
@@ -165,10 +167,10 @@ def _changes(arguments: Namespace, old: dict[str, Any]) -> dict[Key, Any]:
         value = getattr(arguments, key)
         if value is not None:
             changes[key,] = value
-    return changes | _object_changes(arguments, old)
+    return changes | _object_changes(arguments, yaml_path, old)
 
 
-def _object_changes(arguments: Namespace, old: dict[str, Any]) -> dict[Key, Any]:
+def _object_changes(arguments: Namespace, yaml_path: Path, old: dict[str, Any]) -> dict[Key, Any]:
     given: dict[str, dict[str, Any]] = {}
     for name, shape in arguments.shape:
         given.setdefault(name, {})["shape"] = shape
@@ -181,11 +183,10 @@ def _object_changes(arguments: Namespace, old: dict[str, Any]) -> dict[Key, Any]
             raise InputError(f"--first-frame {name}: {frame!r} is not a frame number from 0")
         given.setdefault(name, {})["first_frame"] = int(frame)
 
-    listed = old.get("objects")
-    names = [
-        item.get("name") if isinstance(item, dict) else None
-        for item in (listed if isinstance(listed, list) else [])
-    ]
+    listed = old.get("objects") or []
+    if given and not isinstance(listed, list):
+        raise InputError(f"{yaml_path}: objects: a list with one entry per object expected")
+    names = [item.get("name") if isinstance(item, dict) else None for item in listed]
     changes: dict[Key, Any] = {}
     for name, values in given.items():
         if name in names:
@@ -200,7 +201,7 @@ def _object_changes(arguments: Namespace, old: dict[str, Any]) -> dict[Key, Any]
 def _applied(old: dict[str, Any], changes: dict[Key, Any]) -> dict[str, Any]:
     content = copy.deepcopy(old)
     for key, value in changes.items():
-        if key[0] == "objects" and not isinstance(content.get("objects"), list):
+        if key[0] == "objects" and content.get("objects") is None:
             content["objects"] = []
         match key:
             case ("objects", int(index)):

@@ -6,6 +6,7 @@ or the video to judge is checked in `load` and `placement`.
 """
 
 import math
+import reprlib
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -137,10 +138,14 @@ def _one_of(known: tuple[str, ...]) -> BeforeValidator:
     return BeforeValidator(check)
 
 
+_REPR = reprlib.Repr()  # aliases in a yaml can make a value that is endless when written out
+_REPR.maxlevel, _REPR.maxstring, _REPR.maxother = 3, 60, 60
+
+
 def short(value: Any) -> str:
     """A value as the user wrote it, cut to 60 characters, on one line."""
     try:
-        text = " ".join(repr(value).split())
+        text = " ".join(_REPR.repr(value).split())
     except ValueError:  # an integer with more digits than Python prints
         text = "a number of thousands of digits"
     return text if len(text) <= 60 else text[:57] + "..."

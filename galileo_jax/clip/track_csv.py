@@ -34,7 +34,7 @@ MAX_STEP_S = 1.0
 
 _ISOTROPIC = ("sd_m",)
 _COVARIANCE = ("sd_x_m", "sd_y_m", "correlation")
-_FIELDS = ("x_m", "y_m", *_ISOTROPIC, *_COVARIANCE)
+_FIELDS = (*_COVARIANCE, *_ISOTROPIC, "x_m", "y_m")  # sd_x_m before x_m: the longest ending counts
 
 
 def read_observation_csv(path: Path) -> Observation:
@@ -162,7 +162,7 @@ def _find_columns(
             continue
         field = next((f for f in _FIELDS if title.endswith(f"_{f}") and title != f"_{f}"), None)
         if field is None:
-            wanted = [TIME, *(f"object{n}_{f}" for n in (1, 2) for f in _FIELDS)]
+            wanted = [TIME, *(f"object{n}_{f}" for n in (1, 2) for f in reversed(_FIELDS))]
             close = difflib.get_close_matches(title, wanted, n=1)
             hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(wanted[:4])}, ..."
             raise InputError(f"{path}: column {title[:40]!r}: unknown; {hint}")

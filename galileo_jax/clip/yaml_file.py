@@ -45,7 +45,9 @@ def read_mapping(path: Path) -> dict[str, Any]:
         mark = error.problem_mark or error.context_mark
         where = f"line {mark.line + 1}: " if mark else ""
         raise InputError(f"{path}: not yaml: {where}{error.problem or error.context}") from None
-    except (yaml.YAMLError, ValueError, TypeError, AttributeError, RecursionError) as error:
+    except RecursionError:
+        raise InputError(f"{path}: not a clip yaml: nested too deeply") from None
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError) as error:
         # PyYAML's constructors let other errors through, for instance for the date 2020-99-99.
         raise InputError(f"{path}: not yaml: {' '.join(str(error).split())[:100]}") from None
     if value is None:

@@ -1,0 +1,329 @@
+"""Clips that are wrong in one way each, for every command that takes a CLIP.
+
+@pytest.mark.parametrize("broken", BROKEN_CLIPS, ids=lambda broken: broken.id)
+def test_fit_refuses(broken, tmp_path, capfd):
+    path = broken.build(tmp_path)
+    ...one line on stderr with every word of `broken.words`, exit code 2, nothing written
+"""
+
+import functools
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from tests.video.make_video import SIZE_PX, with_index_first, with_uneven_frames, write_video
+
+GOOD_YAML = """\
+video: clip.mp4
+scenario: ramp
+fps: 30.0
+ramp_angle_deg: 20.0
+direction: right
+pixels_per_metre: 300.0
+origin_px: [160.0, 150.0]
+gravity: 9.81
+objects:
+  - name: object1
+    shape: box
+    size_m: [0.06, 0.05, 0.06]
+    point_px: [73.1, 108.8]
+  - name: object2
+    shape: box
+    size_m: [0.07, 0.05, 0.06]
+    point_px: [205.0, 141.0]
+"""
+
+TRACK_YAML = """\
+track: clip.csv
+scenario: ramp
+ramp_angle_deg: 20.0
+objects:
+  - name: object1
+    shape: box
+    size_m: [0.06, 0.05, 0.06]
+"""
+
+
+@dataclass(frozen=True)
+class BrokenClip:
+    """One wrong input.
+
+    Attributes:
+      id: for pytest.
+      build: makes the files in an empty folder and returns the CLIP argument.
+      words: what the one line must contain, beginning with the file's name.
+    """
+
+    id: str
+    build: Callable[[Path], Path]
+    words: tuple[str, ...]
+
+
+@functools.cache
+def good_video() -> bytes:
+    """An mp4 of 24 frames, 320 x 180, 30 frames per second."""
+    with tempfile.TemporaryDirectory() as folder:
+        return write_video(Path(folder) / "clip.mp4").read_bytes()
+
+
+def build_good(folder: Path) -> Path:
+    """A clip with nothing wrong; returns its yaml."""
+    (folder / "clip.mp4").write_bytes(good_video())
+    path = folder / "clip.yaml"
+    path.write_text(GOOD_YAML)
+    return path
+
+
+def good_track() -> str:
+    """A csv track: 20 frames of constant acceleration down a 20 degree ramp."""
+    lines = ["time_s,object1_x_m,object1_y_m,object1_sd_m"]
+    for index in range(20):
+        time = index / 30
+        along = -0.5 + 0.5 * 1.5 * time**2
+        x, y = along * np.cos(0.349) + 0.0103, -along * np.sin(0.349) + 0.0282
+        lines.append(f"{time:.6f},{x:.6f},{y:.6f},0.0005")
+    return "\n".join(lines) + "\n"
+
+
+def build_good_track(folder: Path) -> Path:
+    """A csv track with nothing wrong; returns its yaml."""
+    (folder / "clip.csv").write_text(good_track())
+    path = folder / "clip.yaml"
+    path.write_text(TRACK_YAML)
+    return path
+
+
+def _text(text: str | bytes, *words: str) -> tuple[Callable[[Path], Path], tuple[str, ...]]:
+    def build(folder: Path) -> Path:
+        path = build_good(folder)
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return build, ("clip.yaml", *words)
+
+
+def _edit(old: str, new: str, *words: str) -> tuple[Callable[[Path], Path], tuple[str, ...]]:
+    assert old in GOOD_YAML
+    return _text(GOOD_YAML.replace(old, new, 1), *words)
+
+
+def _without(line: str, *words: str) -> tuple[Callable[[Path], Path], tuple[str, ...]]:
+    return _edit(f"{line}\n", "", *words)
+
+
+def _video(
+    change: Callable[[bytes], bytes], *words: str
+) -> tuple[Callable[[Path], Path], tuple[str, ...]]:
+    def build(folder: Path) -> Path:
+        path = build_good(folder)
+        (folder / "clip.mp4").write_bytes(change(good_video()))
+        return path
+
+    return build, ("clip.mp4", *words)
+
+
+def _track(old: str, new: str, *words: str) -> tuple[Callable[[Path], Path], tuple[str, ...]]:
+    assert old in good_track()
+
+    def build(folder: Path) -> Path:
+        path = build_good_track(folder)
+        (folder / "clip.csv").write_text(good_track().replace(old, new))
+        return path
+
+    return build, ("clip.csv", *words)
+
+
+def _file(name: str, content: bytes | None) -> Callable[[Path], Path]:
+    """Only the file `name`, without a yaml; None for no file at all."""
+
+    def build(folder: Path) -> Path:
+        if content is not None:
+            (folder / name).write_bytes(content)
+        return folder / name
+
+    return build
+
+
+def _picture(_: bytes) -> bytes:
+    return cv2.imencode(".png", np.zeros((180, 320, 3), np.uint8))[1].tobytes()
+
+
+def _without_frames(_: bytes) -> bytes:
+    with tempfile.TemporaryDirectory() as folder:
+        return write_video(Path(folder) / "clip.mp4", frame_count=0).read_bytes()
+
+
+def _cut(share: float) -> Callable[[bytes], bytes]:
+    return lambda mp4: with_index_first(mp4)[: int(len(mp4) * share)]
+
+
+def _cut_avi(folder: Path) -> Path:
+    avi = write_video(folder / "clip.avi")
+    avi.write_bytes(avi.read_bytes()[: avi.stat().st_size // 2])
+    path = folder / "clip.yaml"
+    path.write_text(GOOD_YAML.replace("clip.mp4", "clip.avi"))
+    return path
+
+
+def _other_video(folder: Path) -> Path:
+    build_good(folder)
+    (folder / "clip.yaml").rename(folder / "copy.yaml")
+    (folder / "copy.mp4").write_bytes(good_video())
+    return folder / "copy.mp4"
+
+
+_WIDTH, _HEIGHT = SIZE_PX
+_CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
+    # keys
+    "unknown_key": _edit("gravity:", "gravitiy:", "gravitiy", "did you mean gravity?"),
+    "unknown_key_nothing_like_it": _edit("gravity:", "colour:", "colour", "known: video"),
+    "unknown_object_key": _edit("size_m:", "size:", "objects[0].size", "did you mean size_m?"),
+    "misspelt_required_key": _edit("fps:", "fsp:", "fsp", "did you mean fps?"),
+    "misspelt_video_key": _edit("video:", "vidoe:", "vidoe", "did you mean video?"),
+    "number_as_key": _edit("gravity:", "7:", "7", "unknown key"),
+    "missing_fps": _without("fps: 30.0", "fps", "missing"),
+    "missing_scenario": _without("scenario: ramp", "scenario", "missing"),
+    "missing_video": _without("video: clip.mp4", "video", "missing"),
+    "missing_objects": _text(GOOD_YAML.split("objects:")[0], "objects", "missing"),
+    "missing_object_name": _edit("name: object1\n    ", "", "objects[0].name", "missing"),
+    "missing_shape": _without("    shape: box", "objects[0].shape", "missing"),
+    "missing_ramp_angle": _without("ramp_angle_deg: 20.0", "ramp_angle_deg", "needs it"),
+    "repeated_key": _edit("fps: 30.0", "fps: 30.0\nfps: 25.0", "fps", "given twice"),
+    "repeated_object_key": _edit("    shape: box\n", "    shape: box\n    shape: box\n", "shape"),
+    "video_and_track": _edit("fps:", "track: clip.csv\nfps:", "video, track", "both given"),
+    # types
+    "fps_is_text": _edit("fps: 30.0", "fps: fast", "fps", "'fast'", "not a number"),
+    "fps_is_quoted": _edit("fps: 30.0", "fps: '30'", "fps", "'30'", "not a number"),
+    "fps_is_a_bool": _edit("fps: 30.0", "fps: yes", "fps", "True", "not a number"),
+    "fps_is_null": _edit("fps: 30.0", "fps: null", "fps", "None", "not a number"),
+    "fps_is_nan": _edit("fps: 30.0", "fps: .nan", "fps", "nan", "not finite"),
+    "angle_is_infinite": _edit("20.0", ".inf", "ramp_angle_deg", "inf", "not finite"),
+    "origin_is_a_number": _edit("[160.0, 150.0]", "160.0", "origin_px", "[x, y]"),
+    "origin_has_one_number": _edit("[160.0, 150.0]", "[160.0]", "origin_px", "second number"),
+    "point_has_three_numbers": _edit(
+        "[73.1, 108.8]", "[73.1, 108.8, 0.0]", "objects[0].point_px", "too many"
+    ),
+    "objects_is_a_mapping": _text(
+        GOOD_YAML.split("objects:")[0] + "objects:\n  name: object1\n", "objects", "list"
+    ),
+    "object_is_a_word": _text(
+        GOOD_YAML.split("objects:")[0] + "objects: [object1]\n", "objects[0]", "not a mapping"
+    ),
+    "first_frame_is_a_fraction": _edit(
+        "    point_px", "    first_frame: 1.5\n    point_px", "objects[0].first_frame", "1.5"
+    ),
+    "first_frame_is_negative": _edit(
+        "    point_px", "    first_frame: -1\n    point_px", "objects[0].first_frame", "-1"
+    ),
+    "name_with_space": _edit("object1", "object 1", "objects[0].name", "object 1"),
+    "video_is_a_number": _edit("clip.mp4", "5", "video", "5", "file name"),
+    # values and units
+    "unknown_scenario": _edit("scenario: ramp", "scenario: slope", "slope", "ramp, incline, fall"),
+    "unknown_shape": _edit("shape: box", "shape: cube", "shape", "cube", "box, cylinder"),
+    "unknown_direction": _edit("direction: right", "direction: up", "direction", "up", "left"),
+    "fps_is_zero": _edit("fps: 30.0", "fps: 0", "fps", "0", "above 0"),
+    "fps_is_negative": _edit("fps: 30.0", "fps: -30.0", "fps", "-30"),
+    "fps_is_a_duration": _edit("fps: 30.0", "fps: 0.03333", "fps", "did you mean 30"),
+    "angle_is_zero": _edit("20.0", "0.0", "ramp_angle_deg", "(0, 90)"),
+    "angle_is_ninety": _edit("20.0", "90", "ramp_angle_deg", "90", "(0, 90)"),
+    "angle_is_negative": _edit("20.0", "-20.0", "ramp_angle_deg", "-20", "(0, 90)"),
+    "angle_in_radians": _edit("20.0", "0.349", "ramp_angle_deg", "did you mean 20", "radians"),
+    "gravity_in_cm": _edit("9.81", "981", "gravity", "did you mean 9.81"),
+    "gravity_is_negative": _edit("9.81", "-9.81", "gravity", "did you mean 9.81"),
+    "scale_per_millimetre": _edit("300.0", "0.9", "pixels_per_metre", "did you mean 900"),
+    "scale_in_metres_per_pixel": _edit("300.0", "0.00333", "pixels_per_metre", "did you mean 300"),
+    "scale_is_zero": _edit("300.0", "0", "pixels_per_metre", "0", "above 0"),
+    "size_in_millimetres": _edit("[0.06, ", "[60, ", "objects[0].size_m[0]", "did you mean 0.06"),
+    "size_in_centimetres": _edit("[0.06, ", "[6, ", "objects[0].size_m[0]", "did you mean 0.06"),
+    "size_is_negative": _edit("[0.06, ", "[-0.06, ", "objects[0].size_m[0]", "-0.06"),
+    "size_of_a_cylinder_for_a_box": _edit(
+        "[0.06, 0.05, 0.06]", "[0.06, 0.05]", "objects[0].size_m", "2 values", "depth, height"
+    ),
+    "size_of_a_box_for_a_sphere": _edit(
+        "shape: box", "shape: sphere", "objects[0].size_m", "3 values", "[radius]"
+    ),
+    "torus_thicker_than_its_ring": _edit(
+        "shape: box\n    size_m: [0.06, 0.05, 0.06]",
+        "shape: torus\n    size_m: [0.01, 0.05]",
+        "objects[0].size_m",
+        "ring radius",
+    ),
+    "size_does_not_fit_the_frame": _edit("300.0", "9000.0", "size_m", "pixels_per_metre"),
+    "no_objects": _text(
+        GOOD_YAML.split("objects:")[0] + "objects: []\n", "objects", "at least one"
+    ),
+    "same_name_twice": _edit("object2", "object1", "objects[1].name", "object1", "differ"),
+    "three_objects_on_a_ramp": _text(
+        GOOD_YAML + "  - {name: object3, shape: box}\n", "objects", "at most 2", "multi"
+    ),
+    # places
+    "point_outside_the_frame": _edit(
+        "[205.0, 141.0]", "[2050.0, 141.0]", "objects[1].point_px", f"{_WIDTH} x {_HEIGHT}"
+    ),
+    "point_left_of_the_frame": _edit(
+        "[73.1, 108.8]", "[-3.0, 108.8]", "objects[0].point_px", "outside the frame"
+    ),
+    "point_as_fractions": _edit(
+        "[73.1, 108.8]", "[0.23, 0.6]", "objects[0].point_px", "pixels expected"
+    ),
+    "origin_far_outside": _edit("[160.0, 150.0]", "[1600.0, 150.0]", "origin_px", "far outside"),
+    "objects_overlap": _edit("[73.1, 108.8]", "[195.0, 141.0]", "object2", "reaches into object1"),
+    "object_inside_the_ramp": _edit("[73.1, 108.8]", "[73.1, 140.0]", "object1", "inside the ramp"),
+    "object_inside_the_table": _edit(
+        "[205.0, 141.0]", "[205.0, 158.0]", "object2", "inside the table"
+    ),
+    "object_in_the_air": _edit("[205.0, 141.0]", "[205.0, 60.0]", "object2", "above the table"),
+    "wrong_direction": _edit("direction: right", "direction: left", "objects[0]", "direction"),
+    "first_frame_beyond_the_end": _edit(
+        "    point_px",
+        "    first_frame: 24\n    point_px",
+        "objects[0].first_frame",
+        "24",
+        "24 frames",
+    ),
+    # yaml files
+    "empty_yaml": _text("", "empty"),
+    "only_comments": _text("# nothing yet\n", "empty"),
+    "yaml_is_a_list": _text("- video: clip.mp4\n", "not a mapping"),
+    "yaml_is_a_word": _text("clip.mp4\n", "not a mapping"),
+    "not_yaml": _text("video: [clip.mp4\nfps: 30\n", "not yaml", "line"),
+    "tab_in_yaml": _text("video: clip.mp4\n\tfps: 30\n", "not yaml", "line 2"),
+    "impossible_date": _text("video: 2020-99-99\n", "not yaml"),
+    "binary_yaml": _text(b"\xff\xfe\x00\x01", "not a text file"),
+    "missing_file": (_file("none.mp4", None), ("none.mp4", "no such file")),
+    "missing_yaml_file": (_file("none.yaml", None), ("none.yaml", "no such file")),
+    "folder": (lambda folder: folder, ("folder",)),
+    "yaml_beside_another_video": (_other_video, ("copy.yaml", "video", "copy.mp4")),
+    # videos
+    "video_file_missing": _edit("clip.mp4", "other.mp4", "video", "other.mp4", "no such file"),
+    "zero_bytes": _video(lambda _: b"", "empty file"),
+    "text_as_video": _video(lambda _: b"not a video\n" * 100, "cannot be decoded"),
+    "picture_as_video": _video(_picture, "1 frame"),
+    "zero_frames": _video(_without_frames, "cannot be decoded"),
+    "cut_off_before_the_index": _video(lambda mp4: mp4[: len(mp4) // 2], "cannot be decoded"),
+    "cut_off_in_the_middle": _video(_cut(0.6), "cut off", "of 24 frames"),
+    "cut_off_avi": (_cut_avi, ("clip.avi", "cut off", "of 24 frames")),
+    "variable_frame_rate": _video(with_uneven_frames, "variable frame rate", "16.67 to 50 ms"),
+    # csv tracks
+    "track_without_time": _track("time_s", "times", "times", "did you mean time_s?"),
+    "track_without_y": _track("object1_y_m", "object2_y_m", "'object1_y_m'", "missing"),
+    "track_in_pixels": _track(
+        "0.033333,", "0.033333,312.5,0.1,0.0005\n0.05,", "object1", "metres expected"
+    ),
+    "track_times_stand_still": _track("0.066667", "0.033333", "line 4", "time_s", "increase"),
+    "track_with_a_word": _track("0.066667,", "0.066667,x", "line 4", "object1_x_m", "not a number"),
+    "track_with_a_short_row": _track("0.633333,", "0.633333\n", "line 21", "1 cells"),
+    "track_with_a_nan": _track("0.066667,", "nan,", "line 4", "time_s", "not a number"),
+    "track_without_error": _track("0.0005", "0", "object1", "standard deviation"),
+    "track_is_empty": _track(good_track(), "", "empty"),
+    "track_of_two_rows": _track(good_track().split("0.066667")[1], "\n", "rows"),
+    "track_with_semicolons": _track(",", ";", "commas"),
+}
+
+BROKEN_CLIPS: tuple[BrokenClip, ...] = tuple(
+    BrokenClip(name, build, words) for name, (build, words) in _CASES.items()
+)

@@ -1,0 +1,154 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from galileo_jax.clip.track_csv import (
+    MIN_SD_M,
+    position_noise_m,
+    read_observation_csv,
+    write_observation_csv,
+)
+from galileo_jax.errors import InputError
+from galileo_jax.observation import Observation
+
+
+def make_observation(seed: int, is_isotropic: bool, num_frames: int = 40) -> Observation:
+    rng = np.random.default_rng(seed)
+    names = ("object1", "ball")
+    position = rng.normal(size=(2, 2, num_frames))
+    mask = rng.random((2, num_frames)) > 0.2
+    sd = rng.uniform(1e-4, 1e-2, size=(2, 2, num_frames))
+    correlation = rng.uniform(-0.9, 0.9, size=(2, num_frames))
+    if is_isotropic:
+        sd[:, 1], correlation[:] = sd[:, 0], 0.0
+    shared = correlation * sd[:, 0] * sd[:, 1]
+    covariance = np.array([[sd[:, 0] ** 2, shared], [shared, sd[:, 1] ** 2]]).transpose(2, 0, 1, 3)
+    hidden = ~mask[:, None, :]
+    position = np.where(hidden, np.nan, position)
+    covariance = np.where(hidden[:, None], np.nan, covariance)
+    return Observation(names, np.arange(num_frames) / 30, position, covariance, mask)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), is_isotropic=st.booleans())
+def test_written_track_reads_back(seed: int, is_isotropic: bool, tmp_path_factory) -> None:
+    path = tmp_path_factory.getbasetemp() / "track.csv"
+    observation = make_observation(seed, is_isotropic)
+    write_observation_csv(path, observation)
+    back = read_observation_csv(path)
+    assert back.names == observation.names
+    np.testing.assert_array_equal(back.times_s, observation.times_s)
+    np.testing.assert_array_equal(back.position_m, observation.position_m)
+    np.testing.assert_array_equal(back.mask, observation.mask)
+    np.testing.assert_allclose(back.covariance_m2, observation.covariance_m2, rtol=1e-12)
+    header = path.read_text().split("\n")[0]
+    assert ("object1_sd_m" in header) == is_isotropic
+
+
+def test_column_order_and_spaces_do_not_matter(tmp_path: Path) -> None:
+    path = tmp_path / "track.csv"
+    path.write_text(
+        "\ufeffobject1_x_m, time_s, object1_sd_m, object1_y_m\n"
+        + "".join(f"{0.01 * i}, {0.1 * i}, 0.001 ,{0.1 * i}\n" for i in range(6)),
+        "utf-8",
+    )
+    back = read_observation_csv(path)
+    np.testing.assert_allclose(back.position_m[0, 0], 0.01 * np.arange(6))
+    np.testing.assert_allclose(back.covariance_m2[0, :, :, 0], 1e-6 * np.eye(2))
+
+
+@pytest.mark.parametrize("sd_m", [1e-4, 3e-3])
+@pytest.mark.parametrize("is_even", [True, False])
+def test_noise_is_estimated_through_acceleration_and_impact(sd_m: float, is_even: bool) -> None:
+    """Over 200 draws of 60 frames the median estimate is right and no draw is far off."""
+    rng = np.random.default_rng(7)
+    estimates = []
+    for _ in range(200):
+        steps = np.full(59, 1 / 30) if is_even else rng.uniform(0.02, 0.05, 59)
+        times = np.concatenate([[0.0], np.cumsum(steps)])
+        # Down a ramp, then braked on a table.
+        after = np.clip(times - 1.0, 0, None)
+        way = 0.5 * 1.5 * np.minimum(times, 1.0) ** 2 + 1.5 * after - 0.5 * 2.0 * after**2
+        estimates.append(position_noise_m(times, way + rng.normal(0, sd_m, 60)))
+    # 57 overlapping third differences: the MAD scatters by about 17 %.
+    assert np.median(estimates) == pytest.approx(sd_m, rel=0.1)
+    assert np.quantile(estimates, [0.02, 0.98]) == pytest.approx(sd_m, rel=0.6)
+
+
+def test_noise_of_exact_positions_is_the_floor() -> None:
+    times = np.arange(30) / 30
+    assert position_noise_m(times, 4.9 * times**2) == MIN_SD_M
+
+
+def test_missing_error_columns_are_estimated(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    times = np.arange(80) / 30
+    x, y = times**2 + rng.normal(0, 2e-3, 80), -(times**2) + rng.normal(0, 5e-4, 80)
+    path = tmp_path / "track.csv"
+    rows = "".join(f"{t},{a},{b}\n" for t, a, b in zip(times, x, y, strict=True))
+    path.write_text("time_s,ball_x_m,ball_y_m\n" + rows)
+    observation = read_observation_csv(path)
+    assert observation.names == ("ball",)
+    sd = np.sqrt(np.diagonal(observation.covariance_m2[0, :, :, 5]))
+    assert sd == pytest.approx([2e-3, 5e-4], rel=0.4)
+    assert np.ptp(observation.covariance_m2[0, 0, 0]) == 0
+
+
+ROWS = "".join(f"{i / 30:.4f},{0.01 * i:.3f},0.5,0.001\n" for i in range(12))
+GOOD = "time_s,object1_x_m,object1_y_m,object1_sd_m\n" + ROWS
+
+
+@pytest.mark.parametrize("old, new, message", [
+    ("time_s", "t", r"column 't': unknown"),
+    ("time_s,", "time,", r"column 'time': unknown; did you mean time_s"),
+    ("object1_x_m", "object1_x_px", "did you mean object1_x_m"),
+    ("object1_x_m", "object1_y_m", "'object1_y_m': given twice"),
+    ("object1_y_m", "ball_y_m", "'object1_y_m': missing"),
+    ("object1_sd_m", "object1_sd_x_m", "'object1_sd_y_m': missing"),
+    (",object1_x_m,object1_y_m,object1_sd_m", "", "no object in the header|cells"),
+    ("0.1000,0.030", "0.1000,thirty", "line 5: object1_x_m: 'thirty' is not a number"),
+    ("0.1000,0.030", "0.1000,inf", "line 5: object1_x_m: 'inf' is not a number"),
+    ("0.1000,0.030", "0.1000,", "row 4: object1: only one of x and y"),
+    ("0.1000,0.030", ",0.030", "line 5: time_s: empty"),
+    ("0.1000,0.030", "0.0667,0.030", "line 5: time_s: 0.0667 is not after 0.0667"),
+    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5", "line 5: 3 cells; 4 expected"),
+    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5,", "row 4: object1: standard deviation nan"),
+    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5,-1", "row 4: object1: standard deviation -1"),
+    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,500,1", "500 m; metres expected"),
+    (ROWS, ROWS[:46], "2 rows; at least 4"),
+    (ROWS, ROWS.replace("0.5", ""), "only one of x and y"),
+    (GOOD, "", "empty"),
+    (GOOD, GOOD.replace(",", ";"), "commas"),
+])  # fmt: skip
+def test_wrong_track_names_the_place(old: str, new: str, message: str, tmp_path: Path) -> None:
+    assert old in GOOD
+    path = tmp_path / "track.csv"
+    path.write_text(GOOD.replace(old, new, 1))
+    with pytest.raises(InputError, match=rf"track\.csv: .*({message})"):
+        read_observation_csv(path)
+
+
+def test_times_in_milliseconds_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "track.csv"
+    path.write_text("time_s,a_x_m,a_y_m,a_sd_m\n" + "".join(f"{33 * i},0,0,1\n" for i in range(9)))
+    with pytest.raises(InputError, match="33 s apart; seconds expected"):
+        read_observation_csv(path)
+
+
+def test_too_few_rows_to_estimate_the_error(tmp_path: Path) -> None:
+    path = tmp_path / "track.csv"
+    path.write_text("time_s,a_x_m,a_y_m\n" + "".join(f"{i / 30},0,{i}\n" for i in range(8)))
+    with pytest.raises(InputError, match="column 'a_sd_m': missing, and too few"):
+        read_observation_csv(path)
+
+
+@settings(max_examples=200, deadline=None)
+@given(text=st.text(alphabet='time_s,object1_x_m\n\r\t0123.e-"; nai\0', max_size=80))
+def test_garbage_gives_one_line(text: str, tmp_path_factory) -> None:
+    path = tmp_path_factory.getbasetemp() / "garbage.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"garbage\.csv"):
+        read_observation_csv(path)

@@ -1,0 +1,62 @@
+"""Small videos for the tests, and the ways in which a video can be broken."""
+
+import struct
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+SIZE_PX = (320, 180)
+
+
+def write_video(path: Path, frame_count: int = 24, fps: float = 30.0) -> Path:
+    """A textured square on a moving way, 320 x 180, MPEG-4 in mp4 or by suffix."""
+    codec = "MJPG" if path.suffix == ".avi" else "mp4v"
+    fourcc = cv2.VideoWriter.fourcc(*codec)
+    writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, fourcc, fps, SIZE_PX)
+    assert writer.isOpened()
+    texture = np.random.default_rng(0).integers(0, 255, (24, 24, 3), dtype=np.uint8)
+    for index in range(frame_count):
+        frame = np.full((SIZE_PX[1], SIZE_PX[0], 3), 128, np.uint8)
+        frame[80:104, 20 + index : 44 + index] = texture
+        writer.write(frame)
+    writer.release()
+    return path
+
+
+def with_index_first(mp4: bytes) -> bytes:
+    """The same mp4 with its index (moov) before its data, as cameras and the web write it."""
+    boxes = {kind: (start, size) for kind, start, size in _boxes(mp4, 0, len(mp4))}
+    moov_start, moov_size = boxes[b"moov"]
+    moov = bytearray(mp4[moov_start : moov_start + moov_size])
+    at = moov.index(b"stco") + 8
+    (count,) = struct.unpack_from(">I", moov, at)
+    for entry in range(at + 4, at + 4 + 4 * count, 4):
+        (offset,) = struct.unpack_from(">I", moov, entry)
+        struct.pack_into(">I", moov, entry, offset + moov_size)
+    data_start = boxes[b"mdat"][0]
+    return mp4[:data_start] + bytes(moov) + mp4[data_start:moov_start]
+
+
+def with_uneven_frames(mp4: bytes) -> bytes:
+    """The same mp4 with half the step between frames in the first half, 3/2 in the second."""
+    content = bytearray(mp4)
+    at = content.index(b"stts")
+    version, entries, count, step = struct.unpack_from(">IIII", content, at + 4)
+    assert entries == 1
+    halves = (count // 2, step // 2, count - count // 2, step + step // 2)
+    content[at + 4 : at + 20] = struct.pack(">IIIIII", version, 2, *halves)
+    for kind in (b"moov", b"trak", b"mdia", b"minf", b"stbl", b"stts"):
+        size_at = content.index(kind) - 4
+        (size,) = struct.unpack_from(">I", content, size_at)
+        struct.pack_into(">I", content, size_at, size + 8)
+    return bytes(content)
+
+
+def _boxes(mp4: bytes, start: int, end: int) -> list[tuple[bytes, int, int]]:
+    found = []
+    while start < end:
+        size, kind = struct.unpack_from(">I4s", mp4, start)
+        found.append((kind, start, size))
+        start += size
+    return found
