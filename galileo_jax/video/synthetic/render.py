@@ -6,7 +6,7 @@ averaged over these (motion blur) and over each pixel's area, and laid over the 
 background with the averaged coverage as its opacity. Nothing is ever rounded to a pixel.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,8 +106,12 @@ def render_clip(
     num_frames: int,
     *,
     seed: int,
+    on_frame: Callable[[], object] = lambda: None,
 ) -> np.ndarray:
     """Writes the clip to `path` (mp4, MPEG-4 part 2), whole or not at all.
+
+    `on_frame` is called after each frame (a progress bar). The codec moves what it shows by
+    0.02 to 0.03 px RMS; a file of MJPEG would be four times as large.
 
     Returns:
       `[object, frame]`, the share of each object that the hand hides, 0 to 1.
@@ -127,6 +131,7 @@ def render_clip(
             ):
                 writer.write(frame.picture)
                 covered.append(frame.covered)
+                on_frame()
         finally:
             writer.release()
     return np.array(covered).T

@@ -12,7 +12,7 @@ Shape = Literal["box", "cylinder", "torus", "sphere"]
 
 @dataclass(frozen=True)
 class Body:
-    """An object as the camera sees it: from the side, round shapes along their axis.
+    """An object as the camera sees it, from the side: a cylinder stands, a torus lies.
 
     Attributes:
       shape: box, cylinder, torus or sphere.
@@ -26,10 +26,15 @@ class Body:
     @property
     def outline_m(self) -> tuple[float, float]:
         """(length along the travel, height) of what is seen, m."""
-        if self.shape == "box":
-            return self.size_m[0], self.size_m[2]
-        diameter = 2 * (sum(self.size_m) if self.shape == "torus" else self.size_m[0])
-        return diameter, diameter
+        match self.shape:
+            case "box":
+                return self.size_m[0], self.size_m[2]
+            case "cylinder":
+                return 2 * self.size_m[0], self.size_m[1]
+            case "torus":
+                return 2 * sum(self.size_m), 2 * self.size_m[1]
+            case _:
+                return 2 * self.size_m[0], 2 * self.size_m[0]
 
 
 def body_texture(body: Body, texels_per_metre: float, rng: np.random.Generator) -> np.ndarray:
@@ -127,16 +132,12 @@ def _fixed_point(points: np.ndarray) -> np.ndarray:
 
 
 def _silhouette(body: Body, width: int, height: int) -> np.ndarray:
-    if body.shape == "box":
+    """A rectangle, or a bar with half-circles at its ends (a sphere has no bar between)."""
+    if body.shape in ("box", "cylinder"):
         return np.ones((height, width), np.float32)
     y, x = np.mgrid[:height, :width].astype(np.float32)
-    radius = np.hypot(x - (width - 1) / 2, y - (height - 1) / 2)
-    alpha = np.clip(width / 2 - radius, 0, 1)
-    if body.shape == "torus":
-        ring, tube = body.size_m
-        hole = width / 2 * max(0.0, ring - tube) / (ring + tube)
-        alpha *= np.clip(radius - hole, 0, 1)
-    return alpha
+    past_bar = np.maximum(np.abs(x - (width - 1) / 2) - (width - height) / 2, 0)
+    return np.clip(height / 2 - np.hypot(past_bar, y - (height - 1) / 2), 0, 1)
 
 
 def _premultiplied(picture: np.ndarray, alpha: np.ndarray) -> np.ndarray:
