@@ -1,0 +1,71 @@
+"""What a similarity of velocity profiles is, and the similarities by name."""
+
+from abc import abstractmethod
+from typing import ClassVar, TypeVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.typing import ArrayLike
+
+Similarity = TypeVar("Similarity", bound="AbstractSimilarity")
+
+_SIMILARITIES: dict[str, type["AbstractSimilarity"]] = {}
+
+
+class AbstractSimilarity(eqx.Module):
+    """How alike two velocity profiles are; higher is more alike.
+
+    Attributes:
+      name: in the registry.
+      is_log_likelihood: True for a normalized log-likelihood of the observed profile, which
+        evidence and cross-validation need; False for a mere score, good for ranking.
+    """
+
+    name: ClassVar[str]
+    is_log_likelihood: ClassVar[bool]
+
+    def __call__(
+        self, predicted_m_s: ArrayLike, observed_m_s: ArrayLike, mask: ArrayLike
+    ) -> jax.Array:
+        """The similarity `[]`.
+
+        Arguments:
+          predicted_m_s: `[object, 2, frame - 1]`, m/s.
+          observed_m_s: likewise; anything, NaN too, where masked.
+          mask: `[object, frame - 1]`, True where a velocity was measured (both its frames
+            were). What is masked counts for nothing, in the derivative neither.
+        """
+        both = jnp.broadcast_to(jnp.asarray(mask)[:, None, :], jnp.shape(predicted_m_s))
+        # Masked values are replaced before the arithmetic: a NaN times zero stays a NaN.
+        return self._of_measured(
+            jnp.where(both, predicted_m_s, 0.0), jnp.where(both, observed_m_s, 0.0), both
+        )
+
+    @abstractmethod
+    def _of_measured(self, predicted: jax.Array, observed: jax.Array, mask: jax.Array) -> jax.Array:
+        """The similarity; all three `[object, 2, frame - 1]`, zeros where masked."""
+
+
+def register(similarity: type[Similarity]) -> type[Similarity]:
+    """Class decorator: makes the similarity known under its `name`."""
+    if similarity.name in _SIMILARITIES:
+        raise ValueError(f"two similarities are named {similarity.name!r}")
+    _SIMILARITIES[similarity.name] = similarity
+    return similarity
+
+
+def similarity_names() -> tuple[str, ...]:
+    """All names, sorted."""
+    return tuple(sorted(_SIMILARITIES))
+
+
+def similarity_class(name: str) -> type[AbstractSimilarity]:
+    """The similarity of that name.
+
+    Raises:
+      ValueError: nothing is registered under `name`; the message lists what is.
+    """
+    if name not in _SIMILARITIES:
+        raise ValueError(f"unknown similarity {name!r}; known: {', '.join(similarity_names())}")
+    return _SIMILARITIES[name]
