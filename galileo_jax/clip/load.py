@@ -150,8 +150,10 @@ def _first_problem(error: ValidationError) -> tuple[str, str]:
 
 def _key(loc: tuple[int | str, ...]) -> str:
     """('objects', 0, 'size_m', 2) -> 'objects[0].size_m[2]'."""
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc)
-    return " ".join(text.removeprefix(".").split())[:80] or "(top level)"
+    first, *rest = loc or ("(top level)",)
+    text = str(first)
+    text += "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in rest)
+    return " ".join(text.split())[:80]
 
 
 def _problem(error: ErrorDetails) -> str:
@@ -166,7 +168,7 @@ def _problem(error: ErrorDetails) -> str:
         case "missing":
             example = EXAMPLES.get(str(loc[-1]))
             is_in_pair = isinstance(loc[-1], int)
-            return "a second number is missing" if is_in_pair else f"missing; write {example}"
+            return "missing; [x, y] expected" if is_in_pair else f"missing; write {example}"
         case "too_long":
             return f"{found} has too many values; [x, y] expected"
         case "tuple_type":
@@ -182,8 +184,7 @@ def _problem(error: ErrorDetails) -> str:
         case "finite_number":
             return f"{found} is not finite; a number expected"
         case "float_type":
-            hint = "; in yaml write 1.0e+3, not 1e3" if _is_number_text(value) else ""
-            return f"{found} is not a number{hint}"
+            return f"{found} is not a number{_number_hint(value)}"
         case _:
             return f"{found}: {error['msg']}"
 
@@ -198,14 +199,15 @@ def _expected_list(loc: tuple[int | str, ...]) -> str:
             return "[x, y] in pixels"
 
 
-def _is_number_text(value: Any) -> bool:
+def _number_hint(value: Any) -> str:
+    """How to write what is text to yaml, but looks like a number."""
     if not isinstance(value, str):
-        return False
+        return ""
     try:
         float(value)
     except ValueError:
-        return False
-    return True
+        return ""
+    return "; yaml takes 1.0e+3 for a number, not 1e3" if "e" in value else "; leave out the quotes"
 
 
 def _unknown_key(key: Any, model: type[BaseModel]) -> str:

@@ -143,7 +143,9 @@ _REPR.maxlevel, _REPR.maxstring, _REPR.maxother = 3, 60, 60
 
 
 def short(value: Any) -> str:
-    """A value as the user wrote it, cut to 60 characters, on one line."""
+    """A value as it looks in yaml, cut to 60 characters, on one line."""
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
     try:
         text = " ".join(_REPR.repr(value).split())
     except ValueError:  # an integer with more digits than Python prints

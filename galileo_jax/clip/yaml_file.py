@@ -53,5 +53,6 @@ def read_mapping(path: Path) -> dict[str, Any]:
     if value is None:
         raise InputError(f"{path}: empty; the keys video, scenario, fps, objects, ... expected")
     if not isinstance(value, dict):
-        raise InputError(f"{path}: a {type(value).__name__}, not a mapping; 'key: value' expected")
+        found = "a list" if isinstance(value, list) else "a single value"
+        raise InputError(f"{path}: {found}, not a mapping; 'key: value' expected")
     return value

@@ -6,14 +6,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-# OpenCV reads these at its first use; FFmpeg's own lines on stderr would bury ours.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
-
 import cv2
 import numpy as np
 
 from galileo_jax.errors import InputError
+
+# OpenCV's and FFmpeg's own lines on stderr would bury ours; the variables bring them back.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # read when the first video is opened
+if "OPENCV_LOG_LEVEL" not in os.environ:
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
 
 MIN_FRAMES = 4
 """With fewer frames there is no change of speed to see; also tells a picture from a video."""

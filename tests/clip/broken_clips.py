@@ -197,13 +197,14 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "video_and_track": _edit("fps:", "track: clip.csv\nfps:", "video, track", "both given"),
     # types
     "fps_is_text": _edit("fps: 30.0", "fps: fast", "fps", "'fast'", "not a number"),
-    "fps_is_quoted": _edit("fps: 30.0", "fps: '30'", "fps", "'30'", "not a number"),
-    "fps_is_a_bool": _edit("fps: 30.0", "fps: yes", "fps", "True", "not a number"),
-    "fps_is_null": _edit("fps: 30.0", "fps: null", "fps", "None", "not a number"),
+    "fps_is_quoted": _edit("fps: 30.0", "fps: '30'", "fps", "'30'", "leave out the quotes"),
+    "scale_in_odd_notation": _edit("300.0", "3e2", "pixels_per_metre", "'3e2'", "1.0e+3"),
+    "fps_is_a_bool": _edit("fps: 30.0", "fps: yes", "fps", "true", "not a number"),
+    "fps_is_null": _edit("fps: 30.0", "fps: null", "fps", "null", "not a number"),
     "fps_is_nan": _edit("fps: 30.0", "fps: .nan", "fps", "nan", "not finite"),
     "angle_is_infinite": _edit("20.0", ".inf", "ramp_angle_deg", "inf", "not finite"),
     "origin_is_a_number": _edit("[160.0, 150.0]", "160.0", "origin_px", "[x, y]"),
-    "origin_has_one_number": _edit("[160.0, 150.0]", "[160.0]", "origin_px", "second number"),
+    "origin_has_one_number": _edit("[160.0, 150.0]", "[160.0]", "origin_px", "[x, y]"),
     "point_has_three_numbers": _edit(
         "[73.1, 108.8]", "[73.1, 108.8, 0.0]", "objects[0].point_px", "too many"
     ),
