@@ -117,16 +117,20 @@ class Motion:
 
     def events_s(self, truth: Truth) -> dict[str, float | None]:
         """When object 1's centre turns at the foot and when it meets object 2; None = never."""
-        where = truth.surroundings
         x = self.position_m[:, 0]
-        past_foot = np.flatnonzero(x[0] >= where.corner_m[0])
         # The bumpers give way by a fraction of a millimetre: moved says hit more surely.
-        moved = np.flatnonzero(x[1] - x[1, 0] > 1e-5)
-        found = {"foot": past_foot, "hit": moved}
         return {
-            event: round(float(self.times_s[index[0]]), 4) if index.size else None
-            for event, index in found.items()
+            "foot": self._first_s(x[0] - truth.surroundings.corner_m[0]),
+            "hit": self._first_s(x[1] - x[1, 0] - 1e-5),
         }
+
+    def _first_s(self, value: np.ndarray) -> float | None:
+        """When `value` `[time]`, negative at first, reaches zero."""
+        reached = np.flatnonzero(value >= 0)
+        if not reached.size:
+            return None
+        pair = slice(reached[0] - 1, reached[0] + 1)
+        return round(float(np.interp(0.0, value[pair], self.times_s[pair])), 4)
 
 
 def draw_truth(

@@ -1,5 +1,6 @@
 """The oracle itself is checked by conservation laws and a brute-force integration."""
 
+from dataclasses import replace
 from math import cos, radians, sin, tan
 
 import numpy as np
@@ -91,4 +92,4 @@ def test_boxes_never_overlap():
 def test_object_2_on_the_foot_is_refused():
     given = experiment("parts")
     with pytest.raises(ValueError, match="on the foot"):
-        solve(Experiment(**(vars(given) | {"object2_x_m": 0.065})), np.zeros(1))
+        solve(replace(given, object2_x_m=0.065), np.zeros(1))
