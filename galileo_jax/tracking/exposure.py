@@ -6,10 +6,12 @@ from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refine import FINE_PX, align
 from galileo_jax.tracking.template import Template
 
-SHARES = np.arange(0.0, 1.01, 0.1)
+SHARES = np.linspace(0.0, 1.0, 6)
 MIN_SPEED_PX = 3.0
 """Slower than this per frame, the smear is too short to measure."""
 FIRST_GUESS = 0.25
+MAX_FRAMES = 24
+"""After so many moving frames the share is known to some percent; more would only take time."""
 
 
 def own_motion(velocity: np.ndarray, angle_rad: float) -> np.ndarray:
@@ -22,11 +24,12 @@ class Exposure:
 
     def __init__(self) -> None:
         self.misfit = np.zeros(len(SHARES))
+        self.frames = 0
 
     @property
     def share(self) -> float:
         """The share with the least misfit, interpolated by a parabola."""
-        if not self.misfit.any():
+        if not self.frames:
             return FIRST_GUESS
         i = int(np.clip(np.argmin(self.misfit), 1, len(SHARES) - 2))
         low, middle, high = self.misfit[i - 1 : i + 2]
@@ -38,9 +41,10 @@ class Exposure:
         self, image: np.ndarray, template: Template, pose: np.ndarray, velocity: np.ndarray
     ) -> None:
         """Counts one frame in, where the object stands at `pose` and moves by `velocity`."""
-        if np.hypot(*velocity[:2]) < MIN_SPEED_PX:
+        if np.hypot(*velocity[:2]) < MIN_SPEED_PX or self.frames >= MAX_FRAMES:
             return
+        self.frames += 1
         motion = own_motion(velocity, pose[2])
         for i, share in enumerate(SHARES):
-            fit = align(image, template.target(share * motion, FINE_PX), pose, steps=2)
+            fit = align(image, template.target(share * motion, FINE_PX), pose, steps=1)
             self.misfit[i] += 1 - fit.correlation**2

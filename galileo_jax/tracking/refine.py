@@ -18,8 +18,8 @@ import numpy as np
 
 from galileo_jax.tracking.pose import compose, on_sampling_grid, patch_at, rotation
 
-HUBER = 2.0
-"""Residuals beyond this many noise sigmas weigh less (Huber)."""
+HUBER, REJECT = 2.0, 5.0
+"""Residuals beyond this many noise sigmas weigh less (Huber), or nothing (a hand)."""
 FINE_PX, COARSE_PX = 0.8, 3.0
 """Widths of the Gaussian smoothing of image and template. Fine: keeps the interpolation
 error small; coarse: reaches 5 px and 10 degrees."""
@@ -88,7 +88,8 @@ def align(
         residual = seen - jacobian @ solution
         noise = 1.4826 * np.median(np.abs(residual)) + 1e-6
         if robust:
-            weight = np.minimum(1.0, HUBER * noise / np.maximum(np.abs(residual), 1e-9))
+            size = np.maximum(np.abs(residual), 1e-9)
+            weight = np.minimum(1.0, HUBER * noise / size) * (size < REJECT * noise)
         # seen(x) = gain T(x + move) + offset: the pose has to follow by `move`, and the
         # gradient columns carry the gain.
         gain = solution[3] if abs(solution[3]) > 0.1 else np.copysign(0.1, solution[3] or 1.0)

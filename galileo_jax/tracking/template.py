@@ -11,6 +11,12 @@ from galileo_jax.tracking.refine import Target
 CORE_SHARE = 0.88
 """Only this share of the declared size is compared: the rim shows background when the scale
 is a few percent off, and is what another object touches."""
+RIM_SHARE = 1.4
+"""An object without texture of its own is compared up to this share of its size instead: its
+edge against what is behind it."""
+PLAIN = 2.0e3
+"""Texture (see `texture_of`) below which an object counts as without: with a noise of five grey
+levels its place would be known to 0.1 px only."""
 WINDOW_PX = 21
 """Side of the region when the size is unknown: the object and some of what is around it."""
 MIN_REGION_SHARE = 0.3
@@ -53,17 +59,29 @@ class Template:
 
 def template_at(image: np.ndarray, point_px: np.ndarray, outline: Outline) -> Template:
     """The template of the object at `point_px` in the grey `image`."""
-    region = region_of(outline)
-    pose = np.array([*point_px, 0.0])
-    return Template(patch_at(image, pose, (region.shape[0] - 1) // 2), region)
-
-
-def region_of(outline: Outline) -> np.ndarray:
-    """The compared pixels of an object, `[size, size]` (bool), size odd."""
     if outline.size_px is None:
-        half = np.array([WINDOW_PX, WINDOW_PX]) / 2
-    else:
-        half = np.array(outline.size_px) * CORE_SHARE / 2
+        outline = Outline((WINDOW_PX, WINDOW_PX), outline.angle_rad)
+        return _cut(image, point_px, region_of(outline, 1.0))
+    core = _cut(image, point_px, region_of(outline, CORE_SHARE))
+    if texture_of(core) >= PLAIN:
+        return core
+    return _cut(image, point_px, region_of(outline, RIM_SHARE))
+
+
+def texture_of(template: Template) -> float:
+    """The smaller eigenvalue of the summed structure tensor, grey levels^2 (Shi, Tomasi 1994).
+
+    The variance of the place is the noise's variance divided by it.
+    """
+    target = Target(template.image, template.region, 0.8)
+    gradients = target.jacobian[:, :2]
+    return float(np.linalg.eigvalsh(gradients.T @ gradients)[0])
+
+
+def region_of(outline: Outline, share: float) -> np.ndarray:
+    """The pixels within `share` of an object's outline, `[size, size]` (bool), size odd."""
+    assert outline.size_px is not None
+    half = np.array(outline.size_px) * share / 2
     radius = int(np.ceil(np.hypot(*half))) + 2
     grid = np.arange(-radius, radius + 1, dtype=float)
     x, y = np.meshgrid(grid, grid)
@@ -71,6 +89,10 @@ def region_of(outline: Outline) -> np.ndarray:
     if outline.is_round:
         return np.hypot(own[..., 0] / half[0], own[..., 1] / half[1]) <= 1
     return (np.abs(own[..., 0]) <= half[0]) & (np.abs(own[..., 1]) <= half[1])
+
+
+def _cut(image: np.ndarray, point_px: np.ndarray, region: np.ndarray) -> Template:
+    return Template(patch_at(image, np.array([*point_px, 0.0]), region.shape[0] // 2), region)
 
 
 def median_template(patches: list[np.ndarray], region: np.ndarray) -> Template:

@@ -1,0 +1,147 @@
+"""How well clips with known truth are tracked: `python benchmarks/tracking.py FOLDER`.
+
+For every clip and object of FOLDER (NAME.yaml with NAME.truth.json): RMS distance from the
+truth in pixels, absolute and after taking out a constant offset; the normalised squared error
+(1 is honest, above is too narrow); the correlation of neighbouring frames' errors while the
+object moves; the share of frames in which it is visible, and lost (invisible though no hand is
+near). The followed point is the declared one, or the centre without it (`--find`).
+The last line is JSON.
+"""
+
+import argparse
+import dataclasses
+import json
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax import command
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.schema import Clip
+from galileo_jax.errors import InputError
+from galileo_jax.tracking import track_clip
+from galileo_jax.tracking.track import Track
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """One object of one clip; px, except `nse`, the shares, and `seconds` (of the clip)."""
+
+    clip: str
+    object: str
+    rms: float
+    rms_shifted: float
+    worst: float
+    nse: float
+    correlation: float
+    visible: float
+    lost: int
+    seconds: float
+
+
+def true_points(clip: Clip, truth: dict, index: int) -> np.ndarray:
+    """Where the followed point truly is, `[frame, 2]` px: rigid with the object's centre."""
+    path = truth["trajectory"][f"object{index + 1}"]
+    world = np.stack([path["y"], path["z"], np.ones(len(path["y"]))])
+    image = np.array(truth["world_to_image"]) @ world
+    centre = (image[:2] / image[2]).T
+    point = clip.objects[index].point_px
+    if point is None:
+        return centre
+    x, y = np.array(point) - centre[0]
+    turn = -(np.array(path["pitch"]) - path["pitch"][0])  # the image's y points down
+    c, s = np.cos(turn), np.sin(turn)
+    return centre + np.stack([c * x - s * y, s * x + c * y], axis=1)
+
+
+def hand_is_near(truth: dict, frames: int) -> np.ndarray:
+    """`[frame]`: the hand may cover object 1; it leaves within ten frames."""
+    hand = truth.get("hand")
+    return np.arange(frames) < (hand["leave"] + 10 if hand else 0)
+
+
+def rows_of(clip: Clip, truth: dict, track: Track, seconds: float) -> list[Row]:
+    rows = []
+    for index, name in enumerate(track.names):
+        expected = true_points(clip, truth, index)[: len(track.times_s)]
+        error = track.position_px[index, : len(expected)] - expected
+        seen = track.is_visible[index, : len(expected)]
+        hidden = hand_is_near(truth, len(expected)) if index == 0 else np.zeros_like(seen)
+        error, covariance = error[seen], track.covariance_px2[index, : len(expected)][seen]
+        step = np.linalg.norm(np.gradient(expected, axis=0), axis=1)[seen]
+        shifted = error - error.mean(axis=0)
+        squares = np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error) / 2
+        moving = (error - np.median(error, axis=0))[step > 0.5]
+        pairs = (moving[1:] * moving[:-1]).sum() / max((moving**2).sum(), 1e-12)
+        rows.append(
+            Row(
+                clip.path.stem,
+                name,
+                float(np.sqrt((error**2).sum(axis=1).mean())),
+                float(np.sqrt((shifted**2).sum(axis=1).mean())),
+                float(np.abs(error).max()),
+                float(squares.mean()),
+                float(pairs) if len(moving) > 4 else float("nan"),
+                float(seen.mean()),
+                int((~seen & ~hidden).sum()),
+                seconds,
+            )
+        )
+    return rows
+
+
+def main(argv: list[str]) -> int | None:
+    parser = command.Parser(prog="tracking.py", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--find", action="store_true", help="leave out the declared points")
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    arguments = parser.parse_args(argv)
+    paths = sorted(arguments.folder.glob("*.truth.json"))
+    if not paths:
+        raise InputError(f"{arguments.folder}: no *.truth.json there")
+    rows: list[Row] = []
+    failures: dict[str, str] = {}
+    fields = [field.name for field in dataclasses.fields(Row)]
+    print(f"{fields[0]:<30}" + "".join(f"{field:>12}" for field in fields[1:]))
+    for path in paths:
+        name = path.name.removesuffix(".truth.json")
+        clip = load_clip(path.with_name(f"{name}.yaml"))
+        if arguments.find:
+            blind = [item.model_copy(update={"point_px": None}) for item in clip.objects]
+            clip = clip.model_copy(update={"objects": tuple(blind)})
+        began = time.process_time()
+        try:
+            track = track_clip(clip)
+        except InputError as error:
+            failures[name] = str(error)
+            print(f"{name:<30}  {error}")
+            continue
+        seconds = time.process_time() - began
+        new = rows_of(clip, json.loads(path.read_text()), track, seconds)
+        rows += new
+        for row in new:
+            values = [f"{v:.3f}" if isinstance(v, float) else str(v) for v in vars(row).values()]
+            print(f"{values[0]:<30}" + "".join(f"{v:>12}" for v in values[1:]), flush=True)
+    rms, nse = np.array([r.rms for r in rows]), np.array([r.nse for r in rows])
+    summary = {
+        "benchmark": "tracking",
+        "clips": len(paths),
+        "failures": failures,
+        "rms_px_median": float(np.median(rms)),
+        "rms_px_worst": float(rms.max()),
+        "rms_shifted_px_median": float(np.median([r.rms_shifted for r in rows])),
+        "nse_median": float(np.median(nse)),
+        "nse_mean": float(nse.mean()),
+        "nse_within_half_to_two": float(np.mean((nse >= 0.5) & (nse <= 2))),
+        "correlation_median": float(np.nanmedian([r.correlation for r in rows])),
+        "lost_frames": sum(r.lost for r in rows),
+        "cpu_seconds_worst": max(r.seconds for r in rows),
+    }
+    print(json.dumps(summary))
+    return None
+
+
+if __name__ == "__main__":
+    raise SystemExit(command.run(main, sys.argv[1:]))
