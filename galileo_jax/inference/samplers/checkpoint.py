@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, TypeVar
+from zipfile import BadZipFile
 
 import jax
 import numpy as np
@@ -59,13 +60,13 @@ def load(path: Path, digest: str, like: Carry) -> tuple[Carry, History]:
       InputError: the file is damaged, or belongs to another key, start, sampler or clip.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            content = dict(file)
+        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            content = dict(arrays)
         found = str(content["fingerprint"])
         history = History(*(content[name] for name in History._fields))
         num_leaves = len(jax.tree.leaves(like))
         leaves = [jax.numpy.asarray(content[f"carry{i}"]) for i in range(num_leaves)]
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise InputError(f"{path}: not a checkpoint; delete it to start anew") from error
     if found != digest:
         raise InputError(

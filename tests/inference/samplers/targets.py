@@ -1,0 +1,43 @@
+"""Densities whose moments are known."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.inference.samplers import LogDensity
+
+
+class Target(NamedTuple):
+    log_density: LogDensity
+    mean: np.ndarray
+    covariance: np.ndarray
+
+
+def gaussian(dim: int = 4) -> Target:
+    """Correlated, with standard deviations from 0.1 to 1."""
+    root = np.random.default_rng(0).normal(size=(dim, dim))
+    correlated = root @ root.T / dim + 0.3 * np.eye(dim)
+    scale = np.diag(np.geomspace(0.1, 1.0, dim))
+    covariance = scale @ correlated @ scale
+    mean = np.linspace(-1.0, 1.0, dim)
+    precision = np.linalg.inv(covariance).astype(np.float32)
+
+    def log_density(z):
+        return -0.5 * (z - mean) @ precision @ (z - mean)
+
+    return Target(log_density, mean.astype(np.float32), covariance.astype(np.float32))
+
+
+def gumbel_and_logistic() -> Target:
+    """Two independent skew or heavy-tailed coordinates: neither Gaussian nor symmetric."""
+
+    def log_density(z):
+        gumbel = -z[0] - jnp.exp(-z[0])
+        logistic = -z[1] - 2 * jax.nn.softplus(-z[1])
+        return gumbel + logistic
+
+    mean = np.array([0.5772157, 0.0], np.float32)
+    covariance = np.diag([np.pi**2 / 6, np.pi**2 / 3]).astype(np.float32)
+    return Target(log_density, mean, covariance)
