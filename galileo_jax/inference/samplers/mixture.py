@@ -32,9 +32,12 @@ class Mixture(AbstractTunedSampler):
 
     Both leave the density invariant, so their mixture does. Where a Laplace fit is good the
     first makes nearly independent draws; where it is not, the second is the random walk
-    that always works. The heavy tail keeps p / t bounded where p's tails are wider than
-    the Gaussian's. Measured in eight dimensions, mean and covariance known: 0.2 to 0.5
-    effective draws per evaluation against 0.03 to 0.04 of the random walk.
+    that always works. The tail, heavier than the Gaussian's, lets chains leave where p's is.
+
+    Measured in eight dimensions (Gaussian, banana, log-scale, cut-off Gaussian) after the
+    warm-up: 0.22 to 0.33 effective draws of the worst coordinate per evaluation, the random
+    walk 0.02 to 0.03. To R-hat < 1.01 with eight chains, warm-up included: 4,100 to 6,400
+    evaluations against 33,000 to 44,000.
 
     Source: Tierney, Markov chains for exploring posterior distributions, Ann. Statist. 22
     (1994), sections 2.3 and 2.4, 10.1214/aos/1176325750.
