@@ -44,6 +44,7 @@ class Surroundings:
       start_m: `[object, 2]`, the centres at the release.
       release_s: when the release was, after the first frame: expected, and its standard
         deviation.
+      is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
     """
 
     names: tuple[str, ...]
@@ -54,6 +55,7 @@ class Surroundings:
     corner_m: tuple[float, ...]
     start_m: tuple[tuple[float, float], ...]
     release_s: tuple[float, float] = (0.0, 0.01)
+    is_scale_known: bool = True
 
     def mass(self, theta: Theta) -> list[Array]:
         """The objects' masses, kg, each `[...]`."""
@@ -84,3 +86,7 @@ class Effect:
     def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
         """Maps the clip's time to the time since the release, s: `[frame]` to `[frame]`."""
         return time_s
+
+    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
+        """Maps true centres to measured ones, `[object, 2, frame]`, m (scale, camera)."""
+        return position_m

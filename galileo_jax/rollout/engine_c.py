@@ -86,9 +86,9 @@ class EngineC:
         mass, inertia = batch.expand("body_mass"), batch.expand("body_inertia")
         friction, solref = batch.expand("pair_friction"), batch.expand("pair_solref")
         mass[:, 1:] = fields.mass
-        inertia[:, 1:] = compiled.body_inertia[1:] * (
-            fields.mass / compiled.body_mass[1:]
-        )[..., None]
+        inertia[:, 1:] = (
+            compiled.body_inertia[1:] * (fields.mass / compiled.body_mass[1:])[..., None]
+        )
         for i in range(compiled.npair):
             name = compiled.pair(i).name
             if name == "object1_object2":

@@ -85,7 +85,9 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         if not seen.size:
             raise InputError(f"{clip.path}: {name} is not seen in any frame")
         x, y = observation.position_m[i, :, seen[0]]
-        if i == 0:
+        if not has_table:
+            starts.append((float(x), float(y)))
+        elif i == 0:
             along = x * math.cos(angle) - y * math.sin(angle)
             starts.append(_on_ramp(along, height, angle))
         else:
@@ -99,8 +101,33 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         half_height_m=tuple(height for _, height in half),
         corner_m=corner,
         start_m=tuple(starts),
+        release_s=_release(clip, observation, angle),
+        is_scale_known=clip.pixels_per_metre is not None or clip.video is None,
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
+
+
+def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float, float]:
+    """When object 1 is let go: expected, and its standard deviation, s.
+
+    On a ramp clip it is the first frame, within a third of a frame. On an incline clip it is
+    where the motion begins: from rest the distance grows as (t - release)^2, so that its root
+    is a straight line which meets zero at the release.
+    """
+    frame_s = 1.0 / clip.fps
+    if clip.scenario != "incline":
+        return clip.objects[0].first_frame * frame_s, frame_s / 3
+    seen = np.flatnonzero(observation.mask[0])
+    times, place = observation.times_s[seen], observation.position_m[0][:, seen]
+    gone = (place[0] - place[0, 0]) * math.cos(angle) - (place[1] - place[1, 0]) * math.sin(angle)
+    moving = gone > 0.05 * gone.max()
+    if gone.max() <= 0 or moving.sum() < 3:
+        return float(times[0]), frame_s
+    slope, intercept = np.polyfit(times[moving], np.sqrt(gone[moving]), 1)
+    if slope <= 0:
+        return float(times[0]), frame_s
+    release = float(np.clip(-intercept / slope, times[0], times[-1]))
+    return release, max(3 * frame_s, 0.05)
 
 
 def _on_ramp(along: float, height: float, angle: float) -> tuple[float, float]:
@@ -118,6 +145,11 @@ def compile_scene(
     spec = mujoco.MjSpec.from_file(str(scene_path("ramp.xml")))
     spec.option.gravity = [0, 0, -surroundings.gravity]
     has_table = math.isfinite(surroundings.corner_m[0])
+    if not has_table:
+        # The board is where the object is seen to stand, whatever its height.
+        (x, y), height = surroundings.start_m[0], surroundings.half_height_m[0]
+        sin, cos = math.sin(surroundings.angle_rad), math.cos(surroundings.angle_rad)
+        spec.geom("ramp").pos = [x - height * sin, 0, y - height * cos]
     spec.geom("ramp").alt.euler = [0, math.degrees(surroundings.angle_rad), 0]
     for i, name in enumerate(("object1", "object2")):
         if i >= len(surroundings.names):

@@ -33,11 +33,11 @@ class Whitening(NamedTuple):
       num_values: how many numbers were measured.
     """
 
-    observed_m: jax.Array
-    inverse_root: jax.Array
-    basis: jax.Array
-    gain: jax.Array
-    num_values: jax.Array
+    observed_m: np.ndarray
+    inverse_root: np.ndarray
+    basis: np.ndarray
+    gain: np.ndarray
+    num_values: np.float64
 
 
 class GaussianLikelihood:
@@ -60,11 +60,11 @@ class GaussianLikelihood:
         flat = patterns.reshape(len(patterns), -1)
         _, gain, basis = np.linalg.svd(flat, full_matrices=False)
         return Whitening(
-            jnp.asarray(np.where(mask[:, None], observation.position_m, 0.0)),
-            jnp.asarray(inverse_root),
-            jnp.asarray(basis.reshape(patterns.shape)),
-            jnp.asarray(gain),
-            jnp.asarray(float(2 * mask.sum())),
+            np.where(mask[:, None], observation.position_m, 0.0),
+            inverse_root,
+            basis.reshape(patterns.shape),
+            gain,
+            np.float64(2 * mask.sum()),
         )
 
     @staticmethod
@@ -76,10 +76,8 @@ class GaussianLikelihood:
         return (y - jnp.einsum("moit,m->oit", data.basis, shrink * amplitude)) / noise_scale
 
     @staticmethod
-    def log_density(
-        predicted_m: jax.Array, noise_scale: jax.Array, data: Whitening
-    ) -> jax.Array:
-        """log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
+    def log_density(predicted_m: jax.Array, noise_scale: jax.Array, data: Whitening) -> jax.Array:
+        """Log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
         white = GaussianLikelihood.whiten(data.observed_m - predicted_m, noise_scale, data)
         log_determinant = data.num_values * jnp.log(noise_scale**2) + jnp.sum(
             jnp.log1p((data.gain / noise_scale) ** 2)

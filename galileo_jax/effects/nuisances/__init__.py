@@ -5,7 +5,15 @@ They are effects like any other; only their parameters' role differs (DESIGN.md 
 
 from galileo_jax.effects.effect import Effect
 from galileo_jax.effects.nuisances.foot_transition import FootTransition
+from galileo_jax.effects.nuisances.impact_restitution import ImpactRestitution
+from galileo_jax.effects.nuisances.pixel_scale import PixelScale
 from galileo_jax.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.effects.nuisances.start_offset import StartOffset
 
-NUISANCES: tuple[Effect, ...] = (StartOffset(), FootTransition(), ReleaseInstant())
+NUISANCES: tuple[Effect, ...] = (
+    StartOffset(),
+    FootTransition(),
+    ImpactRestitution(),
+    ReleaseInstant(),
+    PixelScale(),
+)

@@ -14,9 +14,7 @@ class ReleaseInstant(Effect):
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The instant of the release after the first frame, s."""
         return (
-            Parameter(
-                "release_instant", "s", Normal(*scene.release_s), 0.0, "nuisance", step=None
-            ),
+            Parameter("release_instant", "s", Normal(*scene.release_s), 0.0, "nuisance", step=None),
         )
 
     def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:

@@ -33,7 +33,9 @@ class StartOffset(Effect):
             return position_m
         xp = position_m.__array_namespace__()
         offset = xp.stack([theta[f"start_offset_{name}"] for name in scene.names], axis=-1)
-        on_ramp = xp.asarray([x < c for (x, _), c in zip(scene.start_m, scene.corner_m, strict=True)])
+        on_ramp = xp.asarray(
+            [x < c for (x, _), c in zip(scene.start_m, scene.corner_m, strict=True)]
+        )
         angle = xp.where(on_ramp, scene.angle_rad, 0.0)
         direction = xp.stack([xp.cos(angle), -xp.sin(angle)], axis=-1)
         return position_m + offset[..., None] * direction
