@@ -111,7 +111,7 @@ def render_clip(
     """Writes the clip to `path` (mp4, MPEG-4 part 2), whole or not at all.
 
     `on_frame` is called after each frame (a progress bar). The codec moves what it shows by
-    0.02 to 0.03 px RMS; a file of MJPEG would be four times as large.
+    0.01 to 0.02 px RMS; a file of MJPEG would be four times as large.
 
     Returns:
       `[object, frame]`, the share of each object that the hand hides, 0 to 1.

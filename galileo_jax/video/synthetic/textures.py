@@ -47,7 +47,7 @@ def body_texture(body: Body, texels_per_metre: float, rng: np.random.Generator) 
     picture = np.empty((height, width, 3), np.float32)
     picture[:] = ground
     short_side = min(width, height)
-    for size in np.geomspace(0.30, 0.07, 70) * short_side:
+    for size in np.geomspace(0.50, 0.10, 40) * short_side:
         centre = rng.uniform((0, 0), (width, height))
         colour = _colour(rng, saturation=(0.2, 0.9), value=(0.1, 1.0))
         turn = rng.uniform(0, 2 * np.pi)

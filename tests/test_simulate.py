@@ -1,0 +1,148 @@
+import json
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from galileo_jax import command, simulate
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.truth import SLOWEST_HIT_M_S, Truth, draw_truth, roll_out
+from tests.reference_ramp import Experiment, Solution, solve
+
+# MuJoCo's contact takes a few milliseconds at the foot and in the impact; a point takes none.
+SHAPE_OF_CONTACT_M = 0.006
+SHAPE_OF_CONTACT_S = 0.010
+
+# What readers of truth files (../shared/data, benchmarks) rely on.
+TRUTH_KEYS = {"name", "engine", "effect", "effect_parameters", "m1", "k1", "m2", "k2", "gravity"}
+TRUTH_KEYS |= {"ramp_angle_deg_true", "ramp_angle_deg_declared", "release_m", "object2_y_m"}
+TRUTH_KEYS |= {"size1_m", "size2_m", "events_s", "trajectory", "frames", "fps_true"}
+TRUTH_KEYS |= {"fps_declared", "pixels_per_metre_true", "pixels_per_metre_declared"}
+TRUTH_KEYS |= {"world_to_image", "image_px", "noise_grey_levels", "flicker", "exposure_s", "hand"}
+
+
+def reference(truth: Truth, times_s: np.ndarray) -> Solution:
+    (size1, size2) = ((item.size_m[0], item.size_m[2]) for item in truth.objects if item.size_m)
+    experiment = Experiment(
+        truth.mass_kg,
+        truth.friction,
+        truth.angle_rad,
+        (size1, size2),
+        truth.release_m,
+        truth.object2_x_m,
+        truth.gravity,
+    )
+    return solve(experiment, times_s)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_motion_is_that_of_points_with_friction(seed):
+    truth = draw_truth(np.random.default_rng(seed), (10.0, 20.0)[seed % 2], {})
+    motion = roll_out(truth)
+    exact = reference(truth, motion.times_s)
+    assert truth.hit_speed_m_s > SLOWEST_HIT_M_S
+    assert motion.position_m == pytest.approx(exact.position_m, abs=SHAPE_OF_CONTACT_M)
+    events = motion.events_s(truth)
+    assert events["foot"] == pytest.approx(exact.foot_s, abs=SHAPE_OF_CONTACT_S)
+    assert events["hit"] == pytest.approx(exact.hit_s, abs=SHAPE_OF_CONTACT_S)
+
+
+def test_hit_speed_is_the_closed_form():
+    truth = draw_truth(np.random.default_rng(3), 20.0, {})
+    hit_s = reference(truth, np.zeros(1)).hit_s
+    assert hit_s is not None
+    before = reference(truth, np.array([hit_s - 1e-9])).velocity_m_s[0, 0, 0]
+    assert truth.hit_speed_m_s == pytest.approx(before, abs=1e-6)
+    assert replace(truth, friction=(0.5, 0.1)).hit_speed_m_s == 0
+
+
+def test_given_values_are_kept_even_if_nothing_moves():
+    given = {"m1": 0.2, "k1": 0.5, "m2": 0.4, "k2": 0.3}
+    truth = draw_truth(np.random.default_rng(0), 10.0, given)
+    assert (truth.mass_kg, truth.friction) == ((0.2, 0.4), (0.5, 0.3))
+    motion = roll_out(truth)
+    assert motion.events_s(truth) == {"foot": None, "hit": None}
+    assert motion.rest_s < 0.1
+
+
+@pytest.mark.video
+def test_clip_loads_and_its_truth_is_complete(tmp_path):
+    call = ["--seed", "3", "--size", "320x180", "--seconds", "1", "--hand", "--keystone"]
+    path = tmp_path / "new" / "clip.mp4"
+    assert command.run(simulate.main, [*call, "--out", str(path)]) == 0
+    assert {item.name for item in path.parent.iterdir()} == {
+        "clip.mp4",
+        "clip.yaml",
+        "clip.truth.json",
+    }
+    clip = load_clip(path)
+    truth = json.loads(path.with_suffix(".truth.json").read_text())
+    assert (clip.frame_count, clip.frame_size_px) == (30, (320, 180))
+    assert clip.warnings == ()
+    assert truth["hand"]["leave"] >= 1
+    assert truth["covered"]["object1"][-1] == 0
+    for declared in clip.objects:
+        start = truth["trajectory"][declared.name]
+        x, y, w = truth["world_to_image"] @ np.array([start["y"][0], start["z"][0], 1.0])
+        assert declared.point_px == pytest.approx((x / w, y / w), abs=0.051)
+    assert TRUTH_KEYS <= truth.keys()
+    assert truth["trajectory"].keys() == {"t", "object1", "object2"}
+    assert truth["trajectory"]["object1"].keys() == {"y", "z", "pitch", "vy", "vz"}
+
+
+@pytest.mark.video
+def test_same_seed_same_clip(tmp_path):
+    clips = []
+    for name, seed in (("a", "5"), ("b", "5"), ("c", "6")):
+        call = ["--seed", seed, "--size", "160x90", "--seconds", "0.3", "--no-points"]
+        path = tmp_path / name / "clip.mp4"
+        assert command.run(simulate.main, [*call, "--out", str(path)]) == 0
+        video = cv2.VideoCapture(str(path))
+        frames = [frame for ok, frame in iter(video.read, (False, None)) if ok]
+        truth = path.with_suffix(".truth.json").read_text()
+        clips.append((np.array(frames), truth))
+        assert load_clip(path).objects[0].point_px is None
+    assert np.array_equal(clips[0][0], clips[1][0])
+    assert clips[0][1] == clips[1][1]
+    assert not np.array_equal(clips[0][0], clips[2][0])
+    assert clips[0][1] != clips[2][1]
+
+
+def test_track_has_the_declared_noise(tmp_path):
+    path = tmp_path / "clip.csv"
+    call = ["--track-only", "--seconds", "3", "--fps", "60", "--track-noise", "0.001"]
+    assert command.run(simulate.main, [*call, "--out", str(path)]) == 0
+    assert load_clip(path).frame_count == 180
+    observed = read_observation_csv(path)
+    truth = json.loads(path.with_suffix(".truth.json").read_text())["trajectory"]
+    exact = [[truth[name]["y"], truth[name]["z"]] for name in observed.names]
+    assert (observed.position_m - exact).std() == pytest.approx(0.001, rel=0.15)
+    assert observed.covariance_m2[:, 0, 0] == pytest.approx(1e-6)
+
+
+@pytest.mark.parametrize(
+    ("call", "complaint"),
+    [
+        ([], "--out"),
+        (["--out", "clip.avi"], "clip.avi does not end in .mp4"),
+        (["--out", "clip.mp4", "--track-only"], "clip.mp4 does not end in .csv"),
+        (["--out", "clip.mp4", "--angle", "95"], "'95' is no number in [1, 60]"),
+        (["--out", "clip.mp4", "--m1", "0"], "'0' is no number in [0.01, 100]"),
+        (["--out", "clip.mp4", "--k1", "nan"], "'nan' is no number"),
+        (["--out", "clip.mp4", "--seed", "-1"], "'-1' is no whole number at least 0"),
+        (["--out", "clip.mp4", "--size", "640"], "'640' is no size"),
+        (["--out", "clip.mp4", "--size", "641x360"], "even numbers"),
+        (["--out", "clip.mp4", "--scenario", "rmap"], "rmap"),
+        (["--out", "/proc/none/clip.mp4"], "/proc/none/clip.mp4"),
+    ],
+)
+def test_wrong_calls_are_one_line_and_leave_nothing(call, complaint, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert command.run(simulate.main, call) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert complaint in err
+    assert list(tmp_path.iterdir()) == []
