@@ -9,7 +9,9 @@ from galileo_jax.tracking.template import Template
 SHARES = np.linspace(0.0, 1.0, 6)
 MIN_SPEED_PX = 3.0
 """Slower than this per frame, the smear is too short to measure."""
-FIRST_GUESS = 0.25
+UNLEARNT = (0.0, 0.25, 0.5)
+"""Shares that are tried one after the other while fewer than `LEARNT_FRAMES` frames count."""
+LEARNT_FRAMES = 3
 MAX_FRAMES = 24
 """After so many moving frames the share is known to some percent; more would only take time."""
 
@@ -28,14 +30,19 @@ class Exposure:
 
     @property
     def share(self) -> float:
-        """The share with the least misfit, interpolated by a parabola."""
+        """The share with the least misfit, interpolated by a parabola; 0.25 unlearnt."""
         if not self.frames:
-            return FIRST_GUESS
+            return UNLEARNT[1]
         i = int(np.clip(np.argmin(self.misfit), 1, len(SHARES) - 2))
         low, middle, high = self.misfit[i - 1 : i + 2]
         bend = low - 2 * middle + high
         offset = 0.5 * (low - high) / bend if bend > 0 else np.sign(low - high)
         return float(np.clip(SHARES[i] + offset * (SHARES[1] - SHARES[0]), 0, 1))
+
+    @property
+    def trials(self) -> tuple[float, ...]:
+        """The shares worth trying."""
+        return UNLEARNT if self.frames < LEARNT_FRAMES else (self.share,)
 
     def add(
         self, image: np.ndarray, template: Template, pose: np.ndarray, velocity: np.ndarray
@@ -46,5 +53,5 @@ class Exposure:
         self.frames += 1
         motion = own_motion(velocity, pose[2])
         for i, share in enumerate(SHARES):
-            fit = align(image, template.target(share * motion, FINE_PX), pose, steps=1)
+            fit = align(image, template.target(share * motion, FINE_PX), pose, steps=3)
             self.misfit[i] += 1 - fit.correlation**2

@@ -6,17 +6,28 @@ import numpy as np
 
 from galileo_jax.tracking.exposure import Exposure, own_motion
 from galileo_jax.tracking.lucas_kanade import follow
-from galileo_jax.tracking.pose import patch_at
+from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.refine import Fit
 from galileo_jax.tracking.rigid import rigid_motion
-from galileo_jax.tracking.search import SURE, best_fit, candidate_poses
-from galileo_jax.tracking.template import Template
+from galileo_jax.tracking.search import SURE, best_fit, candidate_poses, is_alike
+from galileo_jax.tracking.template import Template, median_template
 
-FOUND = 0.6
-"""Least correlation with the template for an object to count as found."""
+FOUND, FOUND_AGAIN = 0.75, 0.85
+"""Least correlation with the template for an object to count as found: near where it was
+expected, or by a wide search."""
+REACH_SHARE = 0.2
+"""Share of the frame's width searched to each side of where an object was lost: a thrown ball
+moves that far within a frame."""
+WORSE = 0.1
+"""A fit that correlates this much less than the one before is worth a wide search."""
+MAX_TURN_RAD = 0.7
+"""An object does not turn further between two frames in which it is seen."""
 SHARP_PX = 1.0
 """An object that moves less than this during the exposure gives a patch for the template."""
 MAX_PATCHES = 32
+RENEWALS = frozenset(8 * 2**i for i in range(32))
+"""Numbers of sharp frames after which the template becomes the median of the patches so far:
+without noise, without the hand, and in time without what was behind the object."""
 
 
 @dataclass
@@ -24,7 +35,7 @@ class Follower:
     """Follows one object from frame to frame; `poses` grows by one entry per frame.
 
     Attributes:
-      template: from the first frame, hand and noise included.
+      template: from the first frame at first, hand and noise included.
       pose: the last one found.
       velocity: change of the pose per frame, extrapolated to the last one.
       poses: pose of every frame so far, NaN where not found.
@@ -38,6 +49,7 @@ class Follower:
     mean_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     poses: list[np.ndarray] = field(default_factory=list)
     patches: list[np.ndarray] = field(default_factory=list)
+    correlation: float = 1.0
     frames_missed: int = 0
     stride: int = 1
     frames_sharp: int = 0
@@ -45,45 +57,59 @@ class Follower:
     def step(self, before: np.ndarray | None, image: np.ndarray) -> None:
         """Finds the object in the next grey frame; `before` is the frame preceding it."""
         fit = self._near(before, image)
-        if fit.correlation < SURE:
-            other = self._far(image)
-            if other is not None and other.correlation > fit.correlation:
-                fit = other
-        if fit.correlation < FOUND:
+        if fit is None or fit.correlation < min(SURE, self.correlation - WORSE):
+            fit = max((f for f in (fit, self._far(image)) if f), key=_correlation, default=None)
+        if fit is None:
             self.poses.append(np.full(3, np.nan))
             self.frames_missed += 1
             return
         if before is not None:
             self.velocity = self._velocity_at(fit.pose)
             self.mean_velocity = (fit.pose - self.pose) / (self.frames_missed + 1)
+        self.correlation = fit.correlation
         self.frames_missed = 0
         self.pose = fit.pose
         self.poses.append(fit.pose)
         self.exposure.add(image, self.template, self.pose, self.velocity)
         self._keep(image)
 
-    def _near(self, before: np.ndarray | None, image: np.ndarray) -> Fit:
+    def _near(self, before: np.ndarray | None, image: np.ndarray) -> Fit | None:
         """The best fit around where the object was, went, or is led to by its features."""
-        moving = self.pose + (self.frames_missed + 1) * self.velocity
-        guesses = [moving, self.pose]
+        guesses = [self.pose + self.velocity, self.pose]
         if before is not None and not self.frames_missed:
             reach = int(np.ceil(2 * np.hypot(*self.velocity[:2]))) + 16
             motion = rigid_motion(*follow(before, image, self.pose, self.template.region, reach))
             if motion is not None:
                 angle, shift = motion
-                c, s = np.cos(angle), np.sin(angle)
-                place = np.array([[c, -s], [s, c]]) @ self.pose[:2] + shift
-                guesses.insert(0, np.array([*place, self.pose[2] + angle]))
-        return best_fit(image, self.template, [(g, self._smear(g)) for g in guesses])
+                place = rotation(angle) @ self.pose[:2] + shift
+                turned = self.pose[2] + (angle if self.template.shows_turns else 0.0)
+                guesses.insert(0, np.array([*place, turned]))
+        return self._best(image, guesses, FOUND)
 
     def _far(self, image: np.ndarray) -> Fit | None:
-        """The best fit in a wide neighbourhood."""
-        moving = self.pose + self.velocity
-        reach = 2 * np.hypot(*self.velocity[:2]) + 3 * self.template.radius
-        guesses = candidate_poses(image, self.template, moving, float(reach))
+        """The best fit in a wide neighbourhood; rarely looked for while the object is gone."""
+        missed = self.frames_missed
+        if missed & (missed - 1):  # at once, after 1, 2, 4, 8, ... frames
+            return None
+        reach = max(2 * np.hypot(*self.velocity[:2]), REACH_SHARE * max(image.shape))
+        guesses = candidate_poses(image, self.template, self.pose + self.velocity, float(reach))
+        return self._best(image, guesses, FOUND_AGAIN)
+
+    def _best(self, image: np.ndarray, poses: list[np.ndarray], least: float) -> Fit | None:
+        """The best fit from the guessed `poses` if it can be the object."""
+        guesses = [
+            (pose, share * own_motion(self._velocity_at(pose), pose[2]))
+            for pose in poses
+            for share in self.exposure.trials
+        ]
         if not guesses:
             return None
-        return best_fit(image, self.template, [(g, self._smear(g)) for g in guesses])
+        fit = best_fit(image, self.template, guesses)
+        height, width = image.shape
+        is_inside = 0 <= fit.pose[0] < width and 0 <= fit.pose[1] < height
+        is_upright = abs(fit.pose[2] - self.pose[2]) <= MAX_TURN_RAD
+        is_it = is_alike(fit) and fit.correlation >= least
+        return fit if is_inside and is_upright and is_it else None
 
     def _velocity_at(self, pose: np.ndarray) -> np.ndarray:
         """The velocity at `pose`: the mean one since the last frame plus half its change.
@@ -96,9 +122,6 @@ class Follower:
         is_blow = np.hypot(*change[:2]) > 0.5 * np.hypot(*mean[:2])
         return mean if is_blow else mean + change / 2
 
-    def _smear(self, pose: np.ndarray) -> np.ndarray:
-        return self.exposure.share * own_motion(self._velocity_at(pose), pose[2])
-
     def _keep(self, image: np.ndarray) -> None:
         if np.hypot(*self.velocity[:2]) * self.exposure.share > SHARP_PX:
             return
@@ -108,3 +131,9 @@ class Follower:
                 del self.patches[1::2]
                 self.stride *= 2
         self.frames_sharp += 1
+        if self.frames_sharp in RENEWALS:
+            self.template = median_template(self.patches, self.template.region)
+
+
+def _correlation(fit: Fit) -> float:
+    return fit.correlation

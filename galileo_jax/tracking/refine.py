@@ -25,23 +25,34 @@ FINE_PX, COARSE_PX = 0.8, 3.0
 error small; coarse: reaches 5 px and 10 degrees."""
 
 
+TURNLESS = 0.02
+"""A disc without texture looks the same however it is turned. An object whose gradients tell the
+angle less than this share of what they could is taken as one: its angle is not followed."""
+COVERED = 4.0
+"""A pixel that differs by more noise sigmas shows something else than the object."""
+SETTLED_RAD = 3e-4
+"""A turn that moves the rim of a 30 px object by 0.005 px; smaller steps change nothing."""
+
+
 @dataclass(frozen=True)
 class Fit:
-    """A pose, how well the template fits there, and what the fit is made of.
+    """A pose and how well the template fits there.
 
     Attributes:
       pose: `(x, y, angle)`.
       correlation: weighted correlation of patch and template, 1 is perfect.
       noise: robust standard deviation of the residual, grey levels of the smoothed patch.
-      covered: share of the region whose residual is beyond four noise sigmas.
-      covariance: `[3, 3]` of the pose in image axes, from the residual's noise alone.
+      covered: share of the region that differs by more than `COVERED` noise sigmas.
+      gain: the patch's contrast against the template's.
+      weight: `[pixel]`, what each pixel of the region counted.
     """
 
     pose: np.ndarray
     correlation: float
     noise: float
     covered: float
-    covariance: np.ndarray
+    gain: float
+    weight: np.ndarray
 
 
 class Target:
@@ -63,6 +74,16 @@ class Target:
             [dx, dy, turned, self.values, np.ones_like(self.values)]
         ).astype(np.float64)
 
+        self.shows_turns = self._shows_turns()
+        # Holds the angle fast where it cannot be told; otherwise only against 0 / 0.
+        self.ridge = np.diag([1e-9, 1e-9, 1e-9 if self.shows_turns else 1e12, 1e-9, 1e-9])
+
+    def _shows_turns(self) -> bool:
+        normal = self.jacobian.T @ self.jacobian + 1e-9 * np.eye(5)
+        information = 1 / np.linalg.inv(normal)[2, 2]
+        possible = self.radius**2 * (normal[0, 0] + normal[1, 1]) / 2
+        return bool(information > TURNLESS * possible)
+
     def values_at(self, image: np.ndarray, pose: np.ndarray) -> np.ndarray:
         """The smoothed pixels of `image` in the region at `pose`."""
         patch = patch_at(image, pose, self.radius)
@@ -76,15 +97,12 @@ def align(
     pose = on_sampling_grid(start)
     jacobian, values = target.jacobian, target.values
     weight = np.ones_like(values)
-    move = np.zeros(3)
     limit_px = 2 * target.width_px
     for step in range(steps):
-        pose = on_sampling_grid(pose)
         seen = target.values_at(image, pose)
         weighted = jacobian * weight[:, None]
         normal = weighted.T @ jacobian
-        normal[np.diag_indices(5)] *= 1 + 1e-9
-        solution = np.linalg.solve(normal + 1e-9 * np.eye(5), weighted.T @ seen)
+        solution = np.linalg.solve(normal + target.ridge, weighted.T @ seen)
         residual = seen - jacobian @ solution
         noise = 1.4826 * np.median(np.abs(residual)) + 1e-6
         if robust:
@@ -98,40 +116,42 @@ def align(
         if length > limit_px:
             move[:2] *= limit_px / length
         move[2] = np.clip(move[2], -0.15, 0.15)
-        pose = compose(pose, move)
-        if step and length < 0.004 and abs(move[2]) < 2e-4:
+        sampled, pose = pose, compose(pose, move)
+        following = on_sampling_grid(pose)
+        if np.array_equal(following[:2], sampled[:2]) and abs(move[2]) < SETTLED_RAD:
             break
-    return _fit(pose, solution, residual, noise, seen, weight, target)
-
-
-def _fit(pose, solution, residual, noise, seen, weight, target) -> Fit:
+        if step < steps - 1:
+            pose = following
     a = seen - np.average(seen, weights=weight)
-    b = target.values - np.average(target.values, weights=weight)
+    b = values - np.average(values, weights=weight)
     scale = np.sqrt((weight * a * a).sum() * (weight * b * b).sum()) + 1e-9
     return Fit(
         pose=pose,
         correlation=float((weight * a * b).sum() / scale),
         noise=float(noise),
-        covered=float(np.mean(np.abs(residual) > 4 * noise)),
-        covariance=_covariance(pose, solution[3], noise, weight, target),
+        covered=float(np.mean(np.abs(residual) > COVERED * noise)),
+        gain=float(solution[3]),
+        weight=weight,
     )
 
 
-def _covariance(pose, gain, noise, weight, target) -> np.ndarray:
-    """The sandwich A^-1 B A^-1 of least squares whose noise is correlated by the smoothing.
+def covariance_of(fit: Fit, target: Target) -> np.ndarray:
+    """The `[3, 3]` covariance of a fit's pose, in image axes, that the image noise makes.
 
-    Smoothing white noise with a Gaussian of width s gives the autocorrelation
-    exp(-r^2 / 4 s^2): a Gaussian of width sqrt(2) s and sum 4 pi s^2.
+    The sandwich A^-1 B A^-1 of least squares whose noise is correlated by the smoothing:
+    white noise smoothed with a Gaussian of width s has the autocorrelation
+    exp(-r^2 / 4 s^2), a Gaussian of width sqrt(2) s and sum 4 pi s^2.
     """
-    weighted = target.jacobian * weight[:, None]
-    inverse = np.linalg.inv(weighted.T @ target.jacobian + 1e-9 * np.eye(5))
+    weighted = target.jacobian * fit.weight[:, None]
+    normal = weighted.T @ target.jacobian
+    inverse = np.linalg.inv(normal + target.ridge)
     scores = np.zeros((*target.region.shape, 5))
     scores[target.region] = weighted
     spread = cv2.GaussianBlur(
         scores, (0, 0), np.sqrt(2) * target.width_px, borderType=cv2.BORDER_CONSTANT
     )[target.region]
     middle = weighted.T @ spread * (4 * np.pi * target.width_px**2)
-    own = noise**2 * (inverse @ middle @ inverse)[:3, :3] / max(gain**2, 1e-6)
+    own = fit.noise**2 * (inverse @ middle @ inverse)[:3, :3] / max(fit.gain**2, 1e-6)
     turn = np.eye(3)
-    turn[:2, :2] = rotation(pose[2])
+    turn[:2, :2] = rotation(fit.pose[2])
     return turn @ own @ turn.T

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.tracking.exposure import own_motion
-from galileo_jax.tracking.refine import FINE_PX, Fit, align
+from galileo_jax.tracking.refine import FINE_PX, Fit, Target, align, covariance_of
 from galileo_jax.tracking.template import Template
 
 SAME_MOTION_PX = 0.3
@@ -39,27 +39,40 @@ def velocities_at(poses: np.ndarray, frame: int) -> Velocities:
     return Velocities(before, before if after is None else after)
 
 
+@dataclass(frozen=True)
+class Refined:
+    """One frame's final pose; `covariance` `[2, 2]` px^2 of its place, from image noise alone.
+
+    `correlation` and `covered` as in `Fit`.
+    """
+
+    pose: np.ndarray
+    covariance: np.ndarray
+    correlation: float
+    covered: float
+
+
 def refine_pose(
     image: np.ndarray, template: Template, pose: np.ndarray, velocities: Velocities, share: float
-) -> Fit:
+) -> Refined:
     """The pose aligned with `template`, smeared by the motion that fits best.
 
     In a blow the motion during the exposure is that before, that after, or some of both:
     the mean, the earlier and the later velocity are tried, where they differ.
     """
     middle = (velocities.before + velocities.after) / 2
-    best: Fit | None = None
     tried: list[np.ndarray] = []
+    fits: list[tuple[Fit, Target]] = []
     for velocity in (middle, velocities.before, velocities.after):
         motion = share * own_motion(velocity, pose[2])
         if any(_distance(motion - other, template.radius) < SAME_MOTION_PX for other in tried):
             continue
         tried.append(motion)
-        fit = align(image, template.target(motion, FINE_PX), pose)
-        if best is None or fit.correlation > best.correlation:
-            best = fit
-    assert best is not None
-    return best
+        target = template.target(motion, FINE_PX)
+        fits.append((align(image, target, pose), target))
+    best, target = max(fits, key=lambda item: item[0].correlation)
+    covariance = covariance_of(best, target)[:2, :2]
+    return Refined(best.pose, covariance, best.correlation, best.covered)
 
 
 def _distance(motion: np.ndarray, radius: int) -> float:

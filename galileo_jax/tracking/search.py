@@ -9,6 +9,8 @@ from galileo_jax.tracking.template import Template
 
 SURE = 0.85
 """A fit that correlates better than this ends the search for others."""
+CONTRAST = (0.4, 2.5)
+"""What shows the template paler or stronger than this is something else."""
 TURNS_RAD = (0.0, 0.17, -0.17, 0.35, -0.35)
 """Turns tried in a wide search: the alignment reaches 5 degrees to each side of them."""
 MAX_PEAKS = 4
@@ -19,18 +21,28 @@ def best_fit(
 ) -> Fit:
     """The best alignment over guesses, each a pose and a motion during the exposure.
 
-    Coarse, then fine; stops at the first sure one.
+    Coarse, then fine; stops at the first sure one. Fits whose contrast is not the template's
+    count only if there is no other.
     """
     best: Fit | None = None
     for pose, motion in guesses:
         coarse = align(image, template.target(motion, COARSE_PX), pose, steps=6, robust=False)
         fit = align(image, template.target(motion, FINE_PX), coarse.pose)
-        if best is None or fit.correlation > best.correlation:
+        if best is None or _rank(fit) > _rank(best):
             best = fit
-        if best.correlation > SURE:
+        if is_alike(best) and best.correlation > SURE:
             break
     assert best is not None, "best_fit needs a guess"
     return best
+
+
+def is_alike(fit: Fit) -> bool:
+    """Whether the patch has about the template's contrast."""
+    return CONTRAST[0] <= fit.gain <= CONTRAST[1]
+
+
+def _rank(fit: Fit) -> tuple[bool, float]:
+    return is_alike(fit), fit.correlation
 
 
 def candidate_poses(
@@ -38,16 +50,16 @@ def candidate_poses(
 ) -> list[np.ndarray]:
     """Poses within `reach_px` of `pose` where the template, turned several ways, correlates."""
     height, width = image.shape
-    margin = int(reach_px) + template.radius
-    left, top = (int(np.clip(c - margin, 0, n - 1)) for c, n in zip(pose, (width, height)))
-    right, bottom = (int(np.clip(c + margin + 1, 1, n)) for c, n in zip(pose, (width, height)))
-    size = 2 * template.radius + 1
-    if right - left < size or bottom - top < size:
-        return []
-    window = cv2.GaussianBlur(image[top:bottom, left:right], (0, 0), 1.0).astype(np.float32)
-    centre = np.array([template.radius, template.radius])
+    reach, rim = int(reach_px), template.radius
+    left, top = (int(np.clip(c - reach, 0, n - 1)) for c, n in zip(pose, (width, height)))
+    right, bottom = (int(np.clip(c + reach, 0, n - 1)) for c, n in zip(pose, (width, height)))
+    size = 2 * rim + 1
+    padded = cv2.copyMakeBorder(image, rim, rim, rim, rim, cv2.BORDER_REPLICATE)
+    window = padded[top : bottom + size, left : right + size]
+    window = cv2.GaussianBlur(window, (0, 0), 1.0).astype(np.float32)
+    centre = np.array([rim, rim])
     found: list[tuple[float, np.ndarray]] = []
-    for turn in TURNS_RAD:
+    for turn in TURNS_RAD if template.shows_turns else (0.0,):
         angle = pose[2] + turn
         matrix = rotation(angle)
         warp = np.column_stack([matrix, centre - matrix @ centre])
@@ -59,7 +71,7 @@ def candidate_poses(
         score[~np.isfinite(score)] = -1
         for _ in range(MAX_PEAKS):
             _, peak, _, (x, y) = cv2.minMaxLoc(score)
-            found.append((peak, np.array([*(centre + (left + x, top + y)), angle])))
+            found.append((peak, np.array([left + x, top + y, angle])))
             cv2.circle(score, (x, y), 3, -1, -1)
     found.sort(key=lambda item: -item[0])
     return [pose for _, pose in found[: 2 * MAX_PEAKS]]

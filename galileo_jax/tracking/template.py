@@ -1,12 +1,13 @@
 """An object's template: its patch, the region that belongs to it, and its smeared versions."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
 
 from galileo_jax.tracking.pose import patch_at, rotation, smear
-from galileo_jax.tracking.refine import Target
+from galileo_jax.tracking.refine import FINE_PX, Target
 
 CORE_SHARE = 0.88
 """Only this share of the declared size is compared: the rim shows background when the scale
@@ -50,6 +51,11 @@ class Template:
         """Pixels from the centre, the followed point, to the patch's border."""
         return (self.image.shape[0] - 1) // 2
 
+    @cached_property
+    def shows_turns(self) -> bool:
+        """False for a plain disc, which looks the same however it is turned."""
+        return Target(self.image, self.region, FINE_PX).shows_turns
+
     def target(self, motion: np.ndarray, width_px: float) -> Target:
         """What a patch looks like that moves by `motion` (own axes) during the exposure."""
         share = smear(self.region.astype(np.float32), motion)
@@ -73,7 +79,7 @@ def texture_of(template: Template) -> float:
 
     The variance of the place is the noise's variance divided by it.
     """
-    target = Target(template.image, template.region, 0.8)
+    target = Target(template.image, template.region, FINE_PX)
     gradients = target.jacobian[:, :2]
     return float(np.linalg.eigvalsh(gradients.T @ gradients)[0])
 

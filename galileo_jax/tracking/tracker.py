@@ -9,8 +9,7 @@ from galileo_jax.tracking.exposure import Exposure
 from galileo_jax.tracking.follower import Follower
 from galileo_jax.tracking.noise import LEAST_SD_PX, blow_covariance, scatter_variance
 from galileo_jax.tracking.pose import rotation
-from galileo_jax.tracking.refine import Fit
-from galileo_jax.tracking.refiner import refine_pose, velocities_at
+from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
 from galileo_jax.tracking.template import Outline, grey, median_template, template_at
 from galileo_jax.tracking.track import Track
 
@@ -81,7 +80,7 @@ def track_video(
         median_template(f.patches, f.template.region) if f is not None else None
         for f in followers
     ]
-    fits: list[list[Fit | None]] = [[] for _ in starts]
+    fits: list[list[Refined | None]] = [[] for _ in starts]
     for index, frame in enumerate(open_frames()):
         image = grey(frame)
         for poses, template, found in zip(coarse, templates, fits, strict=True):
@@ -115,7 +114,7 @@ def _coarse_poses(follower: Follower | None, count: int) -> np.ndarray:
 
 
 def _finished(
-    fits: list[Fit | None], start: Start, exposure_share: float
+    fits: list[Refined | None], start: Start, exposure_share: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Position `[frame, 2]`, covariance `[frame, 2, 2]` and angle `[frame]`; NaN: not visible."""
     poses = np.full((len(fits), 3), np.nan)
@@ -123,7 +122,7 @@ def _finished(
     for index, fit in enumerate(fits):
         if fit is not None and _is_visible(fit):
             poses[index] = fit.pose
-            covariance[index] = fit.covariance[:2, :2]
+            covariance[index] = fit.covariance
     seen = np.flatnonzero(np.isfinite(poses[:, 0]))
     if not len(seen):
         return poses[:, :2], covariance, poses[:, 2]
@@ -140,5 +139,5 @@ def _finished(
     return position, covariance, angle
 
 
-def _is_visible(fit: Fit) -> bool:
+def _is_visible(fit: Refined) -> bool:
     return fit.correlation >= MIN_CORRELATION and fit.covered <= MAX_COVERED
