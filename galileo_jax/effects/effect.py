@@ -6,7 +6,7 @@ nothing; an effect overrides those it needs. At its parameters' `absent` values 
 must return exactly what the default returns.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
@@ -29,6 +29,9 @@ class State(NamedTuple):
     position_m: Array
     velocity_m_s: Array
     time_s: Array
+
+
+Force = Callable[[State], Array]
 
 
 @dataclass(frozen=True)
@@ -75,8 +78,12 @@ class Effect:
         """Moves the centres at the release: `[..., object, 2]`, m, to the same shape."""
         return position_m
 
-    def force(self, state: State, theta: Theta, scene: Surroundings) -> Array | None:
-        """Returns the force on each object `[..., object, 2]`, N, or None."""
+    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+        """Returns the force as a function of the state, or None.
+
+        What depends on the parameters alone is computed here, once per rollout; the function
+        returned maps a `State` to `[..., object, 2]`, N, and is called every recorded step.
+        """
         return None
 
     def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:

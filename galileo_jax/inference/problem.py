@@ -18,6 +18,7 @@ from galileo_jax.observation import Observation
 from galileo_jax.parameters import LogNormal, Parameter, forward
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine, Rollout, at_times, make_rollout
+from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 
 NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
@@ -64,32 +65,35 @@ class Problem:
         """The engine as a differentiable function."""
         return make_rollout(self.engine)
 
-    @cached_property
-    def coarse_rollout(self) -> Rollout:
-        """The same with one-sided differences, for the way to the fit."""
-        return make_rollout(self.engine, is_coarse=True)
+    def measure(self, z: jax.Array, motion: Trajectory, times_s: Any = None) -> jax.Array:
+        """What the camera sees of a motion: `[object, 2, frame]`, m, at the frames' times.
 
-    def predict(
-        self, z: jax.Array, steps: jax.Array, times_s: Any = None, is_coarse: bool = False
-    ) -> jax.Array:
-        """Predicted centres `[object, 2, frame]`, m, at the frames' (or given) times."""
+        Pure JAX, no rollout: clock, scale and camera act here.
+        """
+        scene = self.model.scene.surroundings
         theta = self.model.by_name(forward(self.model.parameters, z))
         times = jnp.asarray(self.observation.times_s if times_s is None else times_s)
-        for effect in self.model.effects + self.model.nuisances:
-            times = effect.time(times, theta, self.model.scene.surroundings)
-        rollout = self.coarse_rollout if is_coarse else self.rollout
-        position, _ = at_times(rollout(z, steps), times)
-        for effect in self.model.effects + self.model.nuisances:
-            position = effect.measure(position, theta, self.model.scene.surroundings)
+        effects = self.model.effects + self.model.nuisances
+        for effect in effects:
+            times = effect.time(times, theta, scene)
+        position, _ = at_times(motion, times)
+        for effect in effects:
+            position = effect.measure(position, theta, scene)
         return position
 
-    def residuals(
-        self, z: jax.Array, noise_scale: Any, steps: jax.Array, is_coarse: bool = False
-    ) -> jax.Array:
+    def predict(self, z: jax.Array, steps: jax.Array, times_s: Any = None) -> jax.Array:
+        """Predicted centres `[object, 2, frame]`, m, at the frames' (or given) times."""
+        return self.measure(z, self.rollout(z, steps), times_s)
+
+    def whiten(self, predicted_m: jax.Array, noise_scale: Any) -> jax.Array:
         """Whitened residuals, unit normal if the model is right: `[object * 2 * frame]`."""
-        difference = self.data.observed_m - self.predict(z, steps, is_coarse=is_coarse)
+        difference = self.data.observed_m - predicted_m
         white = GaussianLikelihood.whiten(difference, noise_scale, self.data).reshape(-1)
         return jnp.where(jnp.isfinite(white), white, FAILED)
+
+    def residuals(self, z: jax.Array, noise_scale: Any, steps: jax.Array) -> jax.Array:
+        """Whitened residuals of the predicted centres at `z`."""
+        return self.whiten(self.predict(z, steps), noise_scale)
 
     def log_density(self, z_all: jax.Array, steps: jax.Array) -> jax.Array:
         """The unnormalised posterior density of `(z, z_noise)`; -inf where a rollout failed."""

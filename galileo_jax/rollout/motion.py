@@ -3,13 +3,15 @@
 Written in the array standard, so that the same lines run in NumPy (C engine) and in JAX.
 """
 
+import functools
 import math
+import operator
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from galileo_jax.effects.effect import State, Surroundings
+from galileo_jax.effects.effect import Force, Surroundings
 from galileo_jax.rollout.model import Model
 
 Array = Any
@@ -66,13 +68,15 @@ def bumper_solref(restitution: Array, xp: Any) -> Array:
     return xp.stack([-stiffness, -damping], axis=-1)
 
 
-def forces(model: Model, state: State, theta: Mapping[str, Array]) -> Array:
-    """The sum of all effects' forces, `[..., object, 2]`, N; 0.0 when there is none."""
-    total: Array = 0.0
-    for effect in model.effects + model.nuisances:
-        force = effect.force(state, theta, model.scene.surroundings)
-        total = total if force is None else total + force
-    return total
+def total_force(model: Model, theta: Mapping[str, Array]) -> Force | None:
+    """The sum of all effects' forces as a function of the state; None where there is none."""
+    given = [
+        effect.force(theta, model.scene.surroundings) for effect in model.effects + model.nuisances
+    ]
+    forces = [force for force in given if force is not None]
+    if not forces:
+        return None
+    return lambda state: functools.reduce(operator.add, (force(state) for force in forces))
 
 
 def along_path(position: Array, velocity: Array, surroundings: Surroundings) -> tuple[Array, Array]:

@@ -8,8 +8,7 @@ central difference
 
     d/dz_i  =  (rollout(z + h_i e_i) - rollout(z - h_i e_i)) / (2 h_i),    h = steps,
 
-all 2 P rollouts in the same engine call as the primal. (Far from the fit one-sided differences
-do, at half the cost: `is_coarse`.) Stiff contacts make the exact
+all 2 P rollouts in the same engine call as the primal. Stiff contacts make the exact
 derivative of a simulator meaningless (docs/contact.md): what inference needs is the slope
 at the scale of the posterior, and `steps` says that scale. Parameters that no rollout
 depends on (clock, camera) cost none and are differentiated exactly by JAX.
@@ -41,7 +40,7 @@ class Engine(Protocol):
         ...
 
 
-def make_rollout(engine: Engine, is_coarse: bool = False) -> Rollout:
+def make_rollout(engine: Engine) -> Rollout:
     """Returns `rollout(z, steps)`; `z`, `steps`: `[parameter]`.
 
     Rollouts that failed are NaN. `steps` are in `z`; entries of parameters that are not
@@ -77,13 +76,12 @@ def make_rollout(engine: Engine, is_coarse: bool = False) -> Rollout:
         offsets = (
             jnp.zeros((len(simulated), z.shape[0])).at[jnp.arange(len(simulated)), simulated].set(h)
         )
-        sides = [z + offsets] if is_coarse else [z + offsets, z - offsets]
-        out = call(jnp.concatenate([z[None], *sides]))
+        out = call(jnp.concatenate([z[None], z + offsets, z - offsets]))
         count = len(simulated)
 
         def slope(values: jax.Array) -> jax.Array:
-            low, width = (values[:1], h) if is_coarse else (values[1 + count :], 2 * h)
-            jacobian = (values[1 : 1 + count] - low) / width.reshape(-1, 1, 1, 1)
+            difference = values[1 : 1 + count] - values[1 + count :]
+            jacobian = difference / (2 * h).reshape(-1, 1, 1, 1)
             return jnp.tensordot(dz[simulated], jacobian, axes=1)
 
         return (out[0][0], out[1][0]), (slope(out[0]), slope(out[1]))

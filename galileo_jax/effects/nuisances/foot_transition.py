@@ -1,8 +1,9 @@
 """Foot transition: how much speed a real edge keeps at the foot of the ramp."""
 
+import math
 from typing import ClassVar
 
-from galileo_jax.effects.effect import Array, Effect, State, Surroundings, Theta
+from galileo_jax.effects.effect import Array, Effect, Force, State, Surroundings, Theta
 from galileo_jax.parameters import Normal, Parameter
 
 SD = 0.05
@@ -28,19 +29,24 @@ class FootTransition(Effect):
             return ()
         return (Parameter("foot_transition", "1", Normal(1.0, SD), 1.0, "nuisance", 0.1),)
 
-    def force(self, state: State, theta: Theta, scene: Surroundings) -> Array | None:
+    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
         """The zone's drag on whatever comes down the ramp."""
         if not self.parameters(scene):
             return None
-        x, v = state.position_m[..., 0], state.velocity_m_s[..., 0]
-        xp = x.__array_namespace__()
-        corner = xp.asarray(scene.corner_m)
-        came_down = xp.asarray(
-            [start < c for (start, _), c in zip(scene.start_m, scene.corner_m, strict=True)]
+        factor = theta["foot_transition"]
+        xp = factor.__array_namespace__()
+        came_down = [x < c for (x, _), c in zip(scene.start_m, scene.corner_m, strict=True)]
+        logarithm = xp.log(xp.clip(factor, 0.5, 2.0)) / ZONE_M
+        scale = xp.stack(
+            [m * logarithm * down for m, down in zip(scene.mass(theta), came_down, strict=True)],
+            axis=-1,
         )
-        share = xp.clip((x - corner) / ZONE_M, 0.0, 1.0)
-        weight = (1 - xp.cos(2 * xp.pi * share)) / ZONE_M
-        mass = xp.stack(scene.mass(theta), axis=-1)
-        factor = xp.clip(theta["foot_transition"], 0.5, 2.0)
-        drag = mass * xp.log(factor)[..., None] * weight * v * came_down
-        return xp.stack([drag, xp.zeros_like(drag)], axis=-1)
+        begin = xp.asarray(scene.corner_m)
+        along_x = xp.asarray([1.0, 0.0])
+
+        def drag(state: State) -> Array:
+            share = xp.clip((state.position_m[..., 0] - begin) / ZONE_M, 0.0, 1.0)
+            force = scale * (1 - xp.cos(2 * math.pi * share)) * state.velocity_m_s[..., 0]
+            return force[..., None] * along_x
+
+        return drag

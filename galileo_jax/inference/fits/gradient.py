@@ -1,14 +1,22 @@
 """The gradient fit: multi-start Levenberg-Marquardt and a Laplace posterior.
 
     1. Roll out `num_starts` scattered parameter vectors in one batch; keep the best few.
-    2. Refine those by Levenberg-Marquardt (optimistix), vmapped, on
-       [ C^-1/2 (observed - predicted(z)) ; z ], the prior being the second block.
-    3. Set the difference steps to half the posterior's standard deviations and refine the
-       best once more; estimate the noise scale on the way.
+    2. Levenberg-Marquardt on  [ C^-1/2 (observed - predicted(z)) ; z ],  the prior being the
+       second block. One step:
+         a. one batch of rollouts gives the motion and its slopes (differences) at z;
+         b. optimistix solves, for several dampings at once (vmapped), the problem in which
+            the motion is linear in z but clock, scale and camera are exact;
+         c. one batch of rollouts tries all dampings; the best is taken.
+    3. At the fit, with steps of half a posterior standard deviation: slopes, noise scale, one
+       or two steps more.
     4. Posterior: normal in z with covariance (J^T J + 1)^-1.
 
-A single far start ends in a side valley in most cases (the time of the collision decides
-which frames compare with which); the scattered starts cost one batch.
+Compiled code never holds a rollout: JAX's cache keeps it between runs, whichever the engine,
+and no solver step is spent on a trial that a batch can try beside others. A single far start
+ends in a side valley in most cases (the time of the collision decides which frames compare
+with which); the scattered starts cost one batch.
+
+Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983.
 """
 
 from collections.abc import Callable
@@ -22,7 +30,10 @@ import optimistix as optx
 from scipy.stats import norm, qmc
 
 from galileo_jax.inference.problem import FAILED, NOISE_SD, Problem
-from galileo_jax.parameters import inverse
+from galileo_jax.parameters import forward, inverse
+from galileo_jax.rollout.trajectory import Trajectory
+
+DAMPINGS = np.array([0.0, 1e-3, 1e-1, 1e1, 1e3])
 
 
 @dataclass(frozen=True)
@@ -33,21 +44,17 @@ class Settings:
       num_starts: scattered parameter vectors.
       num_refined: of these, how many are refined at the most.
       good_chi2_per_value: below it no further start is refined.
-      max_steps: of one Levenberg-Marquardt run from a scattered start.
-      max_polish_steps: of one run at the fit.
-      coarse_tolerance: of z and of the sum of squares on the way to the fit.
-      tolerance: of the last refinement, in posterior standard deviations.
-      converged_sd: converged where the last refinement moved no combination of parameters
-        by more than this many posterior standard deviations.
+      max_steps: Levenberg-Marquardt steps from one start.
+      enough: stop where a step lowers chi2 / 2 by less.
+      converged_sd: converged where the last step, taken with slopes at the posterior's scale,
+        moved no combination of parameters by more than this many posterior sd.
     """
 
     num_starts: int = 64
     num_refined: int = 4
     good_chi2_per_value: float = 2.0
-    max_steps: int = 12
-    max_polish_steps: int = 4
-    coarse_tolerance: float = 3e-2
-    tolerance: float = 0.1
+    max_steps: int = 15
+    enough: float = 0.5
     converged_sd: float = 0.5
 
 
@@ -55,7 +62,7 @@ class Code(StrEnum):
     """How a fit ended; the value is the sentence for the user."""
 
     CONVERGED = "the fit converged"
-    STEP_LIMIT = "the step limit came before convergence; try more starts or --method mh"
+    STEP_LIMIT = "the fit has not settled; try another --seed or --method mh"
     FAILED = "no rollout succeeded; check the clip's geometry"
 
 
@@ -71,7 +78,7 @@ class GradientFit:
       steps: `[model parameter]`, the difference steps of the final Jacobian, in z.
       jacobian: `[value, model parameter]`, d(whitened residual)/dz at the fit.
       code: how it ended.
-      stats: rollouts, steps.
+      stats: rollouts and steps it took.
     """
 
     z: np.ndarray
@@ -85,135 +92,193 @@ class GradientFit:
 
 
 class GradientFitter:
-    """Compiled once for a problem's shapes; `fit` may be called for many seeds."""
+    """The fit's compiled parts for one problem; `fit` may be called for many seeds."""
 
     def __init__(self, problem: Problem, settings: Settings = Settings()):
         self.problem, self.settings = problem, settings
+        self._num_rollouts = 0
+        parameters = problem.model.parameters
+        times = np.arange(problem.model.num_records + 1) * problem.model.record_dt_s
+        self._simulated = np.array([i for i, p in enumerate(parameters) if p.step is not None])
 
-        def cost(z, steps):
-            return 0.5 * (jnp.sum(problem.residuals(z, 1.0, steps) ** 2) + jnp.sum(z**2))
+        def seen(z, position, velocity):
+            # The drawn pitch is no measurement, so that none is made up here.
+            motion = Trajectory(times, position, velocity, position[:, 0])  # pyright: ignore
+            return problem.measure(z, motion)
 
-        def objective(u, args, is_coarse):
-            centre, root, noise_scale, steps = args
-            z = centre + root @ u
-            return jnp.concatenate([problem.residuals(z, noise_scale, steps, is_coarse), z])
+        def residuals(z, motion, noise_scale):
+            return problem.whiten(seen(z, *motion), noise_scale)
 
-        def refine(centre, root, noise_scale, steps, is_coarse, tolerance, max_steps):
-            solution = optx.least_squares(
-                lambda u, args: objective(u, args, is_coarse),
-                optx.LevenbergMarquardt(rtol=tolerance, atol=tolerance),
-                jnp.zeros_like(centre),
-                args=(centre, root, noise_scale, steps),
-                max_steps=max_steps,
-                throw=False,
+        def linear(u, motion, slopes):
+            return tuple(
+                m + jnp.tensordot(u, s, axes=1) for m, s in zip(motion, slopes, strict=True)
             )
-            moved = jnp.max(jnp.abs(solution.value))
-            return centre + root @ solution.value, moved, solution.stats["num_steps"]
 
-        def linearised(z, noise_scale, steps):
-            def residuals(x):
-                value = problem.residuals(x, noise_scale, steps)
-                return value, value
+        def model_residuals(u, z, motion, slopes, noise_scale):
+            return residuals(z + u, linear(u, motion, slopes), noise_scale)
 
-            jacobian, residual = jax.jacfwd(residuals, has_aux=True)(z)
-            return residual, jacobian
+        def solve(damping, size, z, motion, slopes, noise_scale):
+            def objective(u, _):
+                white = model_residuals(u, z, motion, slopes, noise_scale)
+                return jnp.concatenate([white, z + u, jnp.sqrt(damping) * size * u])
 
-        self._cost = jax.jit(jax.vmap(cost, (0, None)))
-        self._approach = jax.jit(
-            lambda *a: refine(*a, True, settings.coarse_tolerance, settings.max_steps)
+            solver = optx.LevenbergMarquardt(rtol=1e-3, atol=1e-3)
+            start = jnp.zeros_like(z)
+            return z + optx.least_squares(objective, solver, start, max_steps=8, throw=False).value
+
+        self._forward = jax.jit(lambda z: forward(parameters, z))
+        self._residuals = jax.jit(jax.vmap(residuals, (0, 0, None)))
+        self._jacobian = jax.jit(
+            lambda z, *rest: jax.jacfwd(model_residuals)(jnp.zeros_like(z), z, *rest)
         )
-        self._polish = jax.jit(
-            lambda *a: refine(*a, False, settings.tolerance, settings.max_polish_steps)
-        )
-        self._linearised = jax.jit(linearised)
-        self._residuals = jax.jit(problem.residuals)
+        self._solve = jax.jit(jax.vmap(solve, (0, None, None, None, None, None)))
 
     def fit(self, seed: int, on_stage: Callable[[str], None] = lambda _: None) -> GradientFit:
         """Fits; the same seed gives the same result."""
         settings = self.settings
-        z, num_steps = self._search(seed, on_stage)
+        self._num_rollouts = 0
+        on_stage("searching")
+        z, num_steps = self._search(seed)
         on_stage("refining")
-        steps = jnp.asarray(self.problem.coarse_steps)
-        noise_scale, moved = 1.0, jnp.inf
-        identity = np.eye(len(z))
-        for _ in range(2):
-            residual, jacobian = self._linearised(z, noise_scale, steps)
+        steps, noise_scale, moved = self.problem.coarse_steps, 1.0, np.inf
+        for _ in range(3):
+            motion, slopes = self._slopes(z, steps)
+            jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale))
             covariance = _covariance(jacobian)
+            residual = self._white(z, motion, noise_scale)
+            effective = len(z) - float(np.trace(covariance))
+            noise_scale *= self._noise_factor(residual, effective)
+            is_final_scale = np.allclose(steps, _half_sd(covariance), rtol=0.5)
             steps = _half_sd(covariance)
-            noise_scale *= self._noise_factor(residual, float(np.trace(identity - covariance)))
-            root = jnp.asarray(np.linalg.cholesky(covariance))
-            z, moved, used = self._polish(z, root, noise_scale, steps)
-            num_steps += int(used)
-        residual, jacobian = self._linearised(z, noise_scale, steps)
-        at_unit = np.asarray(self._residuals(z, 1.0, steps))
+            new, _ = self._step(z, motion, slopes, noise_scale)
+            moved = np.abs(np.linalg.solve(np.linalg.cholesky(covariance), new - z)).max()
+            z, num_steps = new, num_steps + 1
+            if is_final_scale and moved < settings.converged_sd:
+                break
+        motion, slopes = self._slopes(z, steps)
+        jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale))
+        at_unit = self._white(z, motion, 1.0)
         count = int(self.problem.data.num_values)
         whole = np.zeros((len(z) + 1,) * 2)
         whole[:-1, :-1] = _covariance(jacobian)
         whole[-1, -1] = 1 / (1 + 2 * count * NOISE_SD**2)
-        code = Code.CONVERGED if float(moved) < settings.converged_sd else Code.STEP_LIMIT
+        code = Code.CONVERGED if moved < settings.converged_sd else Code.STEP_LIMIT
         if np.abs(at_unit).max() >= FAILED:
             code = Code.FAILED
         return GradientFit(
-            z=np.append(np.asarray(z), np.log(noise_scale) / NOISE_SD),
+            z=np.append(z, np.log(noise_scale) / NOISE_SD),
             covariance=whole,
             chi2=float(np.sum(at_unit**2)),
             num_values=count,
-            steps=np.asarray(steps),
-            jacobian=np.asarray(jacobian),
+            steps=steps,
+            jacobian=jacobian,
             code=code,
-            stats={"num_steps": num_steps, "num_starts": settings.num_starts},
+            stats={"num_steps": num_steps, "num_rollouts": self._num_rollouts},
         )
 
-    def _search(self, seed: int, on_stage: Callable[[str], None]) -> tuple[jax.Array, int]:
+    def _search(self, seed: int) -> tuple[np.ndarray, int]:
         """The best of the refined starts, z, and how many steps that took."""
         settings = self.settings
-        on_stage("searching")
-        steps = jnp.asarray(self.problem.coarse_steps)
-        starts = jnp.asarray(self._starts(seed))
-        order = np.argsort(np.asarray(self._cost(starts, steps)))
-        on_stage("approaching")
+        starts = self._starts(seed)
+        cost = self._costs(starts, 1.0)
+        order = np.argsort(cost)
         count = float(self.problem.data.num_values)
         best, best_cost, num_steps = starts[order[0]], np.inf, 0
-        for start in starts[order[: settings.num_refined]]:
-            z, _, used = self._approach(start, jnp.eye(len(start)), 1.0, steps)
-            num_steps += int(used)
-            cost = float(self._cost(z[None], steps)[0])
-            if cost < best_cost:
-                best, best_cost = z, cost
+        for i in order[: settings.num_refined]:
+            z, now = starts[i], float(cost[i])
+            for _ in range(settings.max_steps):
+                motion, slopes = self._slopes(z, self.problem.coarse_steps, is_central=False)
+                z, after = self._step(z, motion, slopes, 1.0, now)
+                num_steps += 1
+                if now - after < settings.enough:
+                    break
+                now = after
+            if now < best_cost:
+                best, best_cost = z, now
             if best_cost < 0.5 * settings.good_chi2_per_value * count:
                 break
         return best, num_steps
 
-    def _noise_factor(self, residual: jax.Array, effective: float) -> float:
+    def _step(
+        self,
+        z: np.ndarray,
+        motion: tuple[np.ndarray, np.ndarray],
+        slopes: tuple[np.ndarray, np.ndarray],
+        noise_scale: float,
+        cost: float | None = None,
+    ) -> tuple[np.ndarray, float]:
+        """One Levenberg-Marquardt step: the best of all dampings (or none) and its cost."""
+        jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale))
+        size = np.sqrt(1 + np.sum(jacobian**2, axis=0))
+        tried = np.asarray(self._solve(DAMPINGS, size, z, motion, slopes, noise_scale))
+        tried = np.where(np.isfinite(tried), tried, z)
+        if cost is None:
+            residual = self._white(z, motion, noise_scale)
+            cost = 0.5 * float(np.sum(residual**2) + np.sum(z**2))
+        costs = self._costs(tried, noise_scale)
+        best = int(np.argmin(costs))
+        return (tried[best], float(costs[best])) if costs[best] < cost else (z, cost)
+
+    def _simulate(self, zs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        self._num_rollouts += len(zs)
+        return self.problem.engine.simulate(np.asarray(self._forward(zs)))
+
+    def _costs(self, zs: np.ndarray, noise_scale: float) -> np.ndarray:
+        """chi2 / 2 and the prior's part, `[batch]`."""
+        white = np.asarray(self._residuals(zs, self._simulate(zs), noise_scale))
+        return 0.5 * (np.sum(white**2, axis=1) + np.sum(zs**2, axis=1))
+
+    def _white(
+        self, z: np.ndarray, motion: tuple[np.ndarray, np.ndarray], noise: float
+    ) -> np.ndarray:
+        return np.asarray(self._residuals(z[None], tuple(m[None] for m in motion), noise)[0])
+
+    def _slopes(self, z: np.ndarray, steps: np.ndarray, is_central: bool = True):
+        """The motion at z and its differences, `[model parameter, object, 2, record]`."""
+        h = np.asarray(steps)[self._simulated]
+        offsets = np.zeros((len(h), len(z)))
+        offsets[np.arange(len(h)), self._simulated] = h
+        batch = [z[None], z + offsets, *([z - offsets] if is_central else [])]
+        out = self._simulate(np.concatenate(batch))
+        slopes = []
+        for values in out:
+            low, width = (values[1 + len(h) :], 2 * h) if is_central else (values[:1], h)
+            slope = np.zeros((len(z), *values.shape[1:]))
+            slope[self._simulated] = (values[1 : 1 + len(h)] - low) / width[:, None, None, None]
+            slopes.append(slope)
+        return (out[0][0], out[1][0]), tuple(slopes)
+
+    def _noise_factor(self, residual: np.ndarray, effective: float) -> float:
         """The factor on the noise scale that the residuals ask for, prior included."""
         count = float(self.problem.data.num_values)
         wide = 1 / (2 * NOISE_SD**2)  # the prior is worth this many values
-        total = float(jnp.sum(residual**2))
+        total = float(np.sum(residual**2))
         return float(np.sqrt((total + wide) / (max(count - effective, 1.0) + wide)))
 
     def _starts(self, seed: int) -> np.ndarray:
         """Scattered starts in z: main parameters by a Sobol sequence, all others at rest."""
         parameters = self.problem.model.parameters
+        count = self.settings.num_starts
         rest = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
         rest = np.clip(rest, -1.0, 1.0)  # an absent half-normal has no slope
         free = [i for i, p in enumerate(parameters) if p.role == "main"]
-        sobol = qmc.Sobol(len(free), seed=seed)
-        share = sobol.random_base2(int(np.ceil(np.log2(self.settings.num_starts))))
-        starts = np.tile(rest, (self.settings.num_starts, 1))
+        share = qmc.Sobol(len(free), seed=seed).random_base2(int(np.ceil(np.log2(count))))
+        starts = np.tile(rest, (count, 1))
         angle = self.problem.model.scene.surroundings.angle_rad
         for column, i in enumerate(free):
-            u = share[: self.settings.num_starts, column]
+            u = share[:count, column]
             if parameters[i].name.startswith("k"):
+                # Above tan(angle) nothing slides and every start looks alike.
                 u = u * min(np.tan(angle) if parameters[i].name == "k1" else 0.5, 0.98) + 0.01
             starts[:, i] = norm.ppf(np.clip(u, 0.01, 0.99))
         return starts
 
 
-def _covariance(jacobian: jax.Array) -> np.ndarray:
+def _covariance(jacobian: np.ndarray) -> np.ndarray:
     """The Laplace covariance of z, [parameter, parameter], prior included."""
-    return np.linalg.inv(np.asarray(jacobian.T @ jacobian) + np.eye(jacobian.shape[1]))
+    return np.linalg.inv(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))
 
 
-def _half_sd(covariance: np.ndarray) -> jax.Array:
+def _half_sd(covariance: np.ndarray) -> np.ndarray:
     """Difference steps at the posterior's scale: half its standard deviations, in z."""
-    return jnp.asarray(np.clip(0.5 * np.sqrt(np.diag(covariance)), 1e-4, 0.5))
+    return np.clip(0.5 * np.sqrt(np.diag(covariance)), 1e-4, 0.5)

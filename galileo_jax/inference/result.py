@@ -1,0 +1,117 @@
+"""result.json: the numbers of a fit by contract (DESIGN.md 2.3)."""
+
+from typing import Any
+
+import numpy as np
+
+from galileo_jax import __version__
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.problem import Problem
+from galileo_jax.parameters import inverse
+
+# In z every prior is a standard normal: above this the data told less than half.
+IDENTIFIED_SD_Z = 0.5
+
+
+def summarise(draws: np.ndarray) -> dict[str, float]:
+    """Mean, standard deviation and central 95 % interval of draws `[draw]`."""
+    low, high = np.quantile(draws, [0.025, 0.975])
+    return {
+        "mean": float(draws.mean()),
+        "sd": float(draws.std(ddof=1)),
+        "q025": float(low),
+        "q975": float(high),
+    }
+
+
+def velocity_error(problem: Problem, predicted_m: np.ndarray) -> dict[str, float]:
+    """How far predicted and measured velocity profiles are apart, m/s.
+
+    Args:
+      problem: with the observation.
+      predicted_m: `[object, 2, frame]`, the fitted centres.
+
+    Returns:
+      rmse; noise (what tracking errors alone would give); l1 (mean absolute) and l2 (root of
+      the summed squares, per profile as in the thesis).
+    """
+    observation = problem.observation
+    dt = np.diff(observation.times_s)
+    both = observation.mask[:, 1:] & observation.mask[:, :-1]
+    residual = np.diff(observation.position_m - predicted_m, axis=-1) / dt
+    values = residual[np.broadcast_to(both[:, None], residual.shape)]
+    variance = np.moveaxis(np.diagonal(observation.covariance_m2, axis1=1, axis2=2), -1, 1)
+    noise = (variance[..., 1:] + variance[..., :-1]) / dt**2
+    noise = noise[np.broadcast_to(both[:, None], noise.shape)]
+    if not values.size:
+        return {"rmse": float("nan"), "noise": float("nan"), "l1": float("nan"), "l2": float("nan")}
+    return {
+        "rmse": float(np.sqrt(np.mean(values**2))),
+        "noise": float(np.sqrt(np.mean(noise))),
+        "l1": float(np.mean(np.abs(values))),
+        "l2": float(np.sqrt(np.sum(values**2))),
+    }
+
+
+def make_result(
+    problem: Problem,
+    posterior: Posterior,
+    z_best: np.ndarray,
+    *,
+    clips: list[str],
+    method: str,
+    seed: int,
+    timings_s: dict[str, float],
+    notes: dict[str, Any],
+) -> dict[str, Any]:
+    """The contract's dictionary.
+
+    Args:
+      problem: the fitted problem.
+      posterior: draws in the parameters' units.
+      z_best: `[parameter]`, the mode in z, noise scale last; errors are told at it.
+      clips: the files fitted.
+      method: "grad", "mh" or "cnn".
+      seed: of everything random.
+      timings_s: by stage.
+      notes: what else the method has to say ("engine", "status", warnings).
+    """
+    draws = posterior.flat()
+    spread = np.asarray(inverse(problem.parameters, draws)).std(axis=0)
+    table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
+    for i, parameter in enumerate(problem.parameters):
+        entry: dict[str, Any] = summarise(draws[:, i])
+        entry["unit"] = parameter.unit
+        entry["identified"] = bool(spread[i] < IDENTIFIED_SD_Z)
+        room = "nuisances" if parameter.role == "nuisance" else "parameters"
+        table[room][parameter.name] = entry
+    derived = {}
+    if "m2" in posterior.names:
+        m1, m2 = posterior["m1"].reshape(-1), posterior["m2"].reshape(-1)
+        prior_sd = np.sqrt(2) * problem.parameters[problem.names.index("m1")].prior.sd  # pyright: ignore
+        is_identified = bool(np.log(m1 / m2).std() < IDENTIFIED_SD_Z * prior_sd)
+        derived = {
+            "mass_ratio": {**summarise(m1 / m2), "unit": "1", "identified": is_identified},
+            "phi": {**summarise((m1 - m2) / (m1 + m2)), "unit": "1", "identified": is_identified},
+        }
+    steps = problem.coarse_steps
+    predicted = np.asarray(problem.predict(z_best[:-1], steps))
+    white = np.asarray(problem.residuals(z_best[:-1], 1.0, steps))
+    count = int(problem.data.num_values)
+    # Every parameter takes from the residuals what the data told of it.
+    effective = float(np.sum(1 - np.clip(spread[:-1] ** 2, 0, 1)))
+    error = velocity_error(problem, predicted)
+    error["chi2_per_dof"] = float(np.sum(white**2) / max(count - effective, 1.0))
+    status = {"converged": posterior.is_converged, **notes}
+    return {
+        "clips": clips,
+        "method": method,
+        **status,
+        "effects": [effect.name for effect in problem.model.effects],
+        **table,
+        "derived": derived,
+        "error": error,
+        "timings_s": timings_s,
+        "version": __version__,
+        "seed": seed,
+    }
