@@ -1,16 +1,23 @@
 """Tracking a clip: what is declared about the objects becomes outlines in the image."""
 
 import math
+from collections.abc import Callable, Iterator
 
+import numpy as np
 from rich.progress import Progress
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.errors import InputError
-from galileo_jax.tracking.template import Outline
+from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.template import Outline, grey
 from galileo_jax.tracking.track import Track
 from galileo_jax.tracking.tracker import Start, track_video
 from galileo_jax.video import decode
+
+
+UNKNOWN_SPAN_PX = 40.0
+"""Features of one object are within this of each other when its size is not known."""
 
 
 def track_clip(clip: Clip, *, progress: Progress | None = None) -> Track:
@@ -22,18 +29,56 @@ def track_clip(clip: Clip, *, progress: Progress | None = None) -> Track:
     video = clip.video
     if video is None:
         raise InputError(f"{clip.path}: video: missing; a csv track is tracked already")
-    starts = [
-        Start(item.name, item.point_px, outline_of(clip, item), item.first_frame)
-        for item in clip.objects
-        if item.point_px is not None
-    ]
-    task = progress.add_task("tracking", total=2 * clip.frame_count) if progress else None
+    passes = 2 if all(item.point_px is not None for item in clip.objects) else 3
+    task = progress.add_task("tracking", total=passes * clip.frame_count) if progress else None
 
     def advance() -> None:
         if progress is not None and task is not None:
             progress.advance(task)
 
-    return track_video(lambda: decode.frames(video), starts, clip.fps, advance=advance)
+    def open_frames() -> Iterator[np.ndarray]:
+        return decode.frames(video)
+
+    if passes == 3:
+        clip = _with_points(clip, open_frames, advance)
+    starts = [
+        Start(item.name, item.point_px, outline_of(clip, item), item.first_frame)
+        for item in clip.objects
+        if item.point_px is not None
+    ]
+    return track_video(open_frames, starts, clip.fps, advance=advance)
+
+
+def _with_points(
+    clip: Clip, open_frames: Callable[[], Iterator[np.ndarray]], advance: Callable[[], None]
+) -> Clip:
+    """The clip with a `point_px` for every object: those not declared go to what moves."""
+    sizes = [outline_of(clip, item).size_px for item in clip.objects]
+    known = [max(size) for size in sizes if size is not None]
+    span = max(known) if known else UNKNOWN_SPAN_PX
+    ramp_angle = _ramp_angle_rad(clip)
+    movers = find_movers(open_frames, span, axes_angle_rad=ramp_angle, advance=advance)
+    taken = [item.point_px for item in clip.objects if item.point_px is not None]
+    movers = [m for m in movers if all(math.dist(m.point_px, point) > span for point in taken)]
+    missing = [item for item in clip.objects if item.point_px is None]
+    if len(movers) < len(missing):
+        name = missing[len(movers)].name
+        raise InputError(
+            f"{clip.path}: objects ({name}): point_px: missing, and only {len(movers)} moving "
+            f"object(s) found to take for {len(missing)}; mark it: "
+            f"python -m galileo_jax.label {clip.video or clip.path} --help"
+        )
+    first = grey(next(open_frames()))
+    found: dict[str, ClipObject] = {}
+    for item, mover in zip(missing, movers, strict=False):
+        marked = item.model_copy(update={"point_px": mover.point_px, "first_frame": 0})
+        outline = outline_of(clip, marked)
+        if outline.size_px is not None and not outline.is_round:
+            centre = fit_outline(first, mover.places_px, outline)
+            marked = marked.model_copy(update={"point_px": centre})
+        found[item.name] = marked
+    objects = tuple(found.get(item.name, item) for item in clip.objects)
+    return clip.model_copy(update={"objects": objects})
 
 
 def outline_of(clip: Clip, item: ClipObject) -> Outline:
@@ -57,12 +102,17 @@ def outline_of(clip: Clip, item: ClipObject) -> Outline:
 
 def _image_angle_rad(clip: Clip, item: ClipObject) -> float:
     """How the object stands in the image: along the ramp if it is on it, else level."""
-    if not SCENARIOS[clip.scenario].has_ramp or clip.ramp_angle_deg is None:
-        return 0.0
-    along = 1.0 if clip.direction == "right" else -1.0
     if clip.scenario == "ramp":
         if clip.origin_px is None or item.point_px is None:
             return 0.0
+        along = 1.0 if clip.direction == "right" else -1.0
         if along * (item.point_px[0] - clip.origin_px[0]) > 0:
             return 0.0
-    return along * math.radians(clip.ramp_angle_deg)
+    return _ramp_angle_rad(clip)
+
+
+def _ramp_angle_rad(clip: Clip) -> float:
+    """How the ramp's surface is turned in the image, clockwise positive; 0 without a ramp."""
+    if not SCENARIOS[clip.scenario].has_ramp or clip.ramp_angle_deg is None:
+        return 0.0
+    return math.radians(clip.ramp_angle_deg) * (1 if clip.direction == "right" else -1)

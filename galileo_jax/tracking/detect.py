@@ -1,0 +1,214 @@
+"""Finding the objects of a video without being told where they are: what moves, and when first.
+
+Features of the first frame are followed through the whole video. Those that set out together,
+from places close to each other, and keep going the same way are one thing. A thing that leaves
+the picture is a hand; of the others the first to move is object 1.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from galileo_jax.tracking.pose import patch_at, rotation
+from galileo_jax.tracking.template import Outline, grey
+
+MAX_FEATURES = 1200
+FORWARD_BACKWARD_PX = 0.5
+MOVED_PX = 3.0
+"""A feature that is this far from where it began has moved; noise reaches 1 px."""
+SAME_ONSET_FRAMES = 3
+SAME_WAY_PX = 3.0
+"""Features of one thing are displaced alike to this, while they turn little."""
+MIN_FEATURES = 5
+LOOK_AHEAD_FRAMES = 3
+BORDER_SHARE = 0.03
+"""Share of the frame's width within which a thing counts as at the border."""
+
+
+@dataclass(frozen=True)
+class Mover:
+    """A thing that moves.
+
+    Attributes:
+      point_px: middle of its features in the first frame, `(x, y)`.
+      onset_frame: when it had moved by `MOVED_PX`.
+      num_features: how many features agree on it.
+      leaves_picture: whether its features were last seen going over the border.
+      places_px: `[feature, 2]`, the features in the first frame.
+    """
+
+    point_px: tuple[float, float]
+    onset_frame: int
+    num_features: int
+    leaves_picture: bool
+    places_px: np.ndarray
+
+
+def find_movers(
+    open_frames: Callable[[], Iterable[np.ndarray]],
+    span_px: float,
+    *,
+    axes_angle_rad: float = 0.0,
+    advance: Callable[[], None] = lambda: None,
+) -> list[Mover]:
+    """The things that move, those that stay in the picture first, each kind by onset.
+
+    Args:
+      open_frames: gives the frames from the beginning; called once.
+      span_px: about the size of an object; features farther apart are linked by others only.
+      axes_angle_rad: how the objects' sides are turned in the image (the ramp's angle); their
+        middle is taken along these axes.
+      advance: called after every frame.
+
+    Limits: things without texture, or that are not there in the first frame, are not found.
+    """
+    path, size_px = _feature_paths(open_frames, advance)
+    moved = np.linalg.norm(path - path[:1], axis=2) > MOVED_PX
+    # Moved for good, not for a frame: an occluded feature jumps and is lost.
+    settled = moved & np.roll(moved, -1, axis=0) & np.roll(moved, -2, axis=0)
+    settled[-2:] = False
+    onset = np.where(settled.any(axis=0), settled.argmax(axis=0), -1)
+    movers = []
+    for members in _groups(path, onset, span_px):
+        last = np.array([_last_seen(path[:, i]) for i in members])
+        margin = BORDER_SHARE * size_px[0]
+        beyond = (last < margin) | (last > np.array(size_px) - 1 - margin)
+        movers.append(
+            Mover(
+                point_px=_middle(path[0, members], axes_angle_rad),
+                onset_frame=int(np.median(onset[members])),
+                num_features=len(members),
+                leaves_picture=bool(np.mean(beyond.any(axis=1)) > 0.3),
+                places_px=path[0, members],
+            )
+        )
+    return sorted(movers, key=lambda mover: (mover.leaves_picture, mover.onset_frame))
+
+
+def _feature_paths(
+    open_frames: Callable[[], Iterable[np.ndarray]], advance: Callable[[], None]
+) -> tuple[np.ndarray, tuple[int, int]]:
+    """Places `[frame, feature, 2]` of the first frame's features, NaN once lost; frame size."""
+    before: np.ndarray | None = None
+    path: list[np.ndarray] = []
+    size_px = (0, 0)
+    for frame in open_frames():
+        image = grey(frame)
+        advance()
+        if before is None:
+            found = cv2.goodFeaturesToTrack(image, MAX_FEATURES, 0.02, 3)
+            path.append(np.empty((0, 2), np.float32) if found is None else found.reshape(-1, 2))
+            size_px = (image.shape[1], image.shape[0])
+        else:
+            path.append(_followed(before, image, path[-1]))
+        before = image
+    return np.stack(path), size_px
+
+
+def _followed(before: np.ndarray, after: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Places of the features in the next frame; NaN where lost.
+
+    What stands still is looked for without a pyramid first: on its upper levels something fast
+    passing by would carry it away.
+    """
+    result = np.full_like(places, np.nan)
+    for levels in (0, 3):
+        alive = np.flatnonzero(np.isfinite(places[:, 0]) & ~np.isfinite(result[:, 0]))
+        if not len(alive):
+            break
+        start = places[alive].reshape(-1, 1, 2)
+        options = {"winSize": (13, 13), "maxLevel": levels}
+        moved, is_found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, None, **options)
+        back, is_back, _ = cv2.calcOpticalFlowPyrLK(after, before, moved, None, **options)
+        error = np.linalg.norm((back - start).reshape(-1, 2), axis=1)
+        good = (is_found.ravel() > 0) & (is_back.ravel() > 0) & (error < FORWARD_BACKWARD_PX)
+        result[alive[good]] = moved.reshape(-1, 2)[good]
+    return result
+
+
+def _groups(path: np.ndarray, onset: np.ndarray, span_px: float) -> list[np.ndarray]:
+    """Features that began close together, set out together and went the same way."""
+    candidates = np.flatnonzero(onset >= 0)
+    later = np.minimum(onset[candidates] + LOOK_AHEAD_FRAMES, len(path) - 1)
+    groups: list[np.ndarray] = []
+    left = set(range(len(candidates)))
+    while left:
+        group, edge = set(), {left.pop()}
+        while edge:
+            i = edge.pop()
+            group.add(i)
+            feature = candidates[i]
+            others = np.array(sorted(left), dtype=int)
+            if not len(others):
+                continue
+            features = candidates[others]
+            near = np.linalg.norm(path[0, features] - path[0, feature], axis=1) < span_px / 2
+            together = np.abs(onset[features] - onset[feature]) <= SAME_ONSET_FRAMES
+            way = path[later[i], features] - path[0, features]
+            own = path[later[i], feature] - path[0, feature]
+            alike = np.linalg.norm(way - own, axis=1) < SAME_WAY_PX  # False where lost
+            joined = set(others[near & together & alike].tolist())
+            left -= joined
+            edge |= joined
+        if len(group) >= MIN_FEATURES:
+            groups.append(candidates[sorted(group)])
+    return groups
+
+
+def _last_seen(path: np.ndarray) -> np.ndarray:
+    """The last place of a feature, one frame carried on."""
+    seen = np.flatnonzero(np.isfinite(path[:, 0]))
+    last = path[seen[-1]]
+    return last if len(seen) < 2 else 2 * last - path[seen[-2]]
+
+
+def _middle(places: np.ndarray, angle_rad: float) -> tuple[float, float]:
+    """The middle of the smallest rectangle, with sides along the axes, around `places`."""
+    turn = rotation(angle_rad)
+    own = places @ turn
+    x, y = turn @ ((own.min(axis=0) + own.max(axis=0)) / 2)
+    return float(x), float(y)
+
+
+def fit_outline(
+    image: np.ndarray, places: np.ndarray, outline: Outline
+) -> tuple[float, float]:
+    """The centre of the rectangle of known size that holds `places` and has the sharpest sides.
+
+    Features on one side of an object may be missing (something touched it as it set out), so
+    the middle of those found can be several pixels off. The rectangle is shifted, along its own
+    axes, as far as the features let it, to where the grey image changes most across its sides.
+    """
+    assert outline.size_px is not None
+    size = np.array(outline.size_px)
+    turn = rotation(outline.angle_rad)
+    own = places @ turn
+    low, high = own.min(axis=0), own.max(axis=0)
+    middle = (low + high) / 2
+    slack = np.maximum((size - (high - low)) / 2, 0) + 1.5
+    radius = int(np.ceil(size.max() / 2 + slack.max())) + 2
+    patch = patch_at(image, np.array([*(turn @ middle), outline.angle_rad]), radius)
+    patch = cv2.GaussianBlur(patch, (0, 0), 0.8)
+    across = np.abs(cv2.Sobel(patch, cv2.CV_32F, 1, 0)), np.abs(cv2.Sobel(patch, cv2.CV_32F, 0, 1))
+    half = size / 2
+
+    def sharpness(shift: np.ndarray) -> float:
+        left, top = np.round(radius + shift - half).astype(int)
+        right, bottom = np.round(radius + shift + half).astype(int)
+        sides = (
+            across[0][top:bottom, left],
+            across[0][top:bottom, right],
+            across[1][top, left:right],
+            across[1][bottom, left:right],
+        )
+        return float(np.mean([side.mean() for side in sides]))
+
+    shifts = [
+        np.array([x, y])
+        for x in np.arange(-slack[0], slack[0] + 0.5, 0.5)
+        for y in np.arange(-slack[1], slack[1] + 0.5, 0.5)
+    ]
+    x, y = turn @ (middle + max(shifts, key=sharpness))
+    return float(x), float(y)
