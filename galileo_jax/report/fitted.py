@@ -1,0 +1,124 @@
+"""What the posterior says of the clip's own frames; all plots read from it."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import jax
+import numpy as np
+
+from galileo_jax.observation import Observation
+from galileo_jax.prediction import as_measured, draw_theta, hit_s, roll_out
+from galileo_jax.run import Run
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+
+NUM_DRAWS = 100
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A stretch of one object's motion.
+
+    Attributes:
+      name: "ramp", "foot", "table", "at rest" or "after the hit".
+      start_s, end_s: on the clip's clock.
+    """
+
+    name: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The fit in the clip's frames.
+
+    Attributes:
+      observation: what was measured.
+      position_m: `[draw, object, 2, frame]`, predicted positions of the followed points.
+      noise_scale: the factor on the tracker's own noise.
+      offset_m: `[object, 2]`, followed point minus centre; `position_m` contains each draw's.
+      residuals: `[object, 2, frame]`, in units of the noise; NaN where nothing was measured.
+      phases: of each object.
+      hit_s: when object 1 hits object 2; None = it does not.
+    """
+
+    observation: Observation
+    position_m: np.ndarray
+    noise_scale: float
+    offset_m: np.ndarray
+    residuals: np.ndarray
+    phases: tuple[tuple[Phase, ...], ...]
+    hit_s: float | None
+
+    @property
+    def moves(self) -> np.ndarray:
+        """`[object]`, whether each predicted position changes by more than 2 mm."""
+        span = np.ptp(np.median(self.position_m, axis=0), axis=-1)
+        return np.linalg.norm(span, axis=-1) > 2e-3
+
+
+def evaluate(run: Run, seed: int) -> Fitted:
+    """Rolls out the posterior's median, for the residuals, and draws, for the bands."""
+    problem = run.problem
+    observation, surroundings = problem.observation, problem.model.scene.surroundings
+    # Medians, unlike means, are the same in the parameters' units and in the search space.
+    medians = dict(zip(run.posterior.names, np.median(run.posterior.flat(), axis=0), strict=True))
+    noise_scale = float(medians["noise_scale"])
+    median = np.array([[medians[name] for name in problem.model.names]])
+    centre, draws = (
+        roll_out(problem.model, problem.engine, theta, observation.times_s)
+        for theta in (median, draw_theta(run, NUM_DRAWS, seed))
+    )
+    shown = as_measured(problem.model, centre)[0]
+    white = jax.jit(GaussianLikelihood.whiten)(
+        problem.data.observed_m - shown, noise_scale, problem.data
+    )
+    is_measured = np.broadcast_to(observation.mask[:, None], shown.shape)
+    drawn = as_measured(problem.model, draws)
+    drawn = drawn + _offset(observation, drawn)[..., None]
+    when = hit_s(draws, surroundings)
+    happens = np.isfinite(when)
+    hit = float(np.median(when[happens])) if happens.mean() > 0.5 else None
+    return Fitted(
+        observation=observation,
+        position_m=drawn,
+        noise_scale=noise_scale,
+        offset_m=_offset(observation, shown),
+        residuals=np.where(is_measured, np.asarray(white), np.nan),
+        phases=tuple(
+            _phases(run, centre.position_m[0, i], i, hit) for i in range(len(surroundings.names))
+        ),
+        hit_s=hit,
+    )
+
+
+def _offset(observation: Observation, predicted_m: np.ndarray) -> np.ndarray:
+    """Followed points minus centres `[..., object, 2, frame]`, median over the frames."""
+    return np.stack(
+        [
+            np.median((observation.position_m[i] - predicted_m[..., i, :, :])[..., seen], axis=-1)
+            for i, seen in enumerate(observation.mask)
+        ],
+        axis=-2,
+    )
+
+
+def _phases(run: Run, centre_m: np.ndarray, index: int, hit: float | None) -> tuple[Phase, ...]:
+    """Consecutive phases of one object, from its fitted centre `[2, frame]`."""
+    surroundings = run.problem.model.scene.surroundings
+    times = run.problem.observation.times_s
+    corner, half = surroundings.corner_m[index], surroundings.half_length_m[index]
+    if surroundings.start_m[index][0] < corner:
+        beyond = centre_m[0] - corner  # -inf where there is no table
+        labels = np.select([beyond < -half, beyond < half], ["ramp", "foot"], "table")
+    else:
+        labels = np.full(len(times), "at rest")
+    if hit is not None:
+        labels = np.where(times >= hit, "after the hit", labels)
+    borders = np.flatnonzero(labels[1:] != labels[:-1]) + 1
+    edges = [0, *borders, len(times) - 1]
+    return tuple(
+        Phase(str(labels[start]), float(times[start]), float(times[end]))
+        for start, end in pairwise(edges)
+        if end > start
+    )

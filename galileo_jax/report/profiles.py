@@ -1,0 +1,105 @@
+"""Velocity profiles and positions, measured against fitted, with 95 % bands."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from galileo_jax.report.figure import COLOURS, INK, panel, style
+from galileo_jax.report.fitted import Fitted, Phase
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+AXES = ("x", "y")
+SHORTEST_LABELLED = 0.09  # of the panel's width
+
+
+def velocity_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
+    """The velocity profile of one object along one axis.
+
+    Dark band: the model's velocity with the posterior's uncertainty. Light band: where 95 % of
+    measured velocities are expected, tracking noise included.
+    """
+    observation = fitted.observation
+    times = observation.times_s
+    step = np.diff(times)
+    middle = times[:-1] + step / 2
+    drawn = np.diff(fitted.position_m[:, index, axis], axis=-1) / step
+    variance = observation.covariance_m2[index, axis, axis] * fitted.noise_scale**2
+    noise = np.sqrt(variance[1:] + variance[:-1]) / step
+    name = observation.names[index]
+    with style(f"velocity_{name}_{AXES[axis]}"):
+        figure, axes = panel(f"{name}, {AXES[axis]}", "time, s", "velocity, m/s")
+        _fill(axes, middle, drawn, noise, index)
+        measured = observation.velocity_m_s[index, axis]
+        _measured(axes, middle, measured)
+        shade_phases(axes, fitted.phases[index], times)
+        _legend(axes, index, axis)
+    return figure
+
+
+def position_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
+    """The position of one object along one axis."""
+    observation = fitted.observation
+    variance = observation.covariance_m2[index, axis, axis] * fitted.noise_scale**2
+    name = observation.names[index]
+    with style(f"position_{name}_{AXES[axis]}"):
+        figure, axes = panel(f"{name}, {AXES[axis]}", "time, s", f"{AXES[axis]}, m")
+        drawn = fitted.position_m[:, index, axis]
+        _fill(axes, observation.times_s, drawn, np.sqrt(variance), index)
+        _measured(axes, observation.times_s, observation.position_m[index, axis])
+        shade_phases(axes, fitted.phases[index], observation.times_s)
+        _legend(axes, index, axis)
+    return figure
+
+
+def shade_phases(axes: "Axes", phases: Sequence[Phase], times_s: np.ndarray) -> None:
+    """Shades every other phase and names those wide enough."""
+    whole = float(times_s[-1] - times_s[0])
+    axes.set_xlim(times_s[0] - 0.02 * whole, times_s[-1] + 0.02 * whole)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.14 * (high - low))  # room for the names
+    for i, phase in enumerate(phases):
+        if i % 2:
+            axes.axvspan(phase.start_s, phase.end_s, color=INK, alpha=0.06, linewidth=0)
+        if phase.end_s - phase.start_s > SHORTEST_LABELLED * whole:
+            axes.text(
+                (phase.start_s + phase.end_s) / 2,
+                0.985,
+                phase.name,
+                transform=axes.get_xaxis_transform(),
+                ha="center",
+                va="top",
+                fontsize=8,
+                alpha=0.65,
+            )
+
+
+def _fill(
+    axes: "Axes", times_s: np.ndarray, drawn: np.ndarray, noise: np.ndarray, index: int
+) -> None:
+    """Median and bands of `drawn` `[draw, time]`; `noise` `[time]` is a standard deviation."""
+    colour = COLOURS[index]
+    low, median, high = np.quantile(drawn, [0.025, 0.5, 0.975], axis=0)
+    spread = 1.96 * np.sqrt(drawn.var(axis=0) + np.where(np.isfinite(noise), noise, 0.0) ** 2)
+    mean = drawn.mean(axis=0)
+    axes.fill_between(
+        times_s, mean - spread, mean + spread, color=colour, alpha=0.18, linewidth=0,
+        label="95 % of measurements",
+    )  # fmt: skip
+    axes.fill_between(
+        times_s, low, high, color=colour, alpha=0.45, linewidth=0, label="95 % of the model"
+    )
+    axes.plot(times_s, median, color=colour, label="fitted")
+
+
+def _measured(axes: "Axes", times_s: np.ndarray, values: np.ndarray) -> None:
+    axes.plot(times_s, values, "o", color=INK, markersize=2.6, markeredgewidth=0, label="measured")
+
+
+def _legend(axes: "Axes", index: int, axis: int) -> None:
+    """A legend in the first panel of a group only."""
+    if index == 0 and axis == 0:
+        axes.legend(loc="best", handlelength=1.4, labelspacing=0.25)

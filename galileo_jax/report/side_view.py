@@ -1,0 +1,117 @@
+"""The scene seen from the side: what part of the world a picture shows, and a drawn picture."""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from galileo_jax.report.figure import COLOURS, INK
+from galileo_jax.rollout.motion import pitch
+from galileo_jax.run import Run
+from galileo_jax.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+LARGEST_PX = 960
+MARGIN_M = 0.08
+SLAB_M = 0.012  # how thick ramp and table are drawn
+SURFACE = "#b9b4aa"
+
+
+@dataclass(frozen=True)
+class View:
+    """A side view without perspective.
+
+    Attributes:
+      left_m, right_m, bottom_m, top_m: the picture's edges in the scene.
+      width_px, height_px: its size.
+      is_mirrored: the travel is to the left in the picture.
+    """
+
+    left_m: float
+    right_m: float
+    bottom_m: float
+    top_m: float
+    width_px: int
+    height_px: int
+    is_mirrored: bool
+
+
+@dataclass(frozen=True)
+class Still:
+    """The objects at one instant: centres `[object, 2]`, m, and what to call it."""
+
+    position_m: np.ndarray
+    title: str
+
+
+def view_of(run: Run, positions_m: np.ndarray) -> View:
+    """What the video shows; without a video (or its scale) all of `positions_m` `[..., 2]`."""
+    clip = run.clip
+    if clip.frame_size_px and clip.origin_px and clip.pixels_per_metre:
+        (width, height), (x, y) = clip.frame_size_px, clip.origin_px
+        scale = clip.pixels_per_metre
+        left, right = -x / scale, (width - x) / scale
+        is_mirrored = clip.direction == "left"
+        if is_mirrored:
+            left, right = -right, -left
+        bottom, top = (y - height) / scale, y / scale
+    else:
+        places = positions_m.reshape(-1, 2)
+        reach = MARGIN_M + max(run.problem.model.scene.surroundings.half_length_m)
+        (left, bottom), (right, top) = places.min(axis=0) - reach, places.max(axis=0) + reach
+        width, height, is_mirrored = right - left, top - bottom, False
+    shrink = LARGEST_PX / max(width, height)
+    if clip.frame_size_px:
+        shrink = min(1.0, shrink)
+    size = (2 * round(width * shrink / 2), 2 * round(height * shrink / 2))
+    return View(float(left), float(right), float(bottom), float(top), *size, is_mirrored)
+
+
+def surfaces(scene: Scene, view: View) -> list[tuple[tuple[float, float], float, float]]:
+    """Ramp and table as (upper end that is nearest the foot, length, angle of its direction).
+
+    Lengths reach to the view's edges; the angle is counter-clockwise, rad.
+    """
+    surroundings = scene.surroundings
+    angle = surroundings.angle_rad
+    if scene.has_table:
+        longest = (-view.left_m) / math.cos(angle)
+        start_x = surroundings.start_m[0][0]
+        length = min(longest, -start_x / math.cos(angle) + 2 * surroundings.half_length_m[0])
+        return [((0.0, 0.0), length, math.pi - angle), ((0.0, 0.0), view.right_m, 0.0)]
+    (x, y), height = surroundings.start_m[0], surroundings.half_height_m[0]
+    foot_x, foot_y = x - height * math.sin(angle), y - height * math.cos(angle)
+    back = (foot_x - view.left_m) / math.cos(angle)
+    length = (view.right_m - view.left_m) / math.cos(angle)
+    top = (foot_x - back * math.cos(angle), foot_y + back * math.sin(angle))
+    return [(top, length, -angle)]
+
+
+def draw(axes: "Axes", run: Run, still: Still, view: View) -> None:
+    """Draws the scene with plain shapes."""
+    from matplotlib.patches import Circle, Polygon
+
+    scene = run.problem.model.scene
+    for (x, y), length, angle in surfaces(scene, view):
+        end = (x + length * math.cos(angle), y + length * math.sin(angle))
+        below = SLAB_M / math.cos(angle)
+        corners = [(x, y), end, (end[0], end[1] - abs(below)), (x, y - abs(below))]
+        axes.add_patch(Polygon(corners, color=SURFACE, linewidth=0))
+    turned = pitch(still.position_m, scene.surroundings)
+    for i, (declared, (x, y)) in enumerate(zip(run.clip.objects, still.position_m, strict=True)):
+        length = scene.surroundings.half_length_m[i]
+        height = scene.surroundings.half_height_m[i]
+        if declared.shape == "sphere":
+            axes.add_patch(Circle((x, y), length, color=COLOURS[i], linewidth=0))
+            continue
+        cos, sin = math.cos(float(turned[i])), math.sin(float(turned[i]))
+        corners = [
+            (x + a * length * cos - b * height * sin, y + a * length * sin + b * height * cos)
+            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        ]
+        axes.add_patch(Polygon(corners, color=COLOURS[i], linewidth=0))
+    for side in axes.spines.values():
+        side.set(visible=True, color=INK, alpha=0.3)

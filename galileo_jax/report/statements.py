@@ -1,0 +1,109 @@
+"""What the fit does and does not say, in plain sentences."""
+
+import math
+from typing import Any
+
+from galileo_jax.inference.fits.gradient import Code
+from galileo_jax.report.fitted import Fitted
+from galileo_jax.run import Run
+
+MEANINGS = {
+    "m1": "mass of object 1",
+    "k1": "friction of object 1",
+    "m2": "mass of object 2",
+    "k2": "friction of object 2",
+    "mass_ratio": "m1 / m2",
+    "phi": "(m1 - m2) / (m1 + m2)",
+    "pixels_per_metre": "scale of the picture",
+    "foot_transition": "factor on the speed kept at the foot of the ramp",
+    "impact_restitution": "share of the closing speed left after the impact",
+    "release_instant": "release after the first frame",
+    "start_offset_object1": "start of object 1, from where it was marked",
+    "start_offset_object2": "start of object 2, from where it was marked",
+    "noise_scale": "tracking noise over what the tracker stated",
+}
+CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
+
+
+def undetermined(run: Run, fitted: Fitted) -> dict[str, str]:
+    """Why each main parameter that the clip does not tell is not told, by name."""
+    found = {}
+    for name, entry in {**run.result["parameters"], **run.result.get("derived", {})}.items():
+        if not entry["identified"] and name != "phi":
+            found[name] = _reason(name, run, fitted)
+    return found
+
+
+def _reason(name: str, run: Run, fitted: Fitted) -> str:
+    surroundings = run.problem.model.scene.surroundings
+    has_two, ratio = len(surroundings.names) > 1, run.result.get("derived", {}).get("mass_ratio")
+    if not fitted.moves.any():
+        limit = math.tan(surroundings.angle_rad)
+        if name == "k1":
+            return f"nothing moves: k1 is at least tan(angle) = {limit:.3f}, more cannot be said"
+        return "nothing moves"
+    if name in ("m1", "m2"):
+        if not has_two:
+            return "the mass of a sliding object does not show in its motion"
+        if ratio is not None and ratio["identified"]:
+            return (
+                "only the ratio of the masses shows in such a clip: doubling both changes nothing"
+            )
+        return "masses show in a collision only, and there only their ratio"
+    if name == "pixels_per_metre":
+        return (
+            "on one slope only scale * (sin a - k1 cos a) shows; "
+            "declare pixels_per_metre to get the friction"
+        )
+    if name == "k1" and not surroundings.is_scale_known:
+        return "friction and scale cannot both be told from one slope; declare pixels_per_metre"
+    if name in ("k2", "mass_ratio") and fitted.hit_s is None:
+        return "object 1 never hits object 2"
+    if name in ("k2", "mass_ratio"):
+        return "object 2 is hit too weakly or too late in the clip to tell"
+    return "the clip narrows it by less than half of what was known before"
+
+
+def fit_quality(result: dict[str, Any]) -> str:
+    """chi2 per degree of freedom and what it means, in one sentence."""
+    chi2 = result["error"]["chi2_per_dof"]
+    if chi2 is None or not math.isfinite(chi2):
+        return "chi2 per degree of freedom cannot be told."
+    said = f"chi2 per degree of freedom is {chi2:.2f}: "
+    if chi2 < CHI2_GOOD:
+        return said + "the model fits, and the tracker did better than it claims."
+    if chi2 <= CHI2_HIGH:
+        return said + "what the model leaves over is of the size of the tracking noise."
+    if chi2 <= CHI2_BAD:
+        return said + "the model leaves more over than tracking noise explains; see the residuals."
+    return said + "the model does not describe this clip; do not trust its parameters."
+
+
+def convergence(run: Run) -> str:
+    """Whether the inference converged, in one sentence."""
+    status = run.result.get("status")
+    told = status if isinstance(status, str) else run.posterior.status.value
+    if told == Code.CONVERGED.value:
+        return "The fit converged."
+    word = "Converged" if run.result["converged"] else "Not converged"
+    return f"{word}: {told}."
+
+
+def number(value: float | None, sd: float | None) -> str:
+    """A value with as many places as its uncertainty allows (two figures of it)."""
+    if value is None or not math.isfinite(value):
+        return "n/a"
+    if not sd or not math.isfinite(sd):
+        return f"{value:.4g}"
+    places = max(0, 1 - math.floor(math.log10(sd)))
+    return f"{value:.{min(places, 9)}f}"
+
+
+def command_again(run: Run) -> str:
+    """The command that makes this run again, from the clip as it was fitted."""
+    result = run.result
+    words = ["python -m galileo_jax.fit", str(run.clip.path), f"--method {result['method']}"]
+    if result["effects"]:
+        words.append(f"--effects {','.join(result['effects'])}")
+    words.append(f"--engine {run.problem.engine.name}")
+    return " ".join([*words, f"--seed {result['seed']}"])
