@@ -15,7 +15,6 @@ from galileo_jax.tracking.track import Track
 from galileo_jax.tracking.tracker import Start, track_video
 from galileo_jax.video import decode
 
-
 UNKNOWN_SPAN_PX = 40.0
 """Features of one object are within this of each other when its size is not known."""
 

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from galileo_jax.tracking.lucas_kanade import PYRAMID_LEVELS, follow_points
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.template import Outline, grey
 
 MAX_FEATURES = 1200
-FORWARD_BACKWARD_PX = 0.5
+WINDOW_PX = 13
 MOVED_PX = 3.0
 """A feature that is this far from where it began has moved; noise reaches 1 px."""
 SAME_ONSET_FRAMES = 3
@@ -114,17 +115,12 @@ def _followed(before: np.ndarray, after: np.ndarray, places: np.ndarray) -> np.n
     passing by would carry it away.
     """
     result = np.full_like(places, np.nan)
-    for levels in (0, 3):
+    for levels in (0, PYRAMID_LEVELS):
         alive = np.flatnonzero(np.isfinite(places[:, 0]) & ~np.isfinite(result[:, 0]))
         if not len(alive):
             break
-        start = places[alive].reshape(-1, 1, 2)
-        options = {"winSize": (13, 13), "maxLevel": levels}
-        moved, is_found, _ = cv2.calcOpticalFlowPyrLK(before, after, start, None, **options)
-        back, is_back, _ = cv2.calcOpticalFlowPyrLK(after, before, moved, None, **options)
-        error = np.linalg.norm((back - start).reshape(-1, 2), axis=1)
-        good = (is_found.ravel() > 0) & (is_back.ravel() > 0) & (error < FORWARD_BACKWARD_PX)
-        result[alive[good]] = moved.reshape(-1, 2)[good]
+        moved, is_good = follow_points(before, after, places[alive], WINDOW_PX, levels)
+        result[alive[is_good]] = moved[is_good]
     return result
 
 
@@ -172,9 +168,7 @@ def _middle(places: np.ndarray, angle_rad: float) -> tuple[float, float]:
     return float(x), float(y)
 
 
-def fit_outline(
-    image: np.ndarray, places: np.ndarray, outline: Outline
-) -> tuple[float, float]:
+def fit_outline(image: np.ndarray, places: np.ndarray, outline: Outline) -> tuple[float, float]:
     """The centre of the rectangle of known size that holds `places` and has the sharpest sides.
 
     Features on one side of an object may be missing (something touched it as it set out), so

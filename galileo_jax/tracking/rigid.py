@@ -26,6 +26,8 @@ def rigid_motion(before: np.ndarray, after: np.ndarray) -> tuple[float, np.ndarr
             return None
         a, b = before[is_inlier], after[is_inlier]
         a0, b0 = a - a.mean(axis=0), b - b.mean(axis=0)
-        angle = float(np.arctan2((a0[:, 0] * b0[:, 1] - a0[:, 1] * b0[:, 0]).sum(), (a0 * b0).sum()))
+        angle = float(
+            np.arctan2((a0[:, 0] * b0[:, 1] - a0[:, 1] * b0[:, 0]).sum(), (a0 * b0).sum())
+        )
         shift = b.mean(axis=0) - rotation(angle) @ a.mean(axis=0)
     return angle, shift

@@ -49,11 +49,11 @@ def candidate_poses(
     image: np.ndarray, template: Template, pose: np.ndarray, reach_px: float
 ) -> list[np.ndarray]:
     """Poses within `reach_px` of `pose` where the template, turned several ways, correlates."""
-    height, width = image.shape
-    reach, rim = int(reach_px), template.radius
-    left, top = (int(np.clip(c - reach, 0, n - 1)) for c, n in zip(pose, (width, height)))
-    right, bottom = (int(np.clip(c + reach, 0, n - 1)) for c, n in zip(pose, (width, height)))
+    rim = template.radius
     size = 2 * rim + 1
+    last = np.array(image.shape[::-1]) - 1
+    left, top = np.clip(pose[:2] - reach_px, 0, last).astype(int)
+    right, bottom = np.clip(pose[:2] + reach_px, 0, last).astype(int)
     padded = cv2.copyMakeBorder(image, rim, rim, rim, rim, cv2.BORDER_REPLICATE)
     window = padded[top : bottom + size, left : right + size]
     window = cv2.GaussianBlur(window, (0, 0), 1.0).astype(np.float32)
@@ -63,9 +63,7 @@ def candidate_poses(
         angle = pose[2] + turn
         matrix = rotation(angle)
         warp = np.column_stack([matrix, centre - matrix @ centre])
-        turned = cv2.warpAffine(
-            template.image, warp, (size, size), borderMode=cv2.BORDER_REPLICATE
-        )
+        turned = cv2.warpAffine(template.image, warp, (size, size), borderMode=cv2.BORDER_REPLICATE)
         mask = cv2.warpAffine(template.region.astype(np.float32), warp, (size, size))
         score = cv2.matchTemplate(window, turned, cv2.TM_CCOEFF_NORMED, mask=mask)
         score[~np.isfinite(score)] = -1

@@ -77,8 +77,7 @@ def track_video(
 
     coarse = [_coarse_poses(follower, count) for follower in followers]
     templates = [
-        median_template(f.patches, f.template.region) if f is not None else None
-        for f in followers
+        median_template(f.patches, f.template.region) if f is not None else None for f in followers
     ]
     fits: list[list[Refined | None]] = [[] for _ in starts]
     for index, frame in enumerate(open_frames()):
@@ -127,7 +126,7 @@ def _finished(
     if not len(seen):
         return poses[:, :2], covariance, poses[:, 2]
     jumps = np.zeros_like(poses)
-    jumps[seen] = [velocities_at(poses, index).jump for index in seen]
+    jumps[seen] = [velocities_at(poses, int(index)).jump for index in seen]
     covariance += blow_covariance(jumps, exposure_share)
     covariance += (scatter_variance(poses, covariance) + LEAST_SD_PX**2) * np.eye(2)
 
