@@ -54,7 +54,7 @@ def draw_theta(run: Run, num_draws: int, seed: int) -> np.ndarray:
     chosen = np.random.default_rng(seed).choice(
         len(draws), num_draws, replace=num_draws > len(draws)
     )
-    return draws[np.ix_(chosen, columns)]
+    return draws[chosen][:, columns]
 
 
 def roll_out(model: Model, engine: Engine, theta: np.ndarray, times_s: np.ndarray) -> Motions:
@@ -110,9 +110,11 @@ def hit_s(motions: Motions, surroundings: Surroundings) -> np.ndarray:
     if len(surroundings.names) < 2:
         return when
     reach = surroundings.half_length_m[0] + surroundings.half_length_m[1] + TOUCH_M
-    touches = motions.position_m[:, 1, 0] - motions.position_m[:, 0, 0] <= reach
+    gap = motions.position_m[:, 1, 0] - motions.position_m[:, 0, 0]
+    touches = gap <= reach
     is_hit = touches.any(axis=1)
-    when[is_hit] = motions.times_s[touches.argmax(axis=1)[is_hit]]
+    before = np.maximum(touches.argmax(axis=1) - 1, 0)
+    when[is_hit] = _crossing_s(motions.times_s, gap, before, reach)[is_hit]
     return when
 
 
@@ -134,7 +136,7 @@ def answers(run: Run, motions: Motions, seconds: float, seed: int) -> dict[str, 
         slides = is_moving[:, i].any(axis=1)
         stops = ~is_moving[:, i, -1]
         last = motions.times_s.size - 1 - is_moving[:, i, ::-1].argmax(axis=1)
-        rest_s = motions.times_s[np.minimum(last + 1, motions.times_s.size - 1)]
+        rest_s = _crossing_s(motions.times_s, motions.speed_m_s[:, i], last, MOVING_M_S)
         end_x = motions.position_m[:, i, 0, -1]
         objects[name] = {
             "slides_probability": float(slides.mean()),
@@ -172,6 +174,18 @@ def _since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.n
     for effect in model.effects + model.nuisances:
         times_s = effect.time(times_s, named, model.scene.surroundings)
     return times_s
+
+
+def _crossing_s(
+    times_s: np.ndarray, values: np.ndarray, index: np.ndarray, level: float
+) -> np.ndarray:
+    """When `values` `[draw, time]` fall through `level` between `index` `[draw]` and the next."""
+    index = np.minimum(index, len(times_s) - 2)
+    rows = np.arange(len(values))
+    before, after = values[rows, index], values[rows, index + 1]
+    falls = np.maximum(before - after, np.finfo(float).tiny)
+    share = np.clip((before - level) / falls, 0.0, 1.0)
+    return times_s[index] + share * (times_s[index + 1] - times_s[index])
 
 
 def _summary(values: np.ndarray) -> dict[str, float] | None:

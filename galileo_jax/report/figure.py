@@ -45,7 +45,7 @@ def style(name: str) -> Iterator[None]:
     """The figures' look; `name` makes a figure's SVG the same in every run."""
     import matplotlib
 
-    with matplotlib.rc_context({**_STYLE, "svg.hashsalt": name}):
+    with matplotlib.rc_context(_STYLE | {"svg.hashsalt": name}):  # pyright: ignore
         yield
 
 

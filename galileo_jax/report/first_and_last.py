@@ -36,7 +36,10 @@ def write_first_and_last(run: Run, motions: Motions, path: Path) -> str:
     filmed = _first_and_last_frame(run.clip.video) if run.clip.video else []
     pictures = gl_view.render(run.problem.model.scene, stills, view)
     columns = 2 if filmed else 1
-    row_in = COLUMN_IN * view.height_px / view.width_px + 0.3
+    tallest = max(
+        view.height_px / view.width_px, *(frame.shape[0] / frame.shape[1] for frame in filmed), 0.0
+    )
+    row_in = COLUMN_IN * tallest + 0.3
     with style("first_and_last"):
         figure = Figure(figsize=(COLUMN_IN * columns, row_in * len(stills)), dpi=130)
         grid = figure.subplots(len(stills), columns, squeeze=False)

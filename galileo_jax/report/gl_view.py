@@ -23,6 +23,7 @@ from galileo_jax.scene.scene import Scene
 TIMEOUT_S = 60
 DEPTH_M = 0.15  # half of ramp's and table's extent towards the camera
 HIDDEN_GROUP = 4
+BACKGROUND = [0.95, 0.945, 0.935]
 
 _CHILD = """
 import json, sys
@@ -93,7 +94,7 @@ def _xml(scene: Scene, view: View) -> str:
             y + length / 2 * math.sin(angle) - SLAB_M / 2 * down * math.cos(angle),
         )
         spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_BOX,
+            type=mujoco.mjtGeom.mjGEOM_BOX,  # pyright: ignore
             size=[length / 2, DEPTH_M, SLAB_M / 2],
             pos=[centre[0], 0, centre[1]],
             quat=[math.cos(angle / 2), 0, -math.sin(angle / 2), 0],
@@ -102,15 +103,19 @@ def _xml(scene: Scene, view: View) -> str:
             conaffinity=0,
         )
     spec.add_texture(
-        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT, rgb1=[0.95, 0.945, 0.935],
-        rgb2=[0.95, 0.945, 0.935], width=32, height=192,
-    )  # fmt: skip
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,  # pyright: ignore
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,  # pyright: ignore
+        rgb1=BACKGROUND,
+        rgb2=BACKGROUND,
+        width=32,
+        height=192,
+    )
     spec.worldbody.add_camera(
         name="side",
         pos=[(view.left_m + view.right_m) / 2, -3, (view.bottom_m + view.top_m) / 2],
         quat=[math.sqrt(0.5), math.sqrt(0.5), 0, 0],
-        proj=mujoco.mjtProjection.mjPROJ_ORTHOGRAPHIC,
+        proj=mujoco.mjtProjection.mjPROJ_ORTHOGRAPHIC,  # pyright: ignore
         fovy=view.top_m - view.bottom_m,
     )
     spec.visual.headlight.ambient = [0.5, 0.5, 0.5]

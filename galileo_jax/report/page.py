@@ -29,7 +29,7 @@ p, ul { max-width: 44rem; margin: 0.4rem 0; }
 ul { padding-left: 1.2rem; }
 .soft, figcaption { color: var(--soft); }
 figcaption { font-size: 0.9rem; max-width: 44rem; margin-bottom: 0.6rem; }
-.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(14rem, 1fr)); gap: 0.9rem;
+.cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); gap: 0.9rem;
   margin: 1.6rem 0 1.2rem; }
 .card { background: var(--card); border: 1px solid var(--line); border-radius: 0.6rem;
   padding: 0.9rem 1.1rem; }
@@ -39,10 +39,10 @@ figcaption { font-size: 0.9rem; max-width: 44rem; margin-bottom: 0.6rem; }
 .grid { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 22rem), 1fr));
   gap: 0.9rem; }
 figure { margin: 0; }
-figure svg, .grid svg { display: block; width: 100%; height: auto; color: var(--ink); }
+figure svg { display: block; max-width: 36rem; width: 100%; height: auto; color: var(--ink); }
 svg text { font-family: inherit !important; }
 .narrow { max-width: 44rem; overflow-x: auto; }
-.narrow svg { min-width: 30rem; }
+.narrow svg { min-width: 30rem; max-width: none; }
 .table { overflow-x: auto; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: 0.4rem 0.9rem 0.4rem 0; border-bottom: 1px solid var(--line);

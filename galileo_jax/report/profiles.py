@@ -34,7 +34,7 @@ def velocity_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
         figure, axes = panel(f"{name}, {AXES[axis]}", "time, s", "velocity, m/s")
         _fill(axes, middle, drawn, noise, index)
         measured = observation.velocity_m_s[index, axis]
-        _measured(axes, middle, measured)
+        _measured(axes, middle, measured, noise)
         shade_phases(axes, fitted.phases[index], times)
         _legend(axes, index, axis)
     return figure
@@ -48,8 +48,9 @@ def position_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
     with style(f"position_{name}_{AXES[axis]}"):
         figure, axes = panel(f"{name}, {AXES[axis]}", "time, s", f"{AXES[axis]}, m")
         drawn = fitted.position_m[:, index, axis]
-        _fill(axes, observation.times_s, drawn, np.sqrt(variance), index)
-        _measured(axes, observation.times_s, observation.position_m[index, axis])
+        noise, measured = np.sqrt(variance), observation.position_m[index, axis]
+        _fill(axes, observation.times_s, drawn, noise, index)
+        _measured(axes, observation.times_s, measured, noise)
         shade_phases(axes, fitted.phases[index], observation.times_s)
         _legend(axes, index, axis)
     return figure
@@ -95,11 +96,17 @@ def _fill(
     axes.plot(times_s, median, color=colour, label="fitted")
 
 
-def _measured(axes: "Axes", times_s: np.ndarray, values: np.ndarray) -> None:
+def _measured(axes: "Axes", times_s: np.ndarray, values: np.ndarray, noise: np.ndarray) -> None:
+    """The dots; the panel shows all of them, but not all of a band that is far wider."""
     axes.plot(times_s, values, "o", color=INK, markersize=2.6, markeredgewidth=0, label="measured")
+    seen = np.isfinite(values)
+    if seen.any():
+        span = np.ptp(values[seen])
+        spare = max(0.1 * span, min(3 * float(np.median(noise[seen])), max(0.5 * span, 1e-3)))
+        axes.set_ylim(values[seen].min() - spare, values[seen].max() + spare)
 
 
 def _legend(axes: "Axes", index: int, axis: int) -> None:
     """A legend in the first panel of a group only."""
     if index == 0 and axis == 0:
-        axes.legend(loc="best", handlelength=1.4, labelspacing=0.25)
+        axes.legend(loc="best", bbox_to_anchor=(0, 0, 1, 0.9), handlelength=1.4, labelspacing=0.25)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from galileo_jax.observation import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.report.figure import COLOURS, INK
 from galileo_jax.rollout.motion import pitch
 from galileo_jax.run import Run
@@ -48,25 +49,26 @@ class Still:
 
 
 def view_of(run: Run, positions_m: np.ndarray) -> View:
-    """What the video shows; without a video (or its scale) all of `positions_m` `[..., 2]`."""
+    """What the video shows; without one all of `positions_m` `[..., 2]`."""
     clip = run.clip
-    if clip.frame_size_px and clip.origin_px and clip.pixels_per_metre:
-        (width, height), (x, y) = clip.frame_size_px, clip.origin_px
-        scale = clip.pixels_per_metre
+    # As in `observe`: without a declared foot the first object's first place is the origin.
+    origin = clip.origin_px or clip.objects[0].point_px
+    if clip.frame_size_px and origin:
+        (width, height), (x, y) = clip.frame_size_px, origin
+        scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
         left, right = -x / scale, (width - x) / scale
-        is_mirrored = clip.direction == "left"
-        if is_mirrored:
-            left, right = -right, -left
         bottom, top = (y - height) / scale, y / scale
+        enlarge = min(1.0, LARGEST_PX / max(width, height))
     else:
         places = positions_m.reshape(-1, 2)
         reach = MARGIN_M + max(run.problem.model.scene.surroundings.half_length_m)
         (left, bottom), (right, top) = places.min(axis=0) - reach, places.max(axis=0) + reach
-        width, height, is_mirrored = right - left, top - bottom, False
-    shrink = LARGEST_PX / max(width, height)
-    if clip.frame_size_px:
-        shrink = min(1.0, shrink)
-    size = (2 * round(width * shrink / 2), 2 * round(height * shrink / 2))
+        width, height = right - left, top - bottom
+        enlarge = LARGEST_PX / max(width, height)
+    is_mirrored = clip.direction == "left"
+    if is_mirrored and clip.frame_size_px and origin:
+        left, right = -right, -left
+    size = (2 * round(width * enlarge / 2), 2 * round(height * enlarge / 2))
     return View(float(left), float(right), float(bottom), float(top), *size, is_mirrored)
 
 

@@ -47,7 +47,7 @@ def _reason(name: str, run: Run, fitted: Fitted) -> str:
             return "the mass of a sliding object does not show in its motion"
         if ratio is not None and ratio["identified"]:
             return (
-                "only the ratio of the masses shows in such a clip: doubling both changes nothing"
+                "only the ratio of the masses shows in such a clip; doubling both changes nothing"
             )
         return "masses show in a collision only, and there only their ratio"
     if name == "pixels_per_metre":
