@@ -23,7 +23,7 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, White
 
 NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
 NOISE_SCALE = Parameter("noise_scale", "1", LogNormal(1.0, NOISE_SD), 1.0, "nuisance", step=None)
-FAILED = 1e3  # the whitened residual of a rollout that failed: worse than any that did not
+FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from mujoco.batch import Batch
 
 from galileo_jax.effects.effect import State
 from galileo_jax.rollout.model import SUBSTEPS, Model
-from galileo_jax.rollout.motion import along_path, set_up, total_force
+from galileo_jax.rollout.motion import rigid_motion, set_up, total_force
 
 # Slower than this and no longer changing: at rest (contacts creep at 0.2 mm/s).
 REST_SPEED_M_S, REST_CHANGE_M_S = 1e-3, 1e-5
@@ -47,6 +47,7 @@ class EngineC:
         applied = batch.bind("qfrc_applied")
         home = self.model.scene.model.body_pos[1:][:, [0, 2]]
         shape = (len(theta), len(home), 2)
+        mass = np.stack(self.model.scene.surroundings.mass(named), axis=-1)
         force = total_force(self.model, named)
         positions = np.empty((self.model.num_records + 1, *shape))
         velocities = np.empty_like(positions)
@@ -68,7 +69,7 @@ class EngineC:
         positions -= 0.5 * dt * velocities
         if batch.warning.any() or not np.isfinite(positions).all():
             is_good &= ~batch.warning.reshape(len(theta), -1).any(axis=1)
-        path, speed = along_path(positions, velocities, self.model.scene.surroundings)
+        path, speed = rigid_motion(positions, velocities, mass, self.model.scene.surroundings)
         path[:, ~is_good] = np.nan
         speed[:, ~is_good] = np.nan
         return np.moveaxis(path, 0, -1), np.moveaxis(speed, 0, -1)

@@ -3,10 +3,9 @@
 import jax
 
 from galileo_jax.errors import InputError
+from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine
-
-ENGINES = ("auto", "c", "mjx")
 
 
 def make_engine(name: str, model: Model) -> Engine:

@@ -9,6 +9,7 @@ import operator
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from galileo_jax.effects.effect import Force, Surroundings
@@ -79,20 +80,49 @@ def total_force(model: Model, theta: Mapping[str, Array]) -> Force | None:
     return lambda state: functools.reduce(operator.add, (force(state) for force in forces))
 
 
-def along_path(position: Array, velocity: Array, surroundings: Surroundings) -> tuple[Array, Array]:
+def rigid_motion(
+    position: Array, velocity: Array, mass: Array, surroundings: Surroundings
+) -> tuple[Array, Array]:
     """Takes the contacts' penetration out of simulated centres.
 
-    Every centre runs parallel to ramp and table at the object's half height. A point is
-    put onto that path at the same distance along the surface it is on.
+    Between objects: while two faces overlap, each centre is put back by its share (the other's
+    mass over the sum) of the deepest overlap so far, as if the hit had taken no time. Onto the
+    surfaces: every centre runs parallel to ramp and table at the object's half height, and is
+    put there at the same distance along the surface it is on.
 
     Args:
-      position: `[..., object, 2]`, m.
-      velocity: `[..., object, 2]`, m/s.
+      position: `[record, ..., object, 2]`, m.
+      velocity: `[record, ..., object, 2]`, m/s.
+      mass: `[..., object]`, kg.
       surroundings: the scene's geometry.
 
     Returns:
-      The same shapes.
+      positions and velocities of the same shapes.
     """
+    if len(surroundings.names) > 1:
+        position = _without_overlap(position, mass, surroundings)
+    return _along_path(position, velocity, surroundings)
+
+
+def _without_overlap(position: Array, mass: Array, surroundings: Surroundings) -> Array:
+    """Undoes the overlap of object 1's front and object 2's back face."""
+    xp = position.__array_namespace__()
+    reach = surroundings.half_length_m[0] + surroundings.half_length_m[1]
+    overlap = xp.maximum(position[..., 0, 0] - position[..., 1, 0] + reach, 0.0)
+    if isinstance(overlap, np.ndarray):
+        deepest = np.maximum.accumulate(overlap, axis=0)
+    else:
+        deepest = jax.lax.cummax(overlap, axis=0)
+    total = mass[..., 0] + mass[..., 1]
+    back = xp.stack([-mass[..., 1] / total, mass[..., 0] / total], axis=-1)
+    moved = deepest[..., None] * back
+    return position + xp.stack([moved, xp.zeros_like(moved)], axis=-1)
+
+
+def _along_path(
+    position: Array, velocity: Array, surroundings: Surroundings
+) -> tuple[Array, Array]:
+    """Puts centres onto the paths parallel to ramp and table."""
     xp = position.__array_namespace__()
     cos, sin = math.cos(surroundings.angle_rad), math.sin(surroundings.angle_rad)
     height = xp.asarray(surroundings.half_height_m)

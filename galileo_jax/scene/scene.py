@@ -14,7 +14,7 @@ from galileo_jax.observation import Observation
 
 # Where nothing else is declared; an incline's dynamics do not depend on it.
 UNKNOWN_SIZE_M = (0.04, 0.04, 0.04)
-BUMPER_RADIUS_M = 0.05
+BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do not climb
 
 
 @dataclass(frozen=True)

@@ -43,8 +43,11 @@ class Settings:
     Attributes:
       num_starts: scattered parameter vectors.
       num_refined: of these, how many are refined at the most.
-      good_chi2_per_value: below it no further start is refined.
+      search_sd_m: noise assumed on the way to the fit: a camera that sees hundredths of a
+        millimetre makes valleys too narrow to be met by scattered starts.
+      good_chi2_per_value: below it, at that noise, no further start is refined.
       max_steps: Levenberg-Marquardt steps from one start.
+      max_polish_steps: with slopes at the posterior's scale.
       enough: stop where a step lowers chi2 / 2 by less.
       converged_sd: converged where the last step, taken with slopes at the posterior's scale,
         moved no combination of parameters by more than this many posterior sd.
@@ -52,7 +55,9 @@ class Settings:
 
     num_starts: int = 64
     num_refined: int = 4
+    search_sd_m: float = 0.001
     good_chi2_per_value: float = 2.0
+    max_polish_steps: int = 6
     max_steps: int = 15
     enough: float = 0.5
     converged_sd: float = 0.5
@@ -133,6 +138,18 @@ class GradientFitter:
         )
         self._solve = jax.jit(jax.vmap(solve, (0, None, None, None, None, None)))
 
+    def compile(self) -> None:
+        """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
+        z = np.zeros(len(self.problem.model.parameters))
+        shape = (len(self.problem.model.scene.names), 2, self.problem.model.num_records + 1)
+        motion = (np.zeros(shape), np.zeros(shape))
+        slopes = tuple(np.zeros((len(z), *shape)) for _ in range(2))
+        self._jacobian(z, motion, slopes, 1.0)
+        self._solve(DAMPINGS, np.ones(len(z)), z, motion, slopes, 1.0)
+        for size in (1, len(DAMPINGS), self.settings.num_starts):
+            batch = tuple(np.zeros((size, *shape)) for _ in range(2))
+            self._residuals(np.tile(z, (size, 1)), batch, 1.0)
+
     def fit(self, seed: int, on_stage: Callable[[str], None] = lambda _: None) -> GradientFit:
         """Fits; the same seed gives the same result."""
         settings = self.settings
@@ -140,14 +157,15 @@ class GradientFitter:
         on_stage("searching")
         z, num_steps = self._search(seed)
         on_stage("refining")
-        steps, noise_scale, moved = self.problem.coarse_steps, 1.0, np.inf
-        for _ in range(3):
+        steps, moved = self.problem.coarse_steps, np.inf
+        noise_scale = self._search_noise
+        for _ in range(settings.max_polish_steps):
             motion, slopes = self._slopes(z, steps)
             jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale))
             covariance = _covariance(jacobian)
             residual = self._white(z, motion, noise_scale)
             effective = len(z) - float(np.trace(covariance))
-            noise_scale *= self._noise_factor(residual, effective)
+            noise_scale = self._noise_scale(residual * noise_scale, effective)
             is_final_scale = np.allclose(steps, _half_sd(covariance), rtol=0.5)
             steps = _half_sd(covariance)
             new, _ = self._step(z, motion, slopes, noise_scale)
@@ -180,7 +198,8 @@ class GradientFitter:
         """The best of the refined starts, z, and how many steps that took."""
         settings = self.settings
         starts = self._starts(seed)
-        cost = self._costs(starts, 1.0)
+        noise = self._search_noise
+        cost = self._costs(starts, noise)
         order = np.argsort(cost)
         count = float(self.problem.data.num_values)
         best, best_cost, num_steps = starts[order[0]], np.inf, 0
@@ -188,7 +207,7 @@ class GradientFitter:
             z, now = starts[i], float(cost[i])
             for _ in range(settings.max_steps):
                 motion, slopes = self._slopes(z, self.problem.coarse_steps, is_central=False)
-                z, after = self._step(z, motion, slopes, 1.0, now)
+                z, after = self._step(z, motion, slopes, noise, now)
                 num_steps += 1
                 if now - after < settings.enough:
                     break
@@ -248,10 +267,19 @@ class GradientFitter:
             slopes.append(slope)
         return (out[0][0], out[1][0]), tuple(slopes)
 
-    def _noise_factor(self, residual: np.ndarray, effective: float) -> float:
-        """The factor on the noise scale that the residuals ask for, prior included."""
+    @property
+    def _search_noise(self) -> float:
+        """The noise scale at which the tracker's median error is `search_sd_m`."""
+        observation = self.problem.observation
+        variance = np.trace(observation.covariance_m2, axis1=1, axis2=2)[observation.mask] / 2
+        if not variance.size:
+            return 1.0
+        return max(1.0, self.settings.search_sd_m / float(np.sqrt(np.median(variance))))
+
+    def _noise_scale(self, residual: np.ndarray, effective: float) -> float:
+        """The noise scale that residuals (in units of the tracker's noise) ask for."""
         count = float(self.problem.data.num_values)
-        wide = 1 / (2 * NOISE_SD**2)  # the prior is worth this many values
+        wide = 1 / (2 * NOISE_SD**2)  # the prior, at 1, is worth this many values
         total = float(np.sum(residual**2))
         return float(np.sqrt((total + wide) / (max(count - effective, 1.0) + wide)))
 

@@ -1,0 +1,215 @@
+"""`galileo fit`: from a clip to masses and friction coefficients."""
+
+import argparse
+import hashlib
+import json
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from galileo_jax import command, jax_cache
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.errors import InputError
+from galileo_jax.observation import Observation, observe
+from galileo_jax.rollout.engine_names import ENGINES
+
+METHODS = ("grad", "mh", "cnn")
+PRESETS = ("galileo", "thesis")
+
+
+def main(argv: Sequence[str]) -> int | None:
+    """Fits one clip and writes a run."""
+    call = _parser().parse_args(argv)
+    if call.method == "cnn":
+        raise InputError("--method: cnn is not there yet; known: grad, mh")
+    if len(call.clips) > 1:
+        raise InputError(
+            f"{call.clips[1]}: one clip at a time so far; joint fits of several are not there yet"
+        )
+    if call.effects:
+        raise InputError(f"--effects: {call.effects!r}: the library of effects is not there yet")
+    path = Path(call.clips[0])
+    clip = load_clip(path, pixels_per_metre=call.pixels_per_metre)
+    shown = command.console()
+    for warning in clip.warnings:
+        shown.print(f"warning: {warning}")
+    out = Path(call.out) if call.out else Path("runs") / clip.path.stem
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out: {out} is a file; a folder expected")
+    if clip.scenario == "ramp" and clip.pixels_per_metre is None and clip.video is not None:
+        raise InputError(
+            f"{clip.path}: pixels_per_metre: null; the scale of a ramp clip cannot be told from "
+            "its motion; set it with `galileo label --scale X1 Y1 X2 Y2 METRES` or "
+            "--pixels-per-metre"
+        )
+    timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
+    began = time.perf_counter()
+    observation = _observe(clip)
+    timings["track"] = time.perf_counter() - began
+    result = fit_clip(clip, observation, call, out, timings)
+    print(_table(result))
+    shown.print(f"{out}/result.json, {out}/report.html")
+    return None
+
+
+def fit_clip(
+    clip: Clip,
+    observation: Observation,
+    call: argparse.Namespace,
+    out: Path,
+    timings: dict[str, float],
+) -> dict[str, Any]:
+    """Fits a tracked clip, writes the run and its report, and returns result.json."""
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    jax_cache.enable()
+    from galileo_jax.inference.fits.gradient import Code, GradientFitter
+    from galileo_jax.inference.laplace import laplace_posterior
+    from galileo_jax.inference.result import make_result
+    from galileo_jax.report import write_report
+    from galileo_jax.run import Run, make_problem, save_run
+
+    problem = make_problem(clip, observation, call.engine)
+    began = time.perf_counter()
+    fitter = GradientFitter(problem)
+    fitter.compile()
+    timings["compile"] = time.perf_counter() - began
+    began = time.perf_counter()
+    with command.console().status("fitting") as status:
+        fit = fitter.fit(call.seed, on_stage=status.update)
+    if fit.code is Code.FAILED:
+        raise InputError(f"{clip.path}: {fit.code}")
+    posterior = laplace_posterior(problem, fit, call.seed)
+    notes: dict[str, Any] = {"engine": problem.engine.name, "status": fit.code.value}
+    if call.method == "mh":
+        identity = _identity(clip, observation, call)
+        if call.preset == "thesis":
+            posterior, extra = _thesis(problem, call)
+        else:
+            posterior, extra = _metropolis(problem, fit, call, out, identity)
+        notes |= extra
+    timings["fit"] = time.perf_counter() - began
+    result = make_result(
+        problem,
+        posterior,
+        fit.z,
+        clips=[str(path) for path in call.clips],
+        method=call.method,
+        seed=call.seed,
+        timings_s={key: round(value, 3) for key, value in timings.items()},
+        notes=notes,
+    )
+    save_run(out, clip, observation, posterior, result)
+    (out / CHECKPOINT).unlink(missing_ok=True)
+    write_report(Run(out, clip, problem, posterior, result))
+    return result
+
+
+CHECKPOINT = "chains.checkpoint.npz"
+
+
+def _metropolis(problem, fit, call, out: Path, identity: str):
+    """Samples with a progress bar; resumes what a Ctrl-C left in the run's folder."""
+    from galileo_jax.inference.metropolis import metropolis_posterior
+    from galileo_jax.inference.samplers.driver import Settings
+
+    settings = Settings(max_steps=call.max_steps) if call.max_steps else Settings()
+    out.mkdir(parents=True, exist_ok=True)
+    with command.progress() as bar:
+        task = bar.add_task("sampling", total=settings.warmup_steps + settings.max_steps)
+        posterior = metropolis_posterior(
+            problem,
+            fit,
+            call.seed,
+            sampler=call.sampler,
+            settings=settings,
+            checkpoint=out / CHECKPOINT,
+            identity=identity,
+            on_block=lambda state: bar.update(task, completed=state.num_steps),
+        )
+    return posterior, {
+        "status": posterior.status.value,
+        "sampler": call.sampler,
+        "sampling": dict(posterior.stats),
+    }
+
+
+def _thesis(problem, call):
+    """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
+    from galileo_jax.inference.thesis_preset import thesis_posterior
+
+    posterior, best = thesis_posterior(
+        problem, call.seed, call.similarity, call.acceptance, call.selection
+    )
+    return posterior, {"status": posterior.status.value, "preset": "thesis", "best": best}
+
+
+def _observe(clip: Clip) -> Observation:
+    """Tracks the clip's video, or reads its csv track."""
+    if clip.video is None:
+        assert clip.track is not None  # load_clip requires one of the two
+        return read_observation_csv(clip.track)
+    from galileo_jax.tracking import track_clip
+
+    with command.progress() as bar:
+        return observe(clip, track_clip(clip, progress=bar))
+
+
+def _identity(clip: Clip, observation: Observation, call: argparse.Namespace) -> str:
+    """What the chains sample: a checkpoint of anything else is refused."""
+    digest = hashlib.sha256()
+    for array in (observation.times_s, observation.position_m, observation.covariance_m2):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    digest.update(clip.model_dump_json(exclude={"path", "video", "track"}).encode())
+    digest.update(json.dumps([call.engine, call.sampler, call.seed]).encode())
+    return digest.hexdigest()
+
+
+def _table(result: dict[str, Any]) -> str:
+    """What the user asked for, in a few lines."""
+    lines = [f"{'':<18}{'mean':>10}{'sd':>10}   95 % interval"]
+    for name, entry in (result["parameters"] | result["derived"]).items():
+        unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
+        interval = f"[{entry['q025']:.4g}, {entry['q975']:.4g}]{unit}"
+        known = "" if entry["identified"] else "   not determined by this clip"
+        lines.append(f"{name:<18}{entry['mean']:>10.4g}{entry['sd']:>10.2g}   {interval}{known}")
+    error = result["error"]
+    lines.append(
+        f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
+        f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}); {result['status']}"
+    )
+    return "\n".join(lines)
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="galileo fit", description=__doc__)
+    parser.add_argument("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
+    parser.add_argument("--method", choices=METHODS, default="grad")
+    parser.add_argument("--effects", default="", help="a,b: effects in the model")
+    parser.add_argument("--out", help="folder of the run (default runs/CLIP)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--engine", choices=ENGINES, default="auto")
+    parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
+    group = parser.add_argument_group("--method mh")
+    group.add_argument("--sampler", choices=("mixture", "random_walk"), default="mixture")
+    group.add_argument("--max-steps", type=int, help="per chain, after the warm-up")
+    group.add_argument("--preset", choices=PRESETS, default="galileo")
+    group.add_argument(
+        "--similarity",
+        choices=("thesis_gaussian", "earth_mover", "root_mean"),
+        default="thesis_gaussian",
+        help="of --preset thesis",
+    )
+    group.add_argument("--acceptance", choices=("coin", "metropolis"), default="coin")
+    group.add_argument("--selection", choices=("best", "least_variance"), default="best")
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(command.run(main))

@@ -1,0 +1,75 @@
+"""Metropolis-Hastings for a problem: start, target and what must converge."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.result import IDENTIFIED_SD_Z
+from galileo_jax.inference.samplers import dispersed_starts, sample, sampler_class
+from galileo_jax.inference.samplers.driver import Progress, Settings
+
+NUM_CHAINS = 8  # R-hat < 1.01 needs about 50 effective draws for each half chain
+
+
+def metropolis_posterior(
+    problem: Problem,
+    fit: GradientFit,
+    seed: int,
+    *,
+    sampler: str = "mixture",
+    settings: Settings = Settings(),  # noqa: B008
+    checkpoint: Path | None = None,
+    identity: str = "",
+    on_block: Callable[[Progress], None] | None = None,
+) -> Posterior:
+    """Samples a problem's posterior, started from and tuned by a gradient fit.
+
+    Args:
+      problem: the target is `problem.log_density`, noise scale included.
+      fit: its covariance is the first proposal; chains start dispersed round it.
+      seed: same seed, same draws.
+      sampler: a name in the samplers' registry.
+      settings: how long.
+      checkpoint, identity, on_block: see `samplers.sample`.
+
+    Returns:
+      Draws in the parameters' units. Converged when the main parameters that the fit found
+      identified, and the mass ratio, have R-hat and ESS as asked for.
+    """
+    steps = jnp.asarray(fit.steps)
+    start_key, key = jax.random.split(jax.random.key(seed))
+    starts = dispersed_starts(start_key, fit.z, fit.covariance, NUM_CHAINS)
+    sd = np.sqrt(np.diag(fit.covariance))
+    watched = [
+        (i, parameter.name)
+        for i, parameter in enumerate(problem.parameters)
+        if parameter.role != "nuisance" and sd[i] < IDENTIFIED_SD_Z
+    ]
+
+    def monitor(draws: np.ndarray) -> dict[str, np.ndarray]:
+        found = {name: draws[..., i] for i, name in watched}
+        if "m2" in problem.names:
+            found["mass_ratio"] = (
+                draws[..., problem.names.index("m1")] - draws[..., problem.names.index("m2")]
+            )
+        return found or {"log_noise": draws[..., -1]}
+
+    posterior = sample(
+        key,
+        sampler_class(sampler).from_gaussian(jnp.asarray(fit.z), jnp.asarray(fit.covariance)),  # pyright: ignore
+        lambda z: problem.log_density(z, steps),
+        starts,
+        problem.names,
+        settings=settings,
+        monitor=monitor,
+        on_block=on_block,
+        checkpoint=checkpoint,
+        identity=identity,
+    )
+    return posterior.mapped(problem.theta, problem.names)

@@ -1,0 +1,3 @@
+"""The engines' names, importable without JAX."""
+
+ENGINES = ("auto", "c", "mjx")
