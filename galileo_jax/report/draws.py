@@ -43,7 +43,8 @@ def pair_figure(posterior: Posterior, names: list[str]) -> "Figure":
                 axes.tick_params(labelsize=7, length=2)
                 axes.locator_params(nbins=3)
                 if row == column:
-                    axes.hist(x, bins=30, color=COLOURS[1], alpha=0.75, histtype="stepfilled")
+                    bins = 30 if np.ptp(x) > 1e-6 * np.abs(x).max() else 1  # a stuck chain
+                    axes.hist(x, bins=bins, color=COLOURS[1], alpha=0.75, histtype="stepfilled")
                     axes.set_yticks([])
                     axes.spines["left"].set_visible(False)
                 else:

@@ -3,7 +3,6 @@
 import math
 from typing import Any
 
-from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.report.fitted import Fitted
 from galileo_jax.run import Run
 
@@ -83,8 +82,8 @@ def convergence(run: Run) -> str:
     """Whether the inference converged, in one sentence."""
     status = run.result.get("status")
     told = status if isinstance(status, str) else run.posterior.status.value
-    if told == Code.CONVERGED.value:
-        return "The fit converged."
+    if run.result["converged"] and "converged" in told:
+        return f"{told[0].upper()}{told[1:]}."
     word = "Converged" if run.result["converged"] else "Not converged"
     return f"{word}: {told}."
 
