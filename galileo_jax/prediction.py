@@ -19,6 +19,7 @@ from galileo_jax.rollout.rollout import Engine
 from galileo_jax.run import Run
 
 MOVING_M_S = 5e-3  # contacts at rest creep at 0.2 mm/s, bumpers part at a few mm/s
+SLIDES_M = 1e-3  # contacts take up some hundredths of a millimetre at the start
 TOUCH_M = 1e-3  # bumpers give way by less
 GRID_S = 1 / 240
 
@@ -133,7 +134,7 @@ def answers(run: Run, motions: Motions, seconds: float, seed: int) -> dict[str, 
     steps = np.where(is_moving[..., 1:], steps, 0.0)
     objects = {}
     for i, name in enumerate(surroundings.names):
-        slides = is_moving[:, i].any(axis=1)
+        slides = steps[:, i].sum(axis=1) > SLIDES_M
         stops = ~is_moving[:, i, -1]
         last = motions.times_s.size - 1 - is_moving[:, i, ::-1].argmax(axis=1)
         rest_s = _crossing_s(motions.times_s, motions.speed_m_s[:, i], last, MOVING_M_S)

@@ -1,0 +1,149 @@
+"""Predictions against the closed form; reproducible; wrong calls are one line."""
+
+import json
+
+import jax
+import numpy as np
+import pytest
+
+from galileo_jax import command, predict
+from galileo_jax.prediction import extrapolate
+from galileo_jax.report import gl_view
+from tests.oracle_run import HIT, MISS, STILL, make_run
+from tests.reference_ramp import solve
+
+CLIP_S = 0.9  # object 1 is on its way across the table
+SECONDS = 1.6
+CONTACT_M = 0.006  # MuJoCo's contacts at the foot and in the impact take time; a point's take none
+CONTACT_S = 0.02
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    return {
+        "hit": make_run(folder / "hit", HIT, CLIP_S),
+        "miss": make_run(folder / "miss", MISS, CLIP_S),
+        "still": make_run(folder / "still", STILL, CLIP_S),
+    }
+
+
+@pytest.fixture(autouse=True)
+def same_precision():
+    """The command switches JAX to 64 bit for its process; not for the other tests."""
+    before = jax.config.read("jax_enable_x64")
+    yield
+    jax.config.update("jax_enable_x64", before)
+
+
+@pytest.fixture
+def drawn_only(monkeypatch):
+    """As on a machine without OpenGL; renders nothing."""
+    monkeypatch.setattr(gl_view, "render", lambda *_: None)
+
+
+def call(run, out, *more):
+    words = [str(run.folder), "--seconds", str(SECONDS), "--out", str(out), "--draws", "60"]
+    assert command.run(predict.main, [*words, *more]) == 0
+    return json.loads((out / "prediction.json").read_text())
+
+
+def holds(entry, value, spare):
+    return entry["q025"] - spare <= value <= entry["q975"] + spare
+
+
+def test_rest_and_hit_agree_with_the_closed_form(runs, tmp_path, drawn_only, capsys):
+    found = call(runs["hit"], tmp_path)
+    times = np.linspace(0, CLIP_S + SECONDS, 20001)
+    exact = solve(HIT, times)
+    speed = np.hypot(*np.moveaxis(exact.velocity_m_s, 1, 0))
+    for i, name in enumerate(("object1", "object2")):
+        entry = found["objects"][name]
+        assert entry["slides_probability"] == entry["stops_probability"] == 1
+        assert holds(entry["rest_x_m"], exact.position_m[i, 0, -1], CONTACT_M)
+        assert holds(entry["rest_time_s"], times[np.flatnonzero(speed[i] > 0)[-1]], CONTACT_S)
+        way = np.sum(speed[i]) * times[1]
+        assert holds(entry["travelled_m"], way, CONTACT_M)
+        beyond = np.sum(speed[i][times > CLIP_S]) * times[1]
+        assert holds(entry["travelled_beyond_clip_m"], beyond, CONTACT_M)
+    assert found["hit"]["probability"] == 1
+    assert holds(found["hit"]["time_s"], exact.hit_s, CONTACT_S)
+    assert found["num_failed"] == 0 and found["picture"] == "drawn"
+    assert "will it slide? yes" in capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "prediction.json",
+        "prediction.svg",
+        "first_and_last.png",
+    }
+
+
+def test_object_2_stays_where_nothing_reaches_it(runs, tmp_path, drawn_only):
+    found = call(runs["miss"], tmp_path)
+    assert found["hit"] == {"probability": 0.0, "time_s": None}
+    assert found["objects"]["object1"]["slides_probability"] == 1
+    assert found["objects"]["object2"]["slides_probability"] == 0
+    assert found["objects"]["object2"]["rest_time_s"] is None
+    assert found["objects"]["object2"]["travelled_m"]["mean"] < 1e-3
+
+
+def test_nothing_slides_on_a_rough_ramp(runs, tmp_path, drawn_only, capsys):
+    found = call(runs["still"], tmp_path)
+    assert [entry["slides_probability"] for entry in found["objects"].values()] == [0, 0]
+    assert capsys.readouterr().out.count("will it slide? no") == 2
+
+
+def test_the_same_seed_gives_the_same_file(runs, tmp_path, drawn_only):
+    texts = []
+    for name, seed in (("a", "5"), ("b", "5"), ("c", "6")):
+        call(runs["hit"], tmp_path / name, "--seed", seed)
+        texts.append((tmp_path / name / "prediction.json").read_bytes())
+        texts.append((tmp_path / name / "prediction.svg").read_bytes())
+    assert texts[:2] == texts[2:4]
+    assert texts[0] != texts[4]
+
+
+def test_prediction_does_not_depend_on_its_length(runs):
+    short, long = (extrapolate(runs["hit"], seconds, 8, 0) for seconds in (0.1, 1.1))
+    until = short.times_s[-1]
+    ends = [
+        [np.interp(until, motions.times_s, x) for x in motions.position_m[:, 0, 0]]
+        for motions in (short, long)
+    ]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-5)
+
+
+def test_rendered_where_there_is_opengl_and_always_a_picture(runs, tmp_path):
+    found = call(runs["hit"], tmp_path)
+    assert found["picture"] in ("rendered", "drawn")
+    assert (tmp_path / "first_and_last.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_renderer_that_dies_is_no_error(runs, tmp_path, monkeypatch):
+    monkeypatch.setattr(gl_view, "_CHILD", "import os; os.abort()")
+    assert call(runs["still"], tmp_path)["picture"] == "drawn"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["{tmp}/none", "--seconds", "1"], "no result.json"),
+        (["{tmp}", "--seconds", "1"], "no result.json"),
+        (["{file}", "--seconds", "1"], "is a file"),
+        (["{run}", "--seconds", "0"], "seconds"),
+        (["{run}", "--seconds", "-1"], "seconds"),
+        (["{run}", "--seconds", "nan"], "seconds"),
+        (["{run}"], "--seconds"),
+        (["{run}", "--seconds", "1", "--draws", "1"], "--draws"),
+        (["{run}", "--seconds", "1", "--seed", "x"], "--seed"),
+        (["{run}", "--seconds", "1", "--out", "{file}"], "is a file"),
+    ],
+)
+def test_wrong_calls_are_one_line(runs, tmp_path, capsys, words, said):
+    file = tmp_path / "file"
+    file.write_text("")
+    places = {"tmp": tmp_path, "file": file, "run": runs["hit"].folder}
+    before = sorted(runs["hit"].folder.iterdir())
+    assert command.run(predict.main, [word.format(**places) for word in words]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("error: ") and told.count("\n") == 1 and said in told
+    assert sorted(runs["hit"].folder.iterdir()) == before
