@@ -13,6 +13,7 @@ import dataclasses
 import json
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +93,7 @@ def rows_of(clip: Clip, truth: dict, track: Track, seconds: float) -> list[Row]:
     return rows
 
 
-def main(argv: list[str]) -> int | None:
+def main(argv: Sequence[str]) -> int | None:
     parser = command.Parser(prog="tracking.py", description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--find", action="store_true", help="leave out the declared points")

@@ -12,6 +12,8 @@ MIN_SPEED_PX = 3.0
 UNLEARNT = (0.0, 0.25, 0.5)
 """Shares that are tried one after the other while fewer than `LEARNT_FRAMES` frames count."""
 LEARNT_FRAMES = 3
+SAME_MOTION_PX = 0.3
+"""Motions during the exposure that differ by less are not tried separately."""
 MAX_FRAMES = 24
 """After so many moving frames the share is known to some percent; more would only take time."""
 
@@ -19,6 +21,19 @@ MAX_FRAMES = 24
 def own_motion(velocity: np.ndarray, angle_rad: float) -> np.ndarray:
     """A pose's change per frame `(dx, dy, dangle)`, its shift turned into the object's axes."""
     return np.array([*(rotation(angle_rad).T @ velocity[:2]), velocity[2]])
+
+
+def distinct(motions: list[np.ndarray], radius: int) -> list[np.ndarray]:
+    """The `motions` during an exposure that smear a patch of this radius differently."""
+    kept: list[np.ndarray] = []
+    for motion in motions:
+        if all(_distance(motion - other, radius) >= SAME_MOTION_PX for other in kept):
+            kept.append(motion)
+    return kept
+
+
+def _distance(motion: np.ndarray, radius: int) -> float:
+    return float(np.hypot(*motion[:2]) + abs(motion[2]) * radius / 2)
 
 
 class Exposure:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from galileo_jax.tracking.exposure import Exposure, own_motion
+from galileo_jax.tracking.exposure import Exposure, distinct, own_motion
 from galileo_jax.tracking.lucas_kanade import follow
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.refine import Fit
@@ -22,6 +22,11 @@ WORSE = 0.1
 """A fit that correlates this much less than the one before is worth a wide search."""
 MAX_TURN_RAD = 0.7
 """An object does not turn further between two frames in which it is seen."""
+SETTLED_FRAMES, MAX_LEAP_FRAMES = 4, 4
+"""After so many frames an object's velocity is known: it can then be no farther from where it
+should be than a blow throws it, in each of so many frames of being hidden."""
+LONG_GONE_FRAMES, LOOK_EVERY = 16, 4
+"""An object missed for longer is looked for only in every so many frames."""
 SHARP_PX = 1.0
 """An object that moves less than this during the exposure gives a patch for the template."""
 MAX_PATCHES = 32
@@ -37,6 +42,7 @@ class Follower:
     Attributes:
       template: from the first frame at first, hand and noise included.
       pose: the last one found.
+      first_image: the grey frame in which it began: the scene without it, elsewhere.
       velocity: change of the pose per frame, extrapolated to the last one.
       poses: pose of every frame so far, NaN where not found.
       patches: sharp aligned patches, thinned evenly to at most `MAX_PATCHES`.
@@ -45,6 +51,7 @@ class Follower:
     template: Template
     pose: np.ndarray
     exposure: Exposure
+    first_image: np.ndarray
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     mean_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     poses: list[np.ndarray] = field(default_factory=list)
@@ -54,9 +61,15 @@ class Follower:
     stride: int = 1
     frames_sharp: int = 0
 
+    def __post_init__(self) -> None:
+        self.first_pose = self.pose
+
     def step(self, before: np.ndarray | None, image: np.ndarray) -> None:
         """Finds the object in the next grey frame; `before` is the frame preceding it."""
-        fit = self._near(before, image)
+        if self.frames_missed > LONG_GONE_FRAMES and self.frames_missed % LOOK_EVERY:
+            fit = None
+        else:
+            fit = self._near(before, image)
         if fit is None or fit.correlation < min(SURE, self.correlation - WORSE):
             fit = max((f for f in (fit, self._far(image)) if f), key=_correlation, default=None)
         if fit is None:
@@ -97,19 +110,41 @@ class Follower:
 
     def _best(self, image: np.ndarray, poses: list[np.ndarray], least: float) -> Fit | None:
         """The best fit from the guessed `poses` if it can be the object."""
-        guesses = [
-            (pose, share * own_motion(self._velocity_at(pose), pose[2]))
-            for pose in poses
-            for share in self.exposure.trials
-        ]
+        guesses: list[tuple[np.ndarray, np.ndarray]] = []
+        for pose in poses:
+            motion = own_motion(self._velocity_at(pose), pose[2])
+            motions = [share * motion for share in self.exposure.trials]
+            guesses += [(pose, smear) for smear in distinct(motions, self.template.radius)]
         if not guesses:
             return None
         fit = best_fit(image, self.template, guesses)
         height, width = image.shape
         is_inside = 0 <= fit.pose[0] < width and 0 <= fit.pose[1] < height
+        is_near = np.hypot(*(fit.pose - self.pose - self.velocity)[:2]) <= self._leap_px()
         is_upright = abs(fit.pose[2] - self.pose[2]) <= MAX_TURN_RAD
         is_it = is_alike(fit) and fit.correlation >= least
-        return fit if is_inside and is_upright and is_it else None
+        is_possible = is_inside and is_near and is_upright and is_it
+        return fit if is_possible and not self._is_scene(image, fit) else None
+
+    def _is_scene(self, image: np.ndarray, fit: Fit) -> bool:
+        """Whether what was found stood there before the object came.
+
+        A region with some background in it can fit the scene once the object has gone.
+        """
+        radius, region = self.template.radius, self.template.region
+        if np.hypot(*(fit.pose - self.first_pose)[:2]) < radius:
+            return False
+        then, now = (
+            patch_at(scene, fit.pose, radius)[region] for scene in (self.first_image, image)
+        )
+        return float(np.corrcoef(then, now)[0, 1]) > fit.correlation
+
+    def _leap_px(self) -> float:
+        """How far from the expected place the object can be; any distance while it is new."""
+        if len(self.poses) - self.frames_missed < SETTLED_FRAMES:
+            return np.inf
+        speed = float(np.hypot(*self.velocity[:2]))
+        return max(1.5 * speed, self.template.radius) * min(self.frames_missed + 1, MAX_LEAP_FRAMES)
 
     def _velocity_at(self, pose: np.ndarray) -> np.ndarray:
         """The velocity at `pose`: the mean one since the last frame plus half its change.

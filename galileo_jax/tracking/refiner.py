@@ -4,12 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from galileo_jax.tracking.exposure import own_motion
+from galileo_jax.tracking.exposure import distinct, own_motion
 from galileo_jax.tracking.refine import FINE_PX, Fit, Target, align, covariance_of
 from galileo_jax.tracking.template import Template
-
-SAME_MOTION_PX = 0.3
-"""Motions during the exposure that differ by less are not tried separately."""
 
 
 @dataclass(frozen=True)
@@ -61,19 +58,14 @@ def refine_pose(
     the mean, the earlier and the later velocity are tried, where they differ.
     """
     middle = (velocities.before + velocities.after) / 2
-    tried: list[np.ndarray] = []
+    motions = [
+        share * own_motion(velocity, pose[2])
+        for velocity in (middle, velocities.before, velocities.after)
+    ]
     fits: list[tuple[Fit, Target]] = []
-    for velocity in (middle, velocities.before, velocities.after):
-        motion = share * own_motion(velocity, pose[2])
-        if any(_distance(motion - other, template.radius) < SAME_MOTION_PX for other in tried):
-            continue
-        tried.append(motion)
+    for motion in distinct(motions, template.radius):
         target = template.target(motion, FINE_PX)
         fits.append((align(image, target, pose), target))
     best, target = max(fits, key=lambda item: item[0].correlation)
     covariance = covariance_of(best, target)[:2, :2]
     return Refined(best.pose, covariance, best.correlation, best.covered)
-
-
-def _distance(motion: np.ndarray, radius: int) -> float:
-    return float(np.hypot(*motion[:2]) + abs(motion[2]) * radius / 2)

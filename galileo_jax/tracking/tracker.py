@@ -18,6 +18,9 @@ MAX_COVERED = 0.25
 """An object is visible if its patch correlates with the template, and no more of it than this
 share differs from the template by more than noise."""
 
+LONG_RUN = 10
+"""A run of so many frames is believed after any gap."""
+
 
 @dataclass(frozen=True)
 class Start:
@@ -67,7 +70,7 @@ def track_video(
             if index == start.first_frame:
                 point = np.array(start.point_px, dtype=float)
                 template = template_at(image, point, start.outline)
-                followers[k] = Follower(template, np.array([*point, 0.0]), exposure)
+                followers[k] = Follower(template, np.array([*point, 0.0]), exposure, image)
             follower = followers[k]
             if follower is not None:
                 follower.step(before if index > start.first_frame else None, image)
@@ -122,7 +125,9 @@ def _finished(
         if fit is not None and _is_visible(fit):
             poses[index] = fit.pose
             covariance[index] = fit.covariance
-    seen = np.flatnonzero(np.isfinite(poses[:, 0]))
+    is_doubtful = ~_without_glimpses(np.isfinite(poses[:, 0]))
+    poses[is_doubtful], covariance[is_doubtful] = np.nan, np.nan
+    seen = np.flatnonzero(~is_doubtful)
     if not len(seen):
         return poses[:, :2], covariance, poses[:, 2]
     jumps = np.zeros_like(poses)
@@ -136,6 +141,21 @@ def _finished(
     arm = np.array(start.point_px) - anchor[:2]
     position = poses[:, :2] + np.stack([rotation(a) @ arm for a in angle])
     return position, covariance, angle
+
+
+def _without_glimpses(is_seen: np.ndarray) -> np.ndarray:
+    """`is_seen` `[frame]` without the runs that are shorter than the gap before them.
+
+    What comes back for a few frames after a long absence is more likely something like it.
+    """
+    result = np.zeros_like(is_seen)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_seen, [False]]).astype(int)))
+    last_end: int | None = None
+    for begin, end in edges.reshape(-1, 2):
+        if last_end is None or end - begin >= min(begin - last_end, LONG_RUN):
+            result[begin:end] = True
+            last_end = end
+    return result
 
 
 def _is_visible(fit: Refined) -> bool:
