@@ -37,10 +37,12 @@ def main(argv: Sequence[str]) -> int | None:
         found = answers(run, motions, call.seconds, call.seed)
         status.update("drawing")
         svg = to_svg(continuation_figure(run, motions), "prediction")
-        picture = write_first_and_last(run, motions, out / "first_and_last.png")
-    found["picture"] = picture
-    write_text(out / "prediction.svg", svg)
-    write_json(out / "prediction.json", found)
+        try:
+            found["picture"] = write_first_and_last(run, motions, out / "first_and_last.png")
+            write_text(out / "prediction.svg", svg)
+            write_json(out / "prediction.json", found)
+        except OSError as error:
+            raise InputError(f"--out: {out}: {error.strerror or error}") from error
     print("\n".join(_told(found)))
     print(f"{out}/prediction.json, prediction.svg, first_and_last.png")
     return None

@@ -3,6 +3,7 @@
 from math import radians
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import yaml
 
@@ -52,7 +53,7 @@ def make_run(folder: Path, experiment: Experiment, clip_s: float) -> Run:
     truth = {"m1": experiment.mass_kg[0], "m2": experiment.mass_kg[1]}
     truth |= {"k1": experiment.friction[0], "k2": experiment.friction[1]}
     best = np.array([truth.get(p.name, p.absent) for p in problem.parameters])
-    z = np.clip(np.asarray(inverse(problem.parameters, best)), -2.0, 2.0)
+    z = np.clip(np.asarray(inverse(problem.parameters, jnp.asarray(best))), -2.0, 2.0)
     widths = np.array([SD_Z.get(name, 0.3) for name in problem.names])
     draws = z + widths * rng.standard_normal((NUM_DRAWS, len(z)))
     draws[:, [name in ("m1", "m2") for name in problem.names]] += rng.standard_normal(

@@ -68,9 +68,9 @@ def trace_figure(posterior: Posterior, names: list[str]) -> "Figure":
     shown = main_draws(posterior, names)
     with style("trace"):
         height = 0.6 + 1.1 * len(shown)
-        figure = Figure(figsize=(4.8, height))
+        figure = Figure(figsize=(6.8, height))
         grid = figure.subplots(len(shown), 1, squeeze=False, sharex=True)[:, 0]
-        figure.subplots_adjust(0.16, 0.5 / height, 0.98, 1 - 0.1 / height)
+        figure.subplots_adjust(0.12, 0.5 / height, 0.98, 1 - 0.1 / height)
         for axes, (name, chains) in zip(grid, shown.items(), strict=True):
             stride = max(1, chains.shape[1] // NUM_SHOWN)
             index = np.arange(chains.shape[1])[::stride]

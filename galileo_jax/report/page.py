@@ -100,10 +100,12 @@ def _header(title: str, run: Run) -> str:
     effects = ", ".join(result["effects"]) or "none beyond friction and impact"
     converged = escape(statements.convergence(run))
     mark = "" if result["converged"] else ' class="warn"'
+    caution = statements.caution(result)
+    warning = f'\n<p class="warn">{escape(caution)}</p>' if caution else ""
     return (
         f"<h1>{escape(title)}</h1>\n"
         f'<p class="soft">method {escape(result["method"])}, effects: {escape(effects)}</p>\n'
-        f"<p{mark}>{converged}</p>\n<p>{escape(statements.fit_quality(result))}</p>"
+        f"<p{mark}>{converged}</p>\n<p>{escape(statements.fit_quality(result))}</p>{warning}"
     )
 
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = ("x", "y")
-SHORTEST_LABELLED = 0.09  # of the panel's width
+LETTER = 0.021  # of the panel's width, what a phase's name takes
 
 
 def velocity_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
@@ -65,7 +65,7 @@ def shade_phases(axes: "Axes", phases: Sequence[Phase], times_s: np.ndarray) -> 
     for i, phase in enumerate(phases):
         if i % 2:
             axes.axvspan(phase.start_s, phase.end_s, color=INK, alpha=0.06, linewidth=0)
-        if phase.end_s - phase.start_s > SHORTEST_LABELLED * whole:
+        if phase.end_s - phase.start_s > LETTER * len(phase.name) * whole:
             axes.text(
                 (phase.start_s + phase.end_s) / 2,
                 0.985,

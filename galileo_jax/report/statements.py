@@ -1,10 +1,11 @@
 """What the fit does and does not say, in plain sentences."""
 
 import math
+import shlex
 from typing import Any
 
 from galileo_jax.report.fitted import Fitted
-from galileo_jax.run import Run
+from galileo_jax.run import CLIP, Run
 
 MEANINGS = {
     "m1": "mass of object 1",
@@ -88,6 +89,17 @@ def convergence(run: Run) -> str:
     return f"{word}: {told}."
 
 
+def caution(result: dict[str, Any]) -> str | None:
+    """What makes the intervals no intervals, if anything does."""
+    if result.get("preset") != "thesis":
+        return None
+    best = ", ".join(f"{name} = {value:.4g}" for name, value in result.get("best", {}).items())
+    return (
+        f"Made with the thesis's sampler; its answer is {best or 'its best sample'}. "
+        "Its draws are no posterior: means and intervals on this page only describe the chains."
+    )
+
+
 def number(value: float | None, sd: float | None) -> str:
     """A value with as many places as its uncertainty allows (two figures of it)."""
     if value is None or not math.isfinite(value):
@@ -101,8 +113,9 @@ def number(value: float | None, sd: float | None) -> str:
 def command_again(run: Run) -> str:
     """The command that makes this run again, from the clip as it was fitted."""
     result = run.result
-    words = ["python -m galileo_jax.fit", str(run.clip.path), f"--method {result['method']}"]
+    words = ["python -m galileo_jax.fit", shlex.quote(str(run.folder / CLIP))]
+    words.append(f"--method {result['method']}")
     if result["effects"]:
         words.append(f"--effects {','.join(result['effects'])}")
-    words.append(f"--engine {run.problem.engine.name}")
-    return " ".join([*words, f"--seed {result['seed']}"])
+    words += [f"--{key} {result[key]}" for key in ("preset", "sampler") if result.get(key)]
+    return " ".join([*words, f"--engine {run.problem.engine.name}", f"--seed {result['seed']}"])

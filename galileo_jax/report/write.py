@@ -27,6 +27,10 @@ def write_report(run: Run) -> Path:
         svg = to_svg(figure, name)
         write_text(run.folder / PLOTS / f"{name}.svg", svg)
         inline.setdefault(section, {})[name] = to_inline(svg, name.replace("_", " "))
+    names = {name for section in inline.values() for name in section}
+    for path in (run.folder / PLOTS).glob("*.svg"):
+        if path.stem not in names:  # of an earlier fit into the same folder
+            path.unlink()
     page = run.folder / PAGE
     write_text(page, render(run, fitted, inline))
     return page

@@ -79,6 +79,13 @@ def test_names_from_outside_are_escaped(run):
     assert "<h1>&lt;b&gt;&amp;.mp4</h1>" in write_report(hostile).read_text(encoding="utf-8")
 
 
+def test_what_an_earlier_fit_left_is_gone_and_the_thesis_is_no_posterior(run):
+    thesis = {"method": "grad", "preset": "thesis", "best": {"k1": 0.123}}
+    page = write_report(replace(run, result=run.result | thesis)).read_text(encoding="utf-8")
+    assert not (run.folder / "plots" / "trace.svg").exists()
+    assert "no posterior" in page and "k1 = 0.123" in page and "--preset thesis" in page
+
+
 def test_residuals_are_whitened_and_the_hit_is_found(run):
     fitted = evaluate(run, seed=0)
     assert fitted.residuals.std() == pytest.approx(1.0, abs=0.6)
