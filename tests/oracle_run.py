@@ -24,7 +24,15 @@ STILL = Experiment((0.5, 0.3), (0.5, 0.2), radians(20), SIZES, 0.5, 0.25)
 NOISE_M = 2e-4
 NUM_DRAWS = 300
 # Widths of the draws in the search space; the masses are wide, too, but together.
-SD_Z = {"k1": 0.005, "k2": 0.02, "m1": 0.02, "m2": 0.02, "noise_scale": 0.3, "release_instant": 0.1}
+SD_Z = {
+    "foot_transition": 0.05,
+    "k1": 0.005,
+    "k2": 0.02,
+    "m1": 0.02,
+    "m2": 0.02,
+    "noise_scale": 0.3,
+    "release_instant": 0.1,
+}
 
 
 def make_run(folder: Path, experiment: Experiment, clip_s: float) -> Run:
