@@ -25,6 +25,8 @@ MAX_TURN_RAD = 0.7
 SETTLED_FRAMES, MAX_LEAP_FRAMES = 4, 4
 """After so many frames an object's velocity is known: it can then be no farther from where it
 should be than a blow throws it, in each of so many frames of being hidden."""
+MAX_COAST_FRAMES = 8
+"""A hidden object is expected to have gone on for so many frames, and then to have stopped."""
 LONG_GONE_FRAMES, LOOK_EVERY = 16, 4
 """An object missed for longer is looked for only in every so many frames."""
 SHARP_PX = 1.0
@@ -88,7 +90,7 @@ class Follower:
 
     def _near(self, before: np.ndarray | None, image: np.ndarray) -> Fit | None:
         """The best fit around where the object was, went, or is led to by its features."""
-        guesses = [self.pose + self.velocity, self.pose]
+        guesses = [self._expected(), self.pose]
         if before is not None and not self.frames_missed:
             reach = int(np.ceil(2 * np.hypot(*self.velocity[:2]))) + 16
             motion = rigid_motion(*follow(before, image, self.pose, self.template.region, reach))
@@ -105,7 +107,7 @@ class Follower:
         if missed & (missed - 1):  # at once, after 1, 2, 4, 8, ... frames
             return None
         reach = max(2 * np.hypot(*self.velocity[:2]), REACH_SHARE * max(image.shape))
-        guesses = candidate_poses(image, self.template, self.pose + self.velocity, float(reach))
+        guesses = candidate_poses(image, self.template, self._expected(), float(reach))
         return self._best(image, guesses, FOUND_AGAIN)
 
     def _best(self, image: np.ndarray, poses: list[np.ndarray], least: float) -> Fit | None:
@@ -120,7 +122,8 @@ class Follower:
         fit = best_fit(image, self.template, guesses)
         height, width = image.shape
         is_inside = 0 <= fit.pose[0] < width and 0 <= fit.pose[1] < height
-        is_near = np.hypot(*(fit.pose - self.pose - self.velocity)[:2]) <= self._leap_px()
+        leaps = [np.hypot(*(fit.pose - p)[:2]) for p in (self.pose, self._expected())]
+        is_near = min(leaps) <= self._leap_px()
         is_upright = abs(fit.pose[2] - self.pose[2]) <= MAX_TURN_RAD
         is_it = is_alike(fit) and fit.correlation >= least
         is_possible = is_inside and is_near and is_upright and is_it
@@ -138,6 +141,10 @@ class Follower:
             patch_at(scene, fit.pose, radius)[region] for scene in (self.first_image, image)
         )
         return float(np.corrcoef(then, now)[0, 1]) > fit.correlation
+
+    def _expected(self) -> np.ndarray:
+        """Where the object should be if it goes on, for a few frames of hiding."""
+        return self.pose + min(self.frames_missed + 1, MAX_COAST_FRAMES) * self.velocity
 
     def _leap_px(self) -> float:
         """How far from the expected place the object can be; any distance while it is new."""

@@ -37,5 +37,5 @@ def write_pixel_csv(path: Path, track: Track) -> None:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
     for row in zip(*columns, strict=True):
-        writer.writerow([f"{v:.6g}" if np.isfinite(v) else "" for v in row])
+        writer.writerow([f"{v:.8g}" if np.isfinite(v) else "" for v in row])
     write_text(path, text.getvalue())

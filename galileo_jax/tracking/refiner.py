@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.tracking.exposure import distinct, own_motion
+from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refine import FINE_PX, Fit, Target, align, covariance_of
 from galileo_jax.tracking.template import Template
 
@@ -40,13 +41,15 @@ def velocities_at(poses: np.ndarray, frame: int) -> Velocities:
 class Refined:
     """One frame's final pose; `covariance` `[2, 2]` px^2 of its place, from image noise alone.
 
-    `correlation` and `covered` as in `Fit`.
+    `correlation` and `covered` as in `Fit`; `outside` is the share of the object's region that
+    lies beyond the picture's border.
     """
 
     pose: np.ndarray
     covariance: np.ndarray
     correlation: float
     covered: float
+    outside: float
 
 
 def refine_pose(
@@ -68,4 +71,17 @@ def refine_pose(
         fits.append((align(image, target, pose), target))
     best, target = max(fits, key=lambda item: item[0].correlation)
     covariance = covariance_of(best, target)[:2, :2]
-    return Refined(best.pose, covariance, best.correlation, best.covered)
+    return Refined(
+        pose=best.pose,
+        covariance=covariance,
+        correlation=best.correlation,
+        covered=best.covered,
+        outside=_outside(image, template, best.pose),
+    )
+
+
+def _outside(image: np.ndarray, template: Template, pose: np.ndarray) -> float:
+    own = np.argwhere(template.region)[:, ::-1] - template.radius
+    places = own @ rotation(pose[2]).T + pose[:2]
+    last = np.array(image.shape[::-1]) - 1
+    return float(np.mean(((places < 0) | (places > last)).any(axis=1)))

@@ -14,9 +14,9 @@ from galileo_jax.tracking.template import Outline, grey, median_template, templa
 from galileo_jax.tracking.track import Track
 
 MIN_CORRELATION = 0.7
-MAX_COVERED = 0.25
-"""An object is visible if its patch correlates with the template, and no more of it than this
-share differs from the template by more than noise."""
+MAX_COVERED, MAX_OUTSIDE = 0.25, 0.1
+"""An object is visible if its patch correlates with the template, no more of it than these
+shares differs from the template by more than noise, or lies beyond the picture's border."""
 
 LONG_RUN = 10
 """A run of so many frames is believed after any gap."""
@@ -159,4 +159,5 @@ def _without_glimpses(is_seen: np.ndarray) -> np.ndarray:
 
 
 def _is_visible(fit: Refined) -> bool:
-    return fit.correlation >= MIN_CORRELATION and fit.covered <= MAX_COVERED
+    is_shown = fit.covered <= MAX_COVERED and fit.outside <= MAX_OUTSIDE
+    return is_shown and fit.correlation >= MIN_CORRELATION

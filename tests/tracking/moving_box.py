@@ -1,0 +1,117 @@
+"""Pictures of a textured box with exactly known motion, for the tracking tests.
+
+Drawn at four times the resolution and averaged down, as a sensor's pixels average: places are
+right to a few thousandths of a pixel.
+"""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+FINE = 4
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box of `size_px` (width, height) with its own texture (by `seed`)."""
+
+    size_px: tuple[int, int] = (32, 26)
+    seed: int = 0
+
+    def texture(self) -> np.ndarray:
+        rng = np.random.default_rng(self.seed)
+        width, height = (FINE * n for n in self.size_px)
+        coarse = rng.integers(20, 236, (self.size_px[1] // 4, self.size_px[0] // 4))
+        return cv2.resize(coarse.astype(np.float32), (width, height), interpolation=cv2.INTER_CUBIC)
+
+
+def scene(size_px: tuple[int, int], seed: int = 9) -> np.ndarray:
+    """A quiet background, at the fine resolution, `[height, width]` float32."""
+    rng = np.random.default_rng(seed)
+    width, height = (FINE * n for n in size_px)
+    spots = cv2.resize(rng.normal(size=(12, 20)).astype(np.float32), (width, height))
+    return 130 + 12 * spots
+
+
+def shoot(
+    background: np.ndarray,
+    boxes: list[tuple[Box, np.ndarray]],
+    noise: float,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """One uint8 BGR frame; each box comes with its poses `[sub-frame, 3]` in the exposure."""
+    total = np.zeros_like(background)
+    samples = len(boxes[0][1]) if boxes else 1
+    for sample in range(samples):
+        picture = background.copy()
+        for box, poses in boxes:
+            paste(picture, box, poses[sample])
+        total += picture / samples
+    grey = cv2.resize(total, None, fx=1 / FINE, fy=1 / FINE, interpolation=cv2.INTER_AREA)
+    grey = np.clip(np.round(grey + rng.normal(0, noise, grey.shape)), 0, 255).astype(np.uint8)
+    return cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR)
+
+
+def paste(picture: np.ndarray, box: Box, pose: np.ndarray) -> None:
+    """Draws `box` into the fine `picture` at `(x, y, angle)`, pixels of the small picture."""
+    texture = box.texture()
+    height, width = texture.shape
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    turn = np.array([[c, -s], [s, c]])
+    centre = FINE * (pose[:2] + 0.5) - 0.5
+    shift = centre - turn @ ((width - 1) / 2, (height - 1) / 2)
+    warp = np.column_stack([turn, shift])
+    size = picture.shape[::-1]
+    drawn = cv2.warpAffine(texture, warp, size, borderMode=cv2.BORDER_REPLICATE)
+    mask = cv2.warpAffine(np.ones_like(texture), warp, size)
+    picture[:] = mask * drawn + (1 - mask) * picture
+
+
+def exposed(poses: np.ndarray, index: int, share: float, samples: int = 7) -> np.ndarray:
+    """Poses `[samples, 3]` during the exposure centred on frame `index`, piecewise linear."""
+    frames = np.arange(-1, len(poses) + 1)
+    longer = np.concatenate([2 * poses[:1] - poses[1:2], poses, 2 * poses[-1:] - poses[-2:-1]])
+    at = index + share * np.linspace(-0.5, 0.5, samples)
+    return np.stack([np.interp(at, frames, longer[:, k]) for k in range(3)], axis=1)
+
+
+def film(
+    paths: list[tuple[Box, np.ndarray]],
+    *,
+    size_px: tuple[int, int] = (240, 120),
+    noise: float = 3.0,
+    share: float = 0.0,
+    seed: int = 1,
+) -> list[np.ndarray]:
+    """The frames of boxes that follow their paths, each `[frame, 3]` of `(x, y, angle)`."""
+    rng = np.random.default_rng(seed)
+    background = scene(size_px)
+    samples = 7 if share else 1
+    return [
+        shoot(
+            background,
+            [
+                (box, exposed(path, index, share, samples) if share else path[index][None])
+                for box, path in paths
+            ],
+            noise,
+            rng,
+        )
+        for index in range(len(paths[0][1]))
+    ]
+
+
+def slide(frames: int = 40, turn_at: int = 24, turn_rad: float = -0.35) -> np.ndarray:
+    """A box speeds up, turns within two frames (as at the foot of a ramp), slows down."""
+    time = np.arange(frames, dtype=float)
+    down = np.minimum(time, turn_at)
+    flat = np.maximum(time - turn_at, 0)
+    speed = 0.3 * turn_at
+    along = 0.15 * down**2 + np.where(flat > 0, speed * flat - 0.14 * flat**2, 0)
+    on_ramp = np.minimum(along, 0.15 * turn_at**2)
+    after = along - on_ramp
+    x = 40.3 + on_ramp * np.cos(turn_rad) + after
+    y = 40.7 - on_ramp * np.sin(turn_rad)
+    angle = turn_rad * np.clip((time - turn_at + 1) / 2, 0, 1)
+    return np.stack([x, y, angle], axis=1)

@@ -1,0 +1,49 @@
+"""Finding the objects by their motion."""
+
+import numpy as np
+import pytest
+
+from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.template import Outline, grey
+from tests.tracking.moving_box import Box, film
+
+pytestmark = pytest.mark.video
+
+FIRST, SECOND, HAND = Box(seed=0), Box(seed=4), Box((40, 30), seed=7)
+
+
+def paths():
+    """Object 1 slides from frame 6 and stops; object 2 sets out at 20; a hand leaves at 3."""
+    time = np.arange(40.0)
+    zero = 0 * time
+    first = np.stack([40 + 4.0 * np.clip(time - 6, 0, 18), 80 + zero, zero], axis=1)
+    second = np.stack([160 + 2.0 * np.clip(time - 20, 0, 12), 80 + zero, zero], axis=1)
+    hand = np.stack([40 - 9.0 * np.clip(time - 3, 0, 40), 35 + zero, zero], axis=1)
+    return first, second, hand
+
+
+def test_objects_are_found_in_the_order_of_their_motion_and_the_hand_last():
+    first, second, hand = paths()
+    frames = film([(SECOND, second), (FIRST, first), (HAND, hand)])
+    movers = find_movers(lambda: iter(frames), 32)
+    assert [mover.leaves_picture for mover in movers] == [False, False, True]
+    for mover, path in zip(movers, (first, second), strict=False):
+        np.testing.assert_allclose(mover.point_px, path[0, :2], atol=3)
+
+
+def test_nothing_that_moves_gives_nothing():
+    first, second, _ = paths()
+    still = [(FIRST, first[:1].repeat(10, axis=0)), (SECOND, second[:1].repeat(10, axis=0))]
+    frames = film(still)
+    assert find_movers(lambda: iter(frames), 32) == []
+
+
+def test_outline_is_moved_to_the_sharp_sides():
+    pose = np.array([80.4, 60.2, 0.3])
+    image = grey(film([(FIRST, pose[None])])[0])
+    c, s = np.cos(0.3), np.sin(0.3)
+    # Features were only found on the right half.
+    own = np.array([[0, -11], [14, 10], [13, -10], [1, 11], [6, 0]])
+    places = own @ np.array([[c, s], [-s, c]]) + pose[:2]
+    centre = fit_outline(image, places, Outline(FIRST.size_px, 0.3))
+    np.testing.assert_allclose(centre, pose[:2], atol=1.0)

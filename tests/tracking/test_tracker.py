@@ -1,0 +1,126 @@
+"""Whole tracks of filmed boxes with exactly known paths."""
+
+import numpy as np
+import pytest
+
+from galileo_jax.tracking import Start, track_video
+from galileo_jax.tracking.exposure import Exposure
+from galileo_jax.tracking.template import Outline, grey, template_at
+from tests.tracking.moving_box import Box, film, slide
+
+pytestmark = pytest.mark.video
+
+BOX = Box()
+FPS = 30.0
+
+
+def tracked(frames, *poses, box=BOX, first_frame=0):
+    starts = [
+        Start(f"object{k + 1}", (pose[0], pose[1]), Outline(box.size_px), first_frame)
+        for k, pose in enumerate(poses)
+    ]
+    return track_video(lambda: iter(frames), starts, FPS)
+
+
+def errors(track, path, k=0):
+    return track.position_px[k] - path[:, :2]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4])
+def test_slide_with_a_turn_at_the_foot(share):
+    path = slide()
+    track = tracked(film([(BOX, path)], share=share), path[0])
+    assert track.is_visible.all()
+    error = errors(track, path)
+    # Two of forty frames hold a blow inside the exposure.
+    assert np.sqrt((error**2).sum(axis=1).mean()) < (0.15 if share else 0.04)
+    assert np.median(np.linalg.norm(error, axis=1)) < 0.03
+    turn = np.median(np.abs(track.angle_rad[0] - path[:, 2]))
+    assert turn < np.radians(0.2)
+    inverse = np.linalg.inv(track.covariance_px2[0])
+    nse = np.einsum("ni,nij,nj->n", error, inverse, error)[1:] / 2
+    # The first frame's own error is in every point: 2 is expected where only noise errs.
+    assert 0.3 < np.mean(nse) < 4, nse.round(1)
+
+
+def test_exposure_is_learned_from_the_smear():
+    path = np.stack([30 + 6.0 * np.arange(20), np.full(20, 50.0), np.zeros(20)], axis=1)
+    frames = film([(BOX, path)], share=0.5)
+    sharp = film([(BOX, path[:1])])[0]
+    template = template_at(grey(sharp), path[0, :2], Outline(BOX.size_px))
+    exposure = Exposure()
+    for index in range(3, 15):
+        exposure.add(grey(frames[index]), template, path[index], np.array([6.0, 0.0, 0.0]))
+    # Seven instants from end to end spread a little wider than an even exposure.
+    assert exposure.share == pytest.approx(0.5 * 8 / 7, abs=0.08)
+
+
+def test_covered_object_is_a_gap_and_found_again():
+    path = slide(frames=30, turn_at=30)
+    path[:, 0] = 60 + 0.8 * np.arange(30)
+    frames = film([(BOX, path)])
+    for index in range(12, 18):
+        frames[index][10:110, 20:160] = 150  # a hand, all over it
+    track = tracked(frames, path[0])
+    assert not track.is_visible[0, 12:18].any()
+    assert track.is_visible[0, :12].all()
+    assert track.is_visible[0, 18:].all()
+    assert np.isnan(track.position_px[0, 12:18]).all()
+    assert np.nanmax(np.abs(errors(track, path))) < 0.08
+
+
+def test_object_that_leaves_the_picture_leaves_no_points():
+    time = np.arange(40)
+    path = np.stack([150 + 0.2 * time**2, np.full(40, 60.0), np.zeros(40)], axis=1)
+    track = tracked(film([(BOX, path)]), path[0])
+    is_out = path[:, 0] > 240 + 20
+    assert not track.is_visible[0, is_out].any()
+    assert track.is_visible[0, path[:, 0] < 215].all()
+    assert np.nanmax(np.abs(errors(track, path))) < 0.3
+
+
+def test_two_objects_that_touch_are_kept_apart():
+    other = Box(seed=4)
+    time = np.arange(40)
+    first = np.stack([40 + 3.0 * np.minimum(time, 20), np.full(40, 60.0), 0 * time], axis=1)
+    first[20:, 0] += 1.5 * (time[20:] - 20)
+    second = np.stack([np.full(40, 132.0), np.full(40, 60.0), 0 * time], axis=1)
+    second[20:, 0] += 1.5 * (time[20:] - 20)
+    track = tracked(film([(BOX, first), (other, second)]), first[0], second[0])
+    assert track.is_visible.all()
+    for k, path in enumerate((first, second)):
+        assert np.abs(errors(track, path, k)).max() < 0.08
+
+
+def test_point_beside_the_centre_turns_with_the_object():
+    path = slide()
+    point = path[0, :2] + (6.0, 3.0)
+    track = tracked(film([(BOX, path)]), point)
+    c, s = np.cos(path[:, 2]), np.sin(path[:, 2])
+    expected = path[:, :2] + np.stack([6 * c - 3 * s, 6 * s + 3 * c], axis=1)
+    # The region reaches past the box on one side, over the background.
+    assert np.median(np.linalg.norm(track.position_px[0] - expected, axis=1)) < 0.1
+
+
+def test_frames_before_the_first_are_not_visible():
+    path = slide(frames=20)
+    track = tracked(film([(BOX, path)]), path[5], first_frame=5)
+    assert not track.is_visible[0, :5].any()
+    assert track.is_visible[0, 5:].all()
+
+
+def test_plain_disc_is_followed_without_a_turn():
+    frames, path = [], []
+    rng = np.random.default_rng(2)
+    for index in range(14):
+        y, x = np.mgrid[:140, :400]
+        place = (30 + 26.0 * index, 20 + 0.55 * (index - 7) ** 2 + 0.3)
+        ball = 100 * (1 - np.tanh(np.hypot(x - place[0], y - place[1]) - 6))
+        frames.append(np.clip(20 + ball + rng.normal(0, 2, ball.shape), 0, 255).astype(np.uint8))
+        path.append((*place, 0.0))
+    path = np.array(path)
+    start = Start("ball", (path[0, 0], path[0, 1]), Outline(None))
+    track = track_video(lambda: iter(frames), [start], FPS)
+    assert track.is_visible.all()
+    assert np.abs(errors(track, path)).max() < 0.1
+    assert np.abs(track.angle_rad).max() < 1e-6
