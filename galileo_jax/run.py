@@ -1,9 +1,9 @@
 """A run: what `fit` leaves in its folder, and what later commands read from it.
 
-    DIR/result.json       numbers, by contract (DESIGN.md 2.3)
-    DIR/observation.csv   the track in metres with its covariance
-    DIR/clip.yaml         the clip as fitted, overrides included
-    DIR/posterior.nc      draws of all parameters (ArviZ InferenceData)
+DIR/result.json       numbers, by contract (DESIGN.md 2.3)
+DIR/observation.csv   the track in metres with its covariance
+DIR/clip.yaml         the clip as fitted, overrides included
+DIR/posterior.nc      draws of all parameters (ArviZ InferenceData)
 """
 
 import json

@@ -7,7 +7,7 @@ import jax
 import numpy as np
 
 from galileo_jax.observation import Observation
-from galileo_jax.prediction import as_measured, draw_theta, hit_s, roll_out
+from galileo_jax.prediction import GRID_S, as_measured, draw_theta, hit_s, roll_out
 from galileo_jax.run import Run
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
@@ -65,29 +65,27 @@ def evaluate(run: Run, seed: int) -> Fitted:
     medians = dict(zip(run.posterior.names, np.median(run.posterior.flat(), axis=0), strict=True))
     noise_scale = float(medians["noise_scale"])
     median = np.array([[medians[name] for name in problem.model.names]])
-    centre, draws = (
-        roll_out(problem.model, problem.engine, theta, observation.times_s)
-        for theta in (median, draw_theta(run, NUM_DRAWS, seed))
-    )
-    shown = as_measured(problem.model, centre)[0]
+    frames = observation.times_s
+    draws = roll_out(problem.model, problem.engine, draw_theta(run, NUM_DRAWS, seed), frames)
+    # Objects may touch between two frames only.
+    times = np.union1d(frames, np.arange(frames[0], frames[-1], GRID_S))
+    centre = roll_out(problem.model, problem.engine, median, times)
+    shown = as_measured(problem.model, centre)[0][..., np.searchsorted(times, frames)]
     white = jax.jit(GaussianLikelihood.whiten)(
         problem.data.observed_m - shown, noise_scale, problem.data
     )
     is_measured = np.broadcast_to(observation.mask[:, None], shown.shape)
     drawn = as_measured(problem.model, draws)
     drawn = drawn + _offset(observation, drawn)[..., None]
-    when = hit_s(draws, surroundings)
-    happens = np.isfinite(when)
-    hit = float(np.median(when[happens])) if happens.mean() > 0.5 else None
+    when = float(hit_s(centre, surroundings)[0])
+    hit = None if np.isnan(when) else when
     return Fitted(
         observation=observation,
         position_m=drawn,
         noise_scale=noise_scale,
         offset_m=_offset(observation, shown),
         residuals=np.where(is_measured, np.asarray(white), np.nan),
-        phases=tuple(
-            _phases(run, centre.position_m[0, i], i, hit) for i in range(len(surroundings.names))
-        ),
+        phases=tuple(_phases(run, shown[i], i, hit) for i in range(len(surroundings.names))),
         hit_s=hit,
     )
 

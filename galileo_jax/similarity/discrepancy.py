@@ -20,8 +20,6 @@ KEYSTONE_SD = 0.006  # 1/m; half a degree of yaw or tilt, 1.5 m away
 ROLL_SD_RAD = 0.002
 SCALE_SD = 0.001
 IMPULSE_SD = 0.01  # of a hit's impulse: rigid bodies against compliant contacts, at most
-SMOOTH_SD_M = 1e-4  # slow drift of tracker and model
-SMOOTH_TIME_S = 0.15
 MOVED_M = 0.002  # an object that has gone so far has been hit
 
 
@@ -32,9 +30,7 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
     camera, common to all objects; and, for what comes down a ramp, the step that an
     off-centre point and a box's length make when the object turns at the foot.
     After a hit the way each object goes is known to a per cent, because that is how well
-    compliant contacts give the impulse of rigid ones. And every track may drift slowly by a
-    tenth of a millimetre (a squared-exponential process), which is what textures, blur and
-    contacts amount to.
+    compliant contacts give the impulse of rigid ones.
     """
     position = np.nan_to_num(observation.position_m)
     count, _, frames = position.shape
@@ -61,13 +57,6 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
                 step[i, axis] = sd * share
                 found.append(step)
     found.extend(_after_hit(position))
-    smooth = _smooth(observation.times_s)
-    for i in range(count):
-        for axis in range(2):
-            for pattern in smooth:
-                drift = np.zeros((count, 2, frames))
-                drift[i, axis] = pattern
-                found.append(drift)
     return np.stack(found)
 
 
@@ -86,14 +75,6 @@ def _after_hit(position: np.ndarray) -> list[np.ndarray]:
         way[i, 0, hit:] = IMPULSE_SD * (x[i, hit:] - x[i, hit])
         found.append(way)
     return found
-
-
-def _smooth(times_s: np.ndarray) -> np.ndarray:
-    """The drift's covariance as patterns `[mode, frame]`, m; what is below a hundredth left out."""
-    lag = (times_s[:, None] - times_s) / SMOOTH_TIME_S
-    values, vectors = np.linalg.eigh(SMOOTH_SD_M**2 * np.exp(-0.5 * lag**2))
-    kept = values > 1e-4 * SMOOTH_SD_M**2
-    return (vectors[:, kept] * np.sqrt(values[kept])).T
 
 
 def crossing_sd_m(observation: Observation, scene: Surroundings) -> np.ndarray:

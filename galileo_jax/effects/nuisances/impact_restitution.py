@@ -3,9 +3,10 @@
 from typing import ClassVar
 
 from galileo_jax.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.parameters import HalfNormal, Parameter
+from galileo_jax.parameters import LogNormal, Parameter
 
-SD = 0.05  # Bullet's boxes, told to be plastic, part with 0.02 to 0.13
+# Most plastic impacts return about a hundredth; Bullet's boxes, told to be plastic, up to 0.13.
+PRIOR = LogNormal(median=0.01, sd=1.2)
 
 
 class ImpactRestitution(Effect):
@@ -21,7 +22,7 @@ class ImpactRestitution(Effect):
         """The coefficient; none where there is nothing to hit."""
         if len(scene.names) < 2:
             return ()
-        return (Parameter("impact_restitution", "1", HalfNormal(SD), 0.0, "nuisance", 0.2),)
+        return (Parameter("impact_restitution", "1", PRIOR, 0.0, "nuisance", 0.2),)
 
     def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:
         """The coefficient of restitution."""

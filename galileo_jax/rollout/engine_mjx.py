@@ -1,0 +1,127 @@
+"""The MJX engine: the same rollouts in pure JAX, on a GPU or, slowly, on a CPU."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import cached_property
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.effects.effect import State
+from galileo_jax.rollout.mjx_import import mjx
+from galileo_jax.rollout.model import SUBSTEPS, Model
+from galileo_jax.rollout.motion import rigid_motion, set_up, total_force
+
+# Larger batches are slower per rollout on a CPU; a GPU wants to be filled.
+BATCH_CPU, BATCH_GPU = 8, 256
+
+
+class EngineMJX:
+    """Simulates batches of parameter vectors in MJX; compiled once for one batch size."""
+
+    name = "mjx"
+
+    def __init__(self, model: Model):
+        self.model = model
+        self._base = mjx.put_model(model.scene.model)
+        self.is_on_cpu = jax.default_backend() == "cpu"
+        self.batch = BATCH_CPU if self.is_on_cpu else BATCH_GPU
+        self._pairs = [model.scene.model.pair(i).name for i in range(model.scene.model.npair)]
+
+    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rolls the scene out for each parameter vector; as `EngineC.simulate`.
+
+        Args:
+          theta: `[batch, parameter]`, in the model's units.
+
+        Returns:
+          Centres (m) and velocities (m/s), each `[batch, object, 2, record + 1]`; NaN where
+          the parameters are not finite.
+        """
+        theta = np.asarray(theta, float)
+        is_good = np.isfinite(theta).all(axis=1)
+        usable = np.where(is_good[:, None], theta, 0.5)
+        missing = -len(usable) % self.batch
+        padded = np.concatenate([usable, np.repeat(usable[:1], missing, axis=0)])
+        parts = padded.reshape(-1, self.batch, padded.shape[1])
+        # XLA runs one small rollout on one core; threads give the others theirs.
+        workers = (os.cpu_count() or 1) if self.is_on_cpu else 1
+        with ThreadPoolExecutor(workers) as pool:
+            done = list(pool.map(lambda part: jax.block_until_ready(self._compiled(part)), parts))
+        position = np.concatenate([np.asarray(p) for p, _ in done])[: len(theta)]
+        velocity = np.concatenate([np.asarray(v) for _, v in done])[: len(theta)]
+        position, velocity = position.astype(float), velocity.astype(float)
+        position[~is_good] = np.nan
+        velocity[~is_good] = np.nan
+        return position, velocity
+
+    @cached_property
+    def _compiled(self):
+        parameters = jax.ShapeDtypeStruct((self.batch, len(self.model.names)), jnp.zeros(()).dtype)
+        return jax.jit(jax.vmap(self.rollout)).lower(parameters).compile()
+
+    def rollout(self, theta: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """One rollout in pure JAX: `[parameter]` to two arrays `[object, 2, record + 1]`."""
+        compiled = self.model.scene.model
+        named = self.model.by_name(theta)
+        fields = set_up(self.model, named, jnp)
+        model = self._with(fields)
+        data = mjx.make_data(compiled).replace(qpos=fields.qpos, qvel=jnp.zeros(compiled.nv))
+        home = jnp.asarray(compiled.body_pos[1:][:, [0, 2]])
+        dt = float(compiled.opt.timestep)
+        force = total_force(self.model, named)
+
+        def look(data):
+            return data.qpos.reshape(home.shape) + home, data.qvel.reshape(home.shape)
+
+        def record(data, index):
+            position, velocity = look(data)
+            if force is not None:
+                applied = force(State(position, velocity, index * SUBSTEPS * dt))
+                data = data.replace(qfrc_applied=applied.reshape(-1))
+            data = jax.lax.fori_loop(0, SUBSTEPS, lambda _, d: mjx.step(model, d), data)
+            return data, (position, velocity)
+
+        last, (positions, velocities) = jax.lax.scan(
+            record, data, jnp.arange(self.model.num_records)
+        )
+        position, velocity = look(last)
+        positions = jnp.concatenate([positions, position[None]])
+        velocities = jnp.concatenate([velocities, velocity[None]])
+        path, speed = rigid_motion(
+            positions - 0.5 * dt * velocities,
+            velocities,
+            fields.mass,
+            self.model.scene.surroundings,
+        )
+        return jnp.moveaxis(path, 0, -1), jnp.moveaxis(speed, 0, -1)
+
+    def _with(self, fields):
+        """The MJX model with one rollout's masses, frictions and bumpers.
+
+        A mass is more than `body_mass`: contacts are scaled by the inverse weights that
+        `mj_setConst` derives from it. With slide joints only, each scales with 1 / mass.
+        """
+        compiled, base = self.model.scene.model, self._base
+        ratio = fields.mass / compiled.body_mass[1:]
+        per_body = jnp.concatenate([jnp.ones(1), ratio])
+        per_dof = jnp.repeat(ratio, 2)
+        friction, solref = base.pair_friction, base.pair_solref
+        for i, name in enumerate(self._pairs):
+            if name == "object1_object2":
+                solref = solref.at[i].set(fields.bumper)
+            else:
+                which = int(name[len("object") : name.index("_")]) - 1
+                friction = friction.at[i, :2].set(fields.friction[which])
+        return base.tree_replace(
+            {
+                "body_mass": base.body_mass * per_body,
+                "body_subtreemass": base.body_subtreemass * per_body.at[0].set(ratio.mean()),
+                "body_inertia": base.body_inertia * per_body[:, None],
+                "body_invweight0": base.body_invweight0 / per_body[:, None],
+                "dof_invweight0": base.dof_invweight0 / per_dof,
+                "pair_friction": friction,
+                "pair_solref": solref,
+            }
+        )
