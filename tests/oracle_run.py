@@ -18,6 +18,7 @@ from tests.reference_ramp import Experiment, solve
 
 SIZES = ((0.06, 0.05), (0.07, 0.06))
 HIT = Experiment((0.5, 0.3), (0.1, 0.2), radians(20), SIZES, 0.5, 0.25)
+PARTS = Experiment((0.3, 0.6), (0.25, 0.1), radians(20), SIZES, 0.5, 0.25)
 MISS = Experiment((0.5, 0.3), (0.33, 0.2), radians(20), SIZES, 0.5, 0.25)
 STILL = Experiment((0.5, 0.3), (0.5, 0.2), radians(20), SIZES, 0.5, 0.25)
 

@@ -5,13 +5,15 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 
 from galileo_jax.report import write_report
 from galileo_jax.report.fitted import evaluate
 from galileo_jax.report.statements import fit_quality, number, undetermined
 from galileo_jax.run import load_run
-from tests.oracle_run import HIT, MISS, STILL, make_run
+from tests.oracle_run import HIT, MISS, PARTS, STILL, make_run
+from tests.reference_ramp import solve
 
 
 @pytest.fixture(scope="module")
@@ -89,8 +91,13 @@ def test_what_an_earlier_fit_left_is_gone_and_the_thesis_is_no_posterior(run):
 def test_residuals_are_whitened_and_the_hit_is_found(run):
     fitted = evaluate(run, seed=0)
     assert fitted.residuals.std() == pytest.approx(1.0, abs=0.6)
-    assert fitted.hit_s == pytest.approx(0.73, abs=0.15)
+    assert fitted.hit_s == pytest.approx(solve(HIT, np.zeros(1)).hit_s, abs=0.02)
     assert [phase.name for phase in fitted.phases[0]] == ["ramp", "foot", "table", "after the hit"]
+
+
+def test_a_touch_between_two_frames_is_a_hit(tmp_path):
+    fitted = evaluate(make_run(tmp_path, PARTS, 1.8), seed=0)
+    assert fitted.hit_s == pytest.approx(solve(PARTS, np.zeros(1)).hit_s, abs=0.02)
 
 
 def not_identified(run, *names):
