@@ -95,7 +95,7 @@ def test_residuals_are_whitened_and_the_hit_is_found(run):
     assert [phase.name for phase in fitted.phases[0]] == ["ramp", "foot", "table", "after the hit"]
 
 
-def test_a_touch_between_two_frames_is_a_hit(tmp_path):
+def test_the_hit_of_objects_that_part_is_where_the_closed_form_has_it(tmp_path):
     fitted = evaluate(make_run(tmp_path, PARTS, 1.8), seed=0)
     assert fitted.hit_s == pytest.approx(solve(PARTS, np.zeros(1)).hit_s, abs=0.02)
 
