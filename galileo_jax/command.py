@@ -22,6 +22,7 @@ class Parser(argparse.ArgumentParser):
     """An argument parser whose errors are one line (an `InputError`), without the usage."""
 
     def error(self, message: str) -> NoReturn:
+        """Raises the complaint as an `InputError`."""
         raise InputError(f"{self.prog}: {message}; see --help")
 
 

@@ -36,7 +36,9 @@ def metropolis_posterior(
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
       settings: how long.
-      checkpoint, identity, on_block: see `samplers.sample`.
+      checkpoint: file that interrupted chains go on from; see `samplers.sample`.
+      identity: of what is sampled; a checkpoint of anything else is refused.
+      on_block: called with the progress.
 
     Returns:
       Draws in the parameters' units. Converged when the main parameters that the fit found
@@ -44,7 +46,8 @@ def metropolis_posterior(
     """
     steps = jnp.asarray(fit.steps)
     start_key, key = jax.random.split(jax.random.key(seed))
-    starts = dispersed_starts(start_key, fit.z, fit.covariance, NUM_CHAINS)
+    mode, covariance = jnp.asarray(fit.z), jnp.asarray(fit.covariance)
+    starts = dispersed_starts(start_key, mode, covariance, NUM_CHAINS)
     sd = np.sqrt(np.diag(fit.covariance))
     watched = [
         (i, parameter.name)
@@ -62,7 +65,7 @@ def metropolis_posterior(
 
     posterior = sample(
         key,
-        sampler_class(sampler).from_gaussian(jnp.asarray(fit.z), jnp.asarray(fit.covariance)),  # pyright: ignore
+        sampler_class(sampler).from_gaussian(mode, covariance),  # pyright: ignore
         lambda z: problem.log_density(z, steps),
         starts,
         problem.names,

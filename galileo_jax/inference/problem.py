@@ -87,7 +87,7 @@ class Problem:
 
     def whiten(self, predicted_m: jax.Array, noise_scale: Any) -> jax.Array:
         """Whitened residuals, unit normal if the model is right: `[object * 2 * frame]`."""
-        difference = self.data.observed_m - predicted_m
+        difference = jnp.asarray(self.data.observed_m) - predicted_m
         white = GaussianLikelihood.whiten(difference, noise_scale, self.data).reshape(-1)
         return jnp.where(jnp.isfinite(white), white, FAILED)
 

@@ -38,7 +38,7 @@ class EngineC:
           parameters or one that MuJoCo gave up are NaN.
         """
         theta = np.asarray(theta, float)
-        is_good = np.isfinite(theta).all(axis=1)
+        is_good = np.all(np.isfinite(theta), axis=1)
         usable = np.where(is_good[:, None], theta, 0.5)
         named = self.model.by_name(usable)
         batch = self._batch(len(theta))

@@ -40,7 +40,7 @@ class EngineMJX:
           the parameters are not finite.
         """
         theta = np.asarray(theta, float)
-        is_good = np.isfinite(theta).all(axis=1)
+        is_good = np.all(np.isfinite(theta), axis=1)
         usable = np.where(is_good[:, None], theta, 0.5)
         missing = -len(usable) % self.batch
         padded = np.concatenate([usable, np.repeat(usable[:1], missing, axis=0)])

@@ -1,5 +1,8 @@
 """The scene: a clip's geometry as a MuJoCo model, set up through `mujoco.MjSpec`."""
 
+# mujoco's classes live in a compiled module without stubs.
+# pyright: reportAttributeAccessIssue=false
+
 import math
 from dataclasses import dataclass
 
@@ -13,7 +16,8 @@ from galileo_jax.errors import InputError
 from galileo_jax.observation import Observation
 
 # Where nothing else is declared; an incline's dynamics do not depend on it.
-UNKNOWN_SIZE_M = (0.04, 0.04, 0.04)
+UNKNOWN_BOX_M: tuple[float, ...] = (0.04, 0.04, 0.04)
+UNKNOWN_ROUND_M: tuple[float, ...] = (0.02, 0.01)
 BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do not climb
 
 
@@ -47,9 +51,8 @@ def extents(declared: ClipObject) -> tuple[float, float]:
 
     A cylinder stands upright, a torus lies flat: they slide on their base.
     """
-    size = declared.size_m
-    if size is None:
-        size = UNKNOWN_SIZE_M if declared.shape == "box" else (0.02, 0.01)
+    unknown = UNKNOWN_BOX_M if declared.shape == "box" else UNKNOWN_ROUND_M
+    size = declared.size_m or unknown
     match declared.shape:
         case "box":
             return size[0] / 2, size[2] / 2

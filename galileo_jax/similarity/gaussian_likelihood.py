@@ -78,7 +78,8 @@ class GaussianLikelihood:
     @staticmethod
     def log_density(predicted_m: jax.Array, noise_scale: jax.Array, data: Whitening) -> jax.Array:
         """Log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
-        white = GaussianLikelihood.whiten(data.observed_m - predicted_m, noise_scale, data)
+        difference = jnp.asarray(data.observed_m) - predicted_m
+        white = GaussianLikelihood.whiten(difference, noise_scale, data)
         log_determinant = data.num_values * jnp.log(noise_scale**2) + jnp.sum(
             jnp.log1p((data.gain / noise_scale) ** 2)
         )

@@ -290,7 +290,7 @@ class GradientFitter:
         rest = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
         rest = np.clip(rest, -1.0, 1.0)  # an absent half-normal has no slope
         free = [i for i, p in enumerate(parameters) if p.role == "main"]
-        share = qmc.Sobol(len(free), seed=seed).random_base2(int(np.ceil(np.log2(count))))
+        share = qmc.Sobol(len(free), rng=seed).random_base2(int(np.ceil(np.log2(count))))
         starts = np.tile(rest, (count, 1))
         angle = self.problem.model.scene.surroundings.angle_rad
         for column, i in enumerate(free):
