@@ -1,0 +1,150 @@
+"""Is the Jacobian right at the posterior's scale? `python benchmarks/gradient_check.py`.
+
+For random truths in which object 2 is hit (0.3 px of noise at 900 px/m, 30 fps), at the fit:
+
+    || J - J_fd || / || J_fd ||    over all frames and both objects,
+
+J: d(centres)/d(parameter) as used, through `problem.predict`'s custom_jvp at the fit's own
+steps; J_fd: central differences of
+the engine at a step of half a posterior standard deviation of that parameter (marginal),
+computed here from plain rollouts. The fit's steps come from the covariance of the step before,
+and J is a central difference, too: beside it stand the differences of J from central
+differences at 1/4, 1 and 2 posterior sd, which tell whether the scale matters, and for a few
+sets MJX's exact forward derivative through the contacts. The last line is JSON.
+"""
+
+import argparse
+import time
+from collections.abc import Sequence
+
+import jax
+import numpy as np
+import synthetic_tracks
+import tables
+
+from galileo_jax import command, jax_cache
+
+NOISE_M = 0.3 / 900
+PARAMETERS = ("k1", "k2", "m1", "m2")
+SCALES_SD = (0.25, 0.5, 1.0, 2.0)
+BARS = {"median": 0.05, "worst": 0.20}
+
+
+def main(argv: Sequence[str]) -> int | None:
+    call = _parser().parse_args(argv)
+    jax.config.update("jax_enable_x64", True)
+    jax_cache.enable()
+    used, exact = [], []
+    tables.row("set", [f"{name} {scale:g}sd" for name in PARAMETERS for scale in SCALES_SD])
+    for seed in range(call.seed, call.seed + call.num):
+        case = synthetic_tracks.make_case(seed, call.source, NOISE_M, call.engine)
+        z, steps, sd = _fit(case)
+        differences = _differences(case.problem, z, sd)
+        jacobian = _jacobian(case.problem, z, steps)
+        used.append(_relative(jacobian, differences))
+        tables.row(str(seed), list(used[-1].reshape(-1)))
+        if len(exact) < call.mjx:
+            began = time.perf_counter()
+            exact.append(_relative(_mjx_jacobian(case.problem, z), differences))
+            took = f"{time.perf_counter() - began:.0f} s"
+            tables.row(f"{seed} MJX jacfwd, {took}", list(exact[-1].reshape(-1)))
+    errors = np.array(used)
+    figures, missed = {}, []
+    for what, value in (("median", np.median(errors, 0)), ("worst", errors.max(0))):
+        tables.row(what, list(value.reshape(-1)))
+        figures[what] = _named(value)
+        for name, got in zip(PARAMETERS, value[:, SCALES_SD.index(0.5)], strict=True):
+            if not got <= BARS[what]:
+                missed.append(f"{name} {what} {got:.3g} > {BARS[what]:g}")
+    print("bars missed: " + ("; ".join(missed) or "none"))
+    figures |= {"sets": call.num, "source": call.source, "bars_missed": missed}
+    if exact:
+        figures["mjx_jacfwd_worst"] = _named(np.max(exact, axis=0))
+        figures["mjx_jacfwd_median"] = _named(np.median(exact, axis=0))
+    tables.finish("gradient_check", figures)
+    return None
+
+
+def _fit(case: synthetic_tracks.Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The mode, the steps of the fit's Jacobian and the posterior's sd, all in z."""
+    from galileo_jax.inference.fits.gradient import GradientFitter
+
+    fit = GradientFitter(case.problem).fit(0)
+    return fit.z[:-1], fit.steps, np.sqrt(np.diag(fit.covariance))[:-1]
+
+
+def _where(problem) -> list[int]:
+    return [problem.names.index(name) for name in PARAMETERS]
+
+
+def _jacobian(problem, z: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """d(centres)/dz `[parameter, value]` by the custom_jvp that inference uses."""
+    tangents = np.eye(len(z))[_where(problem)]
+    push = jax.vmap(lambda t: jax.jvp(lambda x: problem.predict(x, steps), (z,), (t,))[1])
+    return np.asarray(push(tangents)).reshape(len(PARAMETERS), -1)
+
+
+def _differences(problem, z: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """Central differences `[scale, parameter, value]` from plain rollouts."""
+    where = _where(problem)
+    table = []
+    for scale in SCALES_SD:
+        h = scale * sd[where]
+        offsets = np.zeros((len(where), len(z)))
+        offsets[np.arange(len(where)), where] = h
+        seen = np.asarray(
+            jax.vmap(lambda x: problem.predict(x, problem.coarse_steps))(
+                np.concatenate([z + offsets, z - offsets])
+            )
+        ).reshape(2, len(where), -1)
+        table.append((seen[0] - seen[1]) / (2 * h)[:, None])
+    return np.array(table)
+
+
+def _mjx_jacobian(problem, z: np.ndarray) -> np.ndarray:
+    """The exact derivative of the MJX program, contacts included, by forward mode."""
+    import jax.numpy as jnp
+
+    from galileo_jax.parameters import forward
+    from galileo_jax.rollout.engine_mjx import EngineMJX
+    from galileo_jax.rollout.trajectory import Trajectory
+
+    model = problem.model
+    engine = EngineMJX(model)
+    times = jnp.arange(model.num_records + 1) * model.record_dt_s
+
+    def centres(x: jax.Array) -> jax.Array:
+        position, velocity = engine.rollout(forward(model.parameters, x))
+        return problem.measure(x, Trajectory(times, position, velocity, position[:, 0]))
+
+    tangents = np.eye(len(z))[_where(problem)]
+    push = jax.jit(jax.vmap(lambda t: jax.jvp(centres, (jnp.asarray(z),), (t,))[1]))
+    return np.asarray(push(tangents)).reshape(len(PARAMETERS), -1)
+
+
+def _relative(jacobian: np.ndarray, differences: np.ndarray) -> np.ndarray:
+    """Relative differences `[parameter, scale]`."""
+    gap = np.linalg.norm(jacobian - differences, axis=-1)
+    return (gap / np.linalg.norm(differences, axis=-1)).T
+
+
+def _named(values: np.ndarray) -> dict[str, dict[str, float]]:
+    return {
+        name: {f"{scale:g}_sd": float(v) for scale, v in zip(SCALES_SD, row, strict=True)}
+        for name, row in zip(PARAMETERS, values, strict=True)
+    }
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="gradient_check.py", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--num", type=int, default=32, help="parameter sets")
+    parser.add_argument("--seed", type=int, default=0, help="the first set's seed")
+    parser.add_argument("--source", choices=synthetic_tracks.SOURCES, default="engine")
+    parser.add_argument("--engine", default="auto", help="c, mjx or auto")
+    parser.add_argument("--mjx", type=int, default=0, help="sets for MJX's exact derivative: slow")
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(command.run(main))

@@ -1,0 +1,90 @@
+"""Tracks with known truth, without a video: what inference alone is judged on."""
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax.clip.schema import Clip
+from galileo_jax.inference.problem import Problem
+from galileo_jax.observation import Observation
+from galileo_jax.run import make_problem
+from galileo_jax.truth import Truth, draw_truth, roll_out
+
+# The oracle shares nothing with the package and lives beside the tests that it serves.
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.reference_ramp import Experiment, solve  # noqa: E402
+
+SOURCES = ("exact", "engine")
+FPS, NUM_FRAMES, RAMP_ANGLE_DEG = 30.0, 61, 20.0
+
+
+@dataclass(frozen=True)
+class Case:
+    """A truth and one noisy measurement of it.
+
+    Attributes:
+      truth: what it was made with.
+      problem: the observation, with the base model, ready for inference.
+      clean_m: `[object, 2, frame]`, the centres without noise.
+    """
+
+    truth: Truth
+    problem: Problem
+    clean_m: np.ndarray
+
+    @property
+    def values(self) -> dict[str, float]:
+        """m1, k1, m2, k2."""
+        (m1, m2), (k1, k2) = self.truth.mass_kg, self.truth.friction
+        return {"m1": m1, "k1": k1, "m2": m2, "k2": k2}
+
+
+def make_case(seed: int, source: str, noise_m: float, engine: str = "auto") -> Case:
+    """A random experiment in which object 2 is hit, seen for two seconds at 30 fps.
+
+    Args:
+      seed: same seed, same case.
+      source: "exact": closed form; "engine": the project's own rollouts.
+      noise_m: standard deviation of each coordinate in each frame, declared as it is.
+      engine: which the problem uses.
+    """
+    rng = np.random.default_rng([seed, 2])
+    truth = draw_truth(rng, RAMP_ANGLE_DEG, {})
+    times = np.arange(NUM_FRAMES) / FPS
+    clean = _solve_exactly(truth, times) if source == "exact" else roll_out(truth).at(times)
+    centres = clean.position_m
+    shape = (2, 2, 2, NUM_FRAMES)
+    observation = Observation(
+        names=("object1", "object2"),
+        times_s=times,
+        position_m=centres + noise_m * rng.standard_normal(centres.shape),
+        covariance_m2=np.broadcast_to(noise_m**2 * np.eye(2)[None, ..., None], shape).copy(),
+        mask=np.ones((2, NUM_FRAMES), bool),
+    )
+    clip = Clip(
+        path=Path(f"{source}_{seed}.yaml"),
+        track=Path(f"{source}_{seed}.csv"),
+        scenario="ramp",
+        fps=FPS,
+        ramp_angle_deg=RAMP_ANGLE_DEG,
+        objects=truth.objects,
+        frame_count=NUM_FRAMES,
+    )
+    return Case(truth, make_problem(clip, observation, engine), centres)
+
+
+def _solve_exactly(truth: Truth, times_s: np.ndarray):
+    where = truth.surroundings
+    sizes = zip(where.half_length_m, where.half_height_m, strict=True)
+    experiment = Experiment(
+        mass_kg=truth.mass_kg,
+        friction=truth.friction,
+        angle_rad=truth.angle_rad,
+        size_m=tuple((2 * length, 2 * height) for length, height in sizes),  # pyright: ignore
+        release_m=truth.release_m,
+        object2_x_m=truth.object2_x_m,
+        gravity=truth.gravity,
+    )
+    return solve(experiment, times_s)

@@ -1,0 +1,60 @@
+"""How every benchmark here reports: rows of a table, then one line of JSON."""
+
+import json
+import math
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+PACKAGES = ("jax", "mujoco", "mujoco-mjx", "numpy")
+WIDTH = 11
+
+
+def row(first: str, values: Sequence[Any]) -> None:
+    """Prints one row at once, so that a long benchmark shows how far it is."""
+    print(f"{first:<28}" + "".join(f"{_cell(value):>{WIDTH}}" for value in values), flush=True)
+
+
+def finish(name: str, figures: Mapping[str, Any]) -> None:
+    """Prints the JSON line: the figures, the machine and the versions."""
+    machine = {
+        "cores": os.cpu_count(),
+        "load": round(os.getloadavg()[0], 1),
+        "python": platform.python_version(),
+        **{package: _version(package) for package in PACKAGES},
+    }
+    print(json.dumps({"benchmark": name, **_plain(figures), "machine": machine}))
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "NO"
+    if isinstance(value, float | np.floating):
+        return "-" if math.isnan(value) else f"{value:.4g}"
+    return str(value)
+
+
+def _plain(value: Any) -> Any:
+    """The value with four significant digits, and null where there is no number."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, float | np.floating):
+        return float(f"{value:.4g}") if math.isfinite(value) else None
+    return int(value) if isinstance(value, np.integer) else value
