@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax import __version__
@@ -11,6 +12,9 @@ from galileo_jax.parameters import inverse
 
 # In z every prior is a standard normal: above this the data told less than half.
 IDENTIFIED_SD_Z = 0.5
+
+# chi2 is told at the fitted noise scale, but not at one that no camera explains.
+NOISE_SCALE_RANGE = (0.5, 2.0)
 
 
 def summarise(draws: np.ndarray) -> dict[str, float]:
@@ -77,7 +81,7 @@ def make_result(
       notes: what else the method has to say ("engine", "status", warnings).
     """
     draws = posterior.flat()
-    spread = np.asarray(inverse(problem.parameters, draws)).std(axis=0)
+    spread = np.asarray(inverse(problem.parameters, jnp.asarray(draws))).std(axis=0)
     table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
     for i, parameter in enumerate(problem.parameters):
         entry: dict[str, Any] = summarise(draws[:, i])
@@ -94,13 +98,15 @@ def make_result(
             "mass_ratio": {**summarise(m1 / m2), "unit": "1", "identified": is_identified},
             "phi": {**summarise((m1 - m2) / (m1 + m2)), "unit": "1", "identified": is_identified},
         }
-    steps = problem.coarse_steps
-    predicted = np.asarray(problem.predict(z_best[:-1], steps))
-    white = np.asarray(problem.residuals(z_best[:-1], 1.0, steps))
+    steps = jnp.asarray(problem.coarse_steps)
+    predicted = problem.predict(jnp.asarray(z_best[:-1]), steps)
+    noise_scale = float(np.clip(problem.theta(z_best)[-1], *NOISE_SCALE_RANGE))
+    white = np.asarray(problem.whiten(predicted, noise_scale))
     count = int(problem.data.num_values)
     # Every parameter takes from the residuals what the data told of it.
     effective = float(np.sum(1 - np.clip(spread[:-1] ** 2, 0, 1)))
-    error = velocity_error(problem, predicted)
+    error = velocity_error(problem, np.asarray(predicted))
+    error["noise"] *= noise_scale
     error["chi2_per_dof"] = float(np.sum(white**2) / max(count - effective, 1.0))
     status = {"converged": posterior.is_converged, **notes}
     return {

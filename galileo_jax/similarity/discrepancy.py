@@ -20,6 +20,8 @@ KEYSTONE_SD = 0.006  # 1/m; half a degree of yaw or tilt, 1.5 m away
 ROLL_SD_RAD = 0.002
 SCALE_SD = 0.001
 IMPULSE_SD = 0.01  # of a hit's impulse: rigid bodies against compliant contacts, at most
+HIT_STEP_SD_M = 3e-4  # a compliant hit takes 2 ms, a rigid one none
+HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # compliant faces part more slowly than rigid ones
 MOVED_M = 0.002  # an object that has gone so far has been hit
 
 
@@ -56,12 +58,12 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
                 step = np.zeros((count, 2, frames))
                 step[i, axis] = sd * share
                 found.append(step)
-    found.extend(_after_hit(position))
+    found.extend(_after_hit(position, observation.times_s))
     return np.stack(found)
 
 
-def _after_hit(position: np.ndarray) -> list[np.ndarray]:
-    """For each object the way it goes after the first hit, times `IMPULSE_SD`."""
+def _after_hit(position: np.ndarray, times_s: np.ndarray) -> list[np.ndarray]:
+    """For each object a step at the first hit, the way it goes from there, and a slow drift."""
     x = position[:, 0]
     if len(x) < 2:
         return []
@@ -69,11 +71,22 @@ def _after_hit(position: np.ndarray) -> list[np.ndarray]:
     if not moved.any():
         return []
     hit = max(int(np.argmax(moved)) - 1, 0)
+    after = times_s[hit + 1 :]
+    values, vectors = np.linalg.eigh(
+        HIT_DRIFT_SD_M**2 * np.exp(-0.5 * ((after[:, None] - after) / HIT_DRIFT_S) ** 2)
+    )
     found = []
     for i in range(len(x)):
+        for value, vector in zip(values, vectors.T, strict=True):
+            if value > 1e-3 * HIT_DRIFT_SD_M**2:
+                drift = np.zeros_like(position)
+                drift[i, 0, hit + 1 :] = np.sqrt(value) * vector
+                found.append(drift)
         way = np.zeros_like(position)
         way[i, 0, hit:] = IMPULSE_SD * (x[i, hit:] - x[i, hit])
-        found.append(way)
+        step = np.zeros_like(position)
+        step[i, 0, hit + 1 :] = HIT_STEP_SD_M
+        found.extend([way, step])
     return found
 
 

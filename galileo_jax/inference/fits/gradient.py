@@ -57,7 +57,7 @@ class Settings:
     num_refined: int = 4
     search_sd_m: float = 0.001
     good_chi2_per_value: float = 2.0
-    max_polish_steps: int = 6
+    max_polish_steps: int = 20
     max_steps: int = 15
     enough: float = 0.5
     converged_sd: float = 0.5
