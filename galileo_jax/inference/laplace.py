@@ -3,6 +3,7 @@
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import Code, GradientFit
+from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.inference.problem import Problem
 
@@ -21,7 +22,7 @@ def laplace_posterior(problem: Problem, fit: GradientFit, seed: int) -> Posterio
     z = fit.z + normal @ root.T
     return Posterior(
         names=problem.names,
-        draws=problem.theta(z)[None],
+        draws=add_model_error(problem.theta(z), problem.names, seed)[None],
         log_density=-0.5 * np.sum(normal**2, axis=1)[None],
         status=Status.CONVERGED if fit.code is Code.CONVERGED else Status.STEP_LIMIT,
         stats=fit.stats,

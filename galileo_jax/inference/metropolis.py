@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.result import IDENTIFIED_SD_Z
@@ -75,4 +76,6 @@ def metropolis_posterior(
         checkpoint=checkpoint,
         identity=identity,
     )
-    return posterior.mapped(problem.theta, problem.names)
+    return posterior.mapped(
+        lambda z: add_model_error(problem.theta(z), problem.names, seed), problem.names
+    )

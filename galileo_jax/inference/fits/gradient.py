@@ -33,7 +33,10 @@ from galileo_jax.inference.problem import FAILED, NOISE_SD, Problem
 from galileo_jax.parameters import forward, inverse
 from galileo_jax.rollout.trajectory import Trajectory
 
-DAMPINGS = np.array([0.0, 1e-3, 1e-1, 1e1, 1e3])
+# Against the columns' sizes. Valleys are narrow (masses against friction): most of the range is
+# needed below 1e-2, where steps along them differ.
+DAMPINGS = np.array([0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
+SMALLEST_STEP = 0.2  # of a parameter's coarse step: below it contacts are rough
 
 
 @dataclass(frozen=True)
@@ -166,8 +169,8 @@ class GradientFitter:
             residual = self._white(z, motion, noise_scale)
             effective = len(z) - float(np.trace(covariance))
             noise_scale = self._noise_scale(residual * noise_scale, effective)
-            is_final_scale = np.allclose(steps, _half_sd(covariance), rtol=0.5)
-            steps = _half_sd(covariance)
+            is_final_scale = np.allclose(steps, self._half_sd(covariance), rtol=0.5)
+            steps = self._half_sd(covariance)
             new, _ = self._step(z, motion, slopes, noise_scale)
             moved = np.abs(np.linalg.solve(np.linalg.cholesky(covariance), new - z)).max()
             z, num_steps = new, num_steps + 1
@@ -283,6 +286,11 @@ class GradientFitter:
         total = float(np.sum(residual**2))
         return float(np.sqrt((total + wide) / (max(count - effective, 1.0) + wide)))
 
+    def _half_sd(self, covariance: np.ndarray) -> np.ndarray:
+        """Difference steps in z: half the posterior's sd, not below the contacts' roughness."""
+        smallest = SMALLEST_STEP * self.problem.coarse_steps
+        return np.maximum(np.clip(0.5 * np.sqrt(np.diag(covariance)), 0.0, 0.5), smallest)
+
     def _starts(self, seed: int) -> np.ndarray:
         """Scattered starts in z: main parameters by a Sobol sequence, all others at rest."""
         parameters = self.problem.model.parameters
@@ -305,8 +313,3 @@ class GradientFitter:
 def _covariance(jacobian: np.ndarray) -> np.ndarray:
     """The Laplace covariance of z, [parameter, parameter], prior included."""
     return np.linalg.inv(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))
-
-
-def _half_sd(covariance: np.ndarray) -> np.ndarray:
-    """Difference steps at the posterior's scale: half its standard deviations, in z."""
-    return np.clip(0.5 * np.sqrt(np.diag(covariance)), 1e-4, 0.5)
