@@ -14,7 +14,7 @@ from galileo_jax.truth import Truth, draw_truth, roll_out
 
 # The oracle shares nothing with the package and lives beside the tests that it serves.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from tests.reference_ramp import Experiment, solve  # noqa: E402
+from tests.reference_ramp import Experiment, solve
 
 SOURCES = ("exact", "engine")
 FPS, NUM_FRAMES, RAMP_ANGLE_DEG = 30.0, 61, 20.0
