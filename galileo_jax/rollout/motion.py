@@ -23,6 +23,8 @@ Array = Any
 RESTITUTION = np.array([0.0, 0.0155, 0.046, 0.11, 0.244, 0.295, 0.417, 0.625, 0.783, 0.882, 0.95])
 STIFFNESS = np.array([300.0, 3e3, 1e4, 3e4, 1e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5])
 DAMPING = np.array([600.0, 600.0, 600.0, 600.0, 600.0, 600.0, 400.0, 200.0, 100.0, 50.0, 20.0])
+# MuJoCo's own least (mjMINMU); MJX does not keep to it, and at 0 its elliptic cone sticks.
+LEAST_FRICTION = 1e-5
 
 
 class SetUp(NamedTuple):
@@ -46,7 +48,8 @@ def set_up(model: Model, theta: Mapping[str, Array], xp: Any) -> SetUp:
     surroundings = model.scene.surroundings
     count = len(surroundings.names)
     mass = xp.stack([theta[f"m{i + 1}"] for i in range(count)], axis=-1)
-    friction = xp.stack([theta[f"k{i + 1}"] for i in range(count)], axis=-1)
+    given = xp.stack([theta[f"k{i + 1}"] for i in range(count)], axis=-1)
+    friction = xp.maximum(given, LEAST_FRICTION)
     start = xp.asarray(surroundings.start_m)
     moved = xp.broadcast_to(start, (*mass.shape, 2))
     restitution = xp.zeros(mass.shape[:-1])

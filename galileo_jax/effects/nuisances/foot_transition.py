@@ -13,9 +13,9 @@ ZONE_M = 0.03  # of the size of an object, which takes so long to cross the edge
 class FootTransition(Effect):
     """A short zone of drag (or thrust) just past the foot.
 
-    F = m ln(f) w(x) v,   w a raised cosine over the zone with integral 1,
+    F = m ln(f) w(x) v |v|,   w a raised cosine over the zone with integral 1,
 
-    so that dv/dx = ln(f) w(x) and an object that crosses the zone leaves it with f times
+    so that dv/dx = ln(f) w(x) v and an object that crosses the zone leaves it with f times
     the speed, whatever its speed. A point mass keeps v (cos a - k sin a) at the foot, f = 1;
     boxes of MuJoCo and Bullet keep 1 to 4 % less, depending on angle and size, and so does a
     real edge.
@@ -46,7 +46,8 @@ class FootTransition(Effect):
 
         def drag(state: State) -> Array:
             share = xp.clip((state.position_m[..., 0] - begin) / ZONE_M, 0.0, 1.0)
-            force = scale * (1 - xp.cos(2 * math.pi * share)) * state.velocity_m_s[..., 0]
+            speed = state.velocity_m_s[..., 0]
+            force = scale * (1 - xp.cos(2 * math.pi * share)) * speed * abs(speed)
             return force[..., None] * along_x
 
         return drag
