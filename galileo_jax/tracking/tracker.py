@@ -133,7 +133,8 @@ def _finished(
     jumps = np.zeros_like(poses)
     jumps[seen] = [velocities_at(poses, int(index)).jump for index in seen]
     covariance += blow_covariance(jumps, exposure_share)
-    covariance += (scatter_variance(poses, covariance) + LEAST_SD_PX**2) * np.eye(2)
+    scatter = scatter_variance(poses, covariance) + LEAST_SD_PX**2
+    covariance += scatter[:, None, None] * np.eye(2)
 
     first = fits[start.first_frame]
     anchor = first.pose if first is not None else np.array([*start.point_px, 0.0])
