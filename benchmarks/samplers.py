@@ -5,9 +5,9 @@ Methods on the same tracks, one after the other:
     grad      the multi-start gradient fit with its Laplace posterior
     mh        Metropolis-Hastings, started from the gradient fit (its time included)
     thesis    the thesis's 16 chains x 75 steps on our rollouts; the best sample wins
-    sysid     MuJoCo's own: 256 random rollouts, the best 3 refined by mujoco.minimize's least
-              squares (the optimiser of mujoco.sysid) on the same engine with m1, k1, m2, k2
-              free, intervals by mujoco.sysid.calculate_intervals; no nuisances
+    sysid     as mujoco.sysid does: 256 random rollouts, the best 3 refined by its optimiser,
+              mujoco.minimize.least_squares, on the same engine with m1, k1, m2, k2 free and no
+              nuisances; intervals by its formula, s^2 (J^T J)^-1
 
 Noise: 0.01 m/s on the velocities, that is 0.01 / (fps sqrt 2) m on positions. `--source exact`
 makes the tracks in closed form (a model error for every method here), `--source engine` with
@@ -161,7 +161,7 @@ def fit_thesis(problem: Problem, seed: int) -> Answer:
 
 
 def fit_sysid(problem: Problem, seed: int) -> Answer:
-    from mujoco import minimize, sysid
+    from mujoco import minimize
 
     low, high = np.array([0.05, 0.005, 0.05, 0.005]), np.array([1.5, 0.6, 1.5, 0.6])
     where = [problem.names.index(name) for name in MAIN]
@@ -199,9 +199,11 @@ def fit_sysid(problem: Problem, seed: int) -> Answer:
     # By log(m1 / m2), k1 and k2 at a given m1 m2: the column of the masses' size is null.
     turn = np.zeros((4, 3))
     turn[0, 0], turn[2, 0], turn[1, 1], turn[3, 2] = m1 / 2, -m2 / 2, 1.0, 1.0
-    _, half = sysid.calculate_intervals([np.ravel(last.residual)], last.jacobian @ turn)
+    jacobian, white = last.jacobian @ turn, np.ravel(last.residual)
+    variance = white @ white / (white.size - turn.shape[1])
+    sd = np.sqrt(variance * np.diag(np.linalg.inv(jacobian.T @ jacobian)))
+    half = 1.96 * sd
     seconds = time.perf_counter() - began
-    sd = np.asarray(half) / 1.96
     estimates = {
         "k1": _interval(k1, k1 - half[1], k1 + half[1], sd[1]),
         "k2": _interval(k2, k2 - half[2], k2 + half[2], sd[2]),
