@@ -40,6 +40,7 @@ def enable() -> Path | None:
     if configured := os.environ.get("JAX_COMPILATION_CACHE_DIR"):
         return Path(configured)
     jax.config.update("jax_compilation_cache_dir", str(folder))
-    # Half a second is where reading from disk is certainly faster than compiling again.
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.5)
+    # Small programs too: there are many, and reading one takes a few milliseconds.
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
     return folder

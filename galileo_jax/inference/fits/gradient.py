@@ -22,6 +22,7 @@ Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -32,6 +33,7 @@ from scipy.stats import norm, qmc
 from galileo_jax.inference.problem import FAILED, NOISE_SD, Problem
 from galileo_jax.parameters import forward, inverse
 from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 
 # Against the columns' sizes. Valleys are narrow (masses against friction): most of the range is
 # needed below 1e-2, where steps along them differ.
@@ -84,7 +86,8 @@ class GradientFit:
       chi2: sum of squared whitened residuals at the tracker's own noise (scale 1).
       num_values: how many numbers were measured.
       steps: `[model parameter]`, the difference steps of the final Jacobian, in z.
-      jacobian: `[value, model parameter]`, d(whitened residual)/dz at the fit.
+      jacobian: `[value, model parameter]`, d(whitened residual)/dz at the fit; values as in
+        `Problem.residuals`.
       code: how it ended.
       stats: rollouts and steps it took.
     """
@@ -105,29 +108,32 @@ class GradientFitter:
     def __init__(self, problem: Problem, settings: Settings = Settings()):
         self.problem, self.settings = problem, settings
         self._num_rollouts = 0
+        self._data = _padded(problem)
+        self._num_records = _up(problem.model.num_records + 1, RECORDS)
         parameters = problem.model.parameters
-        times = np.arange(problem.model.num_records + 1) * problem.model.record_dt_s
+        record_times = np.arange(self._num_records) * problem.model.record_dt_s
         self._simulated = np.array([i for i, p in enumerate(parameters) if p.step is not None])
 
-        def seen(z, position, velocity):
+        def residuals(z, motion, noise_scale, data):
+            position, velocity = motion
             # The drawn pitch is no measurement, so that none is made up here.
-            motion = Trajectory(times, position, velocity, position[:, 0])  # pyright: ignore
-            return problem.measure(z, motion)
-
-        def residuals(z, motion, noise_scale):
-            return problem.whiten(seen(z, *motion), noise_scale)
+            whole = Trajectory(record_times, position, velocity, position[:, 0])  # pyright: ignore
+            difference = data.whitening.observed_m - problem.measure(z, whole, data.times_s)
+            white = GaussianLikelihood.whiten(difference, noise_scale, data.whitening).reshape(-1)
+            return jnp.where(jnp.isfinite(white), white, FAILED)
 
         def linear(u, motion, slopes):
             return tuple(
-                m + jnp.tensordot(u, s, axes=1) for m, s in zip(motion, slopes, strict=True)
+                value + jnp.tensordot(u, slope, axes=1)
+                for value, slope in zip(motion, slopes, strict=True)
             )
 
-        def model_residuals(u, z, motion, slopes, noise_scale):
-            return residuals(z + u, linear(u, motion, slopes), noise_scale)
+        def model_residuals(u, z, motion, slopes, noise_scale, data):
+            return residuals(z + u, linear(u, motion, slopes), noise_scale, data)
 
-        def solve(damping, size, z, motion, slopes, noise_scale):
+        def solve(damping, size, z, motion, slopes, noise_scale, data):
             def objective(u, _):
-                white = model_residuals(u, z, motion, slopes, noise_scale)
+                white = model_residuals(u, z, motion, slopes, noise_scale, data)
                 return jnp.concatenate([white, z + u, jnp.sqrt(damping) * size * u])
 
             solver = optx.LevenbergMarquardt(rtol=1e-3, atol=1e-3)
@@ -135,23 +141,23 @@ class GradientFitter:
             return z + optx.least_squares(objective, solver, start, max_steps=8, throw=False).value
 
         self._forward = jax.jit(lambda z: forward(parameters, z))
-        self._residuals = jax.jit(jax.vmap(residuals, (0, 0, None)))
+        self._residuals = jax.jit(jax.vmap(residuals, (0, 0, None, None)))
         self._jacobian = jax.jit(
             lambda z, *rest: jax.jacfwd(model_residuals)(jnp.zeros_like(z), z, *rest)
         )
-        self._solve = jax.jit(jax.vmap(solve, (0, None, None, None, None, None)))
+        self._solve = jax.jit(jax.vmap(solve, (0, None, None, None, None, None, None)))
 
     def compile(self) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
         z = np.zeros(len(self.problem.model.parameters))
-        shape = (len(self.problem.model.scene.names), 2, self.problem.model.num_records + 1)
+        shape = (len(self.problem.model.scene.names), 2, self._num_records)
         motion = (np.zeros(shape), np.zeros(shape))
         slopes = tuple(np.zeros((len(z), *shape)) for _ in range(2))
-        self._jacobian(z, motion, slopes, 1.0)
-        self._solve(DAMPINGS, np.ones(len(z)), z, motion, slopes, 1.0)
+        self._jacobian(z, motion, slopes, 1.0, self._data)
+        self._solve(DAMPINGS, np.ones(len(z)), z, motion, slopes, 1.0, self._data)
         for size in (1, len(DAMPINGS), self.settings.num_starts):
             batch = tuple(np.zeros((size, *shape)) for _ in range(2))
-            self._residuals(np.tile(z, (size, 1)), batch, 1.0)
+            self._residuals(np.tile(z, (size, 1)), batch, 1.0, self._data)
 
     def fit(self, seed: int, on_stage: Callable[[str], None] = lambda _: None) -> GradientFit:
         """Fits; the same seed gives the same result."""
@@ -164,7 +170,7 @@ class GradientFitter:
         noise_scale = self._search_noise
         for _ in range(settings.max_polish_steps):
             motion, slopes = self._slopes(z, steps)
-            jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale))
+            jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale, self._data))
             covariance = _covariance(jacobian)
             residual = self._white(z, motion, noise_scale)
             effective = len(z) - float(np.trace(covariance))
@@ -177,7 +183,7 @@ class GradientFitter:
             if is_final_scale and moved < settings.converged_sd:
                 break
         motion, slopes = self._slopes(z, steps)
-        jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale))
+        jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale, self._data))
         at_unit = self._white(z, motion, 1.0)
         count = int(self.problem.data.num_values)
         whole = np.zeros((len(z) + 1,) * 2)
@@ -192,7 +198,7 @@ class GradientFitter:
             chi2=float(np.sum(at_unit**2)),
             num_values=count,
             steps=steps,
-            jacobian=jacobian,
+            jacobian=self._unpadded(jacobian),
             code=code,
             stats={"num_steps": num_steps, "num_rollouts": self._num_rollouts},
         )
@@ -230,9 +236,9 @@ class GradientFitter:
         cost: float | None = None,
     ) -> tuple[np.ndarray, float]:
         """One Levenberg-Marquardt step: the best of all dampings (or none) and its cost."""
-        jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale))
+        jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale, self._data))
         size = np.sqrt(1 + np.sum(jacobian**2, axis=0))
-        tried = np.asarray(self._solve(DAMPINGS, size, z, motion, slopes, noise_scale))
+        tried = np.asarray(self._solve(DAMPINGS, size, z, motion, slopes, noise_scale, self._data))
         tried = np.where(np.isfinite(tried), tried, z)
         if cost is None:
             residual = self._white(z, motion, noise_scale)
@@ -243,17 +249,22 @@ class GradientFitter:
 
     def _simulate(self, zs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         self._num_rollouts += len(zs)
-        return self.problem.engine.simulate(np.asarray(self._forward(zs)))
+        theta = np.stack([np.asarray(self._forward(z)) for z in zs])
+        position, velocity = self.problem.engine.simulate(theta)
+        missing = [(0, 0)] * 3 + [(0, self._num_records - position.shape[-1])]
+        return np.pad(position, missing, mode="edge"), np.pad(velocity, missing)
 
     def _costs(self, zs: np.ndarray, noise_scale: float) -> np.ndarray:
         """chi2 / 2 and the prior's part, `[batch]`."""
-        white = np.asarray(self._residuals(zs, self._simulate(zs), noise_scale))
+        white = np.asarray(self._residuals(zs, self._simulate(zs), noise_scale, self._data))
         return 0.5 * (np.sum(white**2, axis=1) + np.sum(zs**2, axis=1))
 
     def _white(
         self, z: np.ndarray, motion: tuple[np.ndarray, np.ndarray], noise: float
     ) -> np.ndarray:
-        return np.asarray(self._residuals(z[None], tuple(m[None] for m in motion), noise)[0])
+        return np.asarray(
+            self._residuals(z[None], tuple(m[None] for m in motion), noise, self._data)[0]
+        )
 
     def _slopes(self, z: np.ndarray, steps: np.ndarray, is_central: bool = True):
         """The motion at z and its differences, `[model parameter, object, 2, record]`."""
@@ -286,6 +297,12 @@ class GradientFitter:
         total = float(np.sum(residual**2))
         return float(np.sqrt((total + wide) / (max(count - effective, 1.0) + wide)))
 
+    def _unpadded(self, jacobian: np.ndarray) -> np.ndarray:
+        """Rows of real frames only."""
+        shape = self._data.whitening.observed_m.shape
+        rows = jacobian.reshape(*shape, -1)[:, :, : len(self.problem.observation.times_s)]
+        return rows.reshape(-1, jacobian.shape[1])
+
     def _half_sd(self, covariance: np.ndarray) -> np.ndarray:
         """Difference steps in z: half the posterior's sd, not below the contacts' roughness."""
         smallest = SMALLEST_STEP * self.problem.coarse_steps
@@ -308,6 +325,40 @@ class GradientFitter:
                 u = u * min(np.tan(angle) if parameters[i].name == "k1" else 0.5, 0.98) + 0.01
             starts[:, i] = norm.ppf(np.clip(u, 0.01, 0.99))
         return starts
+
+
+class Padded(NamedTuple):
+    """A clip's data in shapes that many clips share, so that they share compiled code.
+
+    Attributes:
+      times_s: `[frame]`.
+      whitening: with masked frames and idle modes added.
+    """
+
+    times_s: np.ndarray
+    whitening: Whitening
+
+
+FRAMES, MODES, RECORDS = 64, 32, 512  # sizes are rounded up to multiples of these
+
+
+def _up(size: int, multiple: int) -> int:
+    return -(-size // multiple) * multiple
+
+
+def _padded(problem: Problem) -> Padded:
+    """Pads with frames that count for nothing and modes without gain."""
+    times, data = problem.observation.times_s, problem.data
+    frames = _up(len(times), FRAMES) - len(times)
+    modes = _up(len(data.gain), MODES) - len(data.gain)
+    whitening = Whitening(
+        np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),
+        np.pad(data.inverse_root, [(0, 0), (0, 0), (0, 0), (0, frames)]),
+        np.pad(data.basis, [(0, modes), (0, 0), (0, 0), (0, frames)]),
+        np.pad(data.gain, (0, modes)),
+        data.num_values,
+    )
+    return Padded(np.pad(times, (0, frames), mode="edge"), whitening)
 
 
 def _covariance(jacobian: np.ndarray) -> np.ndarray:
