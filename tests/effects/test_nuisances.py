@@ -15,7 +15,7 @@ from galileo_jax.observation import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.rollout.engine_c import EngineC
 from tests.ramp_model import HIT, SMOOTH, make_model, make_surroundings, make_theta
 
-FACTOR_ATOL = 0.002  # the zone is crossed in some 15 ms, in steps of 4 ms
+FACTOR_ATOL = 0.004  # the zone is crossed in some 17 ms, in steps of 4 ms
 RAMP = make_surroundings(HIT)
 INCLINE: Surroundings = replace(
     make_surroundings(replace(HIT, object2_x_m=None)), corner_m=(float("inf"),)

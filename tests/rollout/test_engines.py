@@ -28,6 +28,7 @@ CREEP_M_S, CREEP_FROM = 2e-4, 120  # recorded steps: by then the contact carries
 HALVING_ATOL_M_S = 5e-4
 # What a jump of the velocity depends on its phase in the grid of steps.
 HALVING_JUMP_ATOL_M_S = 0.002
+AT_REST_M_S = 0.02
 FOOT_S, HIT_S = 0.2, 0.1  # until the contacts have settled again
 
 
@@ -168,10 +169,11 @@ def test_halving_the_steps(friction):
     times = np.arange(count) * model.record_dt_s
     solved = solve(experiment, times)
     assert solved.foot_s and solved.hit_s
+    stops = times[np.flatnonzero(coarse[0, 0, :count] > AT_REST_M_S)[-1]]
     for begin, end in (
         (0, solved.foot_s),
         (solved.foot_s + FOOT_S, solved.hit_s),
-        (solved.hit_s + HIT_S, times[-1]),
+        (solved.hit_s + HIT_S, stops),
     ):
         phase = change[:, (times > begin) & (times < end - 0.01)]
         if phase.size:
