@@ -1,0 +1,150 @@
+"""How fast the engines are: `python benchmarks/rollouts.py`.
+
+Environment steps per second (one step of one scene; 1/960 s for ours, 1/240 s for PyBullet),
+seconds of experiment simulated per second, and what compiling MJX costs in a new process:
+without, and with, JAX's persistent cache. No object comes to rest within the rollouts, so that
+no engine stops early. PyBullet builds its world anew for every rollout, as the thesis did, on
+one core. The last line is JSON.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import jax
+import numpy as np
+import tables
+
+from galileo_jax import command, jax_cache
+from galileo_jax.parameters import absent
+from galileo_jax.rollout.engines import make_engine
+from galileo_jax.rollout.model import SUBSTEPS, Model
+from galileo_jax.rollout.rollout import Engine
+from galileo_jax.scene.scene import compile_scene
+from galileo_jax.truth import Truth, draw_truth
+
+DURATION_S = 1.2
+GIVEN = {"m1": 0.5, "k1": 0.05, "m2": 0.3, "k2": 0.08}
+
+
+def main(argv: Sequence[str]) -> int | None:
+    call = _parser().parse_args(argv)
+    jax.config.update("jax_enable_x64", True)
+    if call.time_compile:
+        return _print_compile_seconds()
+    jax_cache.enable()
+    truth = _truth()
+    model = _model(truth)
+    tables.row("engine, batch", ("steps/s", "sim s/s", "ms/rollout"))
+    figures: dict[str, object] = {"backend": jax.default_backend(), "repeats": call.repeats}
+    for name, sizes in (("c", (1, 16, 64, 256)), ("mjx", call.mjx_batch)):
+        engine = make_engine(name, model)
+        steps = SUBSTEPS * model.num_records
+        for size in sizes:
+            seconds = _seconds(_simulation(engine, size), call.repeats)
+            figures[f"{name}_{size}"] = _report(f"{name} {size}", size, steps, seconds)
+    figures["pybullet_1"] = _pybullet(truth, call.repeats)
+    if not call.no_compile:
+        figures["mjx_compile_s"] = _compile_seconds()
+    tables.finish("rollouts", figures)
+    return None
+
+
+def _truth() -> Truth:
+    return draw_truth(np.random.default_rng(0), 20.0, GIVEN)
+
+
+def _model(truth: Truth) -> Model:
+    scene = compile_scene(truth.surroundings, ["box", "box"], truth.objects)
+    return Model(scene, DURATION_S)
+
+
+def _simulation(engine: Engine, size: int) -> Callable[[], object]:
+    """A batch of rollouts that differ by a per cent in every parameter."""
+    theta = absent(engine.model.parameters)
+    for name, value in GIVEN.items():
+        theta[engine.model.index(name)] = value
+    rng = np.random.default_rng(1)
+    batch = theta * (1 + 0.01 * rng.uniform(-1, 1, (size, len(theta))))
+    return lambda: engine.simulate(batch)
+
+
+def _seconds(run: Callable[[], object], repeats: int) -> float:
+    """The median of some runs after a first one that warms up."""
+    run()
+    taken = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        run()
+        taken.append(time.perf_counter() - began)
+    return float(np.median(taken))
+
+
+def _report(label: str, size: int, steps: int, seconds: float) -> dict[str, float]:
+    figures = {
+        "steps_per_s": size * steps / seconds,
+        "simulated_s_per_s": size * DURATION_S / seconds,
+        "ms_per_rollout": 1e3 * seconds / size,
+    }
+    tables.row(label, list(figures.values()))
+    return figures
+
+
+def _pybullet(truth: Truth, repeats: int) -> dict[str, float] | None:
+    try:
+        import bullet_scene
+        import pybullet
+    except ImportError:
+        tables.row("pybullet", ("not installed",))
+        return None
+    client = pybullet.connect(pybullet.DIRECT)
+    steps = round(DURATION_S / bullet_scene.STEP_S)
+    seconds = _seconds(lambda: bullet_scene.roll_out(truth, steps, client), repeats)
+    pybullet.disconnect(client)
+    return _report("pybullet 1", 1, steps, seconds)
+
+
+def _compile_seconds() -> dict[str, float]:
+    """Tracing and compiling the MJX rollout in new processes: no cache, then from the cache."""
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        environment = {**os.environ, jax_cache.SWITCH: folder}
+        environment.pop("JAX_COMPILATION_CACHE_DIR", None)
+        for what in ("cold", "cached"):
+            done = subprocess.run(
+                [sys.executable, str(Path(__file__).resolve()), "--time-compile"],
+                env=environment,
+                capture_output=True,
+                text=True,
+                check=True,
+            )
+            found[what] = float(done.stdout.split()[-1])
+            tables.row(f"mjx compile {what}", (f"{found[what]:.1f} s",))
+    return found
+
+
+def _print_compile_seconds() -> None:
+    jax_cache.enable()
+    engine = make_engine("mjx", _model(_truth()))
+    began = time.perf_counter()
+    _ = engine._compiled  # pyright: ignore
+    print(time.perf_counter() - began)
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="rollouts.py", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--mjx-batch", type=int, nargs="*", default=[1, 16, 64])
+    parser.add_argument("--no-compile", action="store_true", help="leave out compile times")
+    parser.add_argument("--time-compile", action="store_true", help="print one compile time only")
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(command.run(main))
