@@ -53,6 +53,8 @@ def main(argv: Sequence[str]) -> int | None:
     timings["track"] = time.perf_counter() - began
     result = fit_clip(clip, observation, call, out, timings)
     print(_table(result))
+    for warning in result.get("warnings", []):
+        shown.print(f"warning: {warning}")
     shown.print(f"{out}/result.json, {out}/report.html")
     return None
 

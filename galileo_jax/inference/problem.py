@@ -85,6 +85,20 @@ class Problem:
         """Predicted centres `[object, 2, frame]`, m, at the frames' (or given) times."""
         return self.measure(z, self.rollout(z, steps), times_s)
 
+    def simulate(self, z: np.ndarray) -> np.ndarray:
+        """`predict` outside of any JAX transformation: nothing but one rollout and a jit."""
+        position, velocity = self.engine.simulate(self.theta(np.append(z, 0.0))[None, :-1])
+        return np.asarray(self._measure(jnp.asarray(z), position[0], velocity[0]))
+
+    @cached_property
+    def _measure(self) -> Any:
+        times = np.arange(self.model.num_records + 1) * self.model.record_dt_s
+
+        def measure(z: jax.Array, position: jax.Array, velocity: jax.Array) -> jax.Array:
+            return self.measure(z, Trajectory(times, position, velocity, position[:, 0]))  # pyright: ignore
+
+        return jax.jit(measure)
+
     def whiten(self, predicted_m: jax.Array, noise_scale: Any) -> jax.Array:
         """Whitened residuals, unit normal if the model is right: `[object * 2 * frame]`."""
         difference = jnp.asarray(self.data.observed_m) - predicted_m
@@ -104,4 +118,8 @@ class Problem:
 
     def theta(self, z_all: Any) -> np.ndarray:
         """Parameters in their units, `[..., parameter]`, noise scale last."""
-        return np.asarray(forward(self.parameters, jnp.asarray(z_all)))
+        return np.asarray(self._forward(jnp.asarray(z_all)))
+
+    @cached_property
+    def _forward(self) -> Any:
+        return jax.jit(lambda z: forward(self.parameters, z))

@@ -13,6 +13,11 @@ from galileo_jax.parameters import inverse
 # In z every prior is a standard normal: above this the data told less than half.
 IDENTIFIED_SD_Z = 0.5
 
+SCALE_WARNING = (
+    "friction and scale cannot both be told from one clip: give --pixels-per-metre, or fit "
+    "clips of several angles together"
+)
+
 # chi2 is told at the fitted noise scale, but not at one that no camera explains.
 NOISE_SCALE_RANGE = (0.5, 2.0)
 
@@ -98,14 +103,18 @@ def make_result(
             "mass_ratio": {**summarise(m1 / m2), "unit": "1", "identified": is_identified},
             "phi": {**summarise((m1 - m2) / (m1 + m2)), "unit": "1", "identified": is_identified},
         }
-    steps = jnp.asarray(problem.coarse_steps)
-    predicted = problem.predict(jnp.asarray(z_best[:-1]), steps)
+    if not table["parameters"].get("pixels_per_metre", {}).get("identified", True):
+        # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.
+        for name, entry in table["parameters"].items():
+            entry["identified"] = entry["identified"] and not name.startswith("k")
+        notes = notes | {"warnings": [SCALE_WARNING]}
+    predicted = problem.simulate(z_best[:-1])
     noise_scale = float(np.clip(problem.theta(z_best)[-1], *NOISE_SCALE_RANGE))
-    white = np.asarray(problem.whiten(predicted, noise_scale))
+    white = np.asarray(problem.whiten(jnp.asarray(predicted), noise_scale))
     count = int(problem.data.num_values)
     # Every parameter takes from the residuals what the data told of it.
     effective = float(np.sum(1 - np.clip(spread[:-1] ** 2, 0, 1)))
-    error = velocity_error(problem, np.asarray(predicted))
+    error = velocity_error(problem, predicted)
     error["noise"] *= noise_scale
     error["chi2_per_dof"] = float(np.sum(white**2) / max(count - effective, 1.0))
     status = {"converged": posterior.is_converged, **notes}
