@@ -109,18 +109,21 @@ class Posterior:
             )
         return table
 
-    def to_inference_data(self) -> "InferenceData":
-        """As ArviZ's InferenceData: groups `posterior` and `sample_stats` (`lp`)."""
-        notes = {
+    def _notes(self) -> dict[str, Any]:
+        """What is not draws, as JSON can hold it."""
+        return {
             "names": list(self.names),
             "status": self.status.name,
             "stats": dict(self.stats),
             "provenance": dict(self.provenance),
         }
+
+    def to_inference_data(self) -> "InferenceData":
+        """As ArviZ's InferenceData: groups `posterior` and `sample_stats` (`lp`)."""
         return arviz().from_dict(
             posterior={name: self[name] for name in self.names},
             sample_stats={"lp": self.log_density},
-            posterior_attrs={"galileo_jax": json.dumps(notes)},
+            posterior_attrs={"galileo_jax": json.dumps(self._notes())},
         )
 
     @classmethod
@@ -150,9 +153,23 @@ class Posterior:
         )
 
     def to_netcdf(self, path: Path) -> None:
-        """Writes the InferenceData to `path`, in one step."""
+        """Writes what `to_inference_data().to_netcdf` writes, in one step.
+
+        Through xarray alone: importing ArviZ costs more than most fits.
+        """
+        import xarray as xr
+
+        axes = ("chain", "draw")
+        index = {name: np.arange(size) for name, size in zip(axes, self.draws.shape, strict=False)}
+        draws = {name: (axes, self[name]) for name in self.names}
+        posterior = xr.Dataset(draws, index, {"galileo_jax": json.dumps(self._notes())})
+        sample_stats = xr.Dataset({"lp": (axes, self.log_density)}, index)
         with replacing(path) as temporary:
-            self.to_inference_data().to_netcdf(str(temporary), engine="h5netcdf")
+            for mode, group, data in (
+                ("w", "posterior", posterior),
+                ("a", "sample_stats", sample_stats),
+            ):
+                data.to_netcdf(temporary, mode=mode, group=group, engine="h5netcdf")
 
     @classmethod
     def from_netcdf(cls, path: Path) -> Self:

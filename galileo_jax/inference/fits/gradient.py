@@ -28,7 +28,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from galileo_jax.inference.problem import FAILED, NOISE_SD, Problem
 from galileo_jax.parameters import forward, inverse
@@ -309,21 +309,23 @@ class GradientFitter:
         return np.maximum(np.clip(0.5 * np.sqrt(np.diag(covariance)), 0.0, 0.5), smallest)
 
     def _starts(self, seed: int) -> np.ndarray:
-        """Scattered starts in z: main parameters by a Sobol sequence, all others at rest."""
+        """Scattered starts in z: main parameters in a Latin hypercube, all others at rest."""
         parameters = self.problem.model.parameters
         count = self.settings.num_starts
         rest = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
         rest = np.clip(rest, -1.0, 1.0)  # an absent half-normal has no slope
         free = [i for i, p in enumerate(parameters) if p.role == "main"]
-        share = qmc.Sobol(len(free), rng=seed).random_base2(int(np.ceil(np.log2(count))))
+        generator = np.random.default_rng(seed)
+        ranks = np.stack([generator.permutation(count) for _ in free], axis=1)
+        share = (ranks + generator.random(ranks.shape)) / count
         starts = np.tile(rest, (count, 1))
         angle = self.problem.model.scene.surroundings.angle_rad
         for column, i in enumerate(free):
-            u = share[:count, column]
+            u = share[:, column]
             if parameters[i].name.startswith("k"):
                 # Above tan(angle) nothing slides and every start looks alike.
                 u = u * min(np.tan(angle) if parameters[i].name == "k1" else 0.5, 0.98) + 0.01
-            starts[:, i] = norm.ppf(np.clip(u, 0.01, 0.99))
+            starts[:, i] = ndtri(np.clip(u, 0.01, 0.99))
         return starts
 
 
