@@ -5,11 +5,11 @@ At random truths in which object 2 is hit (0.3 px of noise at 900 px/m, 30 fps):
     || J - J_fd || / || J_fd ||    over all frames and both objects,
 
 J: d(centres)/d(parameter) as inference has it, from the custom_jvp of `problem.predict` at the
-steps that a fit ends with: half a posterior standard deviation, by the covariance of the round
-before. J_fd: central differences of plain rollouts at 1/4, 1/2, 1 and 2 posterior sd. The bars
-are for 1/2 sd. As J is a central difference itself, the other columns say more: how much the
-answer depends on the scale. `--mjx N`: for N sets also MJX's exact forward derivative through
-the contacts. The last line is JSON.
+steps that a fit ends with. J_fd: central differences of plain rollouts at 1/4, 1/2, 1 and 2 sd
+of the posterior (model error included); the bars are for 1/2 sd. J is a central difference
+itself, so that the other columns say more: how much the answer depends on the scale.
+`--mjx N`: for N sets also MJX's exact forward derivative through the contacts. The last line
+is JSON.
 """
 
 import argparse
@@ -23,11 +23,15 @@ import synthetic_tracks
 import tables
 
 from galileo_jax import command, jax_cache
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.model_error import add_model_error
+from galileo_jax.inference.problem import Problem
 from galileo_jax.parameters import inverse
 
 NOISE_M = 0.3 / 900
 PARAMETERS = ("k1", "k2", "m1", "m2")
 SCALES_SD = (0.25, 0.5, 1.0, 2.0)
+NUM_DRAWS = 4000
 NUM_ROUNDS = 3  # the fit polishes at least twice before its last Jacobian
 BARS = {"median": 0.05, "worst": 0.20}
 
@@ -75,32 +79,37 @@ def _true_z(case: synthetic_tracks.Case) -> np.ndarray:
     return np.clip(np.asarray(inverse(parameters, jnp.asarray(theta))), -2.5, 2.5)
 
 
-def _scales(problem, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The steps of the last Jacobian of a fit at z, and the posterior's sd, both in z."""
-    steps, sd = problem.coarse_steps, problem.coarse_steps
-    identity = np.eye(len(z))
+def _scales(problem: Problem, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The steps of the last Jacobian of a fit that ends at z, and the posterior's sd, in z."""
+    fitter = GradientFitter(problem)
+    steps, identity = problem.coarse_steps, np.eye(len(z))
     for _ in range(NUM_ROUNDS):
         push = jax.vmap(
             lambda t, h: jax.jvp(lambda x: problem.residuals(x, 1.0, h), (z,), (t,))[1], (0, None)
         )
         jacobian = np.asarray(push(identity, steps)).T
-        before, sd = steps, np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian + identity)))
-        steps = np.clip(0.5 * sd, 1e-4, 0.5)
+        before, covariance = steps, np.linalg.inv(jacobian.T @ jacobian + identity)
+        steps = fitter._half_sd(covariance)
+    normal = np.random.default_rng(0).standard_normal((NUM_DRAWS, len(z)))
+    around = z + normal @ np.linalg.cholesky(covariance).T
+    theta = problem.theta(np.pad(around, [(0, 0), (0, 1)]))
+    draws = add_model_error(theta, problem.names, 0)[:, :-1]
+    sd = np.asarray(inverse(problem.model.parameters, jnp.asarray(draws))).std(axis=0)
     return before, sd
 
 
-def _where(problem) -> list[int]:
+def _where(problem: Problem) -> list[int]:
     return [problem.names.index(name) for name in PARAMETERS]
 
 
-def _jacobian(problem, z: np.ndarray, steps: np.ndarray) -> np.ndarray:
+def _jacobian(problem: Problem, z: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """d(centres)/dz `[parameter, value]` by the custom_jvp that inference uses."""
     tangents = np.eye(len(z))[_where(problem)]
     push = jax.vmap(lambda t: jax.jvp(lambda x: problem.predict(x, steps), (z,), (t,))[1])
     return np.asarray(push(tangents)).reshape(len(PARAMETERS), -1)
 
 
-def _differences(problem, z: np.ndarray, sd: np.ndarray) -> np.ndarray:
+def _differences(problem: Problem, z: np.ndarray, sd: np.ndarray) -> np.ndarray:
     """Central differences `[scale, parameter, value]` from plain rollouts."""
     where = _where(problem)
     table = []
@@ -117,7 +126,7 @@ def _differences(problem, z: np.ndarray, sd: np.ndarray) -> np.ndarray:
     return np.array(table)
 
 
-def _mjx_jacobian(problem, z: np.ndarray) -> np.ndarray:
+def _mjx_jacobian(problem: Problem, z: np.ndarray) -> np.ndarray:
     """The exact derivative of the MJX program, contacts included, by forward mode."""
     from galileo_jax.parameters import forward
     from galileo_jax.rollout.engine_mjx import EngineMJX
