@@ -26,6 +26,22 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{self.prog}: {message}; see --help")
 
 
+def whole_number(least: int, multiple_of: int = 1) -> Callable[[str], int]:
+    """Returns a parser of whole numbers for `add_argument(type=...)`."""
+
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if value < least or value % multiple_of:
+            many = f"multiple of {multiple_of}" if multiple_of > 1 else "whole number"
+            raise argparse.ArgumentTypeError(f"{text!r} is no {many}, {least} or more")
+        return value
+
+    return parse
+
+
 def console() -> Console:
     """Progress and notes go to stderr; stdout is for results."""
     return Console(stderr=True, highlight=False)

@@ -4,7 +4,8 @@ import argparse
 import hashlib
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from galileo_jax.errors import InputError
 from galileo_jax.observation import Observation, observe
 from galileo_jax.rollout.engine_names import ENGINES
 
+BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 METHODS = ("grad", "mh", "cnn")
 PRESETS = ("galileo", "thesis")
 
@@ -47,12 +49,13 @@ def main(argv: Sequence[str]) -> int | None:
             "its motion; set it with `galileo label --scale X1 Y1 X2 Y2 METRES` or "
             "--pixels-per-metre"
         )
+    truth = read_truth(clip)
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
     observation = _observe(clip)
     timings["track"] = time.perf_counter() - began
     result = fit_clip(clip, observation, call, out, timings)
-    print(_table(result))
+    print(_table(result, truth))
     for warning in result.get("warnings", []):
         shown.print(f"warning: {warning}")
     shown.print(f"{out}/result.json, {out}/report.html")
@@ -121,7 +124,9 @@ def _metropolis(problem, fit, call, out: Path, identity: str):
     from galileo_jax.inference.metropolis import metropolis_posterior
     from galileo_jax.inference.samplers.driver import Settings
 
-    settings = Settings(max_steps=call.max_steps) if call.max_steps else Settings()
+    settings = Settings(block_steps=BLOCK_STEPS)
+    if call.max_steps:
+        settings = replace(settings, max_steps=call.max_steps)
     out.mkdir(parents=True, exist_ok=True)
     with command.progress() as bar:
         task = bar.add_task("sampling", total=settings.warmup_steps + settings.max_steps)
@@ -173,14 +178,37 @@ def _identity(clip: Clip, observation: Observation, call: argparse.Namespace) ->
     return digest.hexdigest()
 
 
-def _table(result: dict[str, Any]) -> str:
-    """What the user asked for, in a few lines."""
-    lines = [f"{'':<18}{'mean':>10}{'sd':>10}   95 % interval"]
+def read_truth(clip: Clip) -> dict[str, float]:
+    """What NAME.truth.json beside a synthetic clip says of masses and frictions; {} without.
+
+    It is shown beside the estimate, and nothing else is done with it.
+
+    Raises:
+      InputError: the file is there and is not what `galileo simulate` writes.
+    """
+    path = clip.path.with_suffix(".truth.json")
+    if not path.is_file():
+        return {}
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        known = {key: float(content[key]) for key in ("m1", "k1", "m2", "k2")}
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: not a truth with m1, k1, m2 and k2 ({error})") from error
+    m1, m2 = known["m1"], known["m2"]
+    return known | {"mass_ratio": m1 / m2, "phi": (m1 - m2) / (m1 + m2)}
+
+
+def _table(result: dict[str, Any], truth: Mapping[str, float]) -> str:
+    """What the user asked for, in a few lines; with a column for the truth if it is known."""
+    lines = [f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"]
     for name, entry in (result["parameters"] | result["derived"]).items():
         unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
         interval = f"[{entry['q025']:.4g}, {entry['q975']:.4g}]{unit}"
         known = "" if entry["identified"] else "   not determined by this clip"
-        lines.append(f"{name:<18}{entry['mean']:>10.4g}{entry['sd']:>10.2g}   {interval}{known}")
+        true = f"{truth[name]:.4g}" if name in truth else ""
+        lines.append(
+            f"{name:<18}{true:>10}{entry['mean']:>10.4g}{entry['sd']:>10.2g}   {interval}{known}"
+        )
     error = result["error"]
     lines.append(
         f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
@@ -195,12 +223,16 @@ def _parser() -> command.Parser:
     parser.add_argument("--method", choices=METHODS, default="grad")
     parser.add_argument("--effects", default="", help="a,b: effects in the model")
     parser.add_argument("--out", help="folder of the run (default runs/CLIP)")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=command.whole_number(0), default=0)
     parser.add_argument("--engine", choices=ENGINES, default="auto")
     parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
     group = parser.add_argument_group("--method mh")
     group.add_argument("--sampler", choices=("mixture", "random_walk"), default="mixture")
-    group.add_argument("--max-steps", type=int, help="per chain, after the warm-up")
+    group.add_argument(
+        "--max-steps",
+        type=command.whole_number(BLOCK_STEPS, BLOCK_STEPS),
+        help="per chain, after the warm-up",
+    )
     group.add_argument("--preset", choices=PRESETS, default="galileo")
     group.add_argument(
         "--similarity",
