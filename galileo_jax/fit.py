@@ -20,6 +20,7 @@ from galileo_jax.observation import Observation, observe
 from galileo_jax.rollout.engine_names import ENGINES
 
 BLOCK_STEPS = 25  # of every chain, between two looks at convergence
+WARMUP_STEPS = 100  # enough where the gradient fit has given the covariance
 METHODS = ("grad", "mh", "cnn")
 PRESETS = ("galileo", "thesis")
 
@@ -124,7 +125,7 @@ def _metropolis(problem, fit, call, out: Path, identity: str):
     from galileo_jax.inference.metropolis import metropolis_posterior
     from galileo_jax.inference.samplers.driver import Settings
 
-    settings = Settings(block_steps=BLOCK_STEPS)
+    settings = Settings(warmup_steps=WARMUP_STEPS, block_steps=BLOCK_STEPS)
     if call.max_steps:
         settings = replace(settings, max_steps=call.max_steps)
     out.mkdir(parents=True, exist_ok=True)

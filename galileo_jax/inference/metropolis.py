@@ -15,7 +15,8 @@ from galileo_jax.inference.result import IDENTIFIED_SD_Z
 from galileo_jax.inference.samplers import dispersed_starts, sample, sampler_class
 from galileo_jax.inference.samplers.driver import Progress, Settings
 
-NUM_CHAINS = 8  # R-hat < 1.01 needs about 50 effective draws for each half chain
+# R-hat < 1.01 needs about 50 effective draws for each half chain: more chains cost more rollouts.
+NUM_CHAINS = 4
 
 
 def metropolis_posterior(
