@@ -5,7 +5,7 @@ Optional: `pip install pybullet`.
 
 import math
 
-import pybullet
+import pybullet  # pyright: ignore
 
 from galileo_jax.truth import Truth
 

@@ -105,7 +105,9 @@ def _where(problem: Problem) -> list[int]:
 def _jacobian(problem: Problem, z: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """d(centres)/dz `[parameter, value]` by the custom_jvp that inference uses."""
     tangents = np.eye(len(z))[_where(problem)]
-    push = jax.vmap(lambda t: jax.jvp(lambda x: problem.predict(x, steps), (z,), (t,))[1])
+    push = jax.vmap(
+        lambda t: jax.jvp(lambda x: problem.predict(x, jnp.asarray(steps)), (z,), (t,))[1]
+    )
     return np.asarray(push(tangents)).reshape(len(PARAMETERS), -1)
 
 
@@ -118,7 +120,7 @@ def _differences(problem: Problem, z: np.ndarray, sd: np.ndarray) -> np.ndarray:
         offsets = np.zeros((len(where), len(z)))
         offsets[np.arange(len(where)), where] = h
         seen = np.asarray(
-            jax.vmap(lambda x: problem.predict(x, problem.coarse_steps))(
+            jax.vmap(lambda x: problem.predict(x, jnp.asarray(problem.coarse_steps)))(
                 np.concatenate([z + offsets, z - offsets])
             )
         ).reshape(2, len(where), -1)

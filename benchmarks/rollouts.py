@@ -98,7 +98,7 @@ def _report(label: str, size: int, steps: int, seconds: float) -> dict[str, floa
 def _pybullet(truth: Truth, repeats: int) -> dict[str, float] | None:
     try:
         import bullet_scene
-        import pybullet
+        import pybullet  # pyright: ignore
     except ImportError:
         tables.row("pybullet", ("not installed",))
         return None

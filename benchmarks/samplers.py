@@ -188,7 +188,7 @@ def fit_sysid(problem: Problem, seed: int) -> Answer:
             verbose=minimize.Verbosity.FULLITER,
             output=io.StringIO(),
         )
-        refined.append((float(np.mean(log[-1].residual ** 2)), np.ravel(x), log[-1]))
+        refined.append((float(np.mean(np.asarray(log[-1].residual) ** 2)), np.ravel(x), log[-1]))
     chi2, x, last = min(refined, key=lambda entry: entry[0])
     m1, k1, m2, k2 = x
     # By log(m1 / m2), k1 and k2 at a given m1 m2: the column of the masses' size is null.
@@ -274,8 +274,9 @@ def _velocity_chi2(problem: Problem, answer: Answer) -> float:
 
     from galileo_jax.parameters import inverse
 
-    z = np.asarray(inverse(problem.model.parameters, jnp.asarray(answer.best)))
-    velocity = np.diff(np.asarray(problem.predict(z, problem.coarse_steps)), axis=-1)
+    z = inverse(problem.model.parameters, jnp.asarray(answer.best))
+    steps = jnp.asarray(problem.coarse_steps)
+    velocity = np.diff(np.asarray(problem.predict(z, steps)), axis=-1)
     white = velocity * synthetic_tracks.FPS - problem.observation.velocity_m_s
     return float(np.sum((white / NOISE_M_S) ** 2) / (white.size - answer.num_free))
 
