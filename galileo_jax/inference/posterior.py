@@ -165,11 +165,8 @@ class Posterior:
         posterior = xr.Dataset(draws, index, {"galileo_jax": json.dumps(self._notes())})
         sample_stats = xr.Dataset({"lp": (axes, self.log_density)}, index)
         with replacing(path) as temporary:
-            for mode, group, data in (
-                ("w", "posterior", posterior),
-                ("a", "sample_stats", sample_stats),
-            ):
-                data.to_netcdf(temporary, mode=mode, group=group, engine="h5netcdf")
+            posterior.to_netcdf(temporary, mode="w", group="posterior", engine="h5netcdf")
+            sample_stats.to_netcdf(temporary, mode="a", group="sample_stats", engine="h5netcdf")
 
     @classmethod
     def from_netcdf(cls, path: Path) -> Self:
