@@ -54,8 +54,8 @@ class Settings:
       max_steps: Levenberg-Marquardt steps from one start.
       max_polish_steps: with slopes at the posterior's scale.
       enough: stop where a step lowers chi2 / 2 by less.
-      converged_sd: converged where the last step, taken with slopes at the posterior's scale,
-        moved no combination of parameters by more than this many posterior sd.
+      settled: converged where neither a step with slopes at the posterior's scale nor a walk of
+        one or three sd along the softest directions lowers chi2 / 2 by more.
     """
 
     num_starts: int = 64
@@ -65,7 +65,7 @@ class Settings:
     max_polish_steps: int = 20
     max_steps: int = 15
     enough: float = 0.5
-    converged_sd: float = 0.5
+    settled: float = 0.5
 
 
 class Code(StrEnum):
@@ -166,7 +166,7 @@ class GradientFitter:
         on_stage("searching")
         z, num_steps = self._search(seed)
         on_stage("refining")
-        steps, moved = self.problem.coarse_steps, np.inf
+        steps, is_settled = self.problem.coarse_steps, False
         noise_scale = self._search_noise
         for _ in range(settings.max_polish_steps):
             motion, slopes = self._slopes(z, steps)
@@ -174,14 +174,21 @@ class GradientFitter:
             covariance = _covariance(jacobian)
             residual = self._white(z, motion, noise_scale)
             effective = len(z) - float(np.trace(covariance))
+            before = noise_scale
             noise_scale = self._noise_scale(residual * noise_scale, effective)
-            is_final_scale = np.allclose(steps, self._half_sd(covariance), rtol=0.5)
             steps = self._half_sd(covariance)
-            new, _ = self._step(z, motion, slopes, noise_scale)
-            moved = np.abs(np.linalg.solve(np.linalg.cholesky(covariance), new - z)).max()
-            z, num_steps = new, num_steps + 1
-            if is_final_scale and moved < settings.converged_sd:
+            cost = self._cost_of(residual * before / noise_scale, z)
+            z, after = self._step(z, motion, slopes, noise_scale, cost)
+            num_steps += 1
+            if cost - after > settings.settled or abs(noise_scale / before - 1) > 0.1:
+                continue
+            # No damping helps. In a narrow, rough valley that is no proof: look along it.
+            tried = _along_soft_directions(z, covariance)
+            costs = self._costs(tried, noise_scale)
+            is_settled = bool(after - costs.min() < settings.settled)
+            if is_settled:
                 break
+            z = tried[np.argmin(costs)]
         motion, slopes = self._slopes(z, steps)
         jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale, self._data))
         at_unit = self._white(z, motion, 1.0)
@@ -189,7 +196,7 @@ class GradientFitter:
         whole = np.zeros((len(z) + 1,) * 2)
         whole[:-1, :-1] = _covariance(jacobian)
         whole[-1, -1] = 1 / (1 + 2 * count * NOISE_SD**2)
-        code = Code.CONVERGED if moved < settings.converged_sd else Code.STEP_LIMIT
+        code = Code.CONVERGED if is_settled else Code.STEP_LIMIT
         if np.abs(at_unit).max() >= FAILED:
             code = Code.FAILED
         return GradientFit(
@@ -233,16 +240,13 @@ class GradientFitter:
         motion: tuple[np.ndarray, np.ndarray],
         slopes: tuple[np.ndarray, np.ndarray],
         noise_scale: float,
-        cost: float | None = None,
+        cost: float,
     ) -> tuple[np.ndarray, float]:
         """One Levenberg-Marquardt step: the best of all dampings (or none) and its cost."""
         jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale, self._data))
         size = np.sqrt(1 + np.sum(jacobian**2, axis=0))
         tried = np.asarray(self._solve(DAMPINGS, size, z, motion, slopes, noise_scale, self._data))
         tried = np.where(np.isfinite(tried), tried, z)
-        if cost is None:
-            residual = self._white(z, motion, noise_scale)
-            cost = 0.5 * float(np.sum(residual**2) + np.sum(z**2))
         costs = self._costs(tried, noise_scale)
         best = int(np.argmin(costs))
         return (tried[best], float(costs[best])) if costs[best] < cost else (z, cost)
@@ -258,6 +262,10 @@ class GradientFitter:
         """chi2 / 2 and the prior's part, `[batch]`."""
         white = np.asarray(self._residuals(zs, self._simulate(zs), noise_scale, self._data))
         return 0.5 * (np.sum(white**2, axis=1) + np.sum(zs**2, axis=1))
+
+    @staticmethod
+    def _cost_of(white: np.ndarray, z: np.ndarray) -> float:
+        return 0.5 * float(np.sum(white**2) + np.sum(z**2))
 
     def _white(
         self, z: np.ndarray, motion: tuple[np.ndarray, np.ndarray], noise: float
@@ -361,6 +369,14 @@ def _padded(problem: Problem) -> Padded:
         data.num_values,
     )
     return Padded(np.pad(times, (0, frames), mode="edge"), whitening)
+
+
+def _along_soft_directions(z: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Points one and three sd off z along the three softest directions the data determine."""
+    variance, vectors = np.linalg.eigh(covariance)
+    soft = [i for i in np.argsort(-variance) if variance[i] < 0.5][:3]
+    offsets = [c * np.sqrt(variance[i]) * vectors[:, i] for i in soft for c in (-3, -1, 1, 3)]
+    return z + np.array(offsets).reshape(-1, len(z)) if offsets else z[None]
 
 
 def _covariance(jacobian: np.ndarray) -> np.ndarray:
