@@ -243,10 +243,8 @@ class TestSampling:
 
     @pytest.fixture(autouse=True)
     def short_warmup(self, monkeypatch):
-        whole = driver.Settings
-        monkeypatch.setattr(
-            driver, "Settings", lambda **given: whole(warmup_steps=25, stops_early=False, **given)
-        )
+        whole, short = driver.Settings, {"warmup_steps": 25, "stops_early": False}
+        monkeypatch.setattr(driver, "Settings", lambda **given: whole(**(given | short)))
 
     @pytest.mark.slow
     def test_resumes_to_the_same_result(self, simulated, tmp_path, monkeypatch, capsys):
