@@ -11,8 +11,8 @@ from galileo_jax.rollout.rollout import Engine
 def make_engine(name: str, model: Model) -> Engine:
     """The engine `name` for a model.
 
-    `auto` takes MJX where JAX has an accelerator, and otherwise the C engine, which is more
-    than ten times faster than MJX on a CPU (benchmarks/rollouts.py).
+    `auto` takes MJX where JAX has an accelerator, and otherwise the C engine, which is many
+    times faster than MJX on a CPU (benchmarks/rollouts.py).
 
     Raises:
       InputError: unknown name; lists the known.

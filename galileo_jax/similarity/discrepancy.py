@@ -58,16 +58,17 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
                 step = np.zeros((count, 2, frames))
                 step[i, axis] = sd * share
                 found.append(step)
-    found.extend(_after_hit(position, observation.times_s))
+    found.extend(_after_hit(position, observation))
     return np.stack(found)
 
 
-def _after_hit(position: np.ndarray, times_s: np.ndarray) -> list[np.ndarray]:
+def _after_hit(position: np.ndarray, observation: Observation) -> list[np.ndarray]:
     """For each object a step at the first hit, the way it goes from there, and a slow drift."""
-    x = position[:, 0]
-    if len(x) < 2:
+    x, times_s = position[:, 0], observation.times_s
+    if len(x) < 2 or not observation.mask[1].any():
         return []
-    moved = np.abs(x[1] - np.median(x[1, :3])) > MOVED_M
+    seen = np.flatnonzero(observation.mask[1])
+    moved = observation.mask[1] & (np.abs(x[1] - np.median(x[1, seen[:3]])) > MOVED_M)
     if not moved.any():
         return []
     hit = max(int(np.argmax(moved)) - 1, 0)

@@ -4,8 +4,8 @@
     2. Levenberg-Marquardt on  [ C^-1/2 (observed - predicted(z)) ; z ],  the prior being the
        second block. One step:
          a. one batch of rollouts gives the motion and its slopes (differences) at z;
-         b. optimistix solves, for several dampings at once (vmapped), the problem in which
-            the motion is linear in z but clock, scale and camera are exact;
+         b. optimistix (Gauss-Newton) solves, for several dampings at once (vmapped), the
+            problem in which the motion is linear in z but clock and scale are exact;
          c. one batch of rollouts tries all dampings; the best is taken.
     3. At the fit, with steps of half a posterior standard deviation: slopes, noise scale, one
        or two steps more.
@@ -136,7 +136,7 @@ class GradientFitter:
                 white = model_residuals(u, z, motion, slopes, noise_scale, data)
                 return jnp.concatenate([white, z + u, jnp.sqrt(damping) * size * u])
 
-            solver = optx.LevenbergMarquardt(rtol=1e-3, atol=1e-3)
+            solver = optx.GaussNewton(rtol=1e-3, atol=1e-3)
             start = jnp.zeros_like(z)
             return z + optx.least_squares(objective, solver, start, max_steps=8, throw=False).value
 
