@@ -3,9 +3,11 @@
 import argparse
 import hashlib
 import json
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +53,7 @@ def main(argv: Sequence[str]) -> int | None:
             "--pixels-per-metre"
         )
     truth = read_truth(clip)
+    _import_ahead()
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
     observation = _observe(clip)
@@ -61,6 +64,21 @@ def main(argv: Sequence[str]) -> int | None:
         shown.print(f"warning: {warning}")
     shown.print(f"{out}/result.json, {out}/report.html")
     return None
+
+
+def _import_ahead() -> None:
+    """Imports what the fit needs while the video is tracked: OpenCV leaves a core free."""
+
+    def load() -> None:
+        import jax
+
+        jax.config.update("jax_enable_x64", True)
+        for name in ("inference.fits.gradient", "run", "report.write"):
+            import_module(f"galileo_jax.{name}")
+        for name in ("matplotlib.figure", "matplotlib.backends.backend_svg", "xarray"):
+            import_module(name)
+
+    threading.Thread(target=load, daemon=True).start()
 
 
 def fit_clip(
