@@ -38,7 +38,9 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, White
 # Against the columns' sizes. Valleys are narrow (masses against friction): most of the range is
 # needed below 1e-2, where steps along them differ.
 DAMPINGS = np.array([0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
-SMALLEST_STEP = 0.2  # of a parameter's coarse step: below it contacts are rough
+# Of a parameter's coarse step: below it contacts are rough; above it a step may leave a plateau
+# (nothing moves) over its edge, and the plateau would look steep.
+SMALLEST_STEP, LARGEST_STEP = 0.2, 4.0
 
 
 @dataclass(frozen=True)
@@ -312,9 +314,10 @@ class GradientFitter:
         return rows.reshape(-1, jacobian.shape[1])
 
     def _half_sd(self, covariance: np.ndarray) -> np.ndarray:
-        """Difference steps in z: half the posterior's sd, not below the contacts' roughness."""
-        smallest = SMALLEST_STEP * self.problem.coarse_steps
-        return np.maximum(np.clip(0.5 * np.sqrt(np.diag(covariance)), 0.0, 0.5), smallest)
+        """Difference steps in z: half the posterior's sd, within what slopes are good for."""
+        coarse = self.problem.coarse_steps
+        half = 0.5 * np.sqrt(np.diag(covariance))
+        return np.clip(half, SMALLEST_STEP * coarse, LARGEST_STEP * coarse)
 
     def _starts(self, seed: int) -> np.ndarray:
         """Scattered starts in z: main parameters in a Latin hypercube, all others at rest."""
