@@ -22,7 +22,7 @@ from galileo_jax.observation import Observation, observe
 from galileo_jax.rollout.engine_names import ENGINES
 
 BLOCK_STEPS = 25  # of every chain, between two looks at convergence
-WARMUP_STEPS = 100  # enough where the gradient fit has given the covariance
+WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
 METHODS = ("grad", "mh", "cnn")
 PRESETS = ("galileo", "thesis")
 
