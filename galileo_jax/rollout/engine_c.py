@@ -7,7 +7,7 @@ from mujoco.batch import Batch
 
 from galileo_jax.effects.effect import State
 from galileo_jax.rollout.model import SUBSTEPS, Model
-from galileo_jax.rollout.motion import rigid_motion, set_up, total_force
+from galileo_jax.rollout.motion import rigid_motion, set_up, sliding_object, total_force
 
 # Slower than this and no longer changing: at rest (contacts creep at 0.2 mm/s).
 REST_SPEED_M_S, REST_CHANGE_M_S = 1e-3, 1e-5
@@ -15,7 +15,11 @@ LOOK_EVERY = 8  # recorded steps between looks whether all is at rest
 
 
 class EngineC:
-    """Simulates batches of parameter vectors; results do not depend on the batch."""
+    """Simulates batches of parameter vectors.
+
+    A batch stops once all in it are at rest; until then those at rest creep (0.2 mm/s on a
+    ramp), so that a result depends on its batch by no more than that.
+    """
 
     name = "c"
 
@@ -87,11 +91,10 @@ class EngineC:
             compiled.body_inertia[1:] * (fields.mass / compiled.body_mass[1:])[..., None]
         )
         for i in range(compiled.npair):
-            name = compiled.pair(i).name
-            if name == "object1_object2":
+            which = sliding_object(compiled.pair(i).name)
+            if which is None:
                 solref[:, i] = fields.bumper
             else:
-                which = int(name[len("object") : name.index("_")]) - 1
                 friction[:, i, :2] = fields.friction[:, which, None]
         batch.set_const()
         batch.bind("qpos")[:] = fields.qpos

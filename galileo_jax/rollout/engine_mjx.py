@@ -11,7 +11,7 @@ import numpy as np
 from galileo_jax.effects.effect import State
 from galileo_jax.rollout.mjx_import import mjx
 from galileo_jax.rollout.model import SUBSTEPS, Model
-from galileo_jax.rollout.motion import rigid_motion, set_up, total_force
+from galileo_jax.rollout.motion import rigid_motion, set_up, sliding_object, total_force
 
 # Larger batches are slower per rollout on a CPU; a GPU wants to be filled.
 BATCH_CPU, BATCH_GPU = 8, 256
@@ -27,7 +27,6 @@ class EngineMJX:
         self._base = mjx.put_model(model.scene.model)
         self.is_on_cpu = jax.default_backend() == "cpu"
         self.batch = BATCH_CPU if self.is_on_cpu else BATCH_GPU
-        self._pairs = [model.scene.model.pair(i).name for i in range(model.scene.model.npair)]
 
     def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rolls the scene out for each parameter vector; as `EngineC.simulate`.
@@ -108,11 +107,11 @@ class EngineMJX:
         per_body = jnp.concatenate([jnp.ones(1), ratio])
         per_dof = jnp.repeat(ratio, 2)
         friction, solref = base.pair_friction, base.pair_solref
-        for i, name in enumerate(self._pairs):
-            if name == "object1_object2":
+        for i in range(compiled.npair):
+            which = sliding_object(compiled.pair(i).name)
+            if which is None:
                 solref = solref.at[i].set(fields.bumper)
             else:
-                which = int(name[len("object") : name.index("_")]) - 1
                 friction = friction.at[i, :2].set(fields.friction[which])
         return base.tree_replace(
             {

@@ -1,6 +1,6 @@
 """The model: a scene and the effects in it, as one function of its parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -68,7 +68,3 @@ class Model:
         if name not in self.names:
             raise ValueError(f"unknown parameter {name!r}; known: {', '.join(self.names)}")
         return self.names.index(name)
-
-    def with_effects(self, effects: Sequence[Effect]) -> "Model":
-        """The same scene under another hypothesis."""
-        return Model(self.scene, self.duration_s, tuple(effects), self.nuisances)

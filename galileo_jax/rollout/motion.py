@@ -61,6 +61,12 @@ def set_up(model: Model, theta: Mapping[str, Array], xp: Any) -> SetUp:
     return SetUp(mass, friction, qpos, bumper_solref(restitution, xp))
 
 
+def sliding_object(pair: str) -> int | None:
+    """Which object's friction a contact pair of scenes/ramp.xml carries; None for the hit."""
+    first, second = pair.split("_")
+    return None if second.startswith("object") else int(first.removeprefix("object")) - 1
+
+
 def bumper_solref(restitution: Array, xp: Any) -> Array:
     """The bumpers' (-stiffness, -damping) for a coefficient of restitution, within 0.03.
 

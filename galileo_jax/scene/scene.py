@@ -169,13 +169,10 @@ def compile_scene(
         spec.geom(f"{name}_bumper").pos = [forward * (length - BUMPER_RADIUS_M), 0, lift]
         shape = spec.geom(f"{name}_shape")
         _draw(shape, shapes[i], declared[i], length, height)
-    if len(surroundings.names) < 2 or not has_table:
-        for pair in list(spec.pairs):
-            touched = {pair.geomname1, pair.geomname2}
-            gone = not has_table and "table" in touched
-            if gone or (len(surroundings.names) < 2 and any("object2" in g for g in touched)):
-                spec.delete(pair)
     if not has_table:
+        for pair in list(spec.pairs):
+            if "table" in (pair.geomname1, pair.geomname2):
+                spec.delete(pair)
         spec.delete(spec.geom("table"))
     return Scene(spec=spec, model=spec.compile(), surroundings=surroundings)
 

@@ -1,16 +1,14 @@
 """What a similarity of velocity profiles is, and the similarities by name."""
 
 from abc import abstractmethod
-from typing import ClassVar, TypeVar
+from typing import ClassVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
-Similarity = TypeVar("Similarity", bound="AbstractSimilarity")
-
-_SIMILARITIES: dict[str, type["AbstractSimilarity"]] = {}
+from galileo_jax.registry import Registry
 
 
 class AbstractSimilarity(eqx.Module):
@@ -47,25 +45,8 @@ class AbstractSimilarity(eqx.Module):
         """The similarity; all three `[object, 2, frame - 1]`, zeros where masked."""
 
 
-def register(similarity: type[Similarity]) -> type[Similarity]:
-    """Class decorator: makes the similarity known under its `name`."""
-    if similarity.name in _SIMILARITIES:
-        raise ValueError(f"two similarities are named {similarity.name!r}")
-    _SIMILARITIES[similarity.name] = similarity
-    return similarity
+_SIMILARITIES = Registry(AbstractSimilarity, "similarity", "similarities")
 
-
-def similarity_names() -> tuple[str, ...]:
-    """All names, sorted."""
-    return tuple(sorted(_SIMILARITIES))
-
-
-def similarity_class(name: str) -> type[AbstractSimilarity]:
-    """The similarity of that name.
-
-    Raises:
-      ValueError: nothing is registered under `name`; the message lists what is.
-    """
-    if name not in _SIMILARITIES:
-        raise ValueError(f"unknown similarity {name!r}; known: {', '.join(similarity_names())}")
-    return _SIMILARITIES[name]
+register = _SIMILARITIES.register
+similarity_names = _SIMILARITIES.names
+similarity_class = _SIMILARITIES.get
