@@ -13,7 +13,7 @@ from galileo_jax.parameters import absent
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import pitch
-from galileo_jax.scene.scene import compile_scene, extents
+from galileo_jax.scene.scene import compile_scene, extents, start_paths
 
 GRAVITY_M_S2 = 9.81
 LONGEST_S = 5.0
@@ -53,17 +53,22 @@ class Truth:
         half = [extents(declared) for declared in self.objects]
         up, height = self.release_m, half[0][1]
         cos, sin = math.cos(self.angle_rad), math.sin(self.angle_rad)
+        corner = tuple(height * math.tan(self.angle_rad / 2) for _, height in half)
+        start = (
+            (-up * cos + height * sin, up * sin + height * cos),
+            (self.object2_x_m, half[1][1]),
+        )
         return Surroundings(
             names=tuple(declared.name for declared in self.objects),
             angle_rad=self.angle_rad,
             gravity=self.gravity,
             half_length_m=tuple(length for length, _ in half),
             half_height_m=tuple(height for _, height in half),
-            corner_m=tuple(height * math.tan(self.angle_rad / 2) for _, height in half),
-            start_m=(
-                (-up * cos + height * sin, up * sin + height * cos),
-                (self.object2_x_m, half[1][1]),
-            ),
+            corner_m=corner,
+            start_m=start,
+            start_path_m=start_paths(start, corner, self.angle_rad),
+            has_table=True,
+            comes_down=(True, False),
         )
 
     @property

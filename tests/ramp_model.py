@@ -10,7 +10,7 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.effects.effect import Surroundings
 from galileo_jax.parameters import absent
 from galileo_jax.rollout.model import Model
-from galileo_jax.scene.scene import compile_scene
+from galileo_jax.scene.scene import compile_scene, start_paths
 from tests.reference_ramp import Experiment
 
 HIT = Experiment(
@@ -35,14 +35,18 @@ def make_surroundings(experiment: Experiment) -> Surroundings:
     if experiment.object2_x_m is not None:
         starts.append((experiment.object2_x_m, height2 / 2))
         halves.append((length2 / 2, height2 / 2))
+    corner = tuple(height * math.tan(angle / 2) for _, height in halves)
     return Surroundings(
         names=("object1", "object2")[: len(starts)],
         angle_rad=angle,
         gravity=experiment.gravity,
         half_length_m=tuple(length for length, _ in halves),
         half_height_m=tuple(height for _, height in halves),
-        corner_m=tuple(height * math.tan(angle / 2) for _, height in halves),
+        corner_m=corner,
         start_m=tuple(starts),
+        start_path_m=start_paths(tuple(starts), corner, angle),
+        has_table=True,
+        comes_down=(True, False)[: len(starts)],
     )
 
 

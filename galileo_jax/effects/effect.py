@@ -1,14 +1,19 @@
 """What an effect is: parameters and the few places where it may touch the model.
 
 An effect is written once, in terms of the array standard (`x.__array_namespace__()`), and
-runs inside both engines: NumPy in the C engine, JAX in MJX. Every hook's default does
-nothing; an effect overrides those it needs. At its parameters' `absent` values each hook
-must return exactly what the default returns.
+runs in every engine, NumPy or JAX. Every hook's default does nothing; an effect overrides
+those it needs. At its parameters' `absent` values each hook must return exactly what the
+default returns, and have a finite derivative.
+
+Objects move along a path: down the ramp and along the table. Hooks see and return numbers
+along it, positive downhill and away from the ramp.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
+
+import jax
 
 from galileo_jax.parameters import Parameter
 
@@ -21,30 +26,53 @@ class State(NamedTuple):
     """The objects at one instant; leading axes are the batch's.
 
     Attributes:
-      position_m: `[..., object, 2]`, centres; x along the travel, y up.
-      velocity_m_s: `[..., object, 2]`.
+      path_m: `[..., object]`, how far each centre is past the foot; negative on the ramp.
+        On an incline without a table: how far it has gone.
+      speed_m_s: `[..., object]`.
       time_s: scalar, since the release.
+      is_on_ramp: `[..., object]`.
     """
 
-    position_m: Array
-    velocity_m_s: Array
+    path_m: Array
+    speed_m_s: Array
     time_s: Array
+    is_on_ramp: Array
 
 
 Force = Callable[[State], Array]
+Friction = Callable[[State, Array], Array]
+
+_ARRAYS = (
+    "angle_rad",
+    "gravity",
+    "half_length_m",
+    "half_height_m",
+    "corner_m",
+    "start_m",
+    "start_path_m",
+)
+_STATIC = ("names", "has_table", "comes_down", "is_scale_known", "release_s")
 
 
+@jax.tree_util.register_pytree_with_keys_class
 @dataclass(frozen=True)
 class Surroundings:
     """What an effect may know of the scene.
+
+    A PyTree, so that one compiled program serves every clip: inside it the numbers are
+    traced. What decides which parameters there are is static.
 
     Attributes:
       names: of the objects.
       angle_rad: the ramp's; 0 without a ramp.
       gravity: m/s^2.
       half_length_m, half_height_m: `[object]`, along the travel and across it.
-      corner_m: `[object]`, x at which each centre's path bends from ramp to table.
+      corner_m: `[object]`, x at which each centre's path bends from ramp to table; inf
+        without a table.
       start_m: `[object, 2]`, the centres at the release.
+      start_path_m: `[object]`, the same along the path, see `State`.
+      has_table: whether the ramp ends on a table.
+      comes_down: `[object]`, whether the object starts on the ramp.
       release_s: when the release was, after the first frame: expected, and its standard
         deviation.
       is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
@@ -57,16 +85,37 @@ class Surroundings:
     half_height_m: tuple[float, ...]
     corner_m: tuple[float, ...]
     start_m: tuple[tuple[float, float], ...]
+    start_path_m: tuple[float, ...]
+    has_table: bool
+    comes_down: tuple[bool, ...]
     release_s: tuple[float, float] = (0.0, 0.01)
     is_scale_known: bool = True
+
+    def tree_flatten_with_keys(self):
+        """Splits into traced numbers and static facts."""
+        leaves = [(jax.tree_util.GetAttrKey(key), getattr(self, key)) for key in _ARRAYS]
+        return leaves, tuple(getattr(self, key) for key in _STATIC)
+
+    @classmethod
+    def tree_unflatten(cls, facts, leaves):
+        """The inverse."""
+        return cls(**dict(zip(_ARRAYS, leaves, strict=True)), **dict(zip(_STATIC, facts, strict=True)))
 
     def mass(self, theta: Theta) -> list[Array]:
         """The objects' masses, kg, each `[...]`."""
         return [theta[f"m{i + 1}"] for i in range(len(self.names))]
 
+    def only(self, value: Array, *objects: int) -> Array:
+        """`value` `[...]` for the given objects (counted from 0), 0 for others: `[..., object]`."""
+        chosen = [1.0 if i in objects else 0.0 for i in range(len(self.names))]
+        return value[..., None] * value.__array_namespace__().asarray(chosen)
+
 
 class Effect:
-    """One physical (or measurement) effect; subclasses are stateless."""
+    """One physical (or measurement) effect; subclasses are stateless.
+
+    `theta` maps parameters' names to arrays `[...]`; numbers of objects are `[..., object]`.
+    """
 
     name: ClassVar[str]
 
@@ -74,16 +123,39 @@ class Effect:
         """The unknowns it brings, the strength first; empty where it has no place."""
         raise NotImplementedError
 
-    def start(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
-        """Moves the centres at the release: `[..., object, 2]`, m, to the same shape."""
-        return position_m
+    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
+        """Moves the centres at the release along the path: `[..., object]` to the same."""
+        return path_m
+
+    def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the speed at the release `[..., object]`, m/s, or None."""
+        return None
 
     def force(self, theta: Theta, scene: Surroundings) -> Force | None:
-        """Returns the force as a function of the state, or None.
+        """Returns the force along the path as a function of the state, or None.
 
         What depends on the parameters alone is computed here, once per rollout; the function
-        returned maps a `State` to `[..., object, 2]`, N, and is called every recorded step.
+        returned maps a `State` to `[..., object]`, N.
         """
+        return None
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+        """Returns what friction coefficients become, or None.
+
+        The function maps a `State` and coefficients `[..., object]` to coefficients.
+        """
+        return None
+
+    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the inertia on top of the mass, as a share of it `[..., object]`, or None."""
+        return None
+
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+        """Returns how much steeper ramp and table are than declared, rad, each `[...]`, or None."""
+        return None
+
+    def foot(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the factor on the speed kept at the foot `[...]`, or None."""
         return None
 
     def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:

@@ -1,3 +1,3 @@
 """The engines' names, importable without JAX."""
 
-ENGINES = ("auto", "c", "mjx")
+ENGINES = ("auto", "rigid", "c", "mjx")

@@ -1,7 +1,5 @@
 """The engines by name, and which one `auto` takes."""
 
-import jax
-
 from galileo_jax.errors import InputError
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.rollout.model import Model
@@ -11,8 +9,8 @@ from galileo_jax.rollout.rollout import Engine
 def make_engine(name: str, model: Model) -> Engine:
     """The engine `name` for a model.
 
-    `auto` takes MJX where JAX has an accelerator, and otherwise the C engine, which is many
-    times faster than MJX on a CPU (benchmarks/rollouts.py).
+    `auto` takes the rigid engine: exact where MuJoCo's contacts are compliant, and many times
+    faster on every device (benchmarks/rollouts.py). MuJoCo's engines check it.
 
     Raises:
       InputError: unknown name; lists the known.
@@ -20,7 +18,11 @@ def make_engine(name: str, model: Model) -> Engine:
     if name not in ENGINES:
         raise InputError(f"engine: unknown value {name!r}; known: {', '.join(ENGINES)}")
     if name == "auto":
-        name = "c" if jax.default_backend() == "cpu" else "mjx"
+        name = "rigid"
+    if name == "rigid":
+        from galileo_jax.rollout.engine_rigid import EngineRigid
+
+        return EngineRigid(model)
     if name == "mjx":
         from galileo_jax.rollout.engine_mjx import EngineMJX
 

@@ -3,15 +3,15 @@
     rollout(z, steps) -> Trajectory
 
 `z` is the search space of `parameters`. The function can be jitted, vmapped (one call of
-the engine for the whole batch) and differentiated in forward mode. Its derivative is the
+the engine for the whole batch) and differentiated in forward mode. The rigid engine is JAX
+throughout and has JAX's derivatives. MuJoCo's are called back, and their derivative is the
 central difference
 
     d/dz_i  =  (rollout(z + h_i e_i) - rollout(z - h_i e_i)) / (2 h_i),    h = steps,
 
-all 2 P rollouts in the same engine call as the primal. Stiff contacts make the exact
-derivative of a simulator meaningless (docs/contact.md): what inference needs is the slope
-at the scale of the posterior, and `steps` says that scale. Parameters that no rollout
-depends on (clock, camera) cost none and are differentiated exactly by JAX.
+all 2 P rollouts in the same engine call as the primal: stiff contacts make the exact
+derivative meaningless (docs/contact.md), so that `steps` must say the scale of interest.
+Parameters that no rollout depends on (clock, camera) cost none.
 """
 
 from collections.abc import Callable
@@ -25,6 +25,8 @@ from galileo_jax.parameters import forward
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import pitch
 from galileo_jax.rollout.trajectory import Trajectory
+
+JUMP_M_S2 = 30.0  # no steady force accelerates so much
 
 Rollout = Callable[[jax.Array, jax.Array], Trajectory]
 
@@ -57,6 +59,11 @@ def make_rollout(engine: Engine) -> Rollout:
         lead = theta.shape[:-1]
         return position.reshape(*lead, *shape), velocity.reshape(*lead, *shape)
 
+    def motion_in_jax(z: jax.Array, steps: jax.Array) -> tuple[jax.Array, jax.Array]:
+        del steps
+        position, velocity = engine.traceable(forward(parameters, z)[None])  # pyright: ignore
+        return position[0], velocity[0]
+
     def call(zs: jax.Array) -> tuple[jax.Array, jax.Array]:
         """`[batch, parameter]` to the two `[batch, object, 2, record + 1]`."""
         theta = forward(parameters, zs)
@@ -86,10 +93,11 @@ def make_rollout(engine: Engine) -> Rollout:
 
         return (out[0][0], out[1][0]), (slope(out[0]), slope(out[1]))
 
+    is_traceable = hasattr(engine, "traceable")
     times = np.arange(shape[-1]) * model.record_dt_s
 
     def rollout(z: jax.Array, steps: jax.Array) -> Trajectory:
-        position, velocity = motion(z, steps)
+        position, velocity = (motion_in_jax if is_traceable else motion)(z, steps)
         turned = pitch(jnp.moveaxis(position, -1, 0), model.scene.surroundings)
         return Trajectory(jnp.asarray(times), position, velocity, jnp.moveaxis(turned, 0, -1))
 
@@ -97,7 +105,7 @@ def make_rollout(engine: Engine) -> Rollout:
 
 
 def at_times(trajectory: Trajectory, times_s: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Centres and velocities at any times, by cubic Hermite interpolation.
+    """Centres and velocities at any times, by cubic Hermite interpolation between events.
 
     Args:
       trajectory: of one rollout.
@@ -118,5 +126,12 @@ def at_times(trajectory: Trajectory, times_s: jax.Array) -> tuple[jax.Array, jax
     b = 3 * (x1 - x0) - 2 * v0 - v1
     position = ((a * s + b) * s + v0) * s + x0
     velocity = ((3 * a * s + 2 * b) * s + v0) / dt
+    # A jump of the velocity (a hit, the foot): straight on both sides of where they meet.
+    jump = v1 - v0
+    is_jump = jnp.abs(jump) > JUMP_M_S2 * dt**2
+    meet = jnp.clip((x0 - x1 + v1) / jnp.where(is_jump, jump, 1.0), 0.0, 1.0)
+    before = s < meet
+    position = jnp.where(is_jump, jnp.where(before, x0 + v0 * s, x1 - v1 * (1 - s)), position)
+    velocity = jnp.where(is_jump, jnp.where(before, v0, v1) / dt, velocity)
     inside = (times_s > 0) & (times_s < trajectory.times_s[-1])
     return position, jnp.where(inside, velocity, 0.0)

@@ -104,10 +104,24 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         half_height_m=tuple(height for _, height in half),
         corner_m=corner,
         start_m=tuple(starts),
+        start_path_m=start_paths(tuple(starts), corner, angle),
+        has_table=has_table,
+        comes_down=tuple(has_table and x < c for (x, _), c in zip(starts, corner, strict=True)),
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.pixels_per_metre is not None or clip.video is None,
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
+
+
+def start_paths(
+    starts: tuple[tuple[float, float], ...], corners: tuple[float, ...], angle: float
+) -> tuple[float, ...]:
+    """How far each start `(x, y)` is past the foot, along the path; 0 without a table."""
+    paths = []
+    for (x, _), corner in zip(starts, corners, strict=True):
+        past = x - corner if math.isfinite(corner) else 0.0
+        paths.append(past / math.cos(angle) if past < 0 else past)
+    return tuple(paths)
 
 
 def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float, float]:
