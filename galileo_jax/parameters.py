@@ -106,6 +106,7 @@ class Parameter:
       role: "main" (what the user asks for), "nuisance" or "effect".
       step: a coarse step in `z` for the first finite differences, before the scale of the
         posterior is known; None: no rollout depends on it (clock, camera).
+      per_clip: whether each clip of a series has its own (nuisances always do).
     """
 
     name: str
@@ -114,6 +115,7 @@ class Parameter:
     absent: float
     role: Role = "main"
     step: float | None = 0.02
+    per_clip: bool = False
 
 
 def forward(parameters: Sequence[Parameter], z: jax.Array) -> jax.Array:
