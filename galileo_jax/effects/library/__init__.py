@@ -1,0 +1,1 @@
+"""The library: one physical or measurement effect per file, each registering itself."""
