@@ -5,9 +5,16 @@ from functools import lru_cache
 import numpy as np
 from mujoco.batch import Batch
 
-from galileo_jax.effects.effect import State
 from galileo_jax.rollout.model import SUBSTEPS, Model
-from galileo_jax.rollout.motion import rigid_motion, set_up, sliding_object, total_force
+from galileo_jax.rollout.motion import dynamics
+from galileo_jax.rollout.mujoco_fields import (
+    Fields,
+    make_fields,
+    make_loads,
+    read_state,
+    rigid_motion,
+    sliding_object,
+)
 
 # Slower than this and no longer changing: at rest (contacts creep at 0.2 mm/s).
 REST_SPEED_M_S, REST_CHANGE_M_S = 1e-3, 1e-5
@@ -44,61 +51,71 @@ class EngineC:
         theta = np.asarray(theta, float)
         is_good = np.all(np.isfinite(theta), axis=1)
         usable = np.where(is_good[:, None], theta, 0.5)
-        named = self.model.by_name(usable)
+        model, scene = self.model, self.model.scene.surroundings
+        named = model.by_name(usable)
+        law = dynamics(model.effects + model.nuisances, scene, named, np)
+        loads = make_loads(model.effects + model.nuisances, scene, named, law)
         batch = self._batch(len(theta))
-        self._write(batch, usable)
+        self._write(batch, make_fields(law, scene, np))
         qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
         applied = batch.bind("qfrc_applied")
-        home = self.model.scene.model.body_pos[1:][:, [0, 2]]
+        home = model.scene.model.body_pos[1:][:, [0, 2]]
         shape = (len(theta), len(home), 2)
-        mass = np.stack(self.model.scene.surroundings.mass(named), axis=-1)
-        force = total_force(self.model, named)
-        positions = np.empty((self.model.num_records + 1, *shape))
+        positions = np.empty((model.num_records + 1, *shape))
         velocities = np.empty_like(positions)
-        dt = float(self.model.scene.model.opt.timestep)
+        dt = float(model.scene.model.opt.timestep)
         for record in range(len(positions)):
             np.add(qpos.reshape(shape), home, out=positions[record])
             velocities[record] = qvel.reshape(shape)
-            if record % LOOK_EVERY == 0 and record and _is_at_rest(velocities[record - 1 :]):
+            is_look = loads.is_steady and record and record % LOOK_EVERY == 0
+            if is_look and _is_at_rest(velocities[record - 1 :]):
                 positions[record:] = positions[record]
                 velocities[record:] = 0.0
                 break
             if record == len(positions) - 1:
                 break
-            if force is not None:
-                state = State(positions[record], velocities[record], record * SUBSTEPS * dt)
-                applied[:] = force(state).reshape(len(theta), -1)
+            time_s = record * SUBSTEPS * dt
+            state = read_state(positions[record], velocities[record], np.asarray(time_s), scene)
+            if loads.force is not None:
+                applied[:] = loads.force(state)
+            if loads.friction is not None:
+                self._rub(batch, loads.friction(state))
             batch.step(nstep=SUBSTEPS)
         # Semi-implicit Euler is second order in x - dt v / 2 (leapfrog), first order in x.
         positions -= 0.5 * dt * velocities
         if batch.warning.any() or not np.isfinite(positions).all():
             is_good &= ~batch.warning.reshape(len(theta), -1).any(axis=1)
-        path, speed = rigid_motion(positions, velocities, mass, self.model.scene.surroundings)
+        path, speed = rigid_motion(positions, velocities, law, scene)
         path[:, ~is_good] = np.nan
         speed[:, ~is_good] = np.nan
         return np.moveaxis(path, 0, -1), np.moveaxis(speed, 0, -1)
 
-    def _write(self, batch: Batch, theta: np.ndarray) -> None:
+    def _write(self, batch: Batch, fields: Fields) -> None:
         """Writes masses, frictions and the start into the batch."""
         compiled = self.model.scene.model
-        named = self.model.by_name(theta)
-        fields = set_up(self.model, named, np)
         batch.state[:] = 0.0
         mass, inertia = batch.expand("body_mass"), batch.expand("body_inertia")
-        friction, solref = batch.expand("pair_friction"), batch.expand("pair_solref")
         mass[:, 1:] = fields.mass
         inertia[:, 1:] = (
             compiled.body_inertia[1:] * (fields.mass / compiled.body_mass[1:])[..., None]
         )
+        solref = batch.expand("pair_solref")
         for i in range(compiled.npair):
-            which = sliding_object(compiled.pair(i).name)
-            if which is None:
+            if sliding_object(compiled.pair(i).name) is None:
                 solref[:, i] = fields.bumper
-            else:
-                friction[:, i, :2] = fields.friction[:, which, None]
+        self._rub(batch, fields.friction)
         batch.set_const()
         batch.bind("qpos")[:] = fields.qpos
+        batch.bind("qvel")[:] = fields.qvel
         batch.warning[...] = 0
+
+    def _rub(self, batch: Batch, friction: np.ndarray) -> None:
+        """Writes the objects' friction coefficients `[batch, object]` into their contacts."""
+        written = batch.expand("pair_friction")
+        for i in range(written.shape[1]):
+            which = sliding_object(self.model.scene.model.pair(i).name)
+            if which is not None:
+                written[:, i, :2] = friction[:, which, None]
 
 
 def _is_at_rest(velocities: np.ndarray) -> bool:

@@ -8,10 +8,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.effects.effect import State
 from galileo_jax.rollout.mjx_import import mjx
 from galileo_jax.rollout.model import SUBSTEPS, Model
-from galileo_jax.rollout.motion import rigid_motion, set_up, sliding_object, total_force
+from galileo_jax.rollout.motion import dynamics
+from galileo_jax.rollout.mujoco_fields import (
+    Fields,
+    make_fields,
+    make_loads,
+    read_state,
+    rigid_motion,
+    sliding_object,
+)
 
 # Larger batches are slower per rollout on a CPU; a GPU wants to be filled.
 BATCH_CPU, BATCH_GPU = 8, 256
@@ -63,23 +70,29 @@ class EngineMJX:
     def rollout(self, theta: jax.Array) -> tuple[jax.Array, jax.Array]:
         """One rollout in pure JAX: `[parameter]` to two arrays `[object, 2, record + 1]`."""
         compiled = self.model.scene.model
-        named = self.model.by_name(theta)
-        fields = set_up(self.model, named, jnp)
+        effects = self.model.effects + self.model.nuisances
+        scene, named = self.model.scene.surroundings, self.model.by_name(theta)
+        law = dynamics(effects, scene, named, jnp)
+        loads = make_loads(effects, scene, named, law)
+        fields = make_fields(law, scene, jnp)
         model = self._with(fields)
-        data = mjx.make_data(compiled).replace(qpos=fields.qpos, qvel=jnp.zeros(compiled.nv))
+        data = mjx.make_data(compiled).replace(qpos=fields.qpos, qvel=fields.qvel)
         home = jnp.asarray(compiled.body_pos[1:][:, [0, 2]])
         dt = float(compiled.opt.timestep)
-        force = total_force(self.model, named)
 
         def look(data):
             return data.qpos.reshape(home.shape) + home, data.qvel.reshape(home.shape)
 
         def record(data, index):
             position, velocity = look(data)
-            if force is not None:
-                applied = force(State(position, velocity, index * SUBSTEPS * dt))
-                data = data.replace(qfrc_applied=applied.reshape(-1))
-            data = jax.lax.fori_loop(0, SUBSTEPS, lambda _, d: mjx.step(model, d), data)
+            state = read_state(position, velocity, index * SUBSTEPS * dt, scene)
+            rubbed = model
+            if loads.force is not None:
+                data = data.replace(qfrc_applied=loads.force(state))
+            if loads.friction is not None:
+                friction = self._rub(loads.friction(state))
+                rubbed = model.tree_replace({"pair_friction": friction})
+            data = jax.lax.fori_loop(0, SUBSTEPS, lambda _, d: mjx.step(rubbed, d), data)
             return data, (position, velocity)
 
         last, (positions, velocities) = jax.lax.scan(
@@ -88,15 +101,10 @@ class EngineMJX:
         position, velocity = look(last)
         positions = jnp.concatenate([positions, position[None]])
         velocities = jnp.concatenate([velocities, velocity[None]])
-        path, speed = rigid_motion(
-            positions - 0.5 * dt * velocities,
-            velocities,
-            fields.mass,
-            self.model.scene.surroundings,
-        )
+        path, speed = rigid_motion(positions - 0.5 * dt * velocities, velocities, law, scene)
         return jnp.moveaxis(path, 0, -1), jnp.moveaxis(speed, 0, -1)
 
-    def _with(self, fields):
+    def _with(self, fields: Fields):
         """The MJX model with one rollout's masses, frictions and bumpers.
 
         A mass is more than `body_mass`: contacts are scaled by the inverse weights that
@@ -106,13 +114,10 @@ class EngineMJX:
         ratio = fields.mass / compiled.body_mass[1:]
         per_body = jnp.concatenate([jnp.ones(1), ratio])
         per_dof = jnp.repeat(ratio, 2)
-        friction, solref = base.pair_friction, base.pair_solref
+        solref = base.pair_solref
         for i in range(compiled.npair):
-            which = sliding_object(compiled.pair(i).name)
-            if which is None:
+            if sliding_object(compiled.pair(i).name) is None:
                 solref = solref.at[i].set(fields.bumper)
-            else:
-                friction = friction.at[i, :2].set(fields.friction[which])
         return base.tree_replace(
             {
                 "body_mass": base.body_mass * per_body,
@@ -120,7 +125,16 @@ class EngineMJX:
                 "body_inertia": base.body_inertia * per_body[:, None],
                 "body_invweight0": base.body_invweight0 / per_body[:, None],
                 "dof_invweight0": base.dof_invweight0 / per_dof,
-                "pair_friction": friction,
+                "pair_friction": self._rub(fields.friction),
                 "pair_solref": solref,
             }
         )
+
+    def _rub(self, friction: jax.Array) -> jax.Array:
+        """The contact pairs' friction with the objects' coefficients `[object]` in it."""
+        pairs = self._base.pair_friction
+        for i in range(self.model.scene.model.npair):
+            which = sliding_object(self.model.scene.model.pair(i).name)
+            if which is not None:
+                pairs = pairs.at[i, :2].set(friction[which])
+        return pairs

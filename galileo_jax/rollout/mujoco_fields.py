@@ -1,0 +1,223 @@
+"""The equations of motion as MuJoCo's engines take them: fields, forces, and the way back.
+
+MuJoCo has its own ramp, gravity, contacts and Coulomb friction. What `motion.dynamics` says
+beyond them is applied on top, at every recorded step: as a force along the path and as the
+contacts' friction coefficients. Written in the array standard, so that the same lines run in
+NumPy (C engine) and in JAX (MJX).
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from galileo_jax.effects.effect import Effect, State, Surroundings
+from galileo_jax.rollout.motion import LEAST_FRICTION, Dynamics, state_at, to_plane
+
+Array = Any
+
+# Coefficient of restitution against the bumpers' stiffness (1/s^2) and damping (1/s), measured
+# on this scene at 0.3 and 1 m/s (tests/rollout/test_restitution.py): above 600/s the damping
+# would outrun the time step, so that a small e stiffens the spring first.
+RESTITUTION = np.array([0.0, 0.0155, 0.046, 0.11, 0.244, 0.295, 0.417, 0.625, 0.783, 0.882, 0.95])
+STIFFNESS = np.array([300.0, 3e3, 1e4, 3e4, 1e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5, 1.4e5])
+DAMPING = np.array([600.0, 600.0, 600.0, 600.0, 600.0, 600.0, 400.0, 200.0, 100.0, 50.0, 20.0])
+FOOT_ZONE_M = 0.03  # of the size of an object, which takes so long to cross the edge
+
+
+class Fields(NamedTuple):
+    """What one rollout's parameters change before its first step; leading axes `[...]`.
+
+    Attributes:
+      mass: `[..., object]`, kg: the inertia, which is all the mass there is in MuJoCo.
+      friction: `[..., object]`, of the object's contacts with ramp and table.
+      qpos: `[..., dof]`, x and z of each object's centre relative to its body's place.
+      qvel: `[..., dof]`, m/s.
+      bumper: `[..., 2]`, (-stiffness, -damping) between objects, MuJoCo's direct solref.
+    """
+
+    mass: Array
+    friction: Array
+    qpos: Array
+    qvel: Array
+    bumper: Array
+
+
+class Loads(NamedTuple):
+    """What acts besides MuJoCo's own gravity and friction; None where there is nothing.
+
+    Attributes:
+      force: `State` to generalised forces `[..., dof]`, N.
+      friction: `State` to the contacts' coefficients `[..., object]`.
+      is_steady: whether what has come to rest stays so: nothing may depend on the time.
+    """
+
+    force: Callable[[State], Array] | None
+    friction: Callable[[State], Array] | None
+    is_steady: bool
+
+
+def make_fields(law: Dynamics, scene: Surroundings, xp: Any) -> Fields:
+    """Maps the equations of motion to the model's fields and the start."""
+    declared = xp.asarray(scene.angle_rad)
+    place, speed = to_plane(law.start_m, law.start_speed_m_s, declared, 0.0 * declared, scene)
+    flat = (*law.inertia.shape[:-1], 2 * len(scene.names))
+    return Fields(
+        mass=law.inertia,
+        friction=law.friction,
+        qpos=(place - xp.asarray(scene.start_m)).reshape(flat),
+        qvel=speed.reshape(flat),
+        bumper=bumper_solref(law.restitution, xp),
+    )
+
+
+def make_loads(
+    effects: Sequence[Effect], scene: Surroundings, theta: Mapping[str, Array], law: Dynamics
+) -> Loads:
+    """What the effects ask for beyond MuJoCo's own ramp, gravity and friction.
+
+    With an inertia M, the declared slope A under the object and MuJoCo's weight M g:
+
+        force along the path     drive - M g sin A
+        coefficient of friction  brake / (M g cos A)
+
+    The factor on the speed at the foot is a short zone of drag (or thrust) past it,
+
+        F = M ln(f) w(x) v |v|,   w a raised cosine over the zone with integral 1,
+
+    so that dv/dx = ln(f) w(x) v: what crosses the zone leaves it with f times the speed,
+    whatever its speed. Where slope or inertia differ from MuJoCo's, f makes up for what
+    MuJoCo's own contact keeps at the foot, too.
+    """
+    xp = law.mass.__array_namespace__()
+
+    def has(hook: str) -> bool:
+        return any(getattr(effect, hook)(theta, scene) is not None for effect in effects)
+
+    is_other_body = has("inertia") or has("tilt")
+    has_foot = scene.has_table and any(scene.comes_down) and (has("foot") or is_other_body)
+    angle, weight = scene.angle_rad, law.inertia * scene.gravity
+    log_foot = xp.log(xp.clip(law.foot, 0.5, 2.0))[..., None]
+    comes_down = xp.asarray(scene.comes_down, dtype=law.mass.dtype)
+
+    def slope(state: State) -> Array:
+        return xp.where(state.is_on_ramp, angle, 0.0)
+
+    def friction(state: State) -> Array:
+        return xp.maximum(law.brake(state) / (weight * xp.cos(slope(state))), LEAST_FRICTION)
+
+    def log_kept(state: State) -> Array:
+        """The logarithm of the factor past the foot, `[..., object]`."""
+        if not is_other_body:
+            return log_foot
+        turn = (law.ramp_rad - law.table_rad)[..., None]
+        kept = xp.cos(turn) - law.coefficient(state) * xp.abs(xp.sin(turn))
+        native = math.cos(angle) - friction(state) * math.sin(angle)
+        return log_foot + xp.log(xp.clip(kept / native, 0.5, 2.0))
+
+    def foot_drag(state: State) -> Array:
+        share = xp.clip(state.path_m / FOOT_ZONE_M, 0.0, 1.0)
+        window = (1 - xp.cos(2 * math.pi * share)) / FOOT_ZONE_M
+        speed = state.speed_m_s
+        return law.inertia * comes_down * log_kept(state) * window * speed * xp.abs(speed)
+
+    def force(state: State) -> Array:
+        down = slope(state)
+        along = law.drive(state) - weight * xp.sin(down)
+        if has_foot:
+            along = along + foot_drag(state)
+        both = xp.stack([along * xp.cos(down), -along * xp.sin(down)], axis=-1)
+        return both.reshape(*both.shape[:-2], -1)
+
+    return Loads(
+        force=force if has("force") or has_foot or is_other_body else None,
+        friction=friction if has("friction") or is_other_body else None,
+        is_steady=not (has("force") or has("friction")),
+    )
+
+
+def sliding_object(pair: str) -> int | None:
+    """Which object's friction a contact pair of scenes/ramp.xml carries; None for the hit."""
+    first, second = pair.split("_")
+    return None if second.startswith("object") else int(first.removeprefix("object")) - 1
+
+
+def bumper_solref(restitution: Array, xp: Any) -> Array:
+    """The bumpers' (-stiffness, -damping) for a coefficient of restitution, within 0.03.
+
+    0 gives scenes/ramp.xml's own values exactly: overdamped 17 times, e < 0.002.
+    """
+    stiffness = xp.exp(xp.interp(restitution, RESTITUTION, np.log(STIFFNESS)))
+    stiffness = xp.where(restitution == 0, STIFFNESS[0], stiffness)
+    damping = xp.interp(restitution, RESTITUTION, DAMPING)
+    return xp.stack([-stiffness, -damping], axis=-1)
+
+
+def read_state(position: Array, velocity: Array, time_s: Array, scene: Surroundings) -> State:
+    """The state at MuJoCo's centres and velocities, each `[..., object, 2]`."""
+    return state_at(*to_path(position, velocity, scene), time_s, scene)
+
+
+def to_path(position: Array, velocity: Array, scene: Surroundings) -> tuple[Array, Array]:
+    """Projects centres onto the paths parallel to ramp and table.
+
+    Args:
+      position: `[..., object, 2]`, m, a little off the path where contacts give way.
+      velocity: the same, m/s.
+      scene: its slope is the declared one, MuJoCo's.
+
+    Returns:
+      path (m) and speed along it (m/s), each `[..., object]`.
+    """
+    xp = position.__array_namespace__()
+    cos, sin = math.cos(scene.angle_rad), math.sin(scene.angle_rad)
+    down_ramp = velocity[..., 0] * cos - velocity[..., 1] * sin
+    if not scene.has_table:
+        gone = position - xp.asarray(scene.start_m)
+        return gone[..., 0] * cos - gone[..., 1] * sin, down_ramp
+    x = position[..., 0] - xp.asarray(scene.corner_m)
+    y = position[..., 1] - xp.asarray(scene.half_height_m)
+    ramp = x * cos - y * sin
+    is_on_ramp = ramp < 0
+    path = xp.where(is_on_ramp, ramp, xp.maximum(x, 0.0))
+    return path, xp.where(is_on_ramp, down_ramp, velocity[..., 0])
+
+
+def rigid_motion(
+    position: Array, velocity: Array, law: Dynamics, scene: Surroundings
+) -> tuple[Array, Array]:
+    """Takes the contacts' penetration out of simulated centres, and tilts them truly.
+
+    Args:
+      position: `[record, ..., object, 2]`, m.
+      velocity: `[record, ..., object, 2]`, m/s.
+      law: the rollouts' inertias and true slopes.
+      scene: the geometry.
+
+    Returns:
+      positions and velocities of the same shapes, on the path.
+    """
+    path, speed = to_path(position, velocity, scene)
+    if len(scene.names) > 1:
+        path = _without_overlap(path, law.inertia, scene)
+    return to_plane(path, speed, law.ramp_rad, law.table_rad, scene)
+
+
+def _without_overlap(path: Array, mass: Array, scene: Surroundings) -> Array:
+    """Undoes the overlap of object 1's front and object 2's back face.
+
+    Each centre is put back by its share (the other's mass over the sum) of the deepest overlap
+    so far, as if the hit had taken no time.
+    """
+    xp = path.__array_namespace__()
+    front, back = scene.half_length_m[0], scene.half_length_m[1]
+    x = path + xp.asarray(scene.corner_m)
+    overlap = xp.maximum(x[..., 0] + front - (x[..., 1] - back), 0.0)
+    if isinstance(overlap, np.ndarray):
+        deepest = np.maximum.accumulate(overlap, axis=0)
+    else:
+        deepest = jax.lax.cummax(overlap, axis=0)
+    share = xp.stack([-mass[..., 1], mass[..., 0]], axis=-1) / mass.sum(axis=-1, keepdims=True)
+    return path + deepest[..., None] * share
