@@ -2,21 +2,24 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
+from galileo_jax import truth_solver
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.effects.effect import Surroundings
+from galileo_jax.effects.effect import Effect, Surroundings
 from galileo_jax.errors import InputError
-from galileo_jax.parameters import absent
-from galileo_jax.rollout.engine_c import EngineC
-from galileo_jax.rollout.model import Model
-from galileo_jax.rollout.motion import pitch
-from galileo_jax.scene.scene import compile_scene, extents, start_paths
+from galileo_jax.rollout.motion import pitch, to_plane
+from galileo_jax.scene.scene import extents, start_paths
 
+Solver = Literal["rigid", "fine"]
+SOLVERS: tuple[Solver, ...] = ("rigid", "fine")
 GRAVITY_M_S2 = 9.81
 LONGEST_S = 5.0
+# Between two records the motion is drawn straight: 0.05 mm off at most, in a hard impact.
+RECORD_S = truth_solver.STEP_S * truth_solver.STEPS_PER_RECORD
 NUM_TRIES = 300
 SLOWEST_HIT_M_S = 0.5  # a weaker hit says little about object 2
 
@@ -32,6 +35,8 @@ class Truth:
       release_m: distance up the ramp from the foot to the point under object 1's centre.
       object2_x_m: where object 2's centre stands.
       gravity: m/s^2.
+      effects: what acts besides gravity, friction and impact.
+      effect_values: their parameters by name, all of them.
     """
 
     mass_kg: tuple[float, float]
@@ -41,6 +46,14 @@ class Truth:
     release_m: float
     object2_x_m: float
     gravity: float = GRAVITY_M_S2
+    effects: tuple[Effect, ...] = ()
+    effect_values: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def theta(self) -> dict[str, float]:
+        """All parameters by name."""
+        (m1, m2), (k1, k2) = self.mass_kg, self.friction
+        return {"m1": m1, "k1": k1, "m2": m2, "k2": k2, **self.effect_values}
 
     @property
     def angle_rad(self) -> float:
@@ -153,27 +166,56 @@ def draw_truth(
     return truth
 
 
-def roll_out(truth: Truth) -> Motion:
-    """Simulates a truth with the project's own C engine for 5 s.
+def roll_out(truth: Truth, solver: Solver = "rigid", seconds: float = LONGEST_S) -> Motion:
+    """Simulates a truth for `seconds`.
+
+    Args:
+      truth: effects of the motion act; those of the clock and the camera are the caller's.
+      solver: "rigid": the engine that also fits; "fine": small steps that share no event
+        logic with it (`truth_solver`), for data that are to examine the fit.
+      seconds: s.
 
     Raises:
       InputError: the simulation failed at these values.
     """
-    scene = compile_scene(
-        truth.surroundings, [declared.shape for declared in truth.objects], truth.objects
-    )
-    model = Model(scene, LONGEST_S, nuisances=())
-    theta = absent(model.parameters)
-    for i, (mass, friction) in enumerate(zip(truth.mass_kg, truth.friction, strict=True)):
-        theta[model.index(f"m{i + 1}")] = mass
-        theta[model.index(f"k{i + 1}")] = friction
-    positions, velocities = EngineC(model).simulate(theta[None])
-    if not np.isfinite(positions).all():
-        raise InputError(f"the simulation fails at masses {truth.mass_kg}, k {truth.friction}")
-    position, velocity = positions[0], velocities[0]
-    times = model.record_dt_s * np.arange(position.shape[-1])
-    turned = pitch(np.moveaxis(position, -1, 0), truth.surroundings).T
+    scene = truth.surroundings
+    if solver == "fine":
+        path, speed, law = truth_solver.solve(truth.effects, scene, truth.theta, seconds)
+        slopes = law.ramp_rad[None], law.table_rad[None]
+        moved = to_plane(path, speed, *slopes, scene)
+        position, velocity = (np.moveaxis(values, 0, -1) for values in moved)
+    else:
+        position, velocity = _roll_out_rigid(truth, scene, seconds)
+    if not np.isfinite(position).all():
+        raise InputError(
+            f"the simulation fails at masses {truth.mass_kg}, k {truth.friction}, "
+            f"{dict(truth.effect_values)}"
+        )
+    times = RECORD_S * np.arange(position.shape[-1])
+    turned = pitch(np.moveaxis(position, -1, 0), scene).T
     return Motion(times, position, velocity, turned)
+
+
+def _roll_out_rigid(
+    truth: Truth, scene: Surroundings, seconds: float
+) -> tuple[np.ndarray, np.ndarray]:
+    import jax
+    import jax.numpy as jnp
+
+    from galileo_jax.rollout import engine_rigid
+
+    names = tuple(truth.theta)
+    num_records = round(seconds / RECORD_S) + 1
+    with jax.enable_x64(True):
+        rolled = jax.jit(engine_rigid.roll_out, static_argnums=(0, 1, 2, 3))(
+            truth.effects,
+            names,
+            num_records,
+            RECORD_S,
+            jnp.array([truth.theta[name] for name in names]),
+            scene,
+        )
+        return np.asarray(rolled[0]), np.asarray(rolled[1])
 
 
 def _draw(rng: np.random.Generator, ramp_angle_deg: float, given: Mapping[str, float]) -> Truth:
