@@ -99,7 +99,9 @@ class Surroundings:
     @classmethod
     def tree_unflatten(cls, facts, leaves):
         """The inverse."""
-        return cls(**dict(zip(_ARRAYS, leaves, strict=True)), **dict(zip(_STATIC, facts, strict=True)))
+        return cls(
+            **dict(zip(_ARRAYS, leaves, strict=True)), **dict(zip(_STATIC, facts, strict=True))
+        )
 
     def mass(self, theta: Theta) -> list[Array]:
         """The objects' masses, kg, each `[...]`."""
