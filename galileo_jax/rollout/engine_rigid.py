@@ -130,35 +130,46 @@ def _step(
 
     def phase(carry: Any) -> Any:
         bodies, left, count = carry
-        bodies, spent = _to_next_event(bodies, time_s + dt_s - left, left, law, scene)
+        is_last = count == MAX_EVENTS - 1
+        bodies, spent = _to_next_event(bodies, time_s + dt_s - left, left, is_last, law, scene)
         return bodies, left - spent, count + 1
 
     return jax.lax.while_loop(is_left, phase, (bodies, jnp.asarray(dt_s), 0))[0]
 
 
 def _to_next_event(
-    bodies: Bodies, time_s: jax.Array, left_s: jax.Array, law: Dynamics, scene: Surroundings
+    bodies: Bodies,
+    time_s: jax.Array,
+    left_s: jax.Array,
+    is_last: jax.Array,
+    law: Dynamics,
+    scene: Surroundings,
 ) -> tuple[Bodies, jax.Array]:
-    """Moves on to the next event, or by `left_s`; returns the bodies and the time it took."""
+    """Moves on to the next event, or by `left_s`; returns the bodies and the time it took.
+
+    When `is_last`, by `left_s` in any case: where events never end (an object in a corner from
+    which both sides lead up) what is slow waits, and the others go on.
+    """
     touches = bodies.touches(scene)
     at_start = _acceleration(bodies, bodies, touches, time_s, law, scene)
     half = 0.5 * _event_times(bodies, touches, at_start, left_s, scene).soonest
     middle = _after(bodies, at_start, half)
     a = _acceleration(bodies, middle, touches, time_s + half, law, scene)
     events = _event_times(bodies, touches, a, left_s, scene)
-    t = events.soonest
+    t = jnp.where(is_last, left_s, events.soonest)
     q, v = _after(bodies, a, t)
-    v = jnp.where(events.stop == t, 0.0, v)
+    v = jnp.where(events.stop <= t, 0.0, v)
     if scene.has_table:
         at_foot = state_at(jnp.zeros_like(q), v, time_s + t, scene)
         turn = law.ramp_rad - law.table_rad
         kept = jnp.cos(turn) - law.coefficient(at_foot) * jnp.abs(jnp.sin(turn))
-        arrives = events.foot == t
+        arrives = events.foot <= t
         v = jnp.where(arrives, v * jnp.maximum(kept, 0.0) * law.foot, v)
         q = jnp.where(arrives, jnp.where(v < 0, -PAST_FOOT_M, 0.0), q)
     for i in range(len(scene.names) - 1):
-        v = jnp.where(events.hit[i] == t, _after_hit(v, i, law), v)
-    return Bodies(q, v), t
+        v = jnp.where(events.hit[i] <= t, _after_hit(v, i, law), v)
+    waits = is_last & (t > events.soonest) & (jnp.abs(bodies.speed_m_s) < PLASTIC_M_S)
+    return Bodies(jnp.where(waits, bodies.path_m, q), jnp.where(waits, 0.0, v)), t
 
 
 def _after(bodies: Bodies, a: jax.Array, t: jax.Array) -> Bodies:
