@@ -3,7 +3,7 @@
 import argparse
 import math
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -17,49 +17,111 @@ from galileo_jax.clip.yaml_edit import dump
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
 from galileo_jax.observation import Observation
-from galileo_jax.truth import LONGEST_S, Motion, Truth, draw_truth, roll_out
+from galileo_jax.truth import (
+    LONGEST_S,
+    SOLVERS,
+    Declared,
+    Hidden,
+    Motion,
+    Truth,
+    draw_series,
+    truth_record,
+)
 from galileo_jax.video import synthetic
 
 MARGIN_M = 0.10  # round the motion, to the picture's edge
 WIDEST_M = 2.5
 TABLE_AT = 0.80  # of the picture's height
 KEYSTONE_PER_M = 0.01
+ROLL_RAD = math.radians(0.5)
+OFF_PX = (1.0, 4.0)  # how far a point set by hand is off, where the fault is asked for
+CAMERA_FAULTS = ("keystone", "roll", "origin", "points")
 TRACK_SUFFIX, VIDEO_SUFFIX = ".csv", ".mp4"
 
 
 def main(argv: Sequence[str]) -> int | None:
-    """Writes NAME.mp4 (or NAME.csv), NAME.yaml and NAME.truth.json."""
+    """Writes NAME.mp4 (or NAME.csv), NAME.yaml and NAME.truth.json, for a series NAME_1 and on."""
     call = _parser().parse_args(argv)
     out: Path = call.out
     suffix = TRACK_SUFFIX if call.track_only else VIDEO_SUFFIX
     if out.suffix != suffix:
         raise InputError(f"--out: {out.name} does not end in {suffix}")
-    looks, things, faults = np.random.default_rng(call.seed).spawn(3)
+    if call.track_only and call.camera_fault:
+        raise InputError("--camera-fault: a track (--track-only) has no camera")
+    hidden = _hidden(call)
+    looks, things, faults, secrets = np.random.default_rng(call.seed).spawn(4)
     given = {key: getattr(call, key) for key in ("m1", "k1", "m2", "k2")}
-    truth = draw_truth(things, call.angle, {k: v for k, v in given.items() if v is not None})
-    motion = roll_out(truth)
-    seconds = call.seconds or min(LONGEST_S, max(1.5, motion.rest_s + 0.4))
-    num_frames = max(2, round(seconds * call.fps))
-    frames = motion.at(np.arange(num_frames) / call.fps)
-    camera = _camera(call, truth, frames, faults)
-    declared = _clip_content(call, truth, camera, frames)
-    record = _truth_record(call, truth, motion, frames, camera)
+    trials = draw_series(
+        call.angle,
+        {key: value for key, value in given.items() if value is not None},
+        hidden,
+        call.series or 1,
+        solver=call.solver,
+        things=things,
+        secrets=secrets,
+        frame_s=1 / call.fps if call.faults else None,
+    )
+    names = [f"{out.stem}_{i + 1}" if call.series else out.stem for i in range(len(trials))]
     try:
         with _all_or_nothing(out.parent) as folder:
-            if call.track_only:
-                _write_track(folder / out.name, truth, frames, call.track_noise, looks)
-            else:
-                filming = _filming(call, num_frames, faults)
-                video = folder / out.name
-                record |= _film(video, truth, motion, camera, filming, num_frames, call.seed)
-            check_clip(folder / f"{out.stem}.yaml", declared)
-            write_json(folder / f"{out.stem}.truth.json", record)
-            write_text(folder / f"{out.stem}.yaml", dump(declared))
+            for i, (name, (truth, motion)) in enumerate(zip(names, trials, strict=True)):
+                path = folder / f"{name}{suffix}"
+                _write_clip(path, call, truth, motion, looks, faults, call.seed + i)
     except OSError as error:
         raise InputError(f"--out: {out}: {error.strerror or error}") from error
-    for name in (out, out.with_suffix(".yaml"), out.with_suffix(".truth.json")):
-        print(name)
+    for name in names:
+        for end in (suffix, ".yaml", ".truth.json"):
+            print(out.with_name(name + end))
     return None
+
+
+def _hidden(call: argparse.Namespace) -> list[Hidden]:
+    """The effects asked for, each with the values given."""
+    from galileo_jax.effects.registry import load_file, make_effects
+
+    for path in call.effects_from:
+        load_file(path)
+    values = dict(call.effect)
+    if len(values) < len(call.effect):
+        raise InputError("--effect: an effect is named twice")
+    effects = make_effects(list(values))
+    return [Hidden(effect, values[effect.name], call.strength) for effect in effects]
+
+
+def _write_clip(
+    out: Path,
+    call: argparse.Namespace,
+    truth: Truth,
+    motion: Motion,
+    looks: np.random.Generator,
+    faults: np.random.Generator,
+    seed: int,
+) -> None:
+    """Writes one clip, its yaml and its truth into the folder of `out`."""
+    declared = Declared.of(truth, call.fps)
+    seconds = call.seconds or min(LONGEST_S, max(1.5, motion.rest_s + declared.release_s + 0.4))
+    num_frames = max(2, round(seconds * declared.true_fps))
+    frames = motion.at(declared.taken_s(num_frames))
+    camera = _camera(call, truth, frames, faults)
+    content = _clip_content(call, out.name, truth, declared, camera, frames, faults)
+    record = {
+        "name": out.stem,
+        **truth_record(truth, declared, motion, frames),
+        "pixels_per_metre_true": camera.pixels_per_metre,
+        "pixels_per_metre_declared": content.get("pixels_per_metre", camera.pixels_per_metre),
+        "world_to_image": camera.world_to_image.tolist(),
+        "image_px": list(camera.size_px),
+        "camera_faults": sorted(call.camera_fault),
+        "seed": seed,
+    }
+    if call.track_only:
+        _write_track(out, truth, declared, frames, call.track_noise, looks)
+    else:
+        filming = _filming(call, declared, num_frames, faults)
+        record |= _film(out, truth, declared, motion, camera, filming, num_frames, seed)
+    check_clip(out.with_suffix(".yaml"), content)
+    write_json(out.with_suffix(".truth.json"), record)
+    write_text(out.with_suffix(".yaml"), dump(content))
 
 
 @contextmanager
@@ -75,6 +137,7 @@ def _all_or_nothing(folder: Path) -> Iterator[Path]:
 def _film(
     out: Path,
     truth: Truth,
+    declared: Declared,
     motion: Motion,
     camera: synthetic.Camera,
     filming: synthetic.Filming,
@@ -82,11 +145,11 @@ def _film(
     seed: int,
 ) -> dict[str, Any]:
     """Renders the video; returns what of the filming belongs into the truth."""
-    bodies = tuple(
-        synthetic.Body(declared.shape, declared.size_m or ()) for declared in truth.objects
-    )
+    bodies = tuple(synthetic.Body(each.shape, each.size_m or ()) for each in truth.objects)
     ramp = synthetic.Ramp(truth.angle_rad, truth.release_m + 0.12)
-    path = synthetic.Motion(motion.times_s, motion.position_m, motion.pitch_rad)
+    path = synthetic.Motion(
+        motion.times_s + declared.release_s, motion.position_m, motion.pitch_rad
+    )
     with command.progress() as bar:
         task = bar.add_task("rendering", total=num_frames)
         covered = synthetic.render_clip(
@@ -116,22 +179,29 @@ def _film(
             "off": list(hand.offset_m),
         },
         "covered": {
-            declared.name: [round(float(share), 3) for share in row]
-            for declared, row in zip(truth.objects, covered, strict=True)
+            each.name: [round(float(share), 3) for share in row]
+            for each, row in zip(truth.objects, covered, strict=True)
         },
     }
 
 
 def _write_track(
-    out: Path, truth: Truth, frames: Motion, noise_m: float, rng: np.random.Generator
+    out: Path,
+    truth: Truth,
+    declared: Declared,
+    frames: Motion,
+    noise_m: float,
+    rng: np.random.Generator,
 ) -> None:
-    """Writes the centres with independent normal errors as a csv track."""
-    position = frames.position_m + noise_m * rng.standard_normal(frames.position_m.shape)
+    """Writes the centres, as the declared scale and clock show them, with normal errors."""
+    error = noise_m * rng.standard_normal(frames.position_m.shape)
+    position = declared.scale * frames.position_m + error
     count, _, length = position.shape
     covariance = np.broadcast_to(noise_m**2 * np.eye(2)[None, :, :, None], (count, 2, 2, length))
-    names = tuple(declared.name for declared in truth.objects)
+    names = tuple(each.name for each in truth.objects)
+    times = np.arange(length) / declared.fps
     seen = np.ones((count, length), bool)
-    write_observation_csv(out, Observation(names, frames.times_s, position, covariance, seen))
+    write_observation_csv(out, Observation(names, times, position, covariance, seen))
 
 
 def _camera(
@@ -149,31 +219,34 @@ def _camera(
     foot = left if call.direction == "right" else width - left
     shift = rng.uniform(-0.01, 0.01, 2) * (width, height)
     origin = (round(float(foot + shift[0]), 1), round(float(TABLE_AT * height + shift[1]), 1))
-    keystone = rng.uniform(-KEYSTONE_PER_M, KEYSTONE_PER_M, 2) if call.keystone else (0.0, 0.0)
+    is_askew, is_rolled = (fault in call.camera_fault for fault in ("keystone", "roll"))
+    keystone = rng.uniform(-KEYSTONE_PER_M, KEYSTONE_PER_M, 2) if is_askew else (0.0, 0.0)
     return synthetic.Camera(
         pixels_per_metre=float(scale),
         origin_px=origin,
         size_px=(width, height),
         direction=call.direction,
         keystone_per_m=(float(keystone[0]), float(keystone[1])),
+        roll_rad=float(rng.uniform(-ROLL_RAD, ROLL_RAD)) if is_rolled else 0.0,
     )
 
 
 def _filming(
-    call: argparse.Namespace, num_frames: int, rng: np.random.Generator
+    call: argparse.Namespace, declared: Declared, num_frames: int, rng: np.random.Generator
 ) -> synthetic.Filming:
     hand = None
     if call.hand:
         hand = synthetic.Hand(
-            leave_s=float(rng.uniform(1, 4)) / call.fps,
+            leave_s=max(0.0, declared.release_s) + float(rng.uniform(1, 4)) / call.fps,
             speed_m_s=float(rng.uniform(1.2, 1.9)),
             offset_m=(float(rng.uniform(-0.028, -0.008)), float(rng.uniform(0.010, 0.026))),
         )
     inner = np.arange(1, num_frames)
     missed = rng.choice(inner, min(call.missed_frames, len(inner)), replace=False)
     return synthetic.Filming(
-        fps=call.fps,
-        exposure_s=min(call.exposure, 1 / call.fps),
+        fps=declared.true_fps,
+        written_fps=declared.fps,
+        exposure_s=min(call.exposure, 1 / declared.true_fps),
         noise_grey_levels=call.noise,
         defocus_px=call.defocus,
         repeated_frames=tuple(sorted(map(int, missed))),
@@ -182,86 +255,49 @@ def _filming(
 
 
 def _clip_content(
-    call: argparse.Namespace, truth: Truth, camera: synthetic.Camera, frames: Motion
+    call: argparse.Namespace,
+    name: str,
+    truth: Truth,
+    declared: Declared,
+    camera: synthetic.Camera,
+    frames: Motion,
+    rng: np.random.Generator,
 ) -> dict[str, Any]:
     """What is declared about the clip (DESIGN.md 2.1)."""
     objects: list[dict[str, Any]] = [
-        {"name": declared.name, "shape": declared.shape, "size_m": list(declared.size_m or ())}
-        for declared in truth.objects
+        {"name": each.name, "shape": each.shape, "size_m": list(each.size_m or ())}
+        for each in truth.objects
     ]
     seen: dict[str, Any] = {}
     if not call.track_only:
+        off = {
+            fault: _off_px(rng, count) if fault in call.camera_fault else np.zeros((count, 2))
+            for fault, count in (("origin", 1), ("points", len(objects)))
+        }
         seen = {
             "direction": call.direction,
-            "pixels_per_metre": camera.pixels_per_metre,
-            "origin_px": list(camera.origin_px),
+            "pixels_per_metre": round(camera.pixels_per_metre / declared.scale, 2),
+            "origin_px": np.round(camera.origin_px + off["origin"][0], 1).tolist(),
         }
         if not call.no_points:
-            points = camera.project(frames.position_m[:, :, 0])
+            points = camera.project(frames.position_m[:, :, 0]) + off["points"]
             for entry, point in zip(objects, points, strict=True):
                 entry["point_px"] = np.round(point, 1).tolist()
     return {
-        "track" if call.track_only else "video": call.out.name,
+        "track" if call.track_only else "video": name,
         "scenario": call.scenario,
-        "fps": call.fps,
-        "ramp_angle_deg": truth.ramp_angle_deg,
+        "fps": declared.fps,
+        "ramp_angle_deg": declared.ramp_angle_deg,
         **seen,
         "gravity": truth.gravity,
         "objects": objects,
     }
 
 
-def _truth_record(
-    call: argparse.Namespace,
-    truth: Truth,
-    motion: Motion,
-    frames: Motion,
-    camera: synthetic.Camera,
-) -> dict[str, Any]:
-    """Everything the clip was made with; y along the travel and z up, as in shared clips."""
-    (m1, m2), (k1, k2) = truth.mass_kg, truth.friction
-    return {
-        "name": call.out.stem,
-        "engine": "galileo_jax",
-        "effect": "none",
-        "effect_parameters": {},
-        "m1": m1,
-        "k1": k1,
-        "m2": m2,
-        "k2": k2,
-        "gravity": truth.gravity,
-        "ramp_angle_deg_true": truth.ramp_angle_deg,
-        "ramp_angle_deg_declared": truth.ramp_angle_deg,
-        "release_m": truth.release_m,
-        "object2_y_m": truth.object2_x_m,
-        "size1_m": truth.objects[0].size_m,
-        "size2_m": truth.objects[1].size_m,
-        "events_s": motion.events_s(truth),
-        "trajectory": {"t": _rounded(frames.times_s)}
-        | {declared.name: _trajectory(frames, i) for i, declared in enumerate(truth.objects)},
-        "frames": len(frames.times_s),
-        "fps_true": call.fps,
-        "fps_declared": call.fps,
-        "pixels_per_metre_true": camera.pixels_per_metre,
-        "pixels_per_metre_declared": camera.pixels_per_metre,
-        "world_to_image": camera.world_to_image.tolist(),
-        "image_px": list(camera.size_px),
-        "seed": call.seed,
-    }
-
-
-def _trajectory(frames: Motion, index: int) -> Mapping[str, list[float]]:
-    return {
-        "y": _rounded(frames.position_m[index, 0]),
-        "z": _rounded(frames.position_m[index, 1]),
-        "pitch": _rounded(frames.pitch_rad[index]),
-        "vy": _rounded(frames.velocity_m_s[index, 0]),
-        "vz": _rounded(frames.velocity_m_s[index, 1]),
-    }
-
-
-def _rounded(values: np.ndarray) -> list[float]:
-    return np.round(values, 6).tolist()
+def _off_px(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Errors of points set by hand, `[count, 2]`, in any direction."""
+    size, way = rng.uniform(*OFF_PX, count), rng.uniform(0, 2 * np.pi, count)
+    return size[:, None] * np.stack([np.cos(way), np.sin(way)], axis=1)
 
 
 def _parser() -> command.Parser:
@@ -280,6 +316,8 @@ def _parser() -> command.Parser:
     for index in (1, 2):
         add(f"--m{index}", type=_number(float, 0.01, 100), metavar="KG")
         add(f"--k{index}", type=_number(float, 0, 2), metavar="FRICTION")
+    add("--solver", choices=SOLVERS, default="rigid", help="fine: not the engine that fits")
+    add("--series", type=_number(int, 1, 99), metavar="N", help="N trials: NAME_1, NAME_2, ...")
     add("--track-only", action="store_true", help="a csv track in place of the video")
     add(
         "--track-noise",
@@ -288,12 +326,34 @@ def _parser() -> command.Parser:
         metavar="M",
         help="standard deviation of a track's coordinates, m (default 0.0002)",
     )
+    hide = parser.add_argument_group("what is hidden", "in the truth, and not in the yaml")
+    hide.add_argument(
+        "--effect",
+        type=_effect,
+        action="append",
+        default=[],
+        metavar="NAME[:PARAMETER=VALUE,...]",
+        help="an effect, in SI units; what is left out is drawn (may be given several times)",
+    )
+    hide.add_argument("--strength", type=_number(float, 0, 1), help="0: just seen, 1: strong")
+    hide.add_argument("--effects-from", type=Path, action="append", default=[], metavar="FILE.py")
+    hide.add_argument(
+        "--faults",
+        action="store_true",
+        help="small faults of real clips: release between frames, foot and impact not ideal",
+    )
     film = parser.add_argument_group("filming")
     film.add_argument("--size", type=_size, default=(640, 360), metavar="WIDTHxHEIGHT")
     film.add_argument("--direction", choices=["right", "left"], default="right")
     film.add_argument("--no-points", action="store_true", help="do not tell where objects are")
     film.add_argument("--hand", action="store_true", help="a hand lets object 1 go")
-    film.add_argument("--keystone", action="store_true", help="the camera is held askew")
+    film.add_argument(
+        "--camera-fault",
+        choices=CAMERA_FAULTS,
+        action="append",
+        default=[],
+        help="held askew or rolled, or points of the yaml off by a few px",
+    )
     film.add_argument("--noise", type=_number(float, 0, 60), default=4.0, help="grey levels")
     film.add_argument("--exposure", type=_number(float, 0, 0.2), default=0.008, metavar="S")
     film.add_argument("--defocus", type=_number(float, 0, 20), default=0.0, metavar="PX")
@@ -322,6 +382,21 @@ def _number(kind: type, low: float, high: float = math.inf) -> Any:
         return value
 
     return parse
+
+
+def _effect(text: str) -> tuple[str, dict[str, float]]:
+    """`NAME[:PARAMETER=VALUE,...]`."""
+    name, _, rest = text.partition(":")
+    values = {}
+    for part in rest.split(",") if rest else []:
+        key, _, value = part.partition("=")
+        try:
+            values[key.strip()] = float(value)
+        except ValueError:
+            values[key.strip()] = math.nan
+        if not math.isfinite(values[key.strip()]):
+            raise argparse.ArgumentTypeError(f"{part!r} is not PARAMETER=NUMBER")
+    return name.strip(), values
 
 
 def _size(text: str) -> tuple[int, int]:

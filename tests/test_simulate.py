@@ -69,7 +69,8 @@ def test_given_values_are_kept_even_if_nothing_moves():
 
 @pytest.mark.video
 def test_clip_loads_and_its_truth_is_complete(tmp_path):
-    call = ["--seed", "3", "--size", "320x180", "--seconds", "1", "--hand", "--keystone"]
+    call = ["--seed", "3", "--size", "320x180", "--seconds", "1", "--hand"]
+    call += ["--camera-fault", "keystone", "--camera-fault", "roll"]
     path = tmp_path / "new" / "clip.mp4"
     assert command.run(simulate.main, [*call, "--out", str(path)]) == 0
     assert {item.name for item in path.parent.iterdir()} == {

@@ -19,6 +19,7 @@ class Camera:
       direction: which way x grows in the image.
       keystone_per_m: (along x, along y), 1/m: how much farther away, relative to its
         distance at the origin, the plane is per metre; 0 is a camera held squarely.
+      roll_rad: how far the picture is turned about the origin, counter-clockwise.
     """
 
     pixels_per_metre: float
@@ -26,6 +27,7 @@ class Camera:
     size_px: tuple[int, int] = (640, 360)
     direction: Literal["right", "left"] = "right"
     keystone_per_m: tuple[float, float] = (0.0, 0.0)
+    roll_rad: float = 0.0
 
     @property
     def world_to_image(self) -> np.ndarray:
@@ -38,7 +40,9 @@ class Camera:
         to_origin = np.array(
             [[1.0, 0.0, self.origin_px[0]], [0.0, 1.0, self.origin_px[1]], [0, 0, 1]]
         )
-        return to_origin @ about_origin
+        cos, sin = np.cos(self.roll_rad), np.sin(self.roll_rad)
+        rolled = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        return to_origin @ rolled @ about_origin
 
     def project(self, points_m: np.ndarray) -> np.ndarray:
         """Returns the pixels `[..., 2]` of the points `[..., 2]` in metres."""

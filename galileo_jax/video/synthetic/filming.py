@@ -27,6 +27,7 @@ class Filming:
 
     Attributes:
       fps: frames per second; frame i is taken at time i / fps.
+      written_fps: what the file says; None = the truth.
       exposure_s: how long the shutter is open, evenly about the frame's time, s.
       noise_grey_levels: standard deviation of the sensor noise, independent in every pixel
         and colour; of 255.
@@ -37,6 +38,7 @@ class Filming:
     """
 
     fps: float = 30.0
+    written_fps: float | None = None
     exposure_s: float = 0.008
     noise_grey_levels: float = 4.0
     flicker: float = 0.007

@@ -122,7 +122,8 @@ def render_clip(
     covered = []
     with replacing(path) as temporary:
         codec = cv2.VideoWriter.fourcc(*"mp4v")
-        writer = cv2.VideoWriter(str(temporary), codec, filming.fps, camera.size_px)
+        fps = filming.written_fps or filming.fps
+        writer = cv2.VideoWriter(str(temporary), codec, fps, camera.size_px)
         if not writer.isOpened():
             raise OSError(f"{path}: no video can be written there")
         try:

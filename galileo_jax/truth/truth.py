@@ -3,23 +3,16 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
 
 import numpy as np
 
-from galileo_jax import truth_solver
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.effects.effect import Effect, Surroundings
-from galileo_jax.errors import InputError
-from galileo_jax.rollout.motion import pitch, to_plane
 from galileo_jax.scene.scene import extents, start_paths
 
-Solver = Literal["rigid", "fine"]
-SOLVERS: tuple[Solver, ...] = ("rigid", "fine")
+# What the clip's yaml says wrongly: the motion itself knows nothing of it.
+DECLARED_WRONGLY = ("frame_rate", "ramp_angle", "scale_error")
 GRAVITY_M_S2 = 9.81
-LONGEST_S = 5.0
-# Between two records the motion is drawn straight: 0.05 mm off at most, in a hard impact.
-RECORD_S = truth_solver.STEP_S * truth_solver.STEPS_PER_RECORD
 NUM_TRIES = 300
 SLOWEST_HIT_M_S = 0.5  # a weaker hit says little about object 2
 
@@ -35,7 +28,7 @@ class Truth:
       release_m: distance up the ramp from the foot to the point under object 1's centre.
       object2_x_m: where object 2's centre stands.
       gravity: m/s^2.
-      effects: what acts besides gravity, friction and impact.
+      effects: what is hidden in the clip, in the motion or in what is declared of it.
       effect_values: their parameters by name, all of them.
     """
 
@@ -48,6 +41,11 @@ class Truth:
     gravity: float = GRAVITY_M_S2
     effects: tuple[Effect, ...] = ()
     effect_values: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def motion_effects(self) -> tuple[Effect, ...]:
+        """Those that change the motion. The others only change what is said of it."""
+        return tuple(effect for effect in self.effects if effect.name not in DECLARED_WRONGLY)
 
     @property
     def theta(self) -> dict[str, float]:
@@ -96,61 +94,6 @@ class Truth:
         return math.sqrt(max(0.0, beyond - twice_g * k1 * run))
 
 
-@dataclass(frozen=True)
-class Motion:
-    """The motion of a truth, in the engine's time steps from the release on.
-
-    Attributes:
-      times_s: `[time]`.
-      position_m, velocity_m_s: `[object, 2, time]`.
-      pitch_rad: `[object, time]`, counter-clockwise positive.
-    """
-
-    times_s: np.ndarray
-    position_m: np.ndarray
-    velocity_m_s: np.ndarray
-    pitch_rad: np.ndarray
-
-    @property
-    def rest_s(self) -> float:
-        """When the last object comes to rest; the end if none does."""
-        moving = np.abs(self.velocity_m_s).max(axis=(0, 1)) > 1e-3
-        last = np.flatnonzero(moving)
-        return float(self.times_s[min(last[-1] + 1, len(moving) - 1)]) if last.size else 0.0
-
-    def at(self, times_s: np.ndarray) -> "Motion":
-        """The motion at other times, linear in between; at rest after the end."""
-
-        def between(values: np.ndarray) -> np.ndarray:
-            rows = values.reshape(-1, values.shape[-1])
-            found = [np.interp(times_s, self.times_s, row) for row in rows]
-            return np.reshape(found, (*values.shape[:-1], len(times_s)))
-
-        return Motion(
-            times_s,
-            between(self.position_m),
-            between(self.velocity_m_s),
-            between(self.pitch_rad),
-        )
-
-    def events_s(self, truth: Truth) -> dict[str, float | None]:
-        """When object 1's centre turns at the foot and when it meets object 2; None = never."""
-        x = self.position_m[:, 0]
-        # The bumpers give way by a fraction of a millimetre: moved says hit more surely.
-        return {
-            "foot": self._first_s(x[0] - truth.surroundings.corner_m[0]),
-            "hit": self._first_s(x[1] - x[1, 0] - 1e-5),
-        }
-
-    def _first_s(self, value: np.ndarray) -> float | None:
-        """When `value` `[time]`, negative at first, reaches zero."""
-        reached = np.flatnonzero(value >= 0)
-        if not reached.size:
-            return None
-        pair = slice(reached[0] - 1, reached[0] + 1)
-        return round(float(np.interp(0.0, value[pair], self.times_s[pair])), 4)
-
-
 def draw_truth(
     rng: np.random.Generator, ramp_angle_deg: float, given: Mapping[str, float]
 ) -> Truth:
@@ -164,58 +107,6 @@ def draw_truth(
             break
         truth = _draw(rng, ramp_angle_deg, given)
     return truth
-
-
-def roll_out(truth: Truth, solver: Solver = "rigid", seconds: float = LONGEST_S) -> Motion:
-    """Simulates a truth for `seconds`.
-
-    Args:
-      truth: effects of the motion act; those of the clock and the camera are the caller's.
-      solver: "rigid": the engine that also fits; "fine": small steps that share no event
-        logic with it (`truth_solver`), for data that are to examine the fit.
-      seconds: s.
-
-    Raises:
-      InputError: the simulation failed at these values.
-    """
-    scene = truth.surroundings
-    if solver == "fine":
-        path, speed, law = truth_solver.solve(truth.effects, scene, truth.theta, seconds)
-        slopes = law.ramp_rad[None], law.table_rad[None]
-        moved = to_plane(path, speed, *slopes, scene)
-        position, velocity = (np.moveaxis(values, 0, -1) for values in moved)
-    else:
-        position, velocity = _roll_out_rigid(truth, scene, seconds)
-    if not np.isfinite(position).all():
-        raise InputError(
-            f"the simulation fails at masses {truth.mass_kg}, k {truth.friction}, "
-            f"{dict(truth.effect_values)}"
-        )
-    times = RECORD_S * np.arange(position.shape[-1])
-    turned = pitch(np.moveaxis(position, -1, 0), scene).T
-    return Motion(times, position, velocity, turned)
-
-
-def _roll_out_rigid(
-    truth: Truth, scene: Surroundings, seconds: float
-) -> tuple[np.ndarray, np.ndarray]:
-    import jax
-    import jax.numpy as jnp
-
-    from galileo_jax.rollout import engine_rigid
-
-    names = tuple(truth.theta)
-    num_records = round(seconds / RECORD_S) + 1
-    with jax.enable_x64(True):
-        rolled = jax.jit(engine_rigid.roll_out, static_argnums=(0, 1, 2, 3))(
-            truth.effects,
-            names,
-            num_records,
-            RECORD_S,
-            jnp.array([truth.theta[name] for name in names]),
-            scene,
-        )
-        return np.asarray(rolled[0]), np.asarray(rolled[1])
 
 
 def _draw(rng: np.random.Generator, ramp_angle_deg: float, given: Mapping[str, float]) -> Truth:

@@ -1,0 +1,113 @@
+"""Effects that the library does not have: a diagnosis should say `unknown`.
+
+    galileo simulate --effects-from benchmarks/exotic_effects.py --effect exotic_gust ...
+
+A sticky spot is not among them: any short stretch that brakes is a `friction_patch`, and
+naming it so is right.
+"""
+
+import math
+from typing import ClassVar
+
+from galileo_jax.effects.effect import Array, Effect, Force, Friction, State, Surroundings, Theta
+from galileo_jax.effects.registry import register
+from galileo_jax.parameters import LogNormal, Normal, Parameter, Prior, Uniform
+
+
+def unknown(name: str, unit: str, prior: Prior, usual: float = 0.0) -> Parameter:
+    """A parameter of an effect; `usual` is where it is while nothing is there."""
+    return Parameter(name, unit, prior, usual, "effect")
+
+
+@register
+class Ripple(Effect):
+    """Friction that waves along the path: k (1 + d sin(2 pi q / w)), for all objects."""
+
+    name: ClassVar[str] = "exotic_ripple"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Depth d and wavelength w."""
+        return (
+            unknown("exotic_ripple", "1", LogNormal(0.8, 0.15)),
+            unknown("exotic_ripple_length", "m", LogNormal(0.25, 0.15), 0.25),
+        )
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
+        """The coefficients at the places."""
+        depth, length = theta["exotic_ripple"], theta["exotic_ripple_length"]
+
+        def law(state: State, k: Array) -> Array:
+            wave = k.__array_namespace__().sin(2 * math.pi * state.path_m / length)
+            return k * (1.0 + depth * wave)
+
+        return law
+
+
+@register
+class Gust(Effect):
+    """A gust: a pulse of force on object 1, F exp(-((t - t0) / w)^2), w = 0.06 s."""
+
+    name: ClassVar[str] = "exotic_gust"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Force and time."""
+        return (
+            unknown("exotic_gust", "N", LogNormal(1.0, 0.4)),
+            unknown("exotic_gust_time", "s", Uniform(0.25, 0.55), 0.4),
+        )
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
+        """The force at the time."""
+        size = scene.only(theta["exotic_gust"], 0)
+
+        def pulse(state: State):
+            apart = (state.time_s - theta["exotic_gust_time"]) / 0.06
+            return size * size.__array_namespace__().exp(-(apart**2))
+
+        return pulse
+
+
+@register
+class Bump(Effect):
+    """A bump in the way of object 1: it is slowed down going up and sped up coming down.
+
+    F = -m g dh/dq, h = height exp(-((q - place) / 0.03 m)^2)
+    """
+
+    name: ClassVar[str] = "exotic_bump"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Height and place."""
+        return (
+            unknown("exotic_bump", "m", LogNormal(0.012, 0.2)),
+            unknown("exotic_bump_place", "m", Uniform(-0.25, -0.12), -0.2),
+        )
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
+        """The force at the place."""
+        weight = scene.only(theta["exotic_bump"] * theta["m1"] * scene.gravity, 0)
+
+        def slope(state: State):
+            away = (state.path_m - theta["exotic_bump_place"]) / 0.03
+            return weight * 2 * away / 0.03 * weight.__array_namespace__().exp(-(away**2))
+
+        return slope
+
+
+@register
+class Heating(Effect):
+    """Friction that grows with time as surfaces warm up: k (1 + t / tau), for all objects."""
+
+    name: ClassVar[str] = "exotic_heating"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The rate 1 / tau."""
+        return (unknown("exotic_heating", "1/s", Normal(1.0, 0.5)),)
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
+        """The coefficients at the time."""
+
+        def law(state: State, k: Array) -> Array:
+            return k * (1.0 + theta["exotic_heating"] * state.time_s)
+
+        return law

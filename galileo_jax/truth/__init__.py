@@ -1,0 +1,28 @@
+"""Experiments with known truth: what is in them, how they move, what is said of them.
+
+`draw_truth` draws an experiment, `hide` puts an effect into it, `roll_out` lets it happen,
+and `Declared` is what a user would write down about it.
+"""
+
+from galileo_jax.truth.declared import Declared
+from galileo_jax.truth.hidden import Hidden, hide
+from galileo_jax.truth.motion import LONGEST_S, SOLVERS, Motion, Solver, roll_out
+from galileo_jax.truth.record import truth_record
+from galileo_jax.truth.series import draw_series
+from galileo_jax.truth.truth import SLOWEST_HIT_M_S, Truth, draw_truth
+
+__all__ = [
+    "LONGEST_S",
+    "SLOWEST_HIT_M_S",
+    "SOLVERS",
+    "Declared",
+    "Hidden",
+    "Motion",
+    "Solver",
+    "Truth",
+    "draw_series",
+    "draw_truth",
+    "hide",
+    "roll_out",
+    "truth_record",
+]

@@ -1,0 +1,125 @@
+"""How the objects of a truth move."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from galileo_jax.effects.effect import Surroundings
+from galileo_jax.errors import InputError
+from galileo_jax.rollout.motion import pitch, to_plane
+from galileo_jax.truth import solver as fine
+from galileo_jax.truth.truth import Truth
+
+Solver = Literal["rigid", "fine"]
+SOLVERS: tuple[Solver, ...] = ("rigid", "fine")
+LONGEST_S = 5.0
+# Between two records the motion is drawn straight: 0.05 mm off at most, in a hard impact.
+RECORD_S = fine.STEP_S * fine.STEPS_PER_RECORD
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The motion of a truth, in the engine's time steps from the release on.
+
+    Attributes:
+      times_s: `[time]`.
+      position_m, velocity_m_s: `[object, 2, time]`.
+      pitch_rad: `[object, time]`, counter-clockwise positive.
+    """
+
+    times_s: np.ndarray
+    position_m: np.ndarray
+    velocity_m_s: np.ndarray
+    pitch_rad: np.ndarray
+
+    @property
+    def rest_s(self) -> float:
+        """When the last object comes to rest; the end if none does."""
+        moving = np.abs(self.velocity_m_s).max(axis=(0, 1)) > 1e-3
+        last = np.flatnonzero(moving)
+        return float(self.times_s[min(last[-1] + 1, len(moving) - 1)]) if last.size else 0.0
+
+    def at(self, times_s: np.ndarray) -> "Motion":
+        """The motion at other times, linear in between; at rest after the end."""
+
+        def between(values: np.ndarray) -> np.ndarray:
+            rows = values.reshape(-1, values.shape[-1])
+            found = [np.interp(times_s, self.times_s, row) for row in rows]
+            return np.reshape(found, (*values.shape[:-1], len(times_s)))
+
+        return Motion(
+            times_s,
+            between(self.position_m),
+            between(self.velocity_m_s),
+            between(self.pitch_rad),
+        )
+
+    def events_s(self, truth: Truth) -> dict[str, float | None]:
+        """When object 1's centre turns at the foot and when it meets object 2; None = never."""
+        x = self.position_m[:, 0]
+        # The bumpers give way by a fraction of a millimetre: moved says hit more surely.
+        return {
+            "foot": self._first_s(x[0] - truth.surroundings.corner_m[0]),
+            "hit": self._first_s(x[1] - x[1, 0] - 1e-5),
+        }
+
+    def _first_s(self, value: np.ndarray) -> float | None:
+        """When `value` `[time]`, negative at first, reaches zero."""
+        reached = np.flatnonzero(value >= 0)
+        if not reached.size:
+            return None
+        pair = slice(reached[0] - 1, reached[0] + 1)
+        return round(float(np.interp(0.0, value[pair], self.times_s[pair])), 4)
+
+
+def roll_out(truth: Truth, solver: Solver = "rigid", seconds: float = LONGEST_S) -> Motion:
+    """Simulates a truth for `seconds`.
+
+    Args:
+      truth: its `motion_effects` act.
+      solver: "rigid": the engine that also fits; "fine": small steps that share no event
+        logic with it (`solver.py`), for data that are to examine the fit.
+      seconds: s.
+
+    Raises:
+      InputError: the simulation failed at these values.
+    """
+    scene = truth.surroundings
+    if solver == "fine":
+        path, speed, law = fine.solve(truth.motion_effects, scene, truth.theta, seconds)
+        slopes = law.ramp_rad[None], law.table_rad[None]
+        moved = to_plane(path, speed, *slopes, scene)
+        position, velocity = (np.moveaxis(values, 0, -1) for values in moved)
+    else:
+        position, velocity = _roll_out_rigid(truth, scene, seconds)
+    if not np.isfinite(position).all():
+        raise InputError(
+            f"the simulation fails at masses {truth.mass_kg}, k {truth.friction}, "
+            f"{dict(truth.effect_values)}"
+        )
+    times = RECORD_S * np.arange(position.shape[-1])
+    turned = pitch(np.moveaxis(position, -1, 0), scene).T
+    return Motion(times, position, velocity, turned)
+
+
+def _roll_out_rigid(
+    truth: Truth, scene: Surroundings, seconds: float
+) -> tuple[np.ndarray, np.ndarray]:
+    import jax
+    import jax.numpy as jnp
+
+    from galileo_jax.rollout import engine_rigid
+
+    names = tuple(truth.theta)
+    num_records = round(seconds / RECORD_S) + 1
+    with jax.enable_x64(True):
+        rolled = jax.jit(engine_rigid.roll_out, static_argnums=(0, 1, 2, 3))(
+            truth.motion_effects,
+            names,
+            num_records,
+            RECORD_S,
+            jnp.array([truth.theta[name] for name in names]),
+            scene,
+        )
+        return np.asarray(rolled[0]), np.asarray(rolled[1])

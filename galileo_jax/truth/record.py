@@ -1,0 +1,72 @@
+"""What stands in NAME.truth.json; y along the travel and z up, as in clips made elsewhere."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.truth.declared import Declared
+from galileo_jax.truth.motion import Motion
+from galileo_jax.truth.truth import Truth
+
+
+def truth_record(
+    truth: Truth, declared: Declared, motion: Motion, frames: Motion
+) -> dict[str, Any]:
+    """The experiment, what was hidden in it, and what became of it.
+
+    Args:
+      truth: the experiment.
+      declared: what was said of it.
+      motion: from the release on.
+      frames: at the times of the clip's frames.
+    """
+    parameters = {
+        effect.name: [p for p in effect.parameters(truth.surroundings) if p.role == "effect"]
+        for effect in truth.effects
+    }
+    hidden = {name: found for name, found in parameters.items() if found}
+    names = [parameter.name for found in hidden.values() for parameter in found]
+    values = truth.effect_values
+    (m1, m2), (k1, k2) = truth.mass_kg, truth.friction
+    events = motion.events_s(truth)
+    return {
+        "engine": "galileo_jax",
+        "effect": "+".join(hidden) or "none",
+        "effect_parameters": {name: values[name] for name in names},
+        "nuisances": {name: value for name, value in values.items() if name not in names},
+        "m1": m1,
+        "k1": k1,
+        "m2": m2,
+        "k2": k2,
+        "gravity": truth.gravity,
+        "ramp_angle_deg_true": truth.ramp_angle_deg,
+        "ramp_angle_deg_declared": declared.ramp_angle_deg,
+        "release_m": truth.release_m,
+        "object2_y_m": truth.object2_x_m,
+        "size1_m": truth.objects[0].size_m,
+        "size2_m": truth.objects[1].size_m,
+        "events_s": {
+            name: None if time is None else round(time + declared.release_s, 4)
+            for name, time in events.items()
+        },
+        "trajectory": {"t": _rounded(frames.times_s + declared.release_s)}
+        | {each.name: _trajectory(frames, i) for i, each in enumerate(truth.objects)},
+        "frames": len(frames.times_s),
+        "fps_true": declared.true_fps,
+        "fps_declared": declared.fps,
+    }
+
+
+def _trajectory(frames: Motion, index: int) -> Mapping[str, list[float]]:
+    return {
+        "y": _rounded(frames.position_m[index, 0]),
+        "z": _rounded(frames.position_m[index, 1]),
+        "pitch": _rounded(frames.pitch_rad[index]),
+        "vy": _rounded(frames.velocity_m_s[index, 0]),
+        "vz": _rounded(frames.velocity_m_s[index, 1]),
+    }
+
+
+def _rounded(values: np.ndarray) -> list[float]:
+    return np.round(values, 6).tolist()
