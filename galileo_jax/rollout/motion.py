@@ -123,7 +123,8 @@ def to_plane(
     Args:
       path_m: `[..., object]`, m.
       speed_m_s: `[..., object]`, m/s.
-      ramp_rad, table_rad: the slopes; shapes that broadcast with `[...]`.
+      ramp_rad: the ramp's slope; broadcasts with `[...]`.
+      table_rad: the table's.
       scene: its paths run parallel to ramp and table at the objects' half heights.
 
     Returns:
