@@ -13,7 +13,7 @@ CLIP_S = 1.2  # past the hit
 
 @pytest.fixture(scope="session")
 def engines() -> dict[str, Engine]:
-    """Both engines on the same model, `HIT`."""
+    """MuJoCo's engines on the same model, `HIT`."""
     with in_64_bit():
         model = make_model(HIT, CLIP_S)
         return {"c": EngineC(model), "mjx": EngineMJX(model)}

@@ -1,4 +1,4 @@
-"""Both engines against closed forms, and against each other."""
+"""MuJoCo's engines against closed forms, against each other, and against the rigid engine."""
 
 import math
 from dataclasses import replace
@@ -9,12 +9,15 @@ import pytest
 
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.engine_mjx import EngineMJX
+from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.rollout.model import Model
-from galileo_jax.rollout.motion import set_up
+from galileo_jax.rollout.motion import dynamics
+from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, make_fields
 from galileo_jax.scene.scene import Scene
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT, SMOOTH, make_model, make_theta
 from tests.reference_ramp import solve
+from tests.rollout.simple_effects import EVERY_KIND
 
 ENGINES = ("c", "mjx")
 ACCELERATION_RTOL = 0.005  # the issue's bar; 0.003 is what the contacts' onset costs
@@ -30,6 +33,21 @@ HALVING_ATOL_M_S = 5e-4
 HALVING_JUMP_ATOL_M_S = 0.002
 AT_REST_M_S = 0.02
 FOOT_S, HIT_S = 0.2, 0.1  # until the contacts have settled again
+# The C engine against the rigid one, away from impacts by FOOT_S or HIT_S: the ripple after the
+# foot, and forces that are held for a recorded step.
+RIGID_POSITION_ATOL_M, RIGID_VELOCITY_ATOL_M_S = 0.003, 0.01
+ROUNDING_M = 1e-9  # stiff contacts make more of the last digit
+FACTOR_ATOL = 0.004  # the zone is crossed in some 17 ms, in steps of 4 ms
+STRENGTHS = {
+    "drag": 0.1,
+    "spring": 0.5,
+    "wind": 0.1,
+    "swaying": 0.1,
+    "stribeck": 0.5,
+    "turning": 0.4,
+    "tilt": 0.02,
+    "push": 0.3,
+}
 
 
 def accelerations(engine, theta):
@@ -137,6 +155,71 @@ def test_follows_the_closed_form():
         assert position[0] == pytest.approx(exact, abs=POSITION_ATOL_M)
 
 
+def with_effect(model, effect):
+    """The model with one effect, at its strength and absent, `[2, parameter]`."""
+    richer = replace(model, effects=(effect,))
+    strengths = STRENGTHS[effect.name], 0.0
+    return richer, np.stack([make_theta(richer, HIT, {effect.name: s}) for s in strengths])
+
+
+def quiet(velocity, dt):
+    """Which records are away from every jump of the rigid motion's velocity, `[record]`."""
+    change = np.abs(np.diff(velocity)).max(axis=(0, 1))
+    times = np.arange(velocity.shape[-1]) * dt
+    away = np.ones(len(times), bool)
+    for jump in times[1:][change > 0.1]:
+        away &= (times < jump - 0.01) | (times > jump + FOOT_S)
+    return away
+
+
+@pytest.mark.parametrize("effect", EVERY_KIND, ids=lambda effect: effect.name)
+def test_c_and_rigid_agree_on_effects(effect):
+    """Two engines that share the equations of motion and nothing of how they are solved."""
+    model, theta = with_effect(make_model(HIT, 1.5), effect)
+    (position_c, velocity_c), (position, velocity) = (
+        engine(model).simulate(theta) for engine in (EngineC, EngineRigid)
+    )
+    assert position_c == pytest.approx(position, abs=RIGID_POSITION_ATOL_M)
+    assert np.abs(position[0] - position[1]).max() > 5 * RIGID_POSITION_ATOL_M
+    for found, wanted in zip(velocity_c, velocity, strict=True):
+        away = quiet(wanted, model.record_dt_s)
+        assert away.mean() > 0.5
+        assert found[..., away] == pytest.approx(wanted[..., away], abs=RIGID_VELOCITY_ATOL_M_S)
+
+
+@pytest.mark.parametrize("effect", EVERY_KIND, ids=lambda effect: effect.name)
+def test_absent_effects_are_not_there(effect):
+    plain = make_model(HIT, 1.2)
+    model, theta = with_effect(plain, effect)
+    found = EngineC(model).simulate(theta[1:])
+    wanted = EngineC(plain).simulate(make_theta(plain, HIT)[None])
+    until = slice(0, 200)  # the plain one may be told to be at rest, later
+    assert found[0][..., until] == pytest.approx(wanted[0][..., until], abs=ROUNDING_M)
+
+
+@pytest.mark.slow
+def test_mjx_and_c_agree_on_effects():
+    """All effects at once, so that MJX is compiled once."""
+    model = replace(make_model(HIT, 0.9), effects=EVERY_KIND)
+    theta = make_theta(model, HIT, STRENGTHS)[None]
+    position_c, velocity_c = EngineC(model).simulate(theta)
+    position, velocity = EngineMJX(model).simulate(theta)
+    assert position == pytest.approx(position_c, abs=ENGINES_ATOL_M_S)
+    assert velocity == pytest.approx(velocity_c, abs=ENGINES_ATOL_M_S)
+
+
+def test_foot_transition_is_the_factor_on_the_speed():
+    experiment = replace(SMOOTH, object2_x_m=0.6)
+    model = make_model(experiment, 1.0)
+    theta = np.stack(
+        [make_theta(model, experiment, {"foot_transition": f}) for f in (1.0, 0.9, 0.95, 1.05)]
+    )
+    position, velocity = EngineC(model).simulate(theta)
+    beyond = np.argmax(position[:, 0, 0] > FOOT_ZONE_M + 0.03, axis=-1)
+    speeds = np.array([v[0, 0, i] for v, i in zip(velocity, beyond, strict=True)])
+    assert speeds[1:] / speeds[0] == pytest.approx([0.9, 0.95, 1.05], abs=FACTOR_ATOL)
+
+
 @pytest.mark.parametrize("angle_deg", [10, 20, 30])
 def test_nothing_moves_above_the_friction_angle(angle_deg):
     still = replace(HIT, angle_rad=math.radians(angle_deg))
@@ -187,7 +270,9 @@ def test_masses_carry_their_inverse_weights(engines):
     assert isinstance(engine, EngineMJX)
     experiment = replace(HIT, mass_kg=(0.21, 1.3))
     theta = make_theta(model, experiment)
-    fields = set_up(model, model.by_name(theta), np)
+    scene = model.scene.surroundings
+    law = dynamics(model.nuisances, scene, model.by_name(theta), np)
+    fields = make_fields(law, scene, np)
     scaled = engine._with(fields)
     spec = model.scene.spec.copy()
     for name, mass in zip(model.scene.names, experiment.mass_kg, strict=True):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.effects.effect import Theta
+from galileo_jax.errors import InputError
 from galileo_jax.parameters import forward, inverse
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.engines import make_engine
@@ -125,9 +126,14 @@ def test_interpolation_is_exact_for_constant_acceleration():
     assert np.asarray(v)[0, 0, [0, 5]] == pytest.approx(0.0)
 
 
-def test_auto_takes_the_c_engine_on_a_cpu(model):
-    expected = "c" if jax.default_backend() == "cpu" else "mjx"
-    assert make_engine("auto", model).name == expected
+@pytest.mark.parametrize("name", ["auto", "rigid", "c", "mjx"])
+def test_engines_by_name(name, model):
+    assert make_engine(name, model).name == ("rigid" if name == "auto" else name)
+
+
+def test_unknown_engines_are_refused(model):
+    with pytest.raises(InputError, match="unknown value 'bullet'; known: auto, rigid, c, mjx"):
+        make_engine("bullet", model)
 
 
 def test_rollouts_of_effects_see_their_parameters(model, start):
