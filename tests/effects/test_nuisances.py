@@ -5,20 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.effects.effect import State, Surroundings
+from galileo_jax.effects.effect import Surroundings
 from galileo_jax.effects.nuisances import NUISANCES
-from galileo_jax.effects.nuisances.foot_transition import ZONE_M, FootTransition
+from galileo_jax.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.effects.nuisances.pixel_scale import PixelScale
 from galileo_jax.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.effects.nuisances.start_offset import StartOffset
 from galileo_jax.observation import NOMINAL_SCALE_PX_PER_M
-from galileo_jax.rollout.engine_c import EngineC
-from tests.ramp_model import HIT, SMOOTH, make_model, make_surroundings, make_theta
+from tests.ramp_model import HIT, make_surroundings
 
-FACTOR_ATOL = 0.004  # the zone is crossed in some 17 ms, in steps of 4 ms
 RAMP = make_surroundings(HIT)
 INCLINE: Surroundings = replace(
-    make_surroundings(replace(HIT, object2_x_m=None)), corner_m=(float("inf"),)
+    make_surroundings(replace(HIT, object2_x_m=None)),
+    corner_m=(float("inf"),),
+    has_table=False,
+    comes_down=(False,),
 )
 
 
@@ -34,16 +35,16 @@ def test_absent_is_nothing(effect, scene):
     """Tests exact equality: a richer model contains the poorer one."""
     theta = absent_theta(effect, scene)
     count = len(scene.names)
-    position = np.random.default_rng(0).normal(size=(1, count, 2))
-    assert (effect.start(position, theta, scene) == position).all()
+    path = np.random.default_rng(0).normal(size=(1, count))
+    assert (effect.start(path, theta, scene) == path).all()
     frames = np.linspace(0, 1, 7)
     assert (effect.time(frames, theta, scene) == frames).all()
     track = np.random.default_rng(1).normal(size=(count, 2, 7))
     assert effect.measure(track, theta, scene) == pytest.approx(track, abs=0)
-    force = effect.force(theta, scene)
-    if force is not None:
-        here = np.array([[[scene.corner_m[0] + ZONE_M / 2, 0.03]] * count])
-        assert (force(State(here, np.ones_like(here), np.array(0.0))) == 0).all()
+    for hook in (effect.force, effect.friction, effect.inertia, effect.tilt, effect.start_speed):
+        assert hook(theta, scene) is None
+    foot = effect.foot(theta, scene)
+    assert foot is None or (foot == 1).all()
     restitution = effect.restitution(theta, scene)
     assert restitution is None or (restitution == 0).all()
 
@@ -56,37 +57,25 @@ def test_names_and_roles(effect):
     assert len(set(names)) == len(names)
 
 
-@pytest.mark.parametrize("factor", [0.9, 0.95, 1.05])
-@pytest.mark.parametrize("release_m", [0.15, 0.5])
-def test_foot_transition_is_the_factor_on_the_speed(factor, release_m):
-    experiment = replace(SMOOTH, release_m=release_m, object2_x_m=0.6)
-    engine = EngineC(make_model(experiment, 1.0))
-    theta = np.stack(
-        [make_theta(engine.model, experiment, {"foot_transition": f}) for f in (1.0, factor)]
-    )
-    position, velocity = engine.simulate(theta)
-    beyond = position[:, 0, 0] > ZONE_M + 0.03
-    plain, changed = (v[0, 0][np.argmax(b)] for v, b in zip(velocity, beyond, strict=True))
-    assert changed / plain == pytest.approx(factor, abs=FACTOR_ATOL)
+@pytest.mark.parametrize("nuisance", [FootTransition(), StartOffset()])
+def test_the_foot_and_marks_are_of_a_ramp_with_a_table(nuisance):
+    assert nuisance.parameters(RAMP) and not nuisance.parameters(INCLINE)
 
 
-def test_foot_transition_only_of_what_comes_down():
-    force = FootTransition().force(absent_theta(FootTransition(), RAMP, foot_transition=0.9), RAMP)
-    assert force is not None
-    here = np.full((1, 2, 2), ZONE_M / 2)
-    pushed = force(State(here, np.ones_like(here), np.array(0.0)))
-    assert pushed[0, 0, 0] < 0 and (pushed[0, 1] == 0).all() and (pushed[..., 1] == 0).all()
+def test_foot_transition_is_the_factor_at_the_foot():
+    theta = absent_theta(FootTransition(), RAMP, foot_transition=0.9)
+    assert FootTransition().foot(theta, RAMP) == pytest.approx([0.9])
+    still = replace(RAMP, comes_down=(False, False))
+    assert FootTransition().parameters(still) == (), "nothing comes down"
 
 
-def test_start_offset_is_along_the_surface():
-    start = np.asarray(RAMP.start_m)[None]
+def test_start_offset_is_along_the_path():
     theta = absent_theta(
         StartOffset(), RAMP, start_offset_object1=0.004, start_offset_object2=-0.002
     )
+    start = np.asarray(RAMP.start_path_m)[None]
     moved = (StartOffset().start(start, theta, RAMP) - start)[0]
-    along = np.array([np.cos(RAMP.angle_rad), -np.sin(RAMP.angle_rad)])
-    assert moved[0] == pytest.approx(0.004 * along)
-    assert moved[1] == pytest.approx([-0.002, 0.0])
+    assert moved == pytest.approx([0.004, -0.002])
 
 
 def test_release_instant_shifts_the_clock():

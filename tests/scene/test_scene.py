@@ -12,6 +12,7 @@ from galileo_jax.errors import InputError
 from galileo_jax.observation import Observation
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.model import Model
+from galileo_jax.rollout.motion import to_plane
 from galileo_jax.scene.scene import build_scene, extents
 from tests.ramp_model import HIT
 from tests.reference_ramp import solve
@@ -92,6 +93,20 @@ def test_objects_stand_where_they_are_seen(shape, angle, tmp_path):
     assert data.xpos[1:, [0, 2]] == pytest.approx(start, abs=PLACE_ATOL_M)
     # Sleds touch and do not press; nothing else touches.
     assert all(abs(contact.dist) < 1e-6 for contact in data.contact)
+
+
+@pytest.mark.parametrize("angle", [10.0, 40.0])
+def test_paths_are_the_places_along_ramp_and_table(angle, tmp_path):
+    sin, cos = math.sin(math.radians(angle)), math.cos(math.radians(angle))
+    centres = np.array([[-0.4 * cos, 0.4 * sin], [0.25, 0.02]])[..., None].repeat(3, axis=-1)
+    where = build_scene(clip(tmp_path, angle=angle), observed(centres)).surroundings
+    assert where.has_table and where.comes_down == (True, False)
+    path = np.asarray(where.start_path_m)
+    assert path[0] < 0 < path[1]
+    slopes = np.asarray(where.angle_rad), np.zeros(())
+    position, velocity = to_plane(path, np.ones(2), *slopes, where)
+    assert position == pytest.approx(np.asarray(where.start_m), abs=PLACE_ATOL_M)
+    assert velocity == pytest.approx(np.array([[cos, -sin], [1.0, 0.0]]))
 
 
 def test_sizes_and_gravity_reach_the_model(tmp_path):
