@@ -14,6 +14,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from galileo_jax.effects.effect import Effect
 from galileo_jax.errors import InputError
@@ -23,7 +24,25 @@ ENTRY_POINTS = "galileo_jax.effects"
 LIBRARY = "galileo_jax.effects.library"
 
 effect_registry = Registry(Effect, "effect", "effects")
-register = effect_registry.register
+
+EffectClass = TypeVar("EffectClass", bound=type[Effect])
+
+
+def register(effect: EffectClass) -> EffectClass:
+    """Class decorator: makes an effect known under its `name`.
+
+    Raises:
+      InputError: it is no `Effect`, has no name, or one that is taken.
+    """
+    if not (isinstance(effect, type) and issubclass(effect, Effect)):
+        raise InputError(f"@register: {effect!r} is no subclass of Effect")
+    if not isinstance(getattr(effect, "name", None), str):
+        raise InputError(f"@register: {effect.__name__} has no name")
+    try:
+        effect_registry.register(effect)  # pyright: ignore[reportArgumentType]
+    except ValueError as error:
+        raise InputError(str(error)) from error
+    return effect
 
 
 def load_library() -> None:
@@ -63,8 +82,8 @@ def effect_names() -> tuple[str, ...]:
 def make_effects(names: Sequence[str]) -> tuple[Effect, ...]:
     """The effects of these names, in the alphabetical order in which their hooks are applied.
 
-    The order of `names` does not matter, and one name always gives the same instance, so
-    that models with the same effects share compiled programs.
+    The order of `names` does not matter, so that models with the same effects are the same
+    model and share compiled programs.
 
     Raises:
       InputError: a name is unknown (the message lists the known) or given twice.
@@ -73,13 +92,8 @@ def make_effects(names: Sequence[str]) -> tuple[Effect, ...]:
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"effects: {name!r} is named twice")
-    return tuple(_the_one(name) for name in sorted(names))
-
-
-@functools.cache
-def _the_one(name: str) -> Effect:
     try:
-        return effect_registry.get(name)()
+        return tuple(effect_registry.get(name)() for name in sorted(names))
     except ValueError as error:
         raise InputError(str(error)) from error
 
@@ -110,5 +124,4 @@ def _load_resolved(path: Path) -> tuple[str, ...]:
 
 
 def _said(error: Exception) -> str:
-    known = isinstance(error, ValueError) and str(error).startswith("two effects")
-    return str(error) if known else f"{type(error).__name__}: {error}"
+    return str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"

@@ -3,7 +3,7 @@
 from galileo_jax.effects.effect import Array, Surroundings, Theta
 from galileo_jax.parameters import LogNormal, Parameter, Uniform
 
-EDGE_M = 0.0025  # from 12 to 88 % within 5 mm: smooth enough for the derivative by its place
+EDGE_M = 0.005  # tanh: at 2 m/s a step is 8 mm, and sharper edges would fall between steps
 PAST_FOOT_M, WITHOUT_FOOT_M = 0.3, 0.5  # how far along zones may begin
 LENGTH_PRIOR = LogNormal(median=0.1, sd=0.7)
 

@@ -2,7 +2,7 @@
 
     k(q) = max(0, k + friction_patch)  for  start < q < start + length
 
-with edges some 5 mm wide (tanh), q along the path, 0 at the foot.
+with smooth edges, tanh(q / 5 mm), q along the path, 0 at the foot.
 
 Source: Coulomb, Théorie des machines simples (1785), with a coefficient that depends on the
 place; the smooth edges are ours.

@@ -2,7 +2,7 @@
 
     F = -b v  for  start < q < start + length
 
-with edges some 5 mm wide (tanh). The speed lost is the same however fast the object comes:
+with smooth edges, tanh(q / 5 mm). The speed lost is the same however fast the object comes:
 dv/dq = -b / m.
 
 Source: Wiederick, Gauthier, Campbell, Rochon (1987), Magnetic braking: simple theory and
