@@ -8,7 +8,7 @@ ignorance the data have taken away.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -29,6 +29,10 @@ class Prior(Protocol):
         """Maps the parameter to `z`."""
         ...
 
+    def encode(self) -> tuple[int, float, float]:
+        """Kind and two numbers, as `PriorTable` holds them."""
+        ...
+
 
 @dataclass(frozen=True)
 class Normal:
@@ -45,6 +49,10 @@ class Normal:
         """`(theta - mean) / sd`."""
         return (theta - self.mean) / self.sd
 
+    def encode(self) -> tuple[int, float, float]:
+        """As `PriorTable` holds it."""
+        return 0, self.mean, self.sd
+
 
 @dataclass(frozen=True)
 class LogNormal:
@@ -60,6 +68,10 @@ class LogNormal:
     def inverse(self, theta: jax.Array) -> jax.Array:
         """`log(theta / median) / sd`."""
         return jnp.log(theta / self.median) / self.sd
+
+    def encode(self) -> tuple[int, float, float]:
+        """As `PriorTable` holds it."""
+        return 1, self.median, self.sd
 
 
 @dataclass(frozen=True)
@@ -78,6 +90,10 @@ class Uniform:
         share = (theta - self.low) / (self.high - self.low)
         return ndtri(jnp.clip(share, 1e-9, 1 - 1e-9))
 
+    def encode(self) -> tuple[int, float, float]:
+        """As `PriorTable` holds it."""
+        return 2, self.low, self.high
+
 
 @dataclass(frozen=True)
 class HalfNormal:
@@ -92,6 +108,10 @@ class HalfNormal:
     def inverse(self, theta: jax.Array) -> jax.Array:
         """The `z` of `theta`, finite at 0."""
         return ndtri(jnp.clip(2 * ndtr(theta / self.sd) - 1, 1e-9, 1 - 1e-9))
+
+    def encode(self) -> tuple[int, float, float]:
+        """As `PriorTable` holds it."""
+        return 3, self.sd, 0.0
 
 
 @dataclass(frozen=True)
@@ -116,6 +136,37 @@ class Parameter:
     role: Role = "main"
     step: float | None = 0.02
     per_clip: bool = False
+
+
+class PriorTable(NamedTuple):
+    """Priors as numbers: one compiled program then serves clips whose priors differ.
+
+    Attributes:
+      kind: `[parameter]`: 0 normal, 1 log-normal, 2 uniform, 3 half-normal.
+      a, b: `[parameter]`, the prior's numbers in the order of its fields.
+    """
+
+    kind: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+
+    @classmethod
+    def of(cls, parameters: Sequence[Parameter]) -> "PriorTable":
+        """The table of these parameters' priors."""
+        kind, a, b = zip(*(parameter.prior.encode() for parameter in parameters), strict=True)
+        return cls(np.array(kind), np.array(a, float), np.array(b, float))
+
+    def forward(self, z: jax.Array) -> jax.Array:
+        """As the function `forward`: `z` `[..., parameter]` to the parameters' units."""
+        share = ndtr(z)
+        half = ndtri(0.5 + 0.5 * jnp.clip(share, 0.0, 1 - 1e-12))
+        # Of a kind that is not chosen nothing may overflow: its derivative would be NaN.
+        grown = jnp.exp(jnp.where(self.kind == 1, self.b * z, 0.0))
+        return jnp.select(
+            [self.kind == 0, self.kind == 1, self.kind == 2],
+            [self.a + self.b * z, self.a * grown, self.a + (self.b - self.a) * share],
+            self.a * half,
+        )
 
 
 def forward(parameters: Sequence[Parameter], z: jax.Array) -> jax.Array:

@@ -16,6 +16,7 @@ import yaml
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
+from galileo_jax.effects.effect import Effect
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
 from galileo_jax.inference.posterior import Posterior
@@ -48,11 +49,16 @@ class Run:
     result: dict[str, Any]
 
 
-def make_problem(clip: Clip, observation: Observation, engine: str = "auto") -> Problem:
-    """The base model of a clip, ready for inference."""
+def make_problem(
+    clip: Clip,
+    observation: Observation,
+    engine: str = "auto",
+    effects: tuple[Effect, ...] = (),
+) -> Problem:
+    """A clip with a model of it: the base model, or one with effects."""
     scene = build_scene(clip, observation)
-    model = Model(scene, duration_s=float(observation.times_s[-1]))
-    return Problem(observation, model, make_engine(engine, model))
+    model = Model(scene, float(observation.times_s[-1]), effects)
+    return Problem(observation, model, make_engine(engine, model), clip.path.stem)
 
 
 def save_run(

@@ -121,6 +121,14 @@ class Effect:
 
     name: ClassVar[str]
 
+    def __eq__(self, other: object) -> bool:
+        """Effects have no state: two of a class are the same, also to a compiled program."""
+        return type(self) is type(other)
+
+    def __hash__(self) -> int:
+        """Of the class."""
+        return hash(type(self))
+
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The unknowns it brings, the strength first; empty where it has no place."""
         raise NotImplementedError

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.effects.effect import Effect, Surroundings
+from galileo_jax.rollout.chunks import in_chunks
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
 
@@ -24,6 +25,7 @@ MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few boun
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 TOUCH_M, TOUCH_M_S = 1e-9, 1e-9
 PAST_FOOT_M = 1e-12
+SIZES = (16, 64, 256)  # of compiled batches
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
 
 
@@ -59,11 +61,7 @@ class EngineRigid:
 
     def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
-        theta = np.asarray(theta, float)
-        missing = _batch_size(len(theta)) - len(theta)
-        padded = np.concatenate([theta, np.repeat(theta[:1], missing, axis=0)])
-        position, velocity = self.traceable(jnp.asarray(padded))
-        return np.asarray(position)[: len(theta)], np.asarray(velocity)[: len(theta)]
+        return in_chunks(SIZES, lambda part: self.traceable(jnp.asarray(part)), np.asarray(theta))
 
     def traceable(self, theta: jax.Array) -> tuple[jax.Array, jax.Array]:
         """`simulate` in JAX: can be jitted, vmapped and differentiated."""
@@ -79,11 +77,6 @@ class EngineRigid:
         )
         count = model.num_records + 1
         return position[..., :count], velocity[..., :count]
-
-
-def _batch_size(count: int) -> int:
-    """The next power of two, or multiple of 64: few programs serve all batches."""
-    return 1 << (count - 1).bit_length() if count <= 64 else -(-count // 64) * 64
 
 
 @functools.partial(jax.jit, static_argnums=(0, 1, 2, 3))

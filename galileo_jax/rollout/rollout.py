@@ -42,6 +42,30 @@ class Engine(Protocol):
         ...
 
 
+def in_jax(engine: Engine) -> Callable[[jax.Array], tuple[jax.Array, jax.Array]]:
+    """The engine as a JAX function of parameters `[batch, parameter]`, in their units.
+
+    It can be jitted and vmapped (one call of the engine for the whole batch); only the rigid
+    engine's can be differentiated.
+    """
+    if hasattr(engine, "traceable"):
+        return engine.traceable  # pyright: ignore
+    model = engine.model
+    shape = (len(model.scene.names), 2, model.num_records + 1)
+
+    def host(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        theta = np.asarray(theta)
+        position, velocity = engine.simulate(theta.reshape(-1, theta.shape[-1]))
+        lead = theta.shape[:-1]
+        return position.reshape(*lead, *shape), velocity.reshape(*lead, *shape)
+
+    def call(theta: jax.Array) -> tuple[jax.Array, jax.Array]:
+        result = jax.ShapeDtypeStruct((theta.shape[0], *shape), theta.dtype)
+        return jax.pure_callback(host, (result, result), theta, vmap_method="broadcast_all")
+
+    return call
+
+
 def make_rollout(engine: Engine) -> Rollout:
     """Returns `rollout(z, steps)`; `z`, `steps`: `[parameter]`.
 
@@ -53,22 +77,16 @@ def make_rollout(engine: Engine) -> Rollout:
     simulated = np.array([i for i, p in enumerate(parameters) if p.step is not None], int)
     shape = (len(model.scene.names), 2, model.num_records + 1)
 
-    def host(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        theta = np.asarray(theta)
-        position, velocity = engine.simulate(theta.reshape(-1, theta.shape[-1]))
-        lead = theta.shape[:-1]
-        return position.reshape(*lead, *shape), velocity.reshape(*lead, *shape)
-
-    def motion_in_jax(z: jax.Array, steps: jax.Array) -> tuple[jax.Array, jax.Array]:
-        del steps
-        position, velocity = engine.traceable(forward(parameters, z)[None])  # pyright: ignore
-        return position[0], velocity[0]
+    roll = in_jax(engine)
 
     def call(zs: jax.Array) -> tuple[jax.Array, jax.Array]:
         """`[batch, parameter]` to the two `[batch, object, 2, record + 1]`."""
-        theta = forward(parameters, zs)
-        result = jax.ShapeDtypeStruct((zs.shape[0], *shape), theta.dtype)
-        return jax.pure_callback(host, (result, result), theta, vmap_method="broadcast_all")
+        return roll(forward(parameters, zs))
+
+    def motion_in_jax(z: jax.Array, steps: jax.Array) -> tuple[jax.Array, jax.Array]:
+        del steps
+        position, velocity = call(z[None])
+        return position[0], velocity[0]
 
     @jax.custom_jvp
     def motion(z: jax.Array, steps: jax.Array) -> tuple[jax.Array, jax.Array]:

@@ -8,7 +8,7 @@ displacements count: for independent tracking errors that is the likelihood of t
 profile with its exact (tridiagonal) covariance, without losing the first frame's noise.
 """
 
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -80,7 +80,11 @@ class GaussianLikelihood:
         """Log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
         difference = jnp.asarray(data.observed_m) - predicted_m
         white = GaussianLikelihood.whiten(difference, noise_scale, data)
-        log_determinant = data.num_values * jnp.log(noise_scale**2) + jnp.sum(
-            jnp.log1p((data.gain / noise_scale) ** 2)
-        )
+        log_determinant = GaussianLikelihood.log_determinant(noise_scale, data)
         return -0.5 * (jnp.sum(white**2) + log_determinant)
+
+    @staticmethod
+    def log_determinant(noise_scale: Any, data: Whitening) -> Any:
+        """Of the covariance, up to the constant of the tracker's own."""
+        gain = jnp.log1p((data.gain / noise_scale) ** 2)
+        return data.num_values * jnp.log(noise_scale**2) + jnp.sum(gain)

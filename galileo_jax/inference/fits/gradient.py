@@ -1,28 +1,29 @@
-"""The gradient fit: multi-start Levenberg-Marquardt and a Laplace posterior.
+"""The gradient fit: Levenberg-Marquardt from many starts, for many hypotheses at once.
 
     1. Roll out `num_starts` scattered parameter vectors in one batch; keep the best few.
     2. Levenberg-Marquardt on  [ C^-1/2 (observed - predicted(z)) ; z ],  the prior being the
-       second block. One step:
-         a. one batch of rollouts gives the motion and its slopes (differences) at z;
+       second block, for all starts (and, in a diagnosis, all hypotheses) in one batch. A step:
+         a. one batch of rollouts gives the motions and their slopes (differences) at z;
          b. optimistix (Gauss-Newton) solves, for several dampings at once (vmapped), the
-            problem in which the motion is linear in z but clock and scale are exact;
+            problem in which the motion is linear in z but clock and camera are exact;
          c. one batch of rollouts tries all dampings; the best is taken.
     3. At the fit, with steps of half a posterior standard deviation: slopes, noise scale, one
        or two steps more.
-    4. Posterior: normal in z with covariance (J^T J + 1)^-1.
+    4. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace.
 
 Compiled code never holds a rollout: JAX's cache keeps it between runs, whichever the engine,
-and no solver step is spent on a trial that a batch can try beside others. A single far start
-ends in a side valley in most cases (the time of the collision decides which frames compare
-with which); the scattered starts cost one batch.
+and clips share it: all that differs between them is data. A single far start ends in a side
+valley in most cases (the time of the collision decides which frames compare with which); the
+scattered starts cost one batch.
 
 Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983.
 """
 
-from collections.abc import Callable
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -30,17 +31,21 @@ import numpy as np
 import optimistix as optx
 from scipy.special import ndtri
 
-from galileo_jax.inference.problem import FAILED, NOISE_SD, Problem
-from galileo_jax.parameters import forward, inverse
+from galileo_jax.effects.effect import Surroundings
+from galileo_jax.inference.problem import Problem, seen
+from galileo_jax.inference.trials import NOISE_SD, Trials
+from galileo_jax.parameters import PriorTable, inverse
+from galileo_jax.rollout.chunks import in_chunks
 from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 
 # Against the columns' sizes. Valleys are narrow (masses against friction): most of the range is
 # needed below 1e-2, where steps along them differ.
-DAMPINGS = np.array([0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
-# Of a parameter's coarse step: below it contacts are rough; above it a step may leave a plateau
-# (nothing moves) over its edge, and the plateau would look steep.
-SMALLEST_STEP, LARGEST_STEP = 0.2, 4.0
+DAMPINGS = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
+# Of a parameter's coarse step: below it MuJoCo's contacts are rough; above it a step may leave a
+# plateau (nothing moves) over its edge, and the plateau would look steep.
+SMALLEST_STEP, LARGEST_STEP = 0.02, 4.0
+FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
 
 
 @dataclass(frozen=True)
@@ -49,10 +54,9 @@ class Settings:
 
     Attributes:
       num_starts: scattered parameter vectors.
-      num_refined: of these, how many are refined at the most.
+      num_refined: of these, how many are refined.
       search_sd_m: noise assumed on the way to the fit: a camera that sees hundredths of a
         millimetre makes valleys too narrow to be met by scattered starts.
-      good_chi2_per_value: below it, at that noise, no further start is refined.
       max_steps: Levenberg-Marquardt steps from one start.
       max_polish_steps: with slopes at the posterior's scale.
       enough: stop where a step lowers chi2 / 2 by less.
@@ -63,7 +67,6 @@ class Settings:
     num_starts: int = 64
     num_refined: int = 4
     search_sd_m: float = 0.001
-    good_chi2_per_value: float = 2.0
     max_polish_steps: int = 20
     max_steps: int = 15
     enough: float = 0.5
@@ -80,23 +83,27 @@ class Code(StrEnum):
 
 @dataclass(frozen=True)
 class GradientFit:
-    """The best fit and the normal approximation round it.
+    """The best fit of one hypothesis and the normal approximation round it.
 
     Attributes:
-      z: `[parameter]`, the mode, noise scale last.
-      covariance: `[parameter, parameter]`, in z.
+      z: `[parameter]`, the mode, noise scales last; 0 where pinned.
+      free: `[parameter]`, which parameters the hypothesis has.
+      covariance: `[parameter, parameter]`, in z; 0 where pinned.
       chi2: sum of squared whitened residuals at the tracker's own noise (scale 1).
+      log_evidence: of the hypothesis, by Laplace, up to the data's constant.
       num_values: how many numbers were measured.
       steps: `[model parameter]`, the difference steps of the final Jacobian, in z.
-      jacobian: `[value, model parameter]`, d(whitened residual)/dz at the fit; values as in
-        `Problem.residuals`.
+      jacobian: `[value, model parameter]`, d(whitened residual)/dz at the fit, clip after clip;
+        values as in `Problem.whiten`; 0 where pinned.
       code: how it ended.
       stats: rollouts and steps it took.
     """
 
     z: np.ndarray
+    free: np.ndarray
     covariance: np.ndarray
     chi2: float
+    log_evidence: float
     num_values: int
     steps: np.ndarray
     jacobian: np.ndarray
@@ -104,240 +111,347 @@ class GradientFit:
     stats: dict[str, float]
 
 
+class Batch(NamedTuple):
+    """Points of several hypotheses.
+
+    Attributes:
+      z: `[point, model parameter]`, 0 where pinned.
+      free: `[point, model parameter]`.
+      noise: `[point, clip]`, noise scales.
+    """
+
+    z: np.ndarray
+    free: np.ndarray
+    noise: np.ndarray
+
+    def take(self, index: Any) -> "Batch":
+        """The points of an index array."""
+        return Batch(*(leaf[index] for leaf in self))
+
+
 class GradientFitter:
-    """The fit's compiled parts for one problem; `fit` may be called for many seeds."""
+    """Fits trials; `fit` may be called for many seeds and hypotheses."""
 
-    def __init__(self, problem: Problem, settings: Settings = Settings()):
-        self.problem, self.settings = problem, settings
+    def __init__(self, trials: Trials, settings: Settings = Settings()):
+        self.trials, self.settings = trials, settings
+        self._clips = tuple(_Clip.of(trials, c) for c in range(len(trials.problems)))
+        self._count = len(trials.model_parameters)
+        parameters = trials.model_parameters
+        self._is_simulated = np.array([p.step is not None for p in parameters])
         self._num_rollouts = 0
-        self._data = _padded(problem)
-        self._num_records = _up(problem.model.num_records + 1, RECORDS)
-        parameters = problem.model.parameters
-        record_times = np.arange(self._num_records) * problem.model.record_dt_s
-        self._simulated = np.array([i for i, p in enumerate(parameters) if p.step is not None])
-
-        def residuals(z, motion, noise_scale, data):
-            position, velocity = motion
-            # The drawn pitch is no measurement, so that none is made up here.
-            whole = Trajectory(record_times, position, velocity, position[:, 0])  # pyright: ignore
-            difference = data.whitening.observed_m - problem.measure(z, whole, data.times_s)
-            white = GaussianLikelihood.whiten(difference, noise_scale, data.whitening).reshape(-1)
-            return jnp.where(jnp.isfinite(white), white, FAILED)
-
-        def linear(u, motion, slopes):
-            return tuple(
-                value + jnp.tensordot(u, slope, axes=1)
-                for value, slope in zip(motion, slopes, strict=True)
-            )
-
-        def model_residuals(u, z, motion, slopes, noise_scale, data):
-            return residuals(z + u, linear(u, motion, slopes), noise_scale, data)
-
-        def solve(damping, size, z, motion, slopes, noise_scale, data):
-            def objective(u, _):
-                white = model_residuals(u, z, motion, slopes, noise_scale, data)
-                return jnp.concatenate([white, z + u, jnp.sqrt(damping) * size * u])
-
-            solver = optx.GaussNewton(rtol=1e-3, atol=1e-3)
-            start = jnp.zeros_like(z)
-            return z + optx.least_squares(objective, solver, start, max_steps=8, throw=False).value
-
-        self._forward = jax.jit(lambda z: forward(parameters, z))
-        self._residuals = jax.jit(jax.vmap(residuals, (0, 0, None, None)))
-        self._jacobian = jax.jit(
-            lambda z, *rest: jax.jacfwd(model_residuals)(jnp.zeros_like(z), z, *rest)
-        )
-        self._solve = jax.jit(jax.vmap(solve, (0, None, None, None, None, None, None)))
 
     def compile(self) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
-        z = np.zeros(len(self.problem.model.parameters))
-        shape = (len(self.problem.model.scene.names), 2, self._num_records)
-        motion = (np.zeros(shape), np.zeros(shape))
-        slopes = tuple(np.zeros((len(z), *shape)) for _ in range(2))
-        self._jacobian(z, motion, slopes, 1.0, self._data)
-        self._solve(DAMPINGS, np.ones(len(z)), z, motion, slopes, 1.0, self._data)
-        for size in (1, len(DAMPINGS), self.settings.num_starts):
-            batch = tuple(np.zeros((size, *shape)) for _ in range(2))
-            self._residuals(np.tile(z, (size, 1)), batch, 1.0, self._data)
+        free = self.trials.free(self.trials.all_effects)[: self._count]
+        points = self._batch(np.zeros((1, self._count)), free)
+        self._step(points, self.trials.coarse_steps[None], np.full(1, np.inf), False)
+        self._costs(self._batch(np.zeros((self.settings.num_starts, self._count)), free))
 
-    def fit(self, seed: int, on_stage: Callable[[str], None] = lambda _: None) -> GradientFit:
-        """Fits; the same seed gives the same result."""
-        settings = self.settings
+    def fit(
+        self,
+        seed: int,
+        on_stage: Callable[[str], None] = lambda _: None,
+        effects: Sequence[str] | None = None,
+    ) -> GradientFit:
+        """Fits from scattered starts; the same seed gives the same result.
+
+        Args:
+          seed: of the starts.
+          on_stage: told what is being done.
+          effects: names of the effects that are there; default: all of the models'.
+        """
         self._num_rollouts = 0
+        effects = self.trials.all_effects if effects is None else effects
+        free = self.trials.free(effects)[: self._count]
         on_stage("searching")
-        z, num_steps = self._search(seed)
+        starts = self._batch(self._starts(seed, free), free)
+        best = np.argsort(self._costs(starts))[: self.settings.num_refined]
+        found, costs, num_steps = self._search(starts.take(best))
         on_stage("refining")
-        steps, is_settled = self.problem.coarse_steps, False
-        noise_scale = self._search_noise
-        for _ in range(settings.max_polish_steps):
-            motion, slopes = self._slopes(z, steps)
-            jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale, self._data))
-            covariance = _covariance(jacobian)
-            residual = self._white(z, motion, noise_scale)
-            effective = len(z) - float(np.trace(covariance))
-            before = noise_scale
-            noise_scale = self._noise_scale(residual * noise_scale, effective)
-            steps = self._half_sd(covariance)
-            cost = self._cost_of(residual * before / noise_scale, z)
-            z, after = self._step(z, motion, slopes, noise_scale, cost)
-            num_steps += 1
-            if cost - after > settings.settled or abs(noise_scale / before - 1) > 0.1:
-                continue
-            # No damping helps. In a narrow, rough valley that is no proof: look along it.
-            tried = _along_soft_directions(z, covariance)
-            costs = self._costs(tried, noise_scale)
-            is_settled = bool(after - costs.min() < settings.settled)
-            if is_settled:
-                break
-            z = tried[np.argmin(costs)]
-        motion, slopes = self._slopes(z, steps)
-        jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale, self._data))
-        at_unit = self._white(z, motion, 1.0)
-        count = int(self.problem.data.num_values)
-        whole = np.zeros((len(z) + 1,) * 2)
-        whole[:-1, :-1] = _covariance(jacobian)
-        whole[-1, -1] = 1 / (1 + 2 * count * NOISE_SD**2)
-        code = Code.CONVERGED if is_settled else Code.STEP_LIMIT
-        if np.abs(at_unit).max() >= FAILED:
-            code = Code.FAILED
-        return GradientFit(
-            z=np.append(z, np.log(noise_scale) / NOISE_SD),
-            covariance=whole,
-            chi2=float(np.sum(at_unit**2)),
-            num_values=count,
-            steps=steps,
-            jacobian=self._unpadded(jacobian),
-            code=code,
-            stats={"num_steps": num_steps, "num_rollouts": self._num_rollouts},
-        )
+        return self._polish(found.take([np.argmin(costs)]), num_steps)[0]
 
-    def _search(self, seed: int) -> tuple[np.ndarray, int]:
-        """The best of the refined starts, z, and how many steps that took."""
-        settings = self.settings
-        starts = self._starts(seed)
-        noise = self._search_noise
-        cost = self._costs(starts, noise)
-        order = np.argsort(cost)
-        count = float(self.problem.data.num_values)
-        best, best_cost, num_steps = starts[order[0]], np.inf, 0
-        for i in order[: settings.num_refined]:
-            z, now = starts[i], float(cost[i])
-            for _ in range(settings.max_steps):
-                motion, slopes = self._slopes(z, self.problem.coarse_steps, is_central=False)
-                z, after = self._step(z, motion, slopes, noise, now)
-                num_steps += 1
-                if now - after < settings.enough:
-                    break
-                now = after
-            if now < best_cost:
-                best, best_cost = z, now
-            if best_cost < 0.5 * settings.good_chi2_per_value * count:
+    def fit_from(self, starts: np.ndarray, free: np.ndarray) -> list[GradientFit]:
+        """Fits several hypotheses at once, each from its own start.
+
+        Args:
+          starts: `[hypothesis, model parameter]`, z.
+          free: `[hypothesis, model parameter]`, see `Trials.free`.
+        """
+        self._num_rollouts = 0
+        found, _, num_steps = self._search(self._batch(starts, free))
+        return self._polish(found, num_steps)
+
+    def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
+        return self._costs(self._batch(z, free))
+
+    def _batch(self, z: np.ndarray, free: np.ndarray) -> Batch:
+        free = np.broadcast_to(free, z.shape)
+        noise = np.tile([clip.search_noise(self.settings) for clip in self._clips], (len(z), 1))
+        return Batch(np.where(free, z, 0.0), free, noise)
+
+    def _search(self, points: Batch) -> tuple[Batch, np.ndarray, int]:
+        """Levenberg-Marquardt with coarse slopes from every point."""
+        z, num_steps = points.z.copy(), 0
+        costs = self._costs(points)
+        active = np.arange(len(z))
+        for _ in range(self.settings.max_steps):
+            here = Batch(z, points.free, points.noise).take(active)
+            coarse = self.trials.coarse_steps[None]
+            moved, after = self._step(here, coarse, costs[active], False)[:2]
+            gain = costs[active] - after
+            z[active], costs[active] = moved, after
+            num_steps += 1
+            active = active[gain >= self.settings.enough]
+            if not active.size:
                 break
-        return best, num_steps
+        return Batch(z, points.free, points.noise), costs, num_steps
+
+    def _polish(self, points: Batch, num_steps: int) -> list[GradientFit]:
+        """Slopes at the posterior's scale, noise scales, and a look along the valleys."""
+        settings = self.settings
+        z, noise = points.z.copy(), points.noise.copy()
+        count = len(z)
+        steps = np.tile(self.trials.coarse_steps, (count, 1))
+        is_settled = np.zeros(count, bool)
+        active = np.arange(count)
+        for _ in range(settings.max_polish_steps):
+            here = Batch(z, points.free, noise).take(active)
+            motions, jacobian, white = self._slopes(here, steps[active], is_central=True)
+            covariance = _covariances(jacobian, here.free)
+            before = here.noise
+            scales = self._noise_scales(white, before, covariance, here.free)
+            steps[active] = self._half_sd(covariance)
+            noise[active] = scales
+            here = here._replace(noise=scales)
+            scaled = [w * (b / s)[:, None] for w, b, s in zip(white, before.T, scales.T, strict=True)]
+            cost = _cost(scaled, here.z)
+            moved, after = self._try(here, motions, jacobian, cost)
+            z[active] = moved
+            num_steps += 1
+            drifts = np.abs(scales / before - 1).max(axis=1) > 0.1
+            done = (cost - after < settings.settled) & ~drifts
+            if done.any():
+                # No damping helps. In a narrow, rough valley that is no proof: look along it.
+                chosen = np.flatnonzero(done)
+                there = here._replace(z=moved).take(chosen)
+                best, lowest = self._walk(there, covariance[chosen])
+                settled = after[chosen] - lowest < settings.settled
+                is_settled[active[chosen[settled]]] = True
+                z[active[chosen[~settled]]] = best[~settled]
+            active = active[~is_settled[active]]
+            if not active.size:
+                break
+        return self._finish(Batch(z, points.free, noise), steps, is_settled, num_steps)
+
+    def _finish(
+        self, points: Batch, steps: np.ndarray, is_settled: np.ndarray, num_steps: int
+    ) -> list[GradientFit]:
+        _, jacobian, white = self._slopes(points, steps, is_central=True)
+        covariance = _covariances(jacobian, points.free)
+        fits = []
+        for i in range(len(points.z)):
+            scale = points.noise[i]
+            chi2 = sum(float(np.sum((w[i] * s) ** 2)) for w, s in zip(white, scale, strict=True))
+            free = np.append(points.free[i], np.ones(len(scale), bool))
+            whole = np.zeros((len(free),) * 2)
+            whole[: self._count, : self._count] = covariance[i]
+            for c, clip in enumerate(self._clips):
+                at = self._count + c
+                whole[at, at] = 1 / (1 + 2 * float(clip.data.whitening.num_values) * NOISE_SD**2)
+            failed = max(float(np.abs(w[i]).max()) for w in white) >= FAILED
+            code = Code.CONVERGED if is_settled[i] else Code.STEP_LIMIT
+            at_unit = np.concatenate(
+                [clip.unpadded(j[i]) for clip, j in zip(self._clips, jacobian, strict=True)]
+            )
+            fits.append(
+                GradientFit(
+                    z=np.append(points.z[i], np.log(scale) / NOISE_SD),
+                    free=free,
+                    covariance=whole,
+                    chi2=chi2,
+                    log_evidence=self._log_evidence(i, points, white, whole),
+                    num_values=self.trials.num_values,
+                    steps=steps[i],
+                    jacobian=at_unit,
+                    code=Code.FAILED if failed else code,
+                    stats={"num_steps": num_steps, "num_rollouts": self._num_rollouts},
+                )
+            )
+        return fits
+
+    def _log_evidence(self, i: int, points: Batch, white: list, covariance: np.ndarray) -> float:
+        """Laplace: the density at the mode times the posterior's volume over the prior's."""
+        scale = points.noise[i]
+        total = -_cost([w[i : i + 1] for w in white], points.z[i : i + 1])[0]
+        total -= 0.5 * float(np.sum((np.log(scale) / NOISE_SD) ** 2))
+        for clip, s in zip(self._clips, scale, strict=True):
+            data = clip.data.whitening
+            total -= 0.5 * float(GaussianLikelihood.log_determinant(s, data))
+        free = np.append(points.free[i], np.ones(len(scale), bool))
+        return total + 0.5 * float(np.linalg.slogdet(covariance[np.ix_(free, free)])[1])
+
+    def _walk(self, points: Batch, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The best point along the softest directions, and its cost, of each."""
+        best, lowest = points.z.copy(), np.full(len(points.z), np.inf)
+        walks = [
+            _along_soft_directions(z, c, free)
+            for z, c, free in zip(points.z, covariance, points.free, strict=True)
+        ]
+        owner = np.concatenate([np.full(len(walk), i) for i, walk in enumerate(walks)])
+        costs = self._costs(points.take(owner)._replace(z=np.concatenate(walks)))
+        for i, walk in enumerate(walks):
+            own = costs[owner == i]
+            best[i], lowest[i] = walk[np.argmin(own)], own.min()
+        return best, lowest
 
     def _step(
-        self,
-        z: np.ndarray,
-        motion: tuple[np.ndarray, np.ndarray],
-        slopes: tuple[np.ndarray, np.ndarray],
-        noise_scale: float,
-        cost: float,
-    ) -> tuple[np.ndarray, float]:
-        """One Levenberg-Marquardt step: the best of all dampings (or none) and its cost."""
-        jacobian = np.asarray(self._jacobian(z, motion, slopes, noise_scale, self._data))
-        size = np.sqrt(1 + np.sum(jacobian**2, axis=0))
-        tried = np.asarray(self._solve(DAMPINGS, size, z, motion, slopes, noise_scale, self._data))
-        tried = np.where(np.isfinite(tried), tried, z)
-        costs = self._costs(tried, noise_scale)
-        best = int(np.argmin(costs))
-        return (tried[best], float(costs[best])) if costs[best] < cost else (z, cost)
+        self, points: Batch, steps: np.ndarray, costs: np.ndarray, is_central: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """One Levenberg-Marquardt step of every point: the best of all dampings, or none."""
+        steps = np.broadcast_to(steps, points.z.shape)
+        motions, jacobian, _ = self._slopes(points, steps, is_central)
+        return self._try(points, motions, jacobian, costs)
 
-    def _simulate(self, zs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        self._num_rollouts += len(zs)
-        theta = np.stack([np.asarray(self._forward(z)) for z in zs])
-        position, velocity = self.problem.engine.simulate(theta)
-        missing = [(0, 0)] * 3 + [(0, self._num_records - position.shape[-1])]
-        return np.pad(position, missing, mode="edge"), np.pad(velocity, missing)
-
-    def _costs(self, zs: np.ndarray, noise_scale: float) -> np.ndarray:
-        """chi2 / 2 and the prior's part, `[batch]`."""
-        white = np.asarray(self._residuals(zs, self._simulate(zs), noise_scale, self._data))
-        return 0.5 * (np.sum(white**2, axis=1) + np.sum(zs**2, axis=1))
-
-    @staticmethod
-    def _cost_of(white: np.ndarray, z: np.ndarray) -> float:
-        return 0.5 * float(np.sum(white**2) + np.sum(z**2))
-
-    def _white(
-        self, z: np.ndarray, motion: tuple[np.ndarray, np.ndarray], noise: float
-    ) -> np.ndarray:
-        return np.asarray(
-            self._residuals(z[None], tuple(m[None] for m in motion), noise, self._data)[0]
+    def _try(
+        self, points: Batch, motions: tuple, jacobian: list, costs: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        size = np.sqrt(1 + sum(np.sum(j**2, axis=1) for j in jacobian))
+        index = _free_index(points.free)
+        size = np.take_along_axis(np.pad(size, [(0, 0), (0, 1)]), index, axis=1)
+        kinds = tuple(clip.kind for clip in self._clips)
+        arrays = tuple(clip.arrays for clip in self._clips)
+        # [point, damping, parameter]
+        tried = in_chunks(
+            POINTS,
+            lambda *rows: _solve(kinds, DAMPINGS, *rows, arrays),
+            *(size, points.z, points.free, points.noise, index, motions),
         )
+        tried = np.where(np.isfinite(tried), tried, points.z[:, None])
+        count, dampings, _ = tried.shape
+        owner = np.repeat(np.arange(count), dampings)
+        after = self._costs(points.take(owner)._replace(z=tried.reshape(count * dampings, -1)))
+        after = after.reshape(count, dampings)
+        best = np.argmin(after, axis=1)
+        rows = np.arange(count)
+        lowest = after[rows, best]
+        improves = lowest < costs
+        z = np.where(improves[:, None], tried[rows, best], points.z)
+        return z, np.where(improves, lowest, costs)
 
-    def _slopes(self, z: np.ndarray, steps: np.ndarray, is_central: bool = True):
-        """The motion at z and its differences, `[model parameter, object, 2, record]`."""
-        h = np.asarray(steps)[self._simulated]
-        offsets = np.zeros((len(h), len(z)))
-        offsets[np.arange(len(h)), self._simulated] = h
-        batch = [z[None], z + offsets, *([z - offsets] if is_central else [])]
-        out = self._simulate(np.concatenate(batch))
-        slopes = []
-        for values in out:
-            low, width = (values[1 + len(h) :], 2 * h) if is_central else (values[:1], h)
-            slope = np.zeros((len(z), *values.shape[1:]))
-            slope[self._simulated] = (values[1 : 1 + len(h)] - low) / width[:, None, None, None]
-            slopes.append(slope)
-        return (out[0][0], out[1][0]), tuple(slopes)
+    def _simulate(self, clip: "_Clip", z: np.ndarray, free: np.ndarray, noise: np.ndarray):
+        """`[point, ...]`: parameters in their units, centres and velocities."""
+        self._num_rollouts += len(z)
+        theta = clip.theta(z, free)
+        position, velocity = clip.problem.engine.simulate(theta)
+        missing = [(0, 0)] * 3 + [(0, clip.num_records - position.shape[-1])]
+        return theta, np.pad(position, missing, mode="edge"), np.pad(velocity, missing)
 
-    @property
-    def _search_noise(self) -> float:
-        """The noise scale at which the tracker's median error is `search_sd_m`."""
-        observation = self.problem.observation
-        variance = np.trace(observation.covariance_m2, axis1=1, axis2=2)[observation.mask] / 2
-        if not variance.size:
-            return 1.0
-        return max(1.0, self.settings.search_sd_m / float(np.sqrt(np.median(variance))))
+    def _costs(self, points: Batch) -> np.ndarray:
+        """chi2 / 2 and the prior's part, `[point]`."""
+        white = []
+        for c, clip in enumerate(self._clips):
+            theta, position, velocity = self._simulate(clip, *points)
+            white.append(
+                in_chunks(
+                    MOTIONS,
+                    lambda *rows, clip=clip: _white_batch(clip.kind, *rows, clip.data, clip.scene),
+                    *(theta, position, velocity, points.noise[:, c]),
+                )
+            )
+        return _cost(white, points.z)
 
-    def _noise_scale(self, residual: np.ndarray, effective: float) -> float:
-        """The noise scale that residuals (in units of the tracker's noise) ask for."""
-        count = float(self.problem.data.num_values)
+    def _slopes(self, points: Batch, steps: np.ndarray, is_central: bool):
+        """Motions with their slopes, Jacobians and residuals, clip by clip.
+
+        Returns:
+          For each clip: (position, velocity, slope of position, slope of velocity), the slopes
+          `[point, free parameter, object, 2, record]`; `[point, value, model parameter]`; and
+          `[point, value]`.
+        """
+        index = _free_index(points.free)
+        padded = np.pad(self._is_simulated, (0, 1))
+        signs = (1.0, -1.0) if is_central else (1.0,)
+        motions, jacobians, whites = [], [], []
+        for c, clip in enumerate(self._clips):
+            own = np.pad(np.isin(np.arange(self._count), clip.column), (0, 1))
+            point, slot = np.nonzero(padded[index] & own[index])
+            which = index[point, slot]
+            h = steps[point, which]
+            offsets = np.zeros((len(point), self._count))
+            offsets[np.arange(len(point)), which] = h
+            owner = np.concatenate([np.arange(len(points.z)), *([point] * len(signs))])
+            moved = points.z[owner]
+            moved[len(points.z) :] += np.concatenate([s * offsets for s in signs])
+            _, *out = self._simulate(clip, moved, points.free[owner], points.noise[owner])
+            slopes = []
+            for values in out:
+                base, rest = values[: len(points.z)], values[len(points.z) :]
+                low = rest[len(point) :] if is_central else base[point]
+                width = (2 * h if is_central else h)[:, None, None, None]
+                slope = np.zeros((*index.shape, *values.shape[1:]))
+                slope[point, slot] = (rest[: len(point)] - low) / width
+                slopes.append(slope)
+            motion = (out[0][: len(points.z)], out[1][: len(points.z)], *slopes)
+            white, jacobian = in_chunks(
+                POINTS,
+                lambda *rows, clip=clip: _jacobian_batch(clip.kind, *rows, clip.arrays),
+                *(points.z, points.free, points.noise[:, c], index, *motion),
+            )
+            whites.append(white)
+            full = np.zeros((len(points.z), white.shape[1], self._count + 1))
+            np.put_along_axis(full, index[:, None], jacobian, axis=2)
+            jacobians.append(full[..., :-1])
+            motions.append(motion)
+        return tuple(motions), jacobians, whites
+
+    def _noise_scales(
+        self, white: list, noise: np.ndarray, covariance: np.ndarray, free: np.ndarray
+    ) -> np.ndarray:
+        """The noise scales that residuals ask for, `[point, clip]`."""
+        used = free.sum(axis=1) - np.trace(covariance, axis1=1, axis2=2)
         wide = 1 / (2 * NOISE_SD**2)  # the prior, at 1, is worth this many values
-        total = float(np.sum(residual**2))
-        return float(np.sqrt((total + wide) / (max(count - effective, 1.0) + wide)))
-
-    def _unpadded(self, jacobian: np.ndarray) -> np.ndarray:
-        """Rows of real frames only."""
-        shape = self._data.whitening.observed_m.shape
-        rows = jacobian.reshape(*shape, -1)[:, :, : len(self.problem.observation.times_s)]
-        return rows.reshape(-1, jacobian.shape[1])
+        scales = np.empty_like(noise)
+        for c, clip in enumerate(self._clips):
+            count = float(clip.data.whitening.num_values)
+            share = used * count / self.trials.num_values
+            total = np.sum((white[c] * noise[:, c : c + 1]) ** 2, axis=1)
+            scales[:, c] = np.sqrt((total + wide) / (np.maximum(count - share, 1.0) + wide))
+        return scales
 
     def _half_sd(self, covariance: np.ndarray) -> np.ndarray:
         """Difference steps in z: half the posterior's sd, within what slopes are good for."""
-        coarse = self.problem.coarse_steps
-        half = 0.5 * np.sqrt(np.diag(covariance))
+        coarse = self.trials.coarse_steps
+        half = 0.5 * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         return np.clip(half, SMALLEST_STEP * coarse, LARGEST_STEP * coarse)
 
-    def _starts(self, seed: int) -> np.ndarray:
-        """Scattered starts in z: main parameters in a Latin hypercube, all others at rest."""
-        parameters = self.problem.model.parameters
+    def _starts(self, seed: int, free: np.ndarray) -> np.ndarray:
+        """Scattered starts in z: all but nuisances in a Latin hypercube, those at rest."""
+        parameters = self.trials.model_parameters
         count = self.settings.num_starts
         rest = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
-        rest = np.clip(rest, -1.0, 1.0)  # an absent half-normal has no slope
-        free = [i for i, p in enumerate(parameters) if p.role == "main"]
+        rest = np.clip(rest, -1.0, 1.0)  # an absent positive strength is infinitely far
+        scattered = [i for i, p in enumerate(parameters) if p.role != "nuisance" and free[i]]
         generator = np.random.default_rng(seed)
-        ranks = np.stack([generator.permutation(count) for _ in free], axis=1)
+        ranks = np.stack([generator.permutation(count) for _ in scattered], axis=1)
         share = (ranks + generator.random(ranks.shape)) / count
         starts = np.tile(rest, (count, 1))
-        angle = self.problem.model.scene.surroundings.angle_rad
-        for column, i in enumerate(free):
+        angle = self.trials.problems[0].model.scene.surroundings.angle_rad
+        for column, i in enumerate(scattered):
             u = share[:, column]
-            if parameters[i].name.startswith("k"):
+            if parameters[i].name.startswith("k") and parameters[i].role == "main":
                 # Above tan(angle) nothing slides and every start looks alike.
                 u = u * min(np.tan(angle) if parameters[i].name == "k1" else 0.5, 0.98) + 0.01
             starts[:, i] = ndtri(np.clip(u, 0.01, 0.99))
         return starts
+
+
+class Kind(NamedTuple):
+    """What programs are compiled for: hashable, the same for many clips."""
+
+    effects: tuple
+    names: tuple[str, ...]
+    record_dt_s: float
 
 
 class Padded(NamedTuple):
@@ -352,11 +466,160 @@ class Padded(NamedTuple):
     whitening: Whitening
 
 
-FRAMES, MODES, RECORDS = 64, 32, 512  # sizes are rounded up to multiples of these
+class ClipArrays(NamedTuple):
+    """What compiled code needs of a clip, traced."""
+
+    data: Padded
+    scene: Surroundings
+    priors: PriorTable
+    absent: np.ndarray
+    column: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Clip:
+    """One clip of the trials, ready for compiled code."""
+
+    problem: Problem
+    column: np.ndarray
+    priors: PriorTable
+    absent: np.ndarray
+    data: Padded
+    num_records: int
+
+    @classmethod
+    def of(cls, trials: Trials, index: int) -> "_Clip":
+        problem, column = trials.problems[index], trials.columns[index]
+        parameters = problem.parameters
+        return cls(
+            problem=problem,
+            column=column,
+            priors=PriorTable.of(parameters),
+            absent=np.array([p.absent for p in parameters]),
+            data=_padded(problem),
+            num_records=_up(problem.model.num_records + 1, RECORDS),
+        )
+
+    @property
+    def kind(self) -> Kind:
+        model = self.problem.model
+        return Kind(model.effects + model.nuisances, model.names, model.record_dt_s)
+
+    @property
+    def scene(self) -> Surroundings:
+        return self.problem.model.scene.surroundings
+
+    @property
+    def arrays(self) -> ClipArrays:
+        return ClipArrays(self.data, self.scene, self.priors, self.absent, self.column)
+
+    def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """`[point, joint parameter]` to this clip's parameters in their units."""
+        own, is_free = z[:, self.column], free[:, self.column]
+        theta = in_chunks(MOTIONS, lambda rows: _forward(self.priors, rows), own)
+        return np.where(is_free, theta, self.absent)
+
+    def search_noise(self, settings: Settings) -> float:
+        """The noise scale at which the tracker's median error is `search_sd_m`."""
+        observation = self.problem.observation
+        variance = np.trace(observation.covariance_m2, axis1=1, axis2=2)[observation.mask] / 2
+        if not variance.size:
+            return 1.0
+        return max(1.0, settings.search_sd_m / float(np.sqrt(np.median(variance))))
+
+    def unpadded(self, jacobian: np.ndarray) -> np.ndarray:
+        """Rows of real frames only."""
+        shape = self.data.whitening.observed_m.shape
+        frames = len(self.problem.observation.times_s)
+        rows = jacobian.reshape(*shape, -1)[:, :, :frames]
+        return rows.reshape(-1, jacobian.shape[1])
+
+
+def _white(kind: Kind, theta, position, velocity, noise, data: Padded, scene):
+    """Whitened residuals of one motion, `[value]`."""
+    times = jnp.arange(position.shape[-1]) * kind.record_dt_s
+    # The drawn pitch is no measurement, so that none is made up here.
+    motion = Trajectory(times, position, velocity, position[:, 0])
+    predicted = seen(kind.effects, kind.names, theta, motion, data.times_s, scene)
+    difference = data.whitening.observed_m - predicted
+    white = GaussianLikelihood.whiten(difference, noise, data.whitening).reshape(-1)
+    return jnp.where(jnp.isfinite(white), white, FAILED)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _white_batch(kind: Kind, theta, position, velocity, noise, data, scene):
+    return jax.vmap(lambda t, p, v, n: _white(kind, t, p, v, n, data, scene))(
+        theta, position, velocity, noise
+    )
+
+
+def _white_near(kind: Kind, u, z, free, index, noise, motion, clip: ClipArrays):
+    """Residuals at z + u, with the motion linear in u `[free parameter]`; z of all clips."""
+    moved = z.at[index].add(u, mode="drop")
+    own = moved[clip.column]
+    theta = jnp.where(free[clip.column], clip.priors.forward(own), clip.absent)
+    position, velocity, position_slope, velocity_slope = motion
+    position = position + jnp.tensordot(u, position_slope, axes=1)
+    velocity = velocity + jnp.tensordot(u, velocity_slope, axes=1)
+    return _white(kind, theta, position, velocity, noise, clip.data, clip.scene)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _jacobian_batch(kind: Kind, z, free, noise, index, p, v, dp, dv, clip):
+    def one(z, free, noise, index, *motion):
+        def residuals(u):
+            return _white_near(kind, u, z, free, index, noise, motion, clip)
+
+        zero = jnp.zeros(index.shape[0])
+        jacobian = jax.jacfwd(residuals)(zero)
+        # A dummy entry of the index moves nothing; its column must not look like one that does.
+        return residuals(zero), jnp.where(index < z.shape[0], jacobian, 0.0)
+
+    return jax.vmap(one)(z, free, noise, index, p, v, dp, dv)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _solve(kinds, dampings, size, z, free, noise, index, motions, clips):
+    """The damped problems' solutions, `[point, damping, model parameter]`."""
+    solver = optx.GaussNewton(rtol=1e-3, atol=1e-3)
+
+    def one(damping, size, z, free, noise, index, motions):
+        here = jnp.where(index < z.shape[0], z.at[index].get(mode="fill", fill_value=0.0), 0.0)
+
+        def objective(u, _):
+            white = [
+                _white_near(kind, u, z, free, index, noise[c], motion, clip)
+                for c, (kind, motion, clip) in enumerate(zip(kinds, motions, clips, strict=True))
+            ]
+            return jnp.concatenate([*white, here + u, jnp.sqrt(damping) * size * u])
+
+        start = jnp.zeros(index.shape[0])
+        found = optx.least_squares(objective, solver, start, max_steps=8, throw=False).value
+        return z.at[index].add(found, mode="drop")
+
+    for_dampings = jax.vmap(one, (0, *[None] * 6))
+    return jax.vmap(for_dampings, (None, *[0] * 6))(dampings, size, z, free, noise, index, motions)
+
+
+_forward = jax.jit(lambda priors, z: priors.forward(z))
+
+# Sizes are rounded up to these (or multiples of them), so that few programs serve all clips.
+FRAMES, MODES, RECORDS, FREE = 64, 64, 512, 4
+POINTS, MOTIONS = (4, 16), (16, 64, 256)
 
 
 def _up(size: int, multiple: int) -> int:
     return -(-size // multiple) * multiple
+
+
+def _free_index(free: np.ndarray) -> np.ndarray:
+    """Where each point's free parameters stand, `[point, free]`; the count of all = none."""
+    width = _up(int(free.sum(axis=1).max()), FREE)
+    index = np.full((len(free), width), free.shape[1])
+    for row, own in zip(index, free, strict=True):
+        found = np.flatnonzero(own)
+        row[: len(found)] = found
+    return index
 
 
 def _padded(problem: Problem) -> Padded:
@@ -374,14 +637,31 @@ def _padded(problem: Problem) -> Padded:
     return Padded(np.pad(times, (0, frames), mode="edge"), whitening)
 
 
-def _along_soft_directions(z: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def _cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
+    return 0.5 * (sum(np.sum(w**2, axis=1) for w in white) + np.sum(z**2, axis=1))
+
+
+def _covariances(jacobian: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
+    """Laplace covariances of z, `[point, parameter, parameter]`; 0 where pinned."""
+    normal = sum(np.einsum("bvi,bvj->bij", j, j) for j in jacobian)
+    covariance = np.zeros(normal.shape)
+    for i, own in enumerate(free):
+        block = np.ix_(own, own)
+        covariance[i][block] = np.linalg.inv(normal[i][block] + np.eye(int(own.sum())))
+    return covariance
+
+
+def _along_soft_directions(z: np.ndarray, covariance: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Points one and three sd off z along the three softest directions the data determine."""
-    variance, vectors = np.linalg.eigh(covariance)
+    own = np.flatnonzero(free)
+    variance, vectors = np.linalg.eigh(covariance[np.ix_(own, own)])
     soft = [i for i in np.argsort(-variance) if variance[i] < 0.5][:3]
-    offsets = [c * np.sqrt(variance[i]) * vectors[:, i] for i in soft for c in (-3, -1, 1, 3)]
-    return z + np.array(offsets).reshape(-1, len(z)) if offsets else z[None]
-
-
-def _covariance(jacobian: np.ndarray) -> np.ndarray:
-    """The Laplace covariance of z, [parameter, parameter], prior included."""
-    return np.linalg.inv(jacobian.T @ jacobian + np.eye(jacobian.shape[1]))
+    if not soft:
+        return z[None]
+    walks = []
+    for i in soft:
+        for c in (-3, -1, 1, 3):
+            moved = z.copy()
+            moved[own] += c * np.sqrt(variance[i]) * vectors[:, i]
+            walks.append(moved)
+    return np.stack(walks)
