@@ -106,6 +106,7 @@ def _write_clip(
     content = _clip_content(call, out.name, truth, declared, camera, frames, faults)
     record = {
         "name": out.stem,
+        "series": call.out.stem if call.series else None,
         **truth_record(truth, declared, motion, frames),
         "pixels_per_metre_true": camera.pixels_per_metre,
         "pixels_per_metre_declared": content.get("pixels_per_metre", camera.pixels_per_metre),

@@ -1,0 +1,127 @@
+"""The exam's cases: a grid of our own, or clips that lie in a folder."""
+
+import contextlib
+import io
+import itertools
+import json
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from galileo_jax import command, simulate
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.track_csv import write_observation_csv
+from galileo_jax.errors import InputError
+from galileo_jax.files import write_text
+from galileo_jax.observation import observe
+from galileo_jax.tracking import track_clip
+
+EXOTIC_FILE = Path(__file__).with_name("exotic_effects.py")
+EXOTICS = ("exotic_bump", "exotic_gust", "exotic_heating", "exotic_ripple")
+ANGLES_DEG = (20.0, 10.0, 15.0)
+
+
+@dataclass(frozen=True)
+class Case:
+    """Clips that are diagnosed together.
+
+    Attributes:
+      name: unique.
+      yamls: the clips' yamls, a NAME.truth.json beside each.
+      effect: what is hidden in them, as the truth says it.
+      strength: of our own clips, 0 to 1; None where it is not known or nothing is hidden.
+      recipe: the call of `simulate` that makes the clips; empty if they are there.
+    """
+
+    name: str
+    yamls: tuple[Path, ...]
+    effect: str
+    strength: float | None = None
+    recipe: tuple[str, ...] = ()
+
+
+def grid(
+    folder: Path,
+    effects: Sequence[str],
+    strengths: Sequence[float],
+    seeds: int,
+    num_none: int,
+    noise_m: float,
+    fps: float,
+    series: int | None,
+) -> Iterator[Case]:
+    """Effects x strengths x seeds (library's and exotic ones), then clips without an effect.
+
+    Angles go round with the seed. Every case has a seed of its own, so that a case is the same
+    in a smaller grid.
+    """
+    hidden = itertools.product((*effects, *EXOTICS), strengths, range(seeds))
+    cells = [(effect, strength, seed) for effect, strength, seed in hidden]
+    for effect, strength, seed in [*cells, *(("none", None, i) for i in range(num_none))]:
+        level = "" if strength is None else f"_{round(100 * strength)}"
+        name = f"{effect}{level}_{seed}"
+        call = ["--out", str(folder / f"{name}.csv"), "--track-only", "--solver", "fine"]
+        call += [
+            "--faults",
+            "--seed",
+            str(zlib.crc32(name.encode())),
+            "--angle",
+            str(ANGLES_DEG[seed % 3]),
+        ]
+        call += ["--track-noise", repr(noise_m), "--fps", repr(fps)]
+        if series:
+            call += ["--series", str(series)]
+        if strength is not None:
+            call += ["--effect", effect, "--strength", repr(strength)]
+        if effect in EXOTICS:
+            call += ["--effects-from", str(EXOTIC_FILE)]
+        names = [f"{name}_{i + 1}" for i in range(series)] if series else [name]
+        yamls = tuple(folder / f"{each}.yaml" for each in names)
+        yield Case(name, yamls, effect, strength, tuple(call))
+
+
+def make_clips(recipe: Sequence[str]) -> int:
+    """Runs `simulate`, in a process of its own: exotic effects stay out of the diagnosis's."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        return command.run(simulate.main, recipe)
+
+
+def folder_cases(folder: Path, series: int | None, only: str) -> list[Case]:
+    """The clips with a truth in a folder; with `series` those of a series, so many together.
+
+    Raises:
+      InputError: there is none.
+    """
+    groups: dict[str, list[tuple[Path, dict[str, Any]]]] = {}
+    for path in sorted(folder.glob(f"{only}.truth.json")):
+        truth, name = json.loads(path.read_text()), path.name.removesuffix(".truth.json")
+        group = truth.get("series") if series else name
+        if group:
+            groups.setdefault(str(group), []).append((path.with_name(f"{name}.yaml"), truth))
+    cases = [
+        Case(name, tuple(path for path, _ in clips[:series]), clips[0][1]["effect"])
+        for name, clips in groups.items()
+        if not series or len(clips) >= series
+    ]
+    if not cases:
+        raise InputError(f"{folder}: no {only}.truth.json there" + (" of a series" * bool(series)))
+    return cases
+
+
+def tracked(path: Path, cache: Path) -> Path:
+    """The yaml of the clip's csv track in the cache; a video is tracked where there is none."""
+    kept = cache / path.name
+    if not kept.is_file():
+        clip = load_clip(path)
+        if clip.video is None:
+            return path
+        write_observation_csv(kept.with_suffix(".csv"), observe(clip, track_clip(clip)))
+        content = yaml.safe_load(path.read_text())
+        del content["video"]
+        content["track"] = f"{kept.stem}.csv"
+        write_text(kept, yaml.safe_dump(content, sort_keys=False))
+    return kept
