@@ -58,7 +58,7 @@ def make_run(folder: Path, experiment: Experiment, clip_s: float) -> Run:
     declared = {"track": "oracle.csv", "scenario": "ramp", "fps": 30.0, "ramp_angle_deg": 20.0}
     (folder / "oracle.yaml").write_text(yaml.safe_dump({**declared, "objects": objects}))
     clip = load_clip(folder / "oracle.yaml")
-    problem = make_problem(clip, observation, "c")
+    problem = make_problem(clip, observation, "rigid")
     truth = {"m1": experiment.mass_kg[0], "m2": experiment.mass_kg[1]}
     truth |= {"k1": experiment.friction[0], "k2": experiment.friction[1]}
     best = np.array([truth.get(p.name, p.absent) for p in problem.parameters])
@@ -82,7 +82,7 @@ def make_run(folder: Path, experiment: Experiment, clip_s: float) -> Run:
         method="mh",
         seed=3,
         timings_s={"track": 0.0, "compile": 1.0, "fit": 2.0},
-        notes={"engine": "c"},
+        notes={"engine": "rigid"},
     )
     save_run(folder / "run", clip, observation, posterior, result)
     return Run(folder / "run", clip, problem, posterior, result)
