@@ -12,9 +12,11 @@ from tests.effects.motion import ALONE, LONG_RAMP, LONG_TABLE, film, move, slide
 from tests.ramp_model import HIT, SMOOTH, make_surroundings
 
 EXACT = 1e-9  # the midpoint rule is exact for constant forces
-# Midpoint steps of 1/240 s for forces that change with speed: second order, measured 3e-5.
+# Midpoint steps of 1/240 s for forces that change with speed: second order, 1e-5 for air drag.
 MIDPOINT_M_S = 1e-4
-ZONE_RTOL = 2e-3  # a zone of 0.1 m, crossed in steps of some millimetres
+# A zone whose edges are 5 mm, crossed in steps of up to 9 mm: the worst of 600 draws was off by
+# 4 mm/s of 1.4 m/s (brake), 0.002 J/kg of 0.48 (patch).
+ZONE_RTOL, ZONE_ATOL = 5e-3, 2e-3
 G, ANGLE, (M1, M2) = HIT.gravity, HIT.angle_rad, HIT.mass_kg
 
 
@@ -185,7 +187,7 @@ def test_friction_patch_takes_its_work(release, rougher):
     had, work = 0.5 * speed[0] ** 2, rougher * G * 0.1
     if work < 0.9 * had:
         assert x[-1] > 0.35
-        assert had - 0.5 * speed[-1] ** 2 == pytest.approx(work, rel=ZONE_RTOL, abs=1e-3)
+        assert had - 0.5 * speed[-1] ** 2 == pytest.approx(work, rel=ZONE_RTOL, abs=ZONE_ATOL)
     elif work > 1.1 * had:
         assert x[-1] < CORNER_M + 0.31 and speed[-1] == 0.0
 
@@ -222,7 +224,7 @@ def test_magnetic_brake_takes_the_same_from_every_speed(release, b, mass):
     lost = b * 0.1 / mass
     if lost < 0.8 * speed[0]:
         assert x[-1] > 0.35
-        assert speed[0] - speed[-1] == pytest.approx(lost, rel=ZONE_RTOL, abs=1e-3)
+        assert speed[0] - speed[-1] == pytest.approx(lost, rel=ZONE_RTOL, abs=ZONE_ATOL)
     elif lost > 1.1 * speed[0]:
         assert x[-1] < CORNER_M + 0.31
 
@@ -234,4 +236,4 @@ def test_spring_tether_is_harmonic(stiffness):
     omega = math.sqrt(stiffness / M1)
     amplitude = G * math.sin(ANGLE) / omega**2
     expected = amplitude * (1 - np.cos(omega * motion.times_s))
-    assert motion.gone_m[0] == pytest.approx(expected, abs=2e-3 * amplitude)
+    assert motion.gone_m[0] == pytest.approx(expected, abs=5e-4 * amplitude)
