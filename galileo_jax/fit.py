@@ -9,17 +9,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from galileo_jax import command, jax_cache
-from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
-from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.errors import InputError
-from galileo_jax.observation import Observation, observe
+from galileo_jax.files import write_json
+from galileo_jax.measured import Measured, load_clips, measure
 from galileo_jax.rollout.engine_names import ENGINES
+
+if TYPE_CHECKING:
+    from galileo_jax.effects.effect import Effect
+    from galileo_jax.inference.fits.gradient import GradientFit
+    from galileo_jax.inference.posterior import Posterior
+    from galileo_jax.inference.trials import Trials
 
 BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
@@ -28,42 +33,44 @@ PRESETS = ("galileo", "thesis")
 
 
 def main(argv: Sequence[str]) -> int | None:
-    """Fits one clip and writes a run."""
+    """Fits a clip, or several trials together, and writes a run."""
     call = _parser().parse_args(argv)
     if call.method == "cnn":
         raise InputError("--method: cnn is not there yet; known: grad, mh")
-    if len(call.clips) > 1:
-        raise InputError(
-            f"{call.clips[1]}: one clip at a time so far; joint fits of several are not there yet"
-        )
-    if call.effects:
-        raise InputError(f"--effects: {call.effects!r}: the library of effects is not there yet")
-    path = Path(call.clips[0])
-    clip = load_clip(path, pixels_per_metre=call.pixels_per_metre)
-    shown = command.console()
-    for warning in clip.warnings:
-        shown.print(f"warning: {warning}")
-    out = Path(call.out) if call.out else Path("runs") / clip.path.stem
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out: {out} is a file; a folder expected")
-    if clip.scenario == "ramp" and clip.pixels_per_metre is None and clip.video is not None:
-        raise InputError(
-            f"{clip.path}: pixels_per_metre: null; the scale of a ramp clip cannot be told from "
-            "its motion; set it with `galileo label --scale X1 Y1 X2 Y2 METRES` or "
-            "--pixels-per-metre"
-        )
-    truth = read_truth(clip)
+    clips = load_clips(call.clips, call.pixels_per_metre)
+    out = out_folder(call, clips)
+    if call.preset == "thesis" and len(clips) > 1:
+        raise InputError("--preset thesis: one clip expected")
+    truth = read_truth(clips[0])
     _import_ahead()
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
-    observation = _observe(clip)
+    measured = [measure(clip) for clip in clips]
     timings["track"] = time.perf_counter() - began
-    result = fit_clip(clip, observation, call, out, timings)
+    result = fit_clips(measured, call, out, timings)
     print(_table(result, truth))
     for warning in result.get("warnings", []):
-        shown.print(f"warning: {warning}")
-    shown.print(f"{out}/result.json, {out}/report.html")
+        command.console().print(f"warning: {warning}")
+    pages = [out] if len(clips) == 1 else [out / one.name for one in measured]
+    command.console().print(", ".join([f"{out}/result.json", *(f"{p}/report.html" for p in pages)]))
     return None
+
+
+def out_folder(call: argparse.Namespace, clips: Sequence[Clip]) -> Path:
+    """Where a call's results go: `--out`, or runs/ and the clips' names."""
+    out = Path(call.out) if call.out else Path("runs") / "+".join(clip.path.stem for clip in clips)
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out: {out} is a file; a folder expected")
+    return out
+
+
+def chosen_effects(call: argparse.Namespace) -> "tuple[Effect, ...]":
+    """The effects that `--effects` and `--effects-from` name."""
+    from galileo_jax.effects.registry import load_file, make_effects
+
+    for path in call.effects_from:
+        load_file(path)
+    return make_effects([name for name in call.effects.split(",") if name])
 
 
 def _import_ahead() -> None:
@@ -81,14 +88,13 @@ def _import_ahead() -> None:
     threading.Thread(target=load, daemon=True).start()
 
 
-def fit_clip(
-    clip: Clip,
-    observation: Observation,
-    call: argparse.Namespace,
-    out: Path,
-    timings: dict[str, float],
+def fit_clips(
+    measured: Sequence[Measured], call: argparse.Namespace, out: Path, timings: dict[str, float]
 ) -> dict[str, Any]:
-    """Fits a tracked clip, writes the run and its report, and returns result.json."""
+    """Fits tracked clips, writes the run and its reports, and returns result.json.
+
+    Of several clips each has a run of its own below `out`, with the joint posterior.
+    """
     import jax
 
     jax.config.update("jax_enable_x64", True)
@@ -97,48 +103,66 @@ def fit_clip(
     from galileo_jax.inference.laplace import laplace_posterior
     from galileo_jax.inference.result import make_result
     from galileo_jax.report import write_report
-    from galileo_jax.run import Run, make_problem, save_run
+    from galileo_jax.run import Run, make_trials, save_run
 
-    problem = make_problem(clip, observation, call.engine)
+    clips, observations = [m.clip for m in measured], [m.observation for m in measured]
+    trials = make_trials(clips, observations, call.engine, chosen_effects(call))
     began = time.perf_counter()
-    fitter = GradientFitter(problem)
+    fitter = GradientFitter(trials)
     fitter.compile()
     timings["compile"] = time.perf_counter() - began
     began = time.perf_counter()
     with command.console().status("fitting") as status:
         fit = fitter.fit(call.seed, on_stage=status.update)
     if fit.code is Code.FAILED:
-        raise InputError(f"{clip.path}: {fit.code}")
-    posterior = laplace_posterior(problem, fit, call.seed)
-    notes: dict[str, Any] = {"engine": problem.engine.name, "status": fit.code.value}
+        raise InputError(f"{clips[0].path}: {fit.code}")
+    posterior = laplace_posterior(trials, fit, call.seed)
+    notes: dict[str, Any] = {"engine": trials.problems[0].engine.name, "status": fit.code.value}
+    if call.effects_from:
+        notes["effects_from"] = [str(Path(path).resolve()) for path in call.effects_from]
     if call.method == "mh":
-        identity = _identity(clip, observation, call)
         if call.preset == "thesis":
-            posterior, extra = _thesis(problem, call)
+            posterior, extra = _thesis(trials, call)
         else:
-            posterior, extra = _metropolis(problem, fit, call, out, identity)
+            posterior, extra = _metropolis(trials, fit, call, out, _identity(measured, call))
         notes |= extra
     timings["fit"] = time.perf_counter() - began
-    result = make_result(
-        problem,
-        posterior,
-        fit.z,
-        clips=[str(path) for path in call.clips],
-        method=call.method,
-        seed=call.seed,
-        timings_s={key: round(value, 3) for key, value in timings.items()},
-        notes=notes,
-    )
-    save_run(out, clip, observation, posterior, result)
+
+    def told(some: "Trials", draws: "Posterior", z: np.ndarray, names: list[str]) -> dict[str, Any]:
+        return make_result(
+            some,
+            draws,
+            z,
+            clips=names,
+            method=call.method,
+            seed=call.seed,
+            timings_s={key: round(value, 3) for key, value in timings.items()},
+            notes=notes,
+        )
+
+    result = told(trials, posterior, fit.z, [str(path) for path in call.clips])
+    if len(clips) == 1:
+        save_run(out, clips[0], observations[0], posterior, result)
+        write_report(Run(out, clips[0], trials.problems[0], posterior, result))
+    else:
+        for i, one in enumerate(measured):
+            alone, own = (
+                trials.alone(i),
+                posterior.chosen(trials.columns_of(i), trials.alone(i).names),
+            )
+            told_of = told(alone, own, fit.z[trials.columns_of(i)], [str(call.clips[i])])
+            save_run(out / one.name, one.clip, one.observation, own, told_of)
+            write_report(Run(out / one.name, one.clip, trials.problems[i], own, told_of))
+        posterior.to_netcdf(out / "posterior.nc")
+        write_json(out / "result.json", result)
     (out / CHECKPOINT).unlink(missing_ok=True)
-    write_report(Run(out, clip, problem, posterior, result))
     return result
 
 
 CHECKPOINT = "chains.checkpoint.npz"
 
 
-def _metropolis(problem, fit, call, out: Path, identity: str):
+def _metropolis(trials: "Trials", fit: "GradientFit", call, out: Path, identity: str):
     """Samples with a progress bar; resumes what a Ctrl-C left in the run's folder."""
     from galileo_jax.inference.metropolis import metropolis_posterior
     from galileo_jax.inference.samplers.driver import Settings
@@ -150,7 +174,7 @@ def _metropolis(problem, fit, call, out: Path, identity: str):
     with command.progress() as bar:
         task = bar.add_task("sampling", total=settings.warmup_steps + settings.max_steps)
         posterior = metropolis_posterior(
-            problem,
+            trials,
             fit,
             call.seed,
             sampler=call.sampler,
@@ -166,34 +190,26 @@ def _metropolis(problem, fit, call, out: Path, identity: str):
     }
 
 
-def _thesis(problem, call):
+def _thesis(trials: "Trials", call):
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
     from galileo_jax.inference.thesis_preset import thesis_posterior
 
     posterior, best = thesis_posterior(
-        problem, call.seed, call.similarity, call.acceptance, call.selection
+        trials, call.seed, call.similarity, call.acceptance, call.selection
     )
     return posterior, {"status": posterior.status.value, "preset": "thesis", "best": best}
 
 
-def _observe(clip: Clip) -> Observation:
-    """Tracks the clip's video, or reads its csv track."""
-    if clip.video is None:
-        assert clip.track is not None  # load_clip requires one of the two
-        return read_observation_csv(clip.track)
-    from galileo_jax.tracking import track_clip
-
-    with command.progress() as bar:
-        return observe(clip, track_clip(clip, progress=bar))
-
-
-def _identity(clip: Clip, observation: Observation, call: argparse.Namespace) -> str:
+def _identity(measured: Sequence[Measured], call: argparse.Namespace) -> str:
     """What the chains sample: a checkpoint of anything else is refused."""
     digest = hashlib.sha256()
-    for array in (observation.times_s, observation.position_m, observation.covariance_m2):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    digest.update(clip.model_dump_json(exclude={"path", "video", "track"}).encode())
-    digest.update(json.dumps([call.engine, call.sampler, call.seed]).encode())
+    for one in measured:
+        seen = one.observation
+        for array in (seen.times_s, seen.position_m, seen.covariance_m2):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        digest.update(one.clip.model_dump_json(exclude={"path", "video", "track"}).encode())
+    options = [call.engine, call.sampler, call.seed, call.effects]
+    digest.update(json.dumps(options).encode())
     return digest.hexdigest()
 
 
@@ -241,6 +257,9 @@ def _parser() -> command.Parser:
     parser.add_argument("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
     parser.add_argument("--method", choices=METHODS, default="grad")
     parser.add_argument("--effects", default="", help="a,b: effects in the model")
+    parser.add_argument(
+        "--effects-from", action="append", default=[], metavar="FILE", help="more effects (Python)"
+    )
     parser.add_argument("--out", help="folder of the run (default runs/CLIP)")
     parser.add_argument("--seed", type=command.whole_number(0), default=0)
     parser.add_argument("--engine", choices=ENGINES, default="auto")

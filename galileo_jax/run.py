@@ -7,6 +7,7 @@ DIR/posterior.nc      draws of all parameters (ArviZ InferenceData)
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,12 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
 from galileo_jax.effects.effect import Effect
+from galileo_jax.effects.registry import load_file, load_library, make_effects
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.trials import Trials
 from galileo_jax.observation import Observation
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.model import Model
@@ -38,7 +41,7 @@ class Run:
       folder: where it is.
       clip: as fitted.
       problem: observation, model and engine, as fitted.
-      posterior: draws in the parameters' units, names as `problem.names`.
+      posterior: draws in the parameters' units, names as `trials.names`.
       result: result.json.
     """
 
@@ -47,6 +50,11 @@ class Run:
     problem: Problem
     posterior: Posterior
     result: dict[str, Any]
+
+    @property
+    def trials(self) -> Trials:
+        """The problem alone."""
+        return Trials((self.problem,))
 
 
 def make_problem(
@@ -59,6 +67,21 @@ def make_problem(
     scene = build_scene(clip, observation)
     model = Model(scene, float(observation.times_s[-1]), effects)
     return Problem(observation, model, make_engine(engine, model), clip.path.stem)
+
+
+def make_trials(
+    clips: Sequence[Clip],
+    observations: Sequence[Observation],
+    engine: str = "auto",
+    effects: tuple[Effect, ...] = (),
+) -> Trials:
+    """Clips of the same objects with the same model."""
+    return Trials(
+        tuple(
+            make_problem(clip, observation, engine, effects)
+            for clip, observation in zip(clips, observations, strict=True)
+        )
+    )
 
 
 def save_run(
@@ -91,4 +114,8 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     clip = load_clip(folder / CLIP)
     observation = read_observation_csv(folder / OBSERVATION)
     posterior = Posterior.from_netcdf(folder / POSTERIOR)
-    return Run(folder, clip, make_problem(clip, observation, engine), posterior, result)
+    load_library()
+    for path in result.get("effects_from", []):
+        load_file(path)
+    effects = make_effects(result["effects"])
+    return Run(folder, clip, make_problem(clip, observation, engine, effects), posterior, result)

@@ -5,24 +5,25 @@ import numpy as np
 from galileo_jax.inference.fits.gradient import Code, GradientFit
 from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior, Status
-from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.trials import Trials
 
 NUM_DRAWS = 4000
 
 
-def laplace_posterior(problem: Problem, fit: GradientFit, seed: int) -> Posterior:
+def laplace_posterior(trials: Trials, fit: GradientFit, seed: int) -> Posterior:
     """Draws of N(mode, (J^T J + 1)^-1) in z, mapped to the parameters' units.
 
     Symmetric in z, hence inside the parameters' bounds. It knows nothing of skewness or of a
     second mode: compare with `--method mh` where that matters.
     """
     generator = np.random.default_rng(seed)
-    root = np.linalg.cholesky(fit.covariance)
-    normal = generator.standard_normal((NUM_DRAWS, len(fit.z)))
-    z = fit.z + normal @ root.T
+    root = np.linalg.cholesky(fit.covariance[np.ix_(fit.free, fit.free)])
+    normal = generator.standard_normal((NUM_DRAWS, len(root)))
+    z = np.tile(fit.z, (NUM_DRAWS, 1))
+    z[:, fit.free] += normal @ root.T
     return Posterior(
-        names=problem.names,
-        draws=add_model_error(problem.theta(z), problem.names, seed)[None],
+        names=trials.names,
+        draws=add_model_error(trials.theta(z, fit.free), trials.names, seed)[None],
         log_density=-0.5 * np.sum(normal**2, axis=1)[None],
         status=Status.CONVERGED if fit.code is Code.CONVERGED else Status.STEP_LIMIT,
         stats=fit.stats,

@@ -10,10 +10,10 @@ import numpy as np
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.result import IDENTIFIED_SD_Z
 from galileo_jax.inference.samplers import dispersed_starts, sample, sampler_class
 from galileo_jax.inference.samplers.driver import Progress, Settings
+from galileo_jax.inference.trials import Trials
 
 # R-hat < 1.01 needs about 50 effective draws for each half chain, so that fewer chains would be
 # cheaper; but four learn too poor a proposal (measured: acceptance 0.14 against 0.41).
@@ -21,7 +21,7 @@ NUM_CHAINS = 8
 
 
 def metropolis_posterior(
-    problem: Problem,
+    trials: Trials,
     fit: GradientFit,
     seed: int,
     *,
@@ -31,10 +31,10 @@ def metropolis_posterior(
     identity: str = "",
     on_block: Callable[[Progress], None] | None = None,
 ) -> Posterior:
-    """Samples a problem's posterior, started from and tuned by a gradient fit.
+    """Samples the trials' posterior, started from and tuned by a gradient fit.
 
     Args:
-      problem: the target is `problem.log_density`, noise scale included.
+      trials: the target is `trials.log_density`, noise scales included.
       fit: its covariance is the first proposal; chains start dispersed round it.
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
@@ -47,31 +47,30 @@ def metropolis_posterior(
       Draws in the parameters' units. Converged when the main parameters that the fit found
       identified, and the mass ratio, have R-hat and ESS as asked for.
     """
-    steps = jnp.asarray(fit.steps)
     start_key, key = jax.random.split(jax.random.key(seed))
     mode, covariance = jnp.asarray(fit.z), jnp.asarray(fit.covariance)
     starts = dispersed_starts(start_key, mode, covariance, NUM_CHAINS)
     sd = np.sqrt(np.diag(fit.covariance))
     watched = [
         (i, parameter.name)
-        for i, parameter in enumerate(problem.parameters)
+        for i, parameter in enumerate(trials.parameters)
         if parameter.role != "nuisance" and sd[i] < IDENTIFIED_SD_Z
     ]
 
     def monitor(draws: np.ndarray) -> dict[str, np.ndarray]:
         found = {name: draws[..., i] for i, name in watched}
-        if "m2" in problem.names:
+        if "m2" in trials.names:
             found["mass_ratio"] = (
-                draws[..., problem.names.index("m1")] - draws[..., problem.names.index("m2")]
+                draws[..., trials.names.index("m1")] - draws[..., trials.names.index("m2")]
             )
         return found or {"log_noise": draws[..., -1]}
 
     posterior = sample(
         key,
         sampler_class(sampler).from_gaussian(mode, covariance),  # pyright: ignore
-        lambda z: problem.log_density(z, steps),
+        trials.log_density,
         starts,
-        problem.names,
+        trials.names,
         settings=settings,
         monitor=monitor,
         on_block=on_block,
@@ -79,5 +78,5 @@ def metropolis_posterior(
         identity=identity,
     )
     return posterior.mapped(
-        lambda z: add_model_error(problem.theta(z), problem.names, seed), problem.names
+        lambda z: add_model_error(trials.theta(z), trials.names, seed), trials.names
     )

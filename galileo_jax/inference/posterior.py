@@ -91,6 +91,10 @@ class Posterior:
         """
         return replace(self, draws=np.asarray(function(self.draws)), names=tuple(names))
 
+    def chosen(self, columns: np.ndarray, names: tuple[str, ...]) -> Self:
+        """The marginal of some parameters, under other names."""
+        return replace(self, draws=self.draws[..., columns], names=tuple(names))
+
     def summary(self) -> dict[str, Summary]:
         """Mean, standard deviation, central 95 % interval and convergence, by name."""
         table = {}

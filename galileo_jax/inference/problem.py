@@ -52,7 +52,14 @@ class Problem:
         effects = model.effects + model.nuisances
         frames = jnp.asarray(self.observation.times_s)
         return _seen_one(
-            effects, model.names, theta, times, position[0], velocity[0], frames, model.scene.surroundings
+            effects,
+            model.names,
+            theta,
+            times,
+            position[0],
+            velocity[0],
+            frames,
+            model.scene.surroundings,
         )
 
     def simulate(self, theta: np.ndarray) -> np.ndarray:
@@ -68,7 +75,9 @@ class Problem:
         frames = jnp.asarray(self.observation.times_s)
         surroundings = model.scene.surroundings
         return np.asarray(
-            _seen_batch(effects, model.names, theta, times, position, velocity, frames, surroundings)
+            _seen_batch(
+                effects, model.names, theta, times, position, velocity, frames, surroundings
+            )
         )
 
     def whiten(self, predicted_m: jax.Array, noise_scale: Any) -> jax.Array:

@@ -1,5 +1,6 @@
 """result.json: the numbers of a fit by contract (DESIGN.md 2.3)."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -8,6 +9,7 @@ import numpy as np
 from galileo_jax import __version__
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.trials import Trials
 from galileo_jax.parameters import inverse
 
 # In z every prior is a standard normal: above this the data told less than half.
@@ -33,27 +35,34 @@ def summarise(draws: np.ndarray) -> dict[str, float]:
     }
 
 
-def velocity_error(problem: Problem, predicted_m: np.ndarray) -> dict[str, float]:
+def velocity_error(
+    problems: Sequence[Problem], predicted_m: Sequence[np.ndarray], noise_scale: Sequence[float]
+) -> dict[str, float]:
     """How far predicted and measured velocity profiles are apart, m/s.
 
     Args:
-      problem: with the observation.
-      predicted_m: `[object, 2, frame]`, the fitted centres.
+      problems: with the observations.
+      predicted_m: of each clip `[object, 2, frame]`, the fitted centres.
+      noise_scale: of each clip.
 
     Returns:
       rmse; noise (what tracking errors alone would give); l1 (mean absolute) and l2 (root of
       the summed squares, per profile as in the thesis).
     """
-    observation = problem.observation
-    dt = np.diff(observation.times_s)
-    both = observation.mask[:, 1:] & observation.mask[:, :-1]
-    residual = np.diff(observation.position_m - predicted_m, axis=-1) / dt
-    values = residual[np.broadcast_to(both[:, None], residual.shape)]
-    variance = np.moveaxis(np.diagonal(observation.covariance_m2, axis1=1, axis2=2), -1, 1)
-    noise = (variance[..., 1:] + variance[..., :-1]) / dt**2
-    noise = noise[np.broadcast_to(both[:, None], noise.shape)]
+    residuals, noises = [np.zeros(0)], [np.zeros(0)]
+    for problem, predicted, scale in zip(problems, predicted_m, noise_scale, strict=True):
+        observation = problem.observation
+        dt = np.diff(observation.times_s)
+        both = observation.mask[:, 1:] & observation.mask[:, :-1]
+        residual = np.diff(observation.position_m - predicted, axis=-1) / dt
+        both = np.broadcast_to(both[:, None], residual.shape)
+        variance = np.diagonal(observation.covariance_m2, axis1=1, axis2=2)
+        variance = scale**2 * np.moveaxis(variance, -1, 1)
+        residuals.append(residual[both])
+        noises.append(((variance[..., 1:] + variance[..., :-1]) / dt**2)[both])
+    values, noise = np.concatenate(residuals), np.concatenate(noises)
     if not values.size:
-        return {"rmse": float("nan"), "noise": float("nan"), "l1": float("nan"), "l2": float("nan")}
+        return dict.fromkeys(("rmse", "noise", "l1", "l2"), float("nan"))
     return {
         "rmse": float(np.sqrt(np.mean(values**2))),
         "noise": float(np.sqrt(np.mean(noise))),
@@ -62,8 +71,28 @@ def velocity_error(problem: Problem, predicted_m: np.ndarray) -> dict[str, float
     }
 
 
+def error_of(trials: Trials, theta: np.ndarray, num_used: float) -> dict[str, float]:
+    """`velocity_error` and chi2 per degree of freedom at parameters `theta` `[parameter]`.
+
+    Args:
+      trials: the clips.
+      theta: in the parameters' units, noise scales last.
+      num_used: how many numbers' worth the parameters were fitted with.
+    """
+    scales, predictions, chi2 = [], [], 0.0
+    for clip, problem in enumerate(trials.problems):
+        scale = float(np.clip(trials.noise_scale(theta, clip), *NOISE_SCALE_RANGE))
+        predicted = problem.simulate(trials.of_clip(theta, clip))
+        chi2 += float(np.sum(np.asarray(problem.whiten(jnp.asarray(predicted), scale)) ** 2))
+        scales.append(scale)
+        predictions.append(predicted)
+    error = velocity_error(trials.problems, predictions, scales)
+    error["chi2_per_dof"] = chi2 / max(trials.num_values - num_used, 1.0)
+    return error
+
+
 def make_result(
-    problem: Problem,
+    trials: Trials,
     posterior: Posterior,
     z_best: np.ndarray,
     *,
@@ -76,7 +105,7 @@ def make_result(
     """The contract's dictionary.
 
     Args:
-      problem: the fitted problem.
+      trials: what was fitted.
       posterior: draws in the parameters' units.
       z_best: `[parameter]`, the mode in z, noise scale last; errors are told at it.
       clips: the files fitted.
@@ -86,9 +115,9 @@ def make_result(
       notes: what else the method has to say ("engine", "status", warnings).
     """
     draws = posterior.flat()
-    spread = np.asarray(inverse(problem.parameters, jnp.asarray(draws))).std(axis=0)
+    spread = np.asarray(inverse(trials.parameters, jnp.asarray(draws))).std(axis=0)
     table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
-    for i, parameter in enumerate(problem.parameters):
+    for i, parameter in enumerate(trials.parameters):
         entry: dict[str, Any] = summarise(draws[:, i])
         entry["unit"] = parameter.unit
         entry["identified"] = bool(spread[i] < IDENTIFIED_SD_Z)
@@ -97,7 +126,7 @@ def make_result(
     derived = {}
     if "m2" in posterior.names:
         m1, m2 = posterior["m1"].reshape(-1), posterior["m2"].reshape(-1)
-        prior_sd = np.sqrt(2) * problem.parameters[problem.names.index("m1")].prior.sd  # pyright: ignore
+        prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
         is_identified = bool(np.log(m1 / m2).std() < IDENTIFIED_SD_Z * prior_sd)
         derived = {
             "mass_ratio": {**summarise(m1 / m2), "unit": "1", "identified": is_identified},
@@ -108,21 +137,15 @@ def make_result(
         for name, entry in table["parameters"].items():
             entry["identified"] = entry["identified"] and not name.startswith("k")
         notes = notes | {"warnings": [SCALE_WARNING]}
-    predicted = problem.simulate(z_best[:-1])
-    noise_scale = float(np.clip(problem.theta(z_best)[-1], *NOISE_SCALE_RANGE))
-    white = np.asarray(problem.whiten(jnp.asarray(predicted), noise_scale))
-    count = int(problem.data.num_values)
     # Every parameter takes from the residuals what the data told of it.
-    effective = float(np.sum(1 - np.clip(spread[:-1] ** 2, 0, 1)))
-    error = velocity_error(problem, predicted)
-    error["noise"] *= noise_scale
-    error["chi2_per_dof"] = float(np.sum(white**2) / max(count - effective, 1.0))
+    effective = float(np.sum(1 - np.clip(spread[: len(trials.model_parameters)] ** 2, 0, 1)))
+    error = error_of(trials, trials.theta(z_best), effective)
     status = {"converged": posterior.is_converged, **notes}
     return {
         "clips": clips,
         "method": method,
         **status,
-        "effects": [effect.name for effect in problem.model.effects],
+        "effects": list(trials.all_effects),
         **table,
         "derived": derived,
         "error": error,

@@ -6,16 +6,15 @@ import numpy as np
 
 from galileo_jax.errors import InputError
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.samplers import thesis
-from galileo_jax.parameters import inverse
+from galileo_jax.inference.trials import Trials
 from galileo_jax.similarity.similarity import similarity_class
 
 SEARCHED = ("m1", "k1", "m2", "k2")
 
 
 def thesis_posterior(
-    problem: Problem, seed: int, similarity: str, acceptance: str, selection: str
+    trials: Trials, seed: int, similarity: str, acceptance: str, selection: str
 ) -> tuple[Posterior, dict[str, float]]:
     """Runs the thesis's 16 x 75 steps.
 
@@ -27,21 +26,21 @@ def thesis_posterior(
     Raises:
       InputError: the clip does not have two objects.
     """
-    if not set(SEARCHED) <= set(problem.names):
+    (problem,) = trials.problems
+    if not set(SEARCHED) <= set(trials.names):
         raise InputError("--preset thesis: two objects expected; this clip has one")
     measure = similarity_class(similarity)()
     observation = problem.observation
     both = observation.mask[:, 1:] & observation.mask[:, :-1]
     dt = jnp.asarray(np.diff(observation.times_s))
     observed = jnp.asarray(np.where(both[:, None], np.nan_to_num(observation.velocity_m_s), 0.0))
-    where = np.array([problem.names.index(name) for name in SEARCHED])
-    steps = jnp.asarray(problem.coarse_steps)
-    priors = [problem.parameters[i] for i in where]
-    rest = jnp.zeros(len(problem.model.parameters))
+    where = np.array([trials.names.index(name) for name in SEARCHED])
+    rest_theta = trials.theta(np.zeros(len(trials.names)))
+    rest = jnp.asarray(trials.of_clip(rest_theta, 0))
 
     def log_similarity(theta: jax.Array) -> jax.Array:
-        z = rest.at[where].set(inverse(priors, theta))
-        velocity = jnp.diff(problem.predict(z, steps), axis=-1) / dt
+        predicted = problem.predict(rest.at[where].set(theta))
+        velocity = jnp.diff(predicted, axis=-1) / dt
         return measure(velocity, observed, jnp.asarray(both))
 
     answer = thesis.infer(
@@ -52,11 +51,10 @@ def thesis_posterior(
         selection=thesis.Selection(selection),
     )
     draws = answer.posterior.draws
-    rest_theta = problem.theta(np.zeros(len(problem.names)))
     whole = np.tile(rest_theta, (*draws.shape[:2], 1))
     whole[..., where] = draws
     posterior = Posterior(
-        names=problem.names,
+        names=trials.names,
         draws=whole,
         log_density=answer.posterior.log_density,
         status=answer.posterior.status,

@@ -139,6 +139,14 @@ class Trials:
         """The parameters of one clip's model, `[..., model parameter]`."""
         return np.asarray(theta)[..., self.columns[clip]]
 
+    def alone(self, clip: int) -> "Trials":
+        """One of the clips."""
+        return Trials((self.problems[clip],))
+
+    def columns_of(self, clip: int) -> np.ndarray:
+        """Where the parameters of `alone(clip)`, noise scale last, stand in `parameters`."""
+        return np.append(self.columns[clip], len(self.model_parameters) + clip)
+
     def noise_scale(self, theta: np.ndarray, clip: int) -> float:
         """The noise scale of one clip."""
         return float(theta[len(self.model_parameters) + clip])

@@ -224,7 +224,9 @@ class GradientFitter:
             steps[active] = self._half_sd(covariance)
             noise[active] = scales
             here = here._replace(noise=scales)
-            scaled = [w * (b / s)[:, None] for w, b, s in zip(white, before.T, scales.T, strict=True)]
+            scaled = [
+                w * (b / s)[:, None] for w, b, s in zip(white, before.T, scales.T, strict=True)
+            ]
             cost = _cost(scaled, here.z)
             moved, after = self._try(here, motions, jacobian, cost)
             z[active] = moved
