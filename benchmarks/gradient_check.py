@@ -4,17 +4,16 @@ At random truths in which object 2 is hit (0.3 px of noise at 900 px/m, 30 fps):
 
     || J - J_fd || / || J_fd ||    over all frames and both objects,
 
-J: d(centres)/d(parameter) as inference has it, from the custom_jvp of `problem.predict` at the
-steps that a fit ends with. J_fd: central differences of plain rollouts at 1/4, 1/2, 1 and 2 sd
-of the posterior (model error included); the bars are for 1/2 sd. J is a central difference
-itself, so that the other columns say more: how much the answer depends on the scale.
-`--mjx N`: for N sets also MJX's exact forward derivative through the contacts. The last line
-is JSON.
+J: d(centres)/d(parameter), JAX's forward derivative of the rigid engine. J_fd: central
+differences of plain rollouts at 1/4, 1/2, 1 and 2 sd of the posterior (normal, by J itself);
+the bars are for 1/2 sd. What is left at 2 sd is curvature, and frames between which an impact
+moves: a difference sees both sides of it. `--mjx N`: for N sets also MJX's exact forward
+derivative through its contacts, against the same differences. The last line is JSON.
 """
 
 import argparse
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import jax
 import jax.numpy as jnp
@@ -23,17 +22,17 @@ import synthetic_tracks
 import tables
 
 from galileo_jax import command, jax_cache
-from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.model_error import add_model_error
-from galileo_jax.inference.problem import Problem
-from galileo_jax.parameters import inverse
+from galileo_jax.inference.problem import Problem, seen
+from galileo_jax.parameters import forward, inverse
+from galileo_jax.rollout.engine_mjx import EngineMJX
+from galileo_jax.rollout.trajectory import Trajectory
 
 NOISE_M = 0.3 / 900
 PARAMETERS = ("k1", "k2", "m1", "m2")
 SCALES_SD = (0.25, 0.5, 1.0, 2.0)
-NUM_DRAWS = 4000
-NUM_ROUNDS = 3  # the fit polishes at least twice before its last Jacobian
 BARS = {"median": 0.05, "worst": 0.20}
+
+Predict = Callable[[jax.Array], jax.Array]
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -43,16 +42,18 @@ def main(argv: Sequence[str]) -> int | None:
     used, exact = [], []
     tables.row("set", [f"{name} {scale:g}sd" for name in PARAMETERS for scale in SCALES_SD])
     for seed in range(call.seed, call.seed + call.num):
-        case = synthetic_tracks.make_case(seed, "engine", NOISE_M, call.engine)
-        z = _true_z(case)
-        steps, sd = _scales(case.problem, z)
-        differences = _differences(case.problem, z, sd)
-        jacobian = _jacobian(case.problem, z, steps)
-        used.append(_relative(jacobian, differences))
+        case = synthetic_tracks.make_case(seed, "engine", NOISE_M, "rigid")
+        z, problem = _true_z(case), case.problem
+        predict = _prediction(problem)
+        jacobian = _jacobian(predict, z)
+        differences = _differences(problem, z, _posterior_sd(problem, jacobian))
+        where = [problem.model.index(name) for name in PARAMETERS]
+        used.append(_relative(jacobian[where], differences))
         tables.row(str(seed), list(used[-1].reshape(-1)))
         if len(exact) < call.mjx:
             began = time.perf_counter()
-            exact.append(_relative(_mjx_jacobian(case.problem, z), differences))
+            through_contacts = _jacobian(jax.jit(_prediction_in_mjx(problem)), z)
+            exact.append(_relative(through_contacts[where], differences))
             took = f"{time.perf_counter() - began:.0f} s"
             tables.row(f"{seed} MJX jacfwd, {took}", list(exact[-1].reshape(-1)))
     errors = np.array(used)
@@ -74,77 +75,60 @@ def main(argv: Sequence[str]) -> int | None:
 
 def _true_z(case: synthetic_tracks.Case) -> np.ndarray:
     """The truth in z; the nuisances where they are absent, but inside their priors."""
-    parameters = case.problem.model.parameters
+    parameters = case.problem.parameters
     theta = np.array([case.values.get(p.name, p.absent) for p in parameters])
     return np.clip(np.asarray(inverse(parameters, jnp.asarray(theta))), -2.5, 2.5)
 
 
-def _scales(problem: Problem, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The steps of the last Jacobian of a fit that ends at z, and the posterior's sd, in z."""
-    fitter = GradientFitter(problem)
-    steps, identity = problem.coarse_steps, np.eye(len(z))
-    for _ in range(NUM_ROUNDS):
-        push = jax.vmap(
-            lambda t, h: jax.jvp(lambda x: problem.residuals(x, 1.0, h), (z,), (t,))[1], (0, None)
-        )
-        jacobian = np.asarray(push(identity, steps)).T
-        before, covariance = steps, np.linalg.inv(jacobian.T @ jacobian + identity)
-        steps = fitter._half_sd(covariance)
-    normal = np.random.default_rng(0).standard_normal((NUM_DRAWS, len(z)))
-    around = z + normal @ np.linalg.cholesky(covariance).T
-    theta = problem.theta(np.pad(around, [(0, 0), (0, 1)]))
-    draws = add_model_error(theta, problem.names, 0)[:, :-1]
-    sd = np.asarray(inverse(problem.model.parameters, jnp.asarray(draws))).std(axis=0)
-    return before, sd
+def _prediction(problem: Problem) -> Predict:
+    """What the camera would see, of z."""
+    return lambda z: problem.predict(forward(problem.parameters, z))
 
 
-def _where(problem: Problem) -> list[int]:
-    return [problem.names.index(name) for name in PARAMETERS]
+def _prediction_in_mjx(problem: Problem) -> Predict:
+    """The same through MJX."""
+    model = problem.model
+    engine = EngineMJX(model)
+    times = jnp.arange(model.num_records + 1) * model.record_dt_s
+    frames = jnp.asarray(problem.observation.times_s)
+    effects = model.effects + model.nuisances
+
+    def predict(z: jax.Array) -> jax.Array:
+        theta = forward(model.parameters, z)
+        position, velocity = engine.rollout(theta)
+        motion = Trajectory(times, position, velocity, position[:, 0])
+        return seen(effects, model.names, theta, motion, frames, model.scene.surroundings)
+
+    return predict
 
 
-def _jacobian(problem: Problem, z: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """d(centres)/dz `[parameter, value]` by the custom_jvp that inference uses."""
-    tangents = np.eye(len(z))[_where(problem)]
-    push = jax.vmap(
-        lambda t: jax.jvp(lambda x: problem.predict(x, jnp.asarray(steps)), (z,), (t,))[1]
-    )
-    return np.asarray(push(tangents)).reshape(len(PARAMETERS), -1)
+def _jacobian(predict: Predict, z: np.ndarray) -> np.ndarray:
+    """d(centres)/dz `[parameter, value]`."""
+    slopes = jax.jacfwd(predict)(jnp.asarray(z))
+    return np.moveaxis(np.asarray(slopes), -1, 0).reshape(len(z), -1)
+
+
+def _posterior_sd(problem: Problem, jacobian: np.ndarray) -> np.ndarray:
+    """Of every parameter, in z, where the truth is the best fit and the noise is as declared."""
+    whiten = jax.vmap(lambda slope: problem.whiten(problem.data.observed_m - slope, 1.0))
+    slopes = np.asarray(whiten(jacobian.reshape(-1, *problem.data.observed_m.shape)))
+    covariance = np.linalg.inv(slopes @ slopes.T + np.eye(len(slopes)))
+    return np.sqrt(np.diag(covariance))
 
 
 def _differences(problem: Problem, z: np.ndarray, sd: np.ndarray) -> np.ndarray:
     """Central differences `[scale, parameter, value]` from plain rollouts."""
-    where = _where(problem)
+    where = [problem.model.index(name) for name in PARAMETERS]
     table = []
     for scale in SCALES_SD:
         h = scale * sd[where]
         offsets = np.zeros((len(where), len(z)))
         offsets[np.arange(len(where)), where] = h
-        seen = np.asarray(
-            jax.vmap(lambda x: problem.predict(x, jnp.asarray(problem.coarse_steps)))(
-                np.concatenate([z + offsets, z - offsets])
-            )
-        ).reshape(2, len(where), -1)
-        table.append((seen[0] - seen[1]) / (2 * h)[:, None])
+        both = jnp.asarray(np.concatenate([z + offsets, z - offsets]))
+        there = problem.simulate_batch(np.asarray(forward(problem.parameters, both)))
+        there = there.reshape(2, len(where), -1)
+        table.append((there[0] - there[1]) / (2 * h)[:, None])
     return np.array(table)
-
-
-def _mjx_jacobian(problem: Problem, z: np.ndarray) -> np.ndarray:
-    """The exact derivative of the MJX program, contacts included, by forward mode."""
-    from galileo_jax.parameters import forward
-    from galileo_jax.rollout.engine_mjx import EngineMJX
-    from galileo_jax.rollout.trajectory import Trajectory
-
-    model = problem.model
-    engine = EngineMJX(model)
-    times = jnp.arange(model.num_records + 1) * model.record_dt_s
-
-    def centres(x: jax.Array) -> jax.Array:
-        position, velocity = engine.rollout(forward(model.parameters, x))
-        return problem.measure(x, Trajectory(times, position, velocity, position[:, 0]))
-
-    tangents = np.eye(len(z))[_where(problem)]
-    push = jax.jit(jax.vmap(lambda t: jax.jvp(centres, (jnp.asarray(z),), (t,))[1]))
-    return np.asarray(push(tangents)).reshape(len(PARAMETERS), -1)
 
 
 def _relative(jacobian: np.ndarray, differences: np.ndarray) -> np.ndarray:
@@ -165,7 +149,6 @@ def _parser() -> command.Parser:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("--num", type=int, default=32, help="parameter sets")
     parser.add_argument("--seed", type=int, default=0, help="the first set's seed")
-    parser.add_argument("--engine", default="auto", help="c, mjx or auto")
     parser.add_argument("--mjx", type=int, default=0, help="sets for MJX's exact derivative: slow")
     return parser
 
