@@ -17,6 +17,7 @@ MIDPOINT_M_S = 1e-4
 # A zone whose edges are 5 mm, crossed in steps of up to 9 mm: the worst of 600 draws was off by
 # 4 mm/s of 1.4 m/s (brake), 0.002 J/kg of 0.48 (patch).
 ZONE_RTOL, ZONE_ATOL = 5e-3, 2e-3
+SLOW_S = 5e-4  # 0.02 m/s is passed within two steps of 4 ms
 G, ANGLE, (M1, M2) = HIT.gravity, HIT.angle_rad, HIT.mass_kg
 
 
@@ -78,6 +79,18 @@ def test_static_friction_is_not_felt_by_what_slides():
     motion = move(LONG_RAMP, given)
     expected = 0.3 + slide_m_s2(LONG_RAMP) * motion.times_s
     assert motion.speed_m_s[0] == pytest.approx(expected, abs=EXACT)
+
+
+@pytest.mark.parametrize("extra", [0.05, 0.1, 0.2])
+def test_static_friction_delays_the_start(extra):
+    """Fast again, it is late by the integral of 1 / (A - B exp(-(v / v_s)^2)) - 1 / A."""
+    motion = move(LONG_RAMP, {"static_friction": extra})
+    a, b = slide_m_s2(LONG_RAMP), G * extra * math.cos(ANGLE)
+    v = np.linspace(0.0, 0.2, 20_001)
+    late = np.trapezoid(1 / (a - b * np.exp(-((v / 0.02) ** 2))) - 1 / a, v)
+    fast = motion.speed_m_s[0] > 0.2
+    found = motion.times_s[fast] - motion.speed_m_s[0, fast] / a
+    assert found == pytest.approx(late, abs=SLOW_S)
 
 
 @settings(deadline=None, max_examples=20)
