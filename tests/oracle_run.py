@@ -11,6 +11,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.inference.result import make_result
+from galileo_jax.inference.trials import Trials
 from galileo_jax.observation import Observation
 from galileo_jax.parameters import inverse
 from galileo_jax.run import Run, make_problem, save_run
@@ -59,23 +60,22 @@ def make_run(folder: Path, experiment: Experiment, clip_s: float) -> Run:
     (folder / "oracle.yaml").write_text(yaml.safe_dump({**declared, "objects": objects}))
     clip = load_clip(folder / "oracle.yaml")
     problem = make_problem(clip, observation, "rigid")
+    trials = Trials((problem,))
     truth = {"m1": experiment.mass_kg[0], "m2": experiment.mass_kg[1]}
     truth |= {"k1": experiment.friction[0], "k2": experiment.friction[1]}
-    best = np.array([truth.get(p.name, p.absent) for p in problem.parameters])
-    z = np.clip(np.asarray(inverse(problem.parameters, jnp.asarray(best))), -2.0, 2.0)
-    widths = np.array([SD_Z.get(name, 0.3) for name in problem.names])
+    best = np.array([truth.get(p.name, p.absent) for p in trials.parameters])
+    z = np.clip(np.asarray(inverse(trials.parameters, jnp.asarray(best))), -2.0, 2.0)
+    widths = np.array([SD_Z.get(name, 0.3) for name in trials.names])
     draws = z + widths * rng.standard_normal((NUM_DRAWS, len(z)))
-    draws[:, [name in ("m1", "m2") for name in problem.names]] += rng.standard_normal(
-        (NUM_DRAWS, 1)
-    )
+    draws[:, [name in ("m1", "m2") for name in trials.names]] += rng.standard_normal((NUM_DRAWS, 1))
     posterior = Posterior(
-        names=problem.names,
-        draws=problem.theta(draws).reshape(2, NUM_DRAWS // 2, -1),
+        names=trials.names,
+        draws=trials.theta(draws).reshape(2, NUM_DRAWS // 2, -1),
         log_density=-0.5 * np.sum(draws**2, axis=-1).reshape(2, -1),
         status=Status.CONVERGED,
     )
     result = make_result(
-        problem,
+        trials,
         posterior,
         z,
         clips=["oracle.csv"],
