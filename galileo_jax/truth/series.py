@@ -95,10 +95,13 @@ def _with_hidden(
 
 
 def _shared(hidden: Hidden, first: Truth) -> Hidden:
-    """The same effect, with the first clip's values where they are the objects'."""
+    """The same effect, with the first clip's values where they are the objects'.
+
+    Those of a trial are drawn anew, of any strength.
+    """
     parameters = hidden.effect.parameters(first.surroundings)
     same = {p.name: first.effect_values[p.name] for p in parameters if not p.per_clip}
-    return hidden._replace(given={**hidden.given, **same})
+    return hidden._replace(given={**hidden.given, **same}, strength=None)
 
 
 def _moved(

@@ -91,7 +91,8 @@ class _Bodies:
         """Paths and speeds after `h`."""
         ahead = zip(self.path, self.speed, self.acceleration, strict=True)
         middle = [(q + 0.5 * h * v, v + 0.5 * h * a) for q, v, a in ahead]
-        state = state_at(*np.transpose(middle), time_s + 0.5 * h, self.scene)
+        halfway, speeds = np.transpose(middle)
+        state = state_at(halfway, speeds, time_s + 0.5 * h, self.scene)
         drive, brake = self.law.drive(state).tolist(), self.law.brake(state).tolist()
         pulls = zip(self.speed, drive, self.inertia, strict=True)
         free = [v + h * d / m for v, d, m in pulls]
