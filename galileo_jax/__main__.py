@@ -13,6 +13,7 @@ VERBS = (
     ("label", "write points and scale into a clip's yaml"),
     ("simulate", "make a clip with known truth"),
     ("predict", "continue a fitted scene beyond its clip"),
+    ("train", "train and test the neural estimators"),
 )
 
 USAGE = "usage: galileo VERB ..., galileo VERB --help, galileo --version"

@@ -1,0 +1,64 @@
+"""How a network is trained: one YAML file, kept inside every checkpoint."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from galileo_jax.errors import InputError
+
+Share = Annotated[float, Field(gt=0, lt=1)]
+Count = Annotated[int, Field(gt=0)]
+
+
+class TrainConfig(BaseModel):
+    """Everything that decides what is learned.
+
+    Attributes:
+      preset: which network, data and loss.
+      seed: of data and weights.
+      samples: simulated experiments; the last `validation_share` of them validate.
+      batch: samples a step.
+      learning_rate, cut, patience, cuts: Adam's rate is multiplied by `cut` after `patience`
+        epochs without a better validation loss, `cuts` times; the next plateau is the end.
+      max_epochs: the end at the latest.
+      engine: that makes the data.
+      frames: displacements in a profile (thesis).
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    preset: Literal["thesis", "galileo"]
+    seed: Annotated[int, Field(ge=0)] = 0
+    samples: Annotated[int, Field(ge=100)]
+    validation_share: Share = 0.1
+    batch: Count
+    learning_rate: Annotated[float, Field(gt=0)]
+    cut: Share
+    patience: Count
+    cuts: Annotated[int, Field(ge=0)]
+    max_epochs: Count
+    engine: Literal["auto", "rigid", "c", "mjx"] = "auto"
+    frames: Annotated[int, Field(ge=25, le=400)] = 60
+
+
+def load_config(path: Path, **overrides: object) -> TrainConfig:
+    """Reads a config; `overrides` that are not None replace its values.
+
+    Raises:
+      InputError: unreadable, or a key is unknown, missing or out of range.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, yaml.YAMLError) as error:
+        raise InputError(f"{path}: not a readable YAML file ({error})") from error
+    given = {key: value for key, value in overrides.items() if value is not None}
+    if not isinstance(content, dict):
+        raise InputError(f"{path}: a table of keys and values expected")
+    try:
+        return TrainConfig(**(content | given))
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"]))
+        raise InputError(f"{path}: {key}: {first['msg']}; got {first['input']!r}") from error

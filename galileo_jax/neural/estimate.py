@@ -1,0 +1,135 @@
+"""The neural estimator on a clip: from an observation to draws of all parameters, in no search."""
+
+import functools
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.errors import InputError
+from galileo_jax.inference.posterior import Posterior, Status
+from galileo_jax.inference.trials import Trials
+from galileo_jax.neural.checkpoint import load_network
+from galileo_jax.neural.galileo_task import Estimates, estimate
+from galileo_jax.neural.posterior_network import PosteriorNetwork
+from galileo_jax.neural.seen import Seen, see
+from galileo_jax.neural.summary import Summary, summarise
+from galileo_jax.parameters import inverse
+from galileo_jax.rollout.model import MASS_PRIOR
+
+TRAINED = Path(__file__).parent / "trained" / "galileo.npz"
+NUM_DRAWS = 4000
+
+
+@functools.cache
+def trained_network(path: Path = TRAINED) -> PosteriorNetwork:
+    """The network that ships with the package, or another of preset `galileo`.
+
+    Raises:
+      InputError: not such a network.
+    """
+    network, config = load_network(path)
+    if config.preset != "galileo":
+        raise InputError(f"{path}: a network of preset {config.preset}; one of galileo expected")
+    return network
+
+
+def cnn_posterior(
+    trials: Trials, seed: int, network: PosteriorNetwork | None = None
+) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
+    """Draws of the posterior of k1, k2 and the mass ratio; of all else, of the prior.
+
+    The network is marginal over the nuisances; their draws are prior draws, independent of
+    the rest.
+
+    Returns:
+      the posterior; `[parameter]`, its middle in z; notes for result.json (`status`, `cnn`,
+      and `warnings` where the clip is unlike the training clips).
+
+    Raises:
+      InputError: several clips or effects, not the ramp scene, or no scale.
+    """
+    if len(trials.problems) > 1:
+        raise InputError("--method cnn: one clip expected; take --method grad for joint fits")
+    problem = trials.problems[0]
+    scene = problem.model.scene.surroundings
+    if not scene.is_scale_known:
+        raise InputError("--method cnn: pixels_per_metre is needed; take --method grad")
+    if problem.model.effects:
+        raise InputError("--method cnn: its network knows no effects; take --method grad")
+    network = network or trained_network()
+    seen = see(problem.observation, scene)
+    summary = _summarise(seen)
+    found = _estimate(network, seen, summary, seed)
+    theta = _complete(trials, found, seed)
+    middle = np.zeros(len(trials.names))
+    means = np.asarray(inverse(trials.parameters, jnp.asarray(theta.mean(0))))
+    for i, parameter in enumerate(trials.parameters):
+        if parameter.role == "main":
+            middle[i] = means[i]
+    distance = float(network.distance(summary.features.astype(jnp.float32)))
+    usual = float(network.usual_distance[...])
+    is_usual = distance <= usual
+    notes: dict[str, Any] = {
+        "status": "read off by the network" + ("" if is_usual else "; see the warning"),
+        "cnn": {"distance": round(distance, 3), "usual_distance": round(usual, 3)},
+    }
+    if not is_usual:
+        notes["warnings"] = [
+            f"this clip is unlike those that the network was trained on (distance {distance:.2f}, "
+            f"999 in 1000 are below {usual:.2f}): do not trust its intervals; take --method grad"
+        ]
+    posterior = Posterior(
+        names=trials.names,
+        draws=theta[None],
+        log_density=np.zeros((1, len(theta))),
+        status=Status.CONVERGED if is_usual else Status.FIXED_LENGTH,
+        stats={"rollouts": 0.0},
+        provenance={"method": "cnn", "seed": seed},
+    )
+    return posterior, middle, notes
+
+
+_summarise = jax.jit(summarise)
+
+
+def _estimate(network: PosteriorNetwork, seen: Seen, summary: Summary, seed: int) -> Estimates:
+    """Draws `[draw]` of the three numbers that a clip can tell."""
+    single = {
+        "features": summary.features.astype(jnp.float32)[None],
+        "profile": summary.profile.astype(jnp.float16)[None],
+        "centre": summary.centre[None],
+        "scale": summary.scale[None],
+        "is_hit": np.asarray(summary.is_hit)[None],
+    }
+    k1, ratio, k2 = (values[0] for values in estimate(network, single, seed, NUM_DRAWS))
+    if not bool(summary.moves):
+        # Friction holds it: anything from the ramp's slope upwards.
+        steepest = min(math.tan(float(seen.angle_rad)), 1.0)
+        k1 = np.random.default_rng([seed, 6]).uniform(steepest, 1.0, len(k1))
+    return Estimates(k1, ratio, k2)
+
+
+def _complete(trials: Trials, found: Estimates, seed: int) -> np.ndarray:
+    """Draws of all parameters `[draw, parameter]`, in their units."""
+    generator = np.random.default_rng([seed, 7])
+    count = len(found.k1)
+    z = generator.standard_normal((count, len(trials.names)))
+    theta = trials.theta(z).copy()
+    # The ratio shows, the product does not: of two log-normal masses they are independent.
+    log_product = 2 * math.log(MASS_PRIOR.median) + math.sqrt(2) * MASS_PRIOR.sd * z[:, 0]
+    known: Mapping[str, np.ndarray] = {
+        "k1": found.k1,
+        "k2": found.k2,
+        "m1": np.exp(0.5 * (log_product + np.log(found.mass_ratio))),
+        "m2": np.exp(0.5 * (log_product - np.log(found.mass_ratio))),
+    }
+    is_single = "m2" not in trials.names
+    for name, values in known.items():
+        if name in trials.names and not (is_single and name == "m1"):
+            theta[:, trials.names.index(name)] = values
+    return theta

@@ -1,0 +1,219 @@
+"""The amortised posterior of any ramp clip: data, network, loss, and what it is tested on."""
+
+import functools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import nnx
+
+from galileo_jax.neural.config import TrainConfig
+from galileo_jax.neural.posterior_network import (
+    PosteriorNetwork,
+    from_u,
+    negative_log_density,
+    to_u,
+)
+from galileo_jax.neural.seen import NUM_FRAMES, Seen
+from galileo_jax.neural.summary import summarise
+from galileo_jax.neural.task import Arrays
+from galileo_jax.neural.thesis_task import FPS, ThesisTask
+from galileo_jax.neural.world import Truth, draw, targets
+from galileo_jax.parameters import Uniform
+from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
+
+QUANTITIES = ("k1", "phi", "k2")
+NUM_DRAWS = 1000
+TEST_NOISE_M = 2.2e-5  # 0.02 px at 900 px/m: the tracker's on the shared clips, at most
+INTERVAL = (0.05, 0.95)
+SHRINK = 0.01  # of the features' covariance towards the unit matrix
+USUAL = 0.999
+
+
+class Estimates(NamedTuple):
+    """Draws of k1, mass ratio and k2, each `[..., draw]`."""
+
+    k1: np.ndarray
+    mass_ratio: np.ndarray
+    k2: np.ndarray
+
+
+class GalileoTask:
+    """Data, network and loss of preset `galileo`."""
+
+    loss = staticmethod(negative_log_density)
+    shard_size = 8192
+
+    def __init__(self, config: TrainConfig):
+        self.config = config
+
+    def network(self, seed: int, data: Arrays | None = None) -> PosteriorNetwork:
+        """A new network; `data` set its idea of what is usual."""
+        shapes = jax.eval_shape(_sample, jax.random.key(0))
+        network = PosteriorNetwork(
+            shapes["features"].shape[0], shapes["profile"].shape[0], NUM_FRAMES, nnx.Rngs(seed)
+        )
+        if data is not None:
+            _standardise(network, data["features"])
+        return network
+
+    def make(self, key: jax.Array, count: int) -> Arrays:
+        """Samples of `world.py` in which object 1 moves."""
+        made = []
+        for part in jax.random.split(key, -(-count // 1024)):
+            sample = _samples(jax.random.split(part, min(count, 1024)))
+            made.append({name: np.asarray(values) for name, values in sample.items()})
+        return {name: np.concatenate([m[name] for m in made])[:count] for name in made[0]}
+
+    def test(self, network: PosteriorNetwork, data: Arrays, seed: int) -> dict[str, float]:
+        """Errors and coverage, in the thesis's setting and on clips of all kinds."""
+        thesis = thesis_clips(jax.random.key(seed), len(data["features"]), TEST_NOISE_M)
+        found = _score(network, thesis, seed, "thesis: ")
+        clips = {name: values[data["is_ideal"] == 0] for name, values in data.items()}
+        return found | _score(network, clips, seed, "clips: ")
+
+    def reference(self) -> dict[str, float]:
+        """The bars of the project."""
+        return {
+            "thesis: k1 MAE": 0.0003,
+            "thesis: k2 MAE": 0.006,
+            "thesis: phi MAE": 0.02,
+        } | {f"thesis: {name} in 90 %": 0.9 for name in QUANTITIES}
+
+
+def thesis_clips(key: jax.Array, count: int, noise_m: float) -> Arrays:
+    """The thesis's setting, seen with a little noise, in the form `GalileoTask.make` gives."""
+    setting = ThesisTask(TrainConfig(**_THESIS))
+    of_theta, of_noise = jax.random.split(key)
+    theta = setting.draw(of_theta, count)
+    clean = setting.positions(theta)
+    frames = clean.shape[-1]
+    seen = clean + noise_m * np.asarray(jax.random.normal(of_noise, clean.shape))
+    missing = ((0, 0), (0, 0), (0, 0), (0, NUM_FRAMES - frames))
+    scene = setting.surroundings
+    times = np.arange(NUM_FRAMES) / FPS
+
+    def one(position: jax.Array, theta: jax.Array):
+        clip = Seen(
+            times_s=jnp.asarray(times),
+            position_m=position,
+            mask=jnp.tile(jnp.arange(NUM_FRAMES) < frames, (2, 1)),
+            noise_m=jnp.full(2, noise_m),
+            angle_rad=jnp.asarray(scene.angle_rad),
+            gravity=jnp.asarray(scene.gravity),
+            half_length_m=jnp.asarray(scene.half_length_m),
+            half_height_m=jnp.asarray(scene.half_height_m),
+            is_ideal=jnp.ones(()),
+        )
+        return to_sample(clip, Truth(theta[1], theta[3], theta[0] / theta[2]))
+
+    made = jax.jit(jax.vmap(one))(jnp.asarray(np.pad(seen, missing)), jnp.asarray(theta))
+    made = {name: np.asarray(values) for name, values in made.items()}
+    collides = np.ptp(clean[:, 1, 0], axis=-1) > 1e-4
+    return made | {"collides": collides}
+
+
+_THESIS = {
+    "preset": "thesis",
+    "samples": 100,
+    "batch": 1,
+    "learning_rate": 1.0,
+    "cut": 0.5,
+    "patience": 1,
+    "cuts": 0,
+    "max_epochs": 1,
+}
+
+
+def to_sample(seen: Seen, truth: Truth) -> dict[str, jax.Array]:
+    """What training needs of one clip."""
+    summary = summarise(seen)
+    target = targets(truth)
+    single = jnp.float32
+    return {
+        "features": summary.features.astype(single),
+        "profile": summary.profile.astype(jnp.float16),
+        "u": to_u(target, summary.centre, summary.scale).astype(single),
+        "centre": summary.centre.astype(single),
+        "scale": summary.scale.astype(single),
+        "truth": jnp.stack(truth).astype(single),
+        "moves": summary.moves,
+        "is_hit": summary.is_hit,
+        "is_ideal": seen.is_ideal.astype(single),
+    }
+
+
+def _sample(key: jax.Array) -> dict[str, jax.Array]:
+    return to_sample(*draw(key))
+
+
+_samples = jax.jit(jax.vmap(_sample))
+
+
+def _standardise(network: PosteriorNetwork, features: np.ndarray) -> None:
+    """Sets mean, spread and the usual distance from training features."""
+    mean, sd = features.mean(0), features.std(0)
+    network.mean[...] = jnp.asarray(mean)
+    network.sd[...] = jnp.asarray(np.where(sd > 1e-6, sd, 1.0))
+    values = np.asarray(network.standardised(jnp.asarray(features)), np.float64)
+    covariance = values.T @ values / len(values)
+    covariance = (1 - SHRINK) * covariance + SHRINK * np.eye(len(mean))
+    root = np.linalg.inv(np.linalg.cholesky(covariance)).T
+    network.whitening[...] = jnp.asarray(root, jnp.float32)
+    distance = np.asarray(network.distance(jnp.asarray(features)))
+    network.usual_distance[...] = jnp.asarray(np.quantile(distance, USUAL), jnp.float32)
+
+
+@functools.partial(nnx.jit, static_argnums=4)
+def _draw(network: PosteriorNetwork, key, features, profile, count: int):
+    return network.draw(key, features, profile.astype(features.dtype), count)
+
+
+def estimate(
+    network: PosteriorNetwork, sample: Arrays, seed: int, count: int = NUM_DRAWS
+) -> Estimates:
+    """Draws for a batch of samples; the prior where a clip cannot tell: `[sample, draw]` each.
+
+    Where object 1 does not move, its friction is anything from the ramp's slope upwards; that
+    is left to the caller, who knows the slope.
+    """
+    u = _draw(network, jax.random.key(seed), sample["features"], sample["profile"], count)
+    centre, scale = (np.asarray(sample[name])[:, None] for name in ("centre", "scale"))
+    t = np.array(from_u(jnp.asarray(u, float), centre, scale))
+    generator = np.random.default_rng([seed, 5])
+    t[~np.asarray(sample["is_hit"]), :, 1:] = generator.standard_normal(
+        (int(np.sum(~np.asarray(sample["is_hit"]))), count, 2)
+    )
+    friction = Uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high)
+    ratio = np.exp(np.sqrt(2) * MASS_PRIOR.sd * t[..., 1])
+    return Estimates(
+        np.asarray(friction.forward(t[..., 0])), ratio, np.asarray(friction.forward(t[..., 2]))
+    )
+
+
+def _score(network: PosteriorNetwork, data: Arrays, seed: int, label: str) -> dict[str, float]:
+    draws = estimate(network, data, seed)
+    k1, k2, ratio = data["truth"].T
+    told = data.get("collides", data["is_hit"]) & data["moves"]
+    cases = {
+        "k1": (draws.k1, k1, data["moves"]),
+        "phi": (_phi(draws.mass_ratio), _phi(ratio), told),
+        "k2": (draws.k2, k2, told),
+    }
+    found: dict[str, float] = {f"{label}collisions": float(told.mean())}
+    for name, (drawn, true, where) in cases.items():
+        low, high = np.quantile(drawn, INTERVAL, axis=1)
+        error = np.abs(np.mean(drawn, axis=1) - true)[where]
+        found[f"{label}{name} MAE"] = float(error.mean())
+        found[f"{label}{name} median"] = float(np.median(error))
+        found[f"{label}{name} MAE of medians"] = float(
+            np.abs(np.median(drawn, axis=1) - true)[where].mean()
+        )
+        found[f"{label}{name} in 90 %"] = float(np.mean(((low <= true) & (true <= high))[where]))
+        found[f"{label}{name} width"] = float(np.median((high - low)[where]))
+    return found
+
+
+def _phi(ratio: np.ndarray) -> np.ndarray:
+    return (ratio - 1) / (ratio + 1)

@@ -1,0 +1,77 @@
+"""What the posterior network is shown of a clip, padded to a fixed number of frames."""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.effects.effect import Surroundings
+from galileo_jax.errors import InputError
+from galileo_jax.observation import Observation
+
+NUM_FRAMES = 128  # longer clips are thinned out evenly
+LEAST_NOISE_M = 5e-6  # of the simulated clips; a more certain tracker is taken for one of these
+
+
+class Seen(NamedTuple):
+    """An observation and what is declared about its scene; leading axes `[...]` in batches.
+
+    Attributes:
+      times_s: `[frame]`, evenly spaced.
+      position_m: `[object, 2, frame]`, 0 where masked.
+      mask: `[object, frame]`.
+      noise_m: `[object]`, the tracker's own standard deviation of a coordinate.
+      angle_rad, gravity: of the scene.
+      half_length_m, half_height_m: `[object]`.
+      is_ideal: 1.0 where nothing but noise stands between the rigid bodies and their
+        positions (a simulated world, the thesis's priors); 0.0 for clips.
+    """
+
+    times_s: jax.Array
+    position_m: jax.Array
+    mask: jax.Array
+    noise_m: jax.Array
+    angle_rad: jax.Array
+    gravity: jax.Array
+    half_length_m: jax.Array
+    half_height_m: jax.Array
+    is_ideal: jax.Array
+
+
+def see(observation: Observation, scene: Surroundings, is_ideal: bool = False) -> Seen:
+    """A clip of the ramp scene as the network sees it.
+
+    A clip with one object gets a second one that is never seen.
+
+    Raises:
+      InputError: no ramp with a table.
+    """
+    if not scene.has_table or not scene.comes_down[0] or len(scene.names) > 2:
+        raise InputError(
+            "--method cnn: its network knows one or two objects on a ramp that ends on a table; "
+            "take --method grad"
+        )
+    stride = -(-len(observation.times_s) // NUM_FRAMES)
+    chosen = slice(None, None, stride)
+    times, mask = observation.times_s[chosen], observation.mask[:, chosen]
+    position = np.where(mask[:, None], observation.position_m[..., chosen], 0.0)
+    variance = np.trace(observation.covariance_m2[..., chosen], axis1=1, axis2=2) / 2
+    noise = [
+        np.sqrt(np.median(v[m])) if m.any() else 0.0 for v, m in zip(variance, mask, strict=True)
+    ]
+    missing_frames, missing = NUM_FRAMES - len(times), 2 - len(mask)
+    step = times[1] - times[0]
+    more = times[-1] + step * np.arange(1, missing_frames + 1)
+    objects = ((0, missing),)
+    return Seen(
+        times_s=jnp.asarray(np.concatenate([times, more])),
+        position_m=jnp.asarray(np.pad(position, (*objects, (0, 0), (0, missing_frames)))),
+        mask=jnp.asarray(np.pad(mask, (*objects, (0, missing_frames)))),
+        noise_m=jnp.asarray(np.maximum(np.pad(noise, objects), LEAST_NOISE_M)),
+        angle_rad=jnp.asarray(scene.angle_rad),
+        gravity=jnp.asarray(scene.gravity),
+        half_length_m=jnp.asarray(np.pad(scene.half_length_m, objects, mode="edge")),
+        half_height_m=jnp.asarray(np.pad(scene.half_height_m, objects, mode="edge")),
+        is_ideal=jnp.asarray(float(is_ideal)),
+    )

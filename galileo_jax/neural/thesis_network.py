@@ -1,0 +1,54 @@
+"""The thesis's network: a small CNN that reads masses and frictions off a velocity profile."""
+
+import jax
+import jax.numpy as jnp
+from flax import nnx
+
+NUM_ROWS = 4  # x and y of both objects
+KERNEL, POOL = 7, 2
+FILTERS = (6, 16)
+DENSE = (64, 32, 4)
+
+
+def num_values(frames: int) -> int:
+    """How many numbers reach the dense layers."""
+    length = frames
+    for _ in FILTERS:
+        length = (length - KERNEL + 1) // POOL
+    return FILTERS[-1] * length * (NUM_ROWS // POOL ** len(FILTERS))
+
+
+class ThesisNetwork(nnx.Module):
+    """Convolution, average pool, twice; three dense layers; ReLU between, linear output.
+
+    13,252 parameters for 60 frames. Kernels are (1, 7), along time; pools are 2 x 2.
+    """
+
+    def __init__(self, frames: int, rngs: nnx.Rngs):
+        first, second = FILTERS
+        kernel = (1, KERNEL)
+        self.convolution1 = nnx.Conv(1, first, kernel, padding="VALID", rngs=rngs)
+        self.convolution2 = nnx.Conv(first, second, kernel, padding="VALID", rngs=rngs)
+        sizes = (num_values(frames), *DENSE)
+        self.dense1 = nnx.Linear(sizes[0], sizes[1], rngs=rngs)
+        self.dense2 = nnx.Linear(sizes[1], sizes[2], rngs=rngs)
+        self.dense3 = nnx.Linear(sizes[2], sizes[3], rngs=rngs)
+
+    def __call__(self, profile: jax.Array) -> jax.Array:
+        """`[batch, 4, frame]`, displacements per frame, cm, to m1, k1, m2, k2 `[batch, 4]`."""
+        x = profile[..., None]
+        for convolution in (self.convolution1, self.convolution2):
+            x = nnx.avg_pool(nnx.relu(convolution(x)), (POOL, POOL), (POOL, POOL))
+        x = x.reshape(len(x), -1)
+        x = nnx.relu(self.dense2(nnx.relu(self.dense1(x))))
+        return self.dense3(x)
+
+
+def count_parameters(network: nnx.Module) -> int:
+    """How many numbers are learned."""
+    return sum(leaf.size for leaf in jax.tree.leaves(nnx.state(network, nnx.Param)))
+
+
+def mean_absolute_error(network: ThesisNetwork, batch: dict[str, jax.Array]) -> jax.Array:
+    """The thesis's loss, in kg and 1 alike."""
+    return jnp.mean(jnp.abs(network(batch["profile"]) - batch["target"]))

@@ -1,0 +1,148 @@
+"""The training loop: epochs of Adam, a rate cut at plateaus, checkpoints, resume.
+
+rate <- rate * cut      after `patience` epochs without a better validation loss;
+                        training goes on from the best weights
+end                     at the plateau after the last cut
+"""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import optax
+from flax import nnx
+
+from galileo_jax.neural.checkpoint import NETWORK, Checkpoints, Progress, State, save_network
+from galileo_jax.neural.config import TrainConfig
+from galileo_jax.neural.task import Arrays, Task
+
+SAVE_EVERY_S = 15.0
+
+
+def train(
+    task: Task,
+    config: TrainConfig,
+    data: Arrays,
+    folder: Path,
+    on_epoch: Callable[[Progress], None],
+) -> Progress:
+    """Trains, or goes on from the folder's latest checkpoint; writes `network.npz`.
+
+    A KeyboardInterrupt is passed on after a checkpoint of the last whole epoch.
+    """
+    fresh, held_out = split(data, config)
+    network = task.network(config.seed, fresh)
+    structure, learned, constant = nnx.split(network, nnx.Param, ...)
+    adam = optax.scale_by_adam()
+    run_epoch, validate = _compile(task, structure, constant, adam, config)
+    state = State(learned, learned, adam.init(learned))
+    progress = Progress(0, config.learning_rate, float("inf"), 0, 0, ())
+    checkpoints = Checkpoints(folder, config)
+    if kept := checkpoints.restore(state):
+        state, progress = kept
+    fresh_on_device = {name: jnp.asarray(values) for name, values in fresh.items()}
+    held_on_device = {name: jnp.asarray(values) for name, values in held_out.items()}
+    saved, saved_s = progress.epoch, time.monotonic()
+    try:
+        while not is_done(progress, config):
+            key = jax.random.fold_in(jax.random.key(config.seed), progress.epoch)
+            rate = jnp.float32(progress.learning_rate)
+            weights, moments, loss = run_epoch(
+                state.weights, state.moments, rate, key, fresh_on_device
+            )
+            validation = float(validate(weights, held_on_device))
+            state, progress = _after_epoch(
+                State(weights, state.best_weights, moments),
+                progress,
+                float(loss),
+                validation,
+                config,
+            )
+            on_epoch(progress)
+            if time.monotonic() - saved_s > SAVE_EVERY_S:
+                checkpoints.save(state, progress)
+                saved, saved_s = progress.epoch, time.monotonic()
+    finally:
+        if progress.epoch != saved:
+            checkpoints.save(state, progress)
+        checkpoints.close()
+    best = nnx.state(nnx.merge(structure, state.best_weights, constant))
+    save_network(folder / NETWORK, best, config)
+    return progress
+
+
+def is_done(progress: Progress, config: TrainConfig) -> bool:
+    """Whether the last plateau or the last epoch is reached."""
+    return progress.cuts > config.cuts or progress.epoch >= config.max_epochs
+
+
+def split(data: Arrays, config: TrainConfig) -> tuple[Arrays, Arrays]:
+    """Training and validation samples."""
+    count = round(config.samples * (1 - config.validation_share))
+    return (
+        {name: values[:count] for name, values in data.items()},
+        {name: values[count:] for name, values in data.items()},
+    )
+
+
+def _after_epoch(
+    state: State, progress: Progress, loss: float, validation: float, config: TrainConfig
+) -> tuple[State, Progress]:
+    progress = progress._replace(
+        epoch=progress.epoch + 1, losses=(*progress.losses, (loss, validation))
+    )
+    if validation < progress.best:
+        return state._replace(best_weights=state.weights), progress._replace(
+            best=validation, stale=0
+        )
+    progress = progress._replace(stale=progress.stale + 1)
+    if progress.stale < config.patience:
+        return state, progress
+    return state._replace(weights=state.best_weights), progress._replace(
+        learning_rate=progress.learning_rate * config.cut, stale=0, cuts=progress.cuts + 1
+    )
+
+
+def _compile(
+    task: Task,
+    structure: Any,
+    constant: Any,
+    adam: optax.GradientTransformation,
+    config: TrainConfig,
+):
+    """Two compiled functions: one epoch, and the validation loss."""
+
+    def loss(weights: Any, batch: dict[str, jax.Array]) -> jax.Array:
+        return task.loss(nnx.merge(structure, weights, constant), batch)
+
+    @jax.jit
+    def run_epoch(weights, moments, rate, key, data):
+        count = len(next(iter(data.values())))
+        steps = count // config.batch
+        order = jax.random.permutation(key, count)[: steps * config.batch]
+
+        def step(carry, chosen):
+            weights, moments = carry
+            batch = {name: values[chosen] for name, values in data.items()}
+            value, slope = jax.value_and_grad(loss)(weights, batch)
+            update, moments = adam.update(slope, moments)
+            weights = jax.tree.map(lambda w, u: w - rate * u, weights, update)
+            return (weights, moments), value
+
+        (weights, moments), losses = jax.lax.scan(
+            step, (weights, moments), order.reshape(steps, config.batch)
+        )
+        return weights, moments, losses.mean()
+
+    @jax.jit
+    def validate(weights, data):
+        count = len(next(iter(data.values())))
+        parts = max(1, count // 1000)
+        size = count // parts
+        batches = {n: v[: parts * size].reshape(parts, size, *v.shape[1:]) for n, v in data.items()}
+        return jax.lax.map(lambda batch: loss(weights, batch), batches).mean()
+
+    return run_epoch, validate

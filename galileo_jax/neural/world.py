@@ -1,0 +1,168 @@
+"""Random ramp experiments, filmed: what the posterior network is trained on.
+
+Two worlds are mixed, and the network is told which one it looks at:
+
+    clips   priors and nuisances of the fit (foot, restitution, release, points off the centre)
+            and the imperfections of a camera (similarity/discrepancy.py); friction of object 1
+            uniform among those at which it slides.
+    ideal   the thesis's: masses uniform in (0, 1) kg, friction in (0, 0.3), rigid bodies
+            exactly as declared, noise only.
+
+Scenes differ in all else: slope, sizes, distances, frame rate, length, noise, gaps.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from galileo_jax.effects.effect import Surroundings
+from galileo_jax.effects.nuisances import NUISANCES, foot_transition, impact_restitution
+from galileo_jax.neural.seen import NUM_FRAMES, Seen
+from galileo_jax.rollout.engine_rigid import roll_out
+from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
+from galileo_jax.rollout.rollout import at_times
+from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.similarity import discrepancy
+
+IDEAL_SHARE = 0.3
+RECORD_DT_S, NUM_RECORDS = 1 / 120, 512  # constant forces: exact at any step
+ANGLE_DEG = (8.0, 35.0)
+RELEASE_M, OBJECT2_M = (0.2, 1.0), (0.12, 0.5)
+SIZE_M = (0.03, 0.1)
+FPS, FRAMES = (20.0, 120.0), (40, NUM_FRAMES)
+NOISE_PX, SCALE_PX_PER_M = (0.005, 1.0), (300.0, 1200.0)
+LATE_SHARE, LATEST_S = 0.15, 0.3  # releases seconds after the first frame
+GAP_SHARE, LONGEST_GAP = 0.3, 0.15  # of the frames
+NOISE_SCALE_SD = 0.3
+NUM_WAVES = 8
+NAMES = (
+    *("m1", "k1", "m2", "k2", "start_offset_object1", "start_offset_object2"),
+    *("foot_transition", "impact_restitution", "release_instant"),
+)
+
+
+class Truth(NamedTuple):
+    """What is to be found: `k1`, `k2`, `mass_ratio` = m1 / m2."""
+
+    k1: jax.Array
+    k2: jax.Array
+    mass_ratio: jax.Array
+
+
+def draw(key: jax.Array) -> tuple[Seen, Truth]:
+    """One experiment and its truth; to be vmapped over keys."""
+    keys = iter(jax.random.split(key, 40))
+
+    def uniform(low, high, shape=()):
+        return jax.random.uniform(next(keys), shape, minval=low, maxval=high)
+
+    def log_uniform(low, high, shape=()):
+        return jnp.exp(uniform(jnp.log(low), jnp.log(high), shape))
+
+    def normal(shape=()):
+        return jax.random.normal(next(keys), shape)
+
+    is_ideal = uniform(0, 1) < IDEAL_SHARE
+    imperfect = 1.0 - is_ideal
+    angle = jnp.deg2rad(jnp.where(uniform(0, 1) < 0.2, 20.0, uniform(*ANGLE_DEG)))
+    half_length, half_height = uniform(*SIZE_M, (2,)) / 2, uniform(*SIZE_M, (2,)) / 2
+    corner = half_height * jnp.tan(angle / 2)
+    release = uniform(*RELEASE_M) + corner[0] + half_length[0]
+    object2 = corner[0] + half_length.sum() + uniform(0.02, OBJECT2_M[1] - OBJECT2_M[0])
+    steepest = jnp.tan(angle)
+    m1, m2 = jnp.where(is_ideal, uniform(0, 1, (2,)), MASS_PRIOR.forward(normal((2,))))
+    k1, k2 = jnp.where(
+        is_ideal,
+        uniform(0, 0.3, (2,)) * jnp.stack([jnp.minimum(1, steepest / 0.3), 1.0]),
+        uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high, (2,)) * jnp.stack([steepest, 1.0]),
+    )
+    fps = jnp.where(uniform(0, 1) < 0.4, 30.0, log_uniform(*FPS))
+    num_frames = jax.random.randint(next(keys), (), FRAMES[0], FRAMES[1] + 1)
+    instant = normal() / (3 * fps)
+    late = uniform(0, LATEST_S)
+    instant = imperfect * jnp.where(uniform(0, 1) < LATE_SHARE, late, instant)
+    foot = 1.0 + imperfect * foot_transition.SD * normal()
+    rebound = imperfect * impact_restitution.PRIOR.forward(normal())
+    zero = jnp.zeros(())
+    theta = jnp.stack([m1, k1, m2, k2, zero, zero, foot, rebound, instant])
+    cos, sin = jnp.cos(angle), jnp.sin(angle)
+    start1 = (half_height[0] * sin - release * cos, half_height[0] * cos + release * sin)
+    scene = Surroundings(
+        names=("object1", "object2"),
+        angle_rad=angle,  # pyright: ignore
+        gravity=9.81,
+        half_length_m=tuple(half_length),
+        half_height_m=tuple(half_height),
+        corner_m=tuple(corner),
+        start_m=(start1, (object2, half_height[1])),  # pyright: ignore
+        start_path_m=(corner[0] - release, object2 - corner[1]),  # pyright: ignore
+        has_table=True,
+        comes_down=(True, False),
+    )
+    position, velocity = roll_out(NUISANCES, NAMES, NUM_RECORDS, RECORD_DT_S, theta, scene)
+    records = jnp.arange(NUM_RECORDS) * RECORD_DT_S
+    times = jnp.arange(NUM_FRAMES) / fps
+    motion = Trajectory(records, position, velocity, position[:, 0])
+    clean, _ = at_times(motion, times - instant)
+    seen = _film(clean, times, normal, imperfect)
+    noise = log_uniform(*NOISE_PX, (2,)) / log_uniform(*SCALE_PX_PER_M)
+    noise = jnp.where(uniform(0, 1) < 0.3, noise[0], noise)
+    truly = noise * jnp.exp(imperfect * NOISE_SCALE_SD * normal())
+    seen = seen + truly[:, None, None] * normal(seen.shape)
+    frames = jnp.arange(NUM_FRAMES)
+    # Rollouts end: beyond, the bodies would stand still.
+    mask = jnp.tile((frames < num_frames) & (times < records[-1]), (2, 1))
+    for _ in range(2):
+        first = uniform(0.05, 0.95, (2, 1)) * num_frames
+        length = jnp.where(uniform(0, 1, (2, 1)) < GAP_SHARE, uniform(0, LONGEST_GAP, (2, 1)), 0)
+        mask = mask & ~((frames >= first) & (frames < first + length * num_frames))
+    return (
+        Seen(
+            times_s=times,
+            position_m=jnp.where(mask[:, None], seen, 0.0),
+            mask=mask,
+            noise_m=noise,
+            angle_rad=angle,
+            gravity=jnp.asarray(9.81),
+            half_length_m=half_length,
+            half_height_m=half_height,
+            is_ideal=1.0 - imperfect,
+        ),
+        Truth(k1, k2, m1 / m2),
+    )
+
+
+def _film(position: jax.Array, times: jax.Array, normal, imperfect: jax.Array) -> jax.Array:
+    """Adds the imperfections of `similarity/discrepancy.py`: `[object, 2, frame]`, m.
+
+    Here they are drawn; there they are covariance.
+    """
+    x, y = position[:, 0], position[:, 1]
+    keystone = discrepancy.KEYSTONE_SD * normal((2,))
+    extra = keystone[0] * jnp.stack([x * x, x * y], 1) + keystone[1] * jnp.stack([x * y, y * y], 1)
+    extra += discrepancy.ROLL_SD_RAD * normal() * jnp.stack([-y, x], 1)
+    extra += discrepancy.SCALE_SD * normal() * position
+    extra += discrepancy.POINT_SD_M * normal((2, 2, 1))
+    gone = jnp.abs(x[1] - x[1, 0])
+    is_after = gone > 1e-6
+    at_hit = jnp.where(is_after.any(), x[:, jnp.argmax(is_after)], x[:, -1])
+    along = discrepancy.IMPULSE_SD * normal((2, 1)) * (x - at_hit[:, None])
+    step = discrepancy.HIT_STEP_SD_M * normal((2, 1))
+    # What moves no more drifts no more.
+    moves = jnp.abs(jnp.diff(x, prepend=x[:, :1])) > 1e-7
+    moving_s = jax.lax.cummax(jnp.where(moves, times, 0.0), axis=1)[:, None]
+    frequency = normal((2, NUM_WAVES, 1)) / discrepancy.HIT_DRIFT_S
+    waves = normal((2, NUM_WAVES, 1)) * jnp.cos(
+        frequency * moving_s + 7 * normal((2, NUM_WAVES, 1))
+    )
+    drift = discrepancy.HIT_DRIFT_SD_M * jnp.sqrt(2 / NUM_WAVES) * waves.sum(1)
+    extra = extra.at[:, 0].add(jnp.where(is_after, along + step + drift, 0.0))
+    return position + imperfect * extra
+
+
+def targets(truth: Truth) -> jax.Array:
+    """k1, log mass ratio and k2 where each prior of the fit is standard normal: `[..., 3]`."""
+    ratio = jnp.log(truth.mass_ratio) / (jnp.sqrt(2.0) * MASS_PRIOR.sd)
+    k1, k2 = FRICTION_PRIOR.inverse(truth.k1), FRICTION_PRIOR.inverse(truth.k2)
+    return jnp.stack([k1, ratio, k2], axis=-1)
