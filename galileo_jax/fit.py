@@ -35,8 +35,6 @@ PRESETS = ("galileo", "thesis")
 def main(argv: Sequence[str]) -> int | None:
     """Fits a clip, or several trials together, and writes a run."""
     call = _parser().parse_args(argv)
-    if call.method == "cnn":
-        raise InputError("--method: cnn is not there yet; known: grad, mh")
     clips = load_clips(call.clips, call.pixels_per_metre)
     out = out_folder(call, clips)
     if call.preset == "thesis" and len(clips) > 1:
@@ -99,34 +97,18 @@ def fit_clips(
 
     jax.config.update("jax_enable_x64", True)
     jax_cache.enable()
-    from galileo_jax.inference.fits.gradient import Code, GradientFitter
-    from galileo_jax.inference.laplace import laplace_posterior
     from galileo_jax.inference.result import make_result
     from galileo_jax.report import write_report
     from galileo_jax.run import Run, make_trials, save_run
 
     clips, observations = [m.clip for m in measured], [m.observation for m in measured]
     trials = make_trials(clips, observations, call.engine, chosen_effects(call))
-    began = time.perf_counter()
-    fitter = GradientFitter(trials)
-    fitter.compile()
-    timings["compile"] = time.perf_counter() - began
-    began = time.perf_counter()
-    with command.console().status("fitting") as status:
-        fit = fitter.fit(call.seed, on_stage=status.update)
-    if fit.code is Code.FAILED:
-        raise InputError(f"{clips[0].path}: {fit.code}")
-    posterior = laplace_posterior(trials, fit, call.seed)
-    notes: dict[str, Any] = {"engine": trials.problems[0].engine.name, "status": fit.code.value}
+    if call.method == "cnn":
+        posterior, z_best, notes = _network(trials, call, timings)
+    else:
+        posterior, z_best, notes = _search(trials, measured, call, out, timings)
     if call.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in call.effects_from]
-    if call.method == "mh":
-        if call.preset == "thesis":
-            posterior, extra = _thesis(trials, call)
-        else:
-            posterior, extra = _metropolis(trials, fit, call, out, _identity(measured, call))
-        notes |= extra
-    timings["fit"] = time.perf_counter() - began
 
     def told(some: "Trials", draws: "Posterior", z: np.ndarray, names: list[str]) -> dict[str, Any]:
         return make_result(
@@ -140,7 +122,7 @@ def fit_clips(
             notes=notes,
         )
 
-    result = told(trials, posterior, fit.z, [str(path) for path in call.clips])
+    result = told(trials, posterior, z_best, [str(path) for path in call.clips])
     if len(clips) == 1:
         save_run(out, clips[0], observations[0], posterior, result)
         write_report(Run(out, clips[0], trials.problems[0], posterior, result))
@@ -150,7 +132,7 @@ def fit_clips(
                 trials.alone(i),
                 posterior.chosen(trials.columns_of(i), trials.alone(i).names),
             )
-            told_of = told(alone, own, fit.z[trials.columns_of(i)], [str(call.clips[i])])
+            told_of = told(alone, own, z_best[trials.columns_of(i)], [str(call.clips[i])])
             save_run(out / one.name, one.clip, one.observation, own, told_of)
             write_report(Run(out / one.name, one.clip, trials.problems[i], own, told_of))
         posterior.to_netcdf(out / "posterior.nc")
@@ -160,6 +142,49 @@ def fit_clips(
 
 
 CHECKPOINT = "chains.checkpoint.npz"
+Found = tuple["Posterior", np.ndarray, dict[str, Any]]  # draws, the best z, notes for result.json
+
+
+def _search(
+    trials: "Trials",
+    measured: Sequence[Measured],
+    call: argparse.Namespace,
+    out: Path,
+    timings: dict[str, float],
+) -> Found:
+    """The gradient fit, and where asked for the sampler that starts from it."""
+    from galileo_jax.inference.fits.gradient import Code, GradientFitter
+    from galileo_jax.inference.laplace import laplace_posterior
+
+    began = time.perf_counter()
+    fitter = GradientFitter(trials)
+    fitter.compile()
+    timings["compile"] = time.perf_counter() - began
+    began = time.perf_counter()
+    with command.console().status("fitting") as status:
+        fit = fitter.fit(call.seed, on_stage=status.update)
+    if fit.code is Code.FAILED:
+        raise InputError(f"{measured[0].clip.path}: {fit.code}")
+    posterior = laplace_posterior(trials, fit, call.seed)
+    notes: dict[str, Any] = {"engine": trials.problems[0].engine.name, "status": fit.code.value}
+    if call.method == "mh":
+        if call.preset == "thesis":
+            posterior, extra = _thesis(trials, call)
+        else:
+            posterior, extra = _metropolis(trials, fit, call, out, _identity(measured, call))
+        notes |= extra
+    timings["fit"] = time.perf_counter() - began
+    return posterior, fit.z, notes
+
+
+def _network(trials: "Trials", call: argparse.Namespace, timings: dict[str, float]) -> Found:
+    """The trained network's answer."""
+    from galileo_jax.neural.estimate import cnn_posterior
+
+    began = time.perf_counter()
+    posterior, z_best, notes = cnn_posterior(trials, call.seed)
+    timings["fit"] = time.perf_counter() - began
+    return posterior, z_best, {"engine": trials.problems[0].engine.name} | notes
 
 
 def _metropolis(trials: "Trials", fit: "GradientFit", call, out: Path, identity: str):

@@ -292,7 +292,6 @@ def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
     "words, said",
     [
         (["--method", "foo"], "--method: invalid choice: 'foo'"),
-        (["--method", "cnn"], "cnn"),
         (["--engine", "foo"], "--engine: invalid choice: 'foo'"),
         (["--pixels-per-metre", "-3"], "-3 is not a scale"),
         (["--pixels-per-metre", "nan"], "nan is not finite"),

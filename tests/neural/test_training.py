@@ -104,7 +104,7 @@ def test_configs_errors_name_file_key_and_value(tmp_path):
     with pytest.raises(InputError, match=r"c\.yaml: batch: .* got 0"):
         load_config(path)
     path.write_text("preset: thesis\nsampels: 3\n")
-    with pytest.raises(InputError, match="c.yaml"):
+    with pytest.raises(InputError, match=r"c\.yaml"):
         load_config(path)
     with pytest.raises(InputError, match="not a readable"):
         load_config(tmp_path / "none.yaml")
