@@ -11,6 +11,7 @@ from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.trials import Trials
 from galileo_jax.parameters import inverse
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 # In z every prior is a standard normal: above this the data told less than half.
 IDENTIFIED_SD_Z = 0.5
@@ -79,15 +80,16 @@ def error_of(trials: Trials, theta: np.ndarray, num_used: float) -> dict[str, fl
       theta: in the parameters' units, noise scales last.
       num_used: how many numbers' worth the parameters were fitted with.
     """
-    scales, predictions, chi2 = [], [], 0.0
+    scales, predictions, chi2, count = [], [], 0.0, 0.0
     for clip, problem in enumerate(trials.problems):
         scale = float(np.clip(trials.noise_scale(theta, clip), *NOISE_SCALE_RANGE))
         predicted = problem.simulate(trials.of_clip(theta, clip))
         chi2 += float(np.sum(np.asarray(problem.whiten(jnp.asarray(predicted), scale)) ** 2))
+        count += float(GaussianLikelihood.degrees(scale, problem.data))
         scales.append(scale)
         predictions.append(predicted)
     error = velocity_error(trials.problems, predictions, scales)
-    error["chi2_per_dof"] = chi2 / max(trials.num_values - num_used, 1.0)
+    error["chi2_per_dof"] = chi2 / max(count - num_used, 1.0)
     return error
 
 

@@ -83,7 +83,7 @@ class Checkpoints:
         latest = self._manager.latest_step()
         if latest is None:
             return None
-        kept = self._manager.restore(
+        kept: Any = self._manager.restore(
             latest,
             args=self._ocp.args.Composite(
                 state=self._ocp.args.StandardRestore(flatten(like)),
@@ -123,7 +123,8 @@ def save_network(path: Path, weights: Any, config: TrainConfig) -> None:
     """Writes a network's state and config."""
     arrays = {name: np.asarray(leaf) for name, leaf in flatten(weights).items()}
     with replacing(path) as temporary:
-        np.savez(temporary, config=np.array(json.dumps(config.model_dump())), **arrays)
+        arrays["config"] = np.array(json.dumps(config.model_dump()))
+        np.savez(temporary, **arrays)  # pyright: ignore
 
 
 def load_network(path: Path) -> tuple[Any, TrainConfig]:

@@ -57,7 +57,7 @@ def load_config(path: Path, **overrides: object) -> TrainConfig:
     if not isinstance(content, dict):
         raise InputError(f"{path}: a table of keys and values expected")
     try:
-        return TrainConfig(**(content | given))
+        return TrainConfig.model_validate(content | given)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))

@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -11,14 +12,14 @@ import numpy as np
 from galileo_jax.errors import InputError
 from galileo_jax.files import replacing, write_json
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.task import Arrays, Task
+from galileo_jax.neural.task import Arrays, Trainable
 
 INDEX = "data.json"
 DATA_KEYS = ("preset", "seed", "engine", "frames")  # what the samples depend on
 
 
 def load_or_make(
-    task: Task, config: TrainConfig, folder: Path, on_shard: Callable[[int, int], None]
+    task: Trainable, config: TrainConfig, folder: Path, on_shard: Callable[[int, int], None]
 ) -> Arrays:
     """All samples of a config, from `folder` or made now.
 
@@ -31,7 +32,7 @@ def load_or_make(
     Raises:
       InputError: the folder holds samples of other settings.
     """
-    identity = {"settings": {key: getattr(config, key) for key in DATA_KEYS}}
+    identity: dict[str, Any] = {"settings": {key: getattr(config, key) for key in DATA_KEYS}}
     identity["digest"] = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
     index = folder / INDEX
     if index.is_file() and json.loads(index.read_text(encoding="utf-8")) != identity:
@@ -52,6 +53,6 @@ def load_or_make(
     return {name: values[: config.samples] for name, values in joined.items()}
 
 
-def make_samples(task: Task, seed: int, shard: int, count: int) -> Arrays:
+def make_samples(task: Trainable, seed: int, shard: int, count: int) -> Arrays:
     """New samples; every shard has its own stream of random numbers."""
     return task.make(jax.random.fold_in(jax.random.key(seed), shard), count)

@@ -53,9 +53,9 @@ def cnn_posterior(
     Raises:
       InputError: several clips or effects, not the ramp scene, or no scale.
     """
-    if len(trials.problems) > 1:
+    problem, *others = trials.problems
+    if others:
         raise InputError("--method cnn: one clip expected; take --method grad for joint fits")
-    problem = trials.problems[0]
     scene = problem.model.scene.surroundings
     if not scene.is_scale_known:
         raise InputError("--method cnn: pixels_per_metre is needed; take --method grad")

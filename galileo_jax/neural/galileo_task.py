@@ -84,7 +84,7 @@ class GalileoTask:
 
 def thesis_clips(key: jax.Array, count: int, noise_m: float) -> Arrays:
     """The thesis's setting, seen with a little noise, in the form `GalileoTask.make` gives."""
-    setting = ThesisTask(TrainConfig(**_THESIS))
+    setting = ThesisTask(TrainConfig.model_validate(_THESIS))
     of_theta, of_noise = jax.random.split(key)
     theta = setting.draw(of_theta, count)
     clean = setting.positions(theta)
@@ -179,7 +179,7 @@ def estimate(
     is left to the caller, who knows the slope.
     """
     u = _draw(network, jax.random.key(seed), sample["features"], sample["profile"], count)
-    centre, scale = (np.asarray(sample[name])[:, None] for name in ("centre", "scale"))
+    centre, scale = (jnp.asarray(sample[name])[:, None] for name in ("centre", "scale"))
     t = np.array(from_u(jnp.asarray(u, float), centre, scale))
     generator = np.random.default_rng([seed, 5])
     t[~np.asarray(sample["is_hit"]), :, 1:] = generator.standard_normal(
@@ -188,7 +188,9 @@ def estimate(
     friction = Uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high)
     ratio = np.exp(np.sqrt(2) * MASS_PRIOR.sd * t[..., 1])
     return Estimates(
-        np.asarray(friction.forward(t[..., 0])), ratio, np.asarray(friction.forward(t[..., 2]))
+        np.asarray(friction.forward(jnp.asarray(t[..., 0]))),
+        ratio,
+        np.asarray(friction.forward(jnp.asarray(t[..., 2]))),
     )
 
 

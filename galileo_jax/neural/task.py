@@ -4,13 +4,12 @@ from typing import Any, Protocol
 
 import jax
 import numpy as np
-from flax import nnx
 
 Arrays = dict[str, np.ndarray]
 
 
-class Task(Protocol):
-    """Data, network and loss.
+class Trainable(Protocol):
+    """Data, network and loss: what the training loop needs.
 
     Attributes:
       shard_size: samples made at a time, and kept in one file.
@@ -30,7 +29,11 @@ class Task(Protocol):
         """The mean loss of a batch."""
         ...
 
-    def test(self, network: nnx.Module, data: Arrays, seed: int) -> dict[str, float]:
+
+class Task(Trainable, Protocol):
+    """A preset: it can be tested, too."""
+
+    def test(self, network: Any, data: Arrays, seed: int) -> dict[str, float]:
         """What is to be told of a trained network on new samples."""
         ...
 

@@ -77,14 +77,14 @@ class ThesisTask:
 
 
 def _model(frames: int) -> Model:
-    objects = tuple(ClipObject(name=f"object{i}", shape="box", size_m=SIZE_M) for i in (1, 2))
+    first, second = (ClipObject(name=f"object{i}", shape="box", size_m=SIZE_M) for i in (1, 2))
     truth = Truth(
         mass_kg=(0.4, 0.4),
         friction=(0.1, 0.1),
         ramp_angle_deg=RAMP_ANGLE_DEG,
-        objects=objects,
+        objects=(first, second),
         release_m=RELEASE_M,
         object2_x_m=OBJECT2_M,
     )
-    scene = compile_scene(truth.surroundings, ["box", "box"], objects)
+    scene = compile_scene(truth.surroundings, ["box", "box"], (first, second))
     return Model(scene, frames / FPS, nuisances=())

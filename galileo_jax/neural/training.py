@@ -17,13 +17,13 @@ from flax import nnx
 
 from galileo_jax.neural.checkpoint import NETWORK, Checkpoints, Progress, State, save_network
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.task import Arrays, Task
+from galileo_jax.neural.task import Arrays, Trainable
 
 SAVE_EVERY_S = 15.0
 
 
 def train(
-    task: Task,
+    task: Trainable,
     config: TrainConfig,
     data: Arrays,
     folder: Path,
@@ -107,7 +107,7 @@ def _after_epoch(
 
 
 def _compile(
-    task: Task,
+    task: Trainable,
     structure: Any,
     constant: Any,
     adam: optax.GradientTransformation,

@@ -22,6 +22,10 @@ SCALE_SD = 0.001
 IMPULSE_SD = 0.01  # of a hit's impulse: rigid bodies against compliant contacts, at most
 HIT_STEP_SD_M = 3e-4  # a compliant hit takes 2 ms, a rigid one none
 HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # compliant faces part more slowly than rigid ones
+# Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
+# millimetre; how fast they go along it shows none of that.
+WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
+SMALLEST_MODE = 1e-3  # of a family's largest variance; what is smaller is left out
 MOVED_M = 0.002  # an object that has gone so far has been hit
 
 
@@ -48,7 +52,7 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
     found.append(ROLL_SD_RAD * np.stack([-y, x], axis=1))
     found.append(SCALE_SD * position)
     for i, corner in enumerate(scene.corner_m):
-        if math.isfinite(corner) and scene.start_m[i][0] < corner:
+        if scene.comes_down[i]:
             share = _share_past_foot(position[i, 0], scene, i)
             cos, sin = math.cos(scene.angle_rad), math.sin(scene.angle_rad)
             edge = scene.half_length_m[i] / 2 * (1 - cos)
@@ -58,8 +62,29 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
                 step = np.zeros((count, 2, frames))
                 step[i, axis] = sd * share
                 found.append(step)
+    found.extend(_wobble(position, observation, scene))
     found.extend(_after_hit(position, observation))
     return np.stack(found)
+
+
+def _wobble(
+    position: np.ndarray, observation: Observation, scene: Surroundings
+) -> list[np.ndarray]:
+    """For each object a rough wobble across its path (an Ornstein-Uhlenbeck process)."""
+    apart = np.abs(observation.times_s[:, None] - observation.times_s)
+    values, vectors = np.linalg.eigh(WOBBLE_SD_M**2 * np.exp(-apart / WOBBLE_S))
+    kept = values > SMALLEST_MODE * values[-1]
+    patterns = (np.sqrt(values[kept]) * vectors[:, kept]).T
+    found = []
+    for i, corner in enumerate(scene.corner_m):
+        is_on_ramp = scene.comes_down[i] & (position[i, 0] < corner) | (not scene.has_table)
+        slope = np.where(is_on_ramp, scene.angle_rad, 0.0)
+        across = np.stack([np.sin(slope), np.cos(slope)])
+        for pattern in patterns:
+            wobble = np.zeros_like(position)
+            wobble[i] = pattern * across
+            found.append(wobble)
+    return found
 
 
 def _after_hit(position: np.ndarray, observation: Observation) -> list[np.ndarray]:
@@ -79,7 +104,7 @@ def _after_hit(position: np.ndarray, observation: Observation) -> list[np.ndarra
     found = []
     for i in range(len(x)):
         for value, vector in zip(values, vectors.T, strict=True):
-            if value > 1e-3 * HIT_DRIFT_SD_M**2:
+            if value > SMALLEST_MODE * values[-1]:
                 drift = np.zeros_like(position)
                 drift[i, 0, hit + 1 :] = np.sqrt(value) * vector
                 found.append(drift)
@@ -100,7 +125,7 @@ def crossing_sd_m(observation: Observation, scene: Surroundings) -> np.ndarray:
     position = np.nan_to_num(observation.position_m)
     extra = np.zeros((position.shape[0], position.shape[2]))
     for i, corner in enumerate(scene.corner_m):
-        if math.isfinite(corner) and scene.start_m[i][0] < corner:
+        if scene.comes_down[i]:
             share = _share_past_foot(position[i, 0], scene, i)
             size = scene.half_length_m[i] / 4 * math.sin(scene.angle_rad)
             extra[i] = size * np.where((share > 0) & (share < 1), 1.0, 0.0)

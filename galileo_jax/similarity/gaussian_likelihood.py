@@ -84,6 +84,11 @@ class GaussianLikelihood:
         return -0.5 * (jnp.sum(white**2) + log_determinant)
 
     @staticmethod
+    def degrees(noise_scale: Any, data: Whitening) -> Any:
+        """How many numbers tell of the tracker's noise: the measured less those the modes take."""
+        return data.num_values - (data.gain**2 / (noise_scale**2 + data.gain**2)).sum()
+
+    @staticmethod
     def log_determinant(noise_scale: Any, data: Whitening) -> Any:
         """Of the covariance, up to the constant of the tracker's own."""
         gain = jnp.log1p((data.gain / noise_scale) ** 2)

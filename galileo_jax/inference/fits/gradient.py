@@ -260,7 +260,8 @@ class GradientFitter:
             whole[: self._count, : self._count] = covariance[i]
             for c, clip in enumerate(self._clips):
                 at = self._count + c
-                whole[at, at] = 1 / (1 + 2 * float(clip.data.whitening.num_values) * NOISE_SD**2)
+                count = float(GaussianLikelihood.degrees(scale[c], clip.data.whitening))
+                whole[at, at] = 1 / (1 + 2 * count * NOISE_SD**2)
             failed = max(float(np.abs(w[i]).max()) for w in white) >= FAILED
             code = Code.CONVERGED if is_settled[i] else Code.STEP_LIMIT
             at_unit = np.concatenate(
@@ -415,10 +416,13 @@ class GradientFitter:
         wide = 1 / (2 * NOISE_SD**2)  # the prior, at 1, is worth this many values
         scales = np.empty_like(noise)
         for c, clip in enumerate(self._clips):
-            count = float(clip.data.whitening.num_values)
-            share = used * count / self.trials.num_values
+            data = clip.data.whitening
+            share = used * float(data.num_values) / self.trials.num_values
             total = np.sum((white[c] * noise[:, c : c + 1]) ** 2, axis=1)
-            scales[:, c] = np.sqrt((total + wide) / (np.maximum(count - share, 1.0) + wide))
+            for i, scale in enumerate(noise[:, c]):
+                count = float(GaussianLikelihood.degrees(scale, data))
+                left = max(count - share[i], 1.0)
+                scales[i, c] = np.sqrt((total[i] + wide) / (left + wide))
         return scales
 
     def _half_sd(self, covariance: np.ndarray) -> np.ndarray:
