@@ -82,8 +82,20 @@ class GalileoTask:
         } | {f"thesis: {name} in 90 %": 0.9 for name in QUANTITIES}
 
 
-def thesis_clips(key: jax.Array, count: int, noise_m: float) -> Arrays:
-    """The thesis's setting, seen with a little noise, in the form `GalileoTask.make` gives."""
+def thesis_clips(
+    key: jax.Array, count: int, noise_m: float, told_noise_m: float | None = None
+) -> Arrays:
+    """The thesis's setting, seen with a little noise, in the form `GalileoTask.make` gives.
+
+    Args:
+      key: of everything random.
+      count: how many samples.
+      noise_m: of every coordinate.
+      told_noise_m: what the network is told of it; default: the truth.
+
+    Returns:
+      the samples, and with them `collides`: whether object 2 moves by more than 0.1 mm.
+    """
     setting = ThesisTask(TrainConfig.model_validate(_THESIS))
     of_theta, of_noise = jax.random.split(key)
     theta = setting.draw(of_theta, count)
@@ -99,7 +111,7 @@ def thesis_clips(key: jax.Array, count: int, noise_m: float) -> Arrays:
             times_s=jnp.asarray(times),
             position_m=position,
             mask=jnp.tile(jnp.arange(NUM_FRAMES) < frames, (2, 1)),
-            noise_m=jnp.full(2, noise_m),
+            noise_m=jnp.full(2, told_noise_m or noise_m),
             angle_rad=jnp.asarray(scene.angle_rad),
             gravity=jnp.asarray(scene.gravity),
             half_length_m=jnp.asarray(scene.half_length_m),

@@ -14,6 +14,7 @@ arXiv 1605.06376.
 """
 
 import itertools
+import math
 from typing import NamedTuple
 
 import jax
@@ -21,7 +22,7 @@ import jax.numpy as jnp
 from flax import nnx
 
 NUM_TARGETS = 3
-FILTERS = (24, 32, 32)
+FILTERS, KERNELS = (32, 32), (8, 2)  # strides as wide as kernels: products of matrices
 LARGEST_FEATURE = 8.0
 LARGEST_T = 6.0
 LEAST_LOG_SD, MOST_LOG_SD = -5.0, 2.0
@@ -68,11 +69,11 @@ class PosteriorNetwork(nnx.Module):
         sizes = (num_channels, *FILTERS)
         self.convolutions = nnx.List(
             [
-                nnx.Conv(a, b, (5,), strides=(2,), padding="SAME", rngs=rngs)
-                for a, b in itertools.pairwise(sizes)
+                nnx.Linear(kernel * a, b, rngs=rngs)
+                for kernel, (a, b) in zip(KERNELS, itertools.pairwise(sizes), strict=True)
             ]
         )
-        flat = FILTERS[-1] * num_frames // 2 ** len(FILTERS)
+        flat = FILTERS[-1] * num_frames // math.prod(KERNELS)
         self.profile = nnx.Linear(flat, 64, rngs=rngs)
         self.trunk1 = nnx.Linear(num_features + 64, width, rngs=rngs)
         self.trunk2 = nnx.Linear(width, width, rngs=rngs)
@@ -98,8 +99,8 @@ class PosteriorNetwork(nnx.Module):
     def trunk(self, features: jax.Array, profile: jax.Array) -> jax.Array:
         """What conditions the density, `[batch, width]`."""
         x = jnp.swapaxes(profile, -1, -2)
-        for convolution in self.convolutions:
-            x = nnx.gelu(convolution(x))
+        for kernel, convolution in zip(KERNELS, self.convolutions, strict=True):
+            x = nnx.gelu(convolution(x.reshape(len(x), -1, kernel * x.shape[-1])))
         x = nnx.gelu(self.profile(x.reshape(len(x), -1)))
         x = jnp.concatenate([self.standardised(features), x], axis=-1)
         x = nnx.gelu(self.trunk1(x))
