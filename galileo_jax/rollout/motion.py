@@ -133,9 +133,7 @@ def to_plane(
     xp = path_m.__array_namespace__()
     if scene.has_table:
         slope = xp.where(path_m < 0, ramp_rad[..., None], table_rad[..., None])
-        origin = xp.stack(
-            [xp.asarray(scene.corner_m), xp.asarray(scene.half_height_m)], axis=-1
-        )
+        origin = xp.stack([xp.asarray(scene.corner_m), xp.asarray(scene.half_height_m)], axis=-1)
     else:
         slope = ramp_rad[..., None] + xp.zeros(path_m.shape)
         origin = xp.asarray(scene.start_m)
