@@ -18,6 +18,7 @@ import json
 import math
 import multiprocessing
 import time
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
@@ -47,7 +48,7 @@ def main(argv: Sequence[str]) -> int | None:
     least = call.least_chi2 if call.least_chi2 is not None else (0.0 if call.folder else 3.0)
     tables.row("case", COLUMNS)
     scores: list[tuple[Case, verdicts.Score]] = []
-    seconds, failures, weak = [], {}, []
+    seconds, failures, weak = [], {}, Counter[str]()
     for case in _with_clips(cases, kept):
         entry = kept.get(case.name) or _examine(case, call)
         if entry["error"]:
@@ -58,7 +59,7 @@ def main(argv: Sequence[str]) -> int | None:
         seconds.append(entry["seconds"])
         _show(case, score, seconds[-1])
         if score.kind != "none" and score.before**2 < least:
-            weak.append(case.name)
+            weak[case.effect] += 1
         else:
             scores.append((case, score))
     if not scores:
@@ -68,7 +69,7 @@ def main(argv: Sequence[str]) -> int | None:
     missed += [f"{name} cannot be diagnosed" for name in failures]
     report = {
         "cases": len(cases),
-        "too_weak": len(weak),
+        "too_weak": dict(weak),
         "failures": failures,
         **figures,
         "by_effect": _by(scores, lambda case: case.effect),
@@ -179,7 +180,8 @@ def _print(report: dict[str, Any]) -> None:
     print("\nconfusion: truth, and what was said")
     for truth, row in report["confusion"].items():
         print(f"{truth:<28}  " + ", ".join(f"{label} {count}" for label, count in row.items()))
-    print()
+    weak = ", ".join(f"{name} {count}" for name, count in report["too_weak"].items())
+    print(f"\ntoo weak to show, not counted: {weak or 'none'}")
     for name, value in report.items():
         if isinstance(value, int | float):
             tables.row(name, [value])

@@ -115,9 +115,7 @@ def test_what_is_declared():
     assert declared.taken_s(2) == pytest.approx([-0.2, 1.05 / 30 - 0.2])
 
 
-@pytest.mark.parametrize(
-    "name", ["frame_rate", "ramp_angle", "release_delay", "scale_error", "table_tilt", "rolling"]
-)
+@pytest.mark.parametrize("name", ["frame_rate", "ramp_angle", "release_delay", "scale_error"])
 def test_the_library_mends_what_simulate_hides(name, tmp_path, x64):
     """The effect at its true value explains the clip that a user gets; without it nothing does."""
     from galileo_jax.inference.problem import Problem
