@@ -18,7 +18,6 @@ import json
 import math
 import multiprocessing
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
@@ -48,7 +47,8 @@ def main(argv: Sequence[str]) -> int | None:
     least = call.least_chi2 if call.least_chi2 is not None else (0.0 if call.folder else 3.0)
     tables.row("case", COLUMNS)
     scores: list[tuple[Case, verdicts.Score]] = []
-    seconds, failures, weak = [], {}, Counter[str]()
+    weak: list[tuple[Case, verdicts.Score]] = []
+    seconds, failures = [], {}
     for case in _with_clips(cases, kept):
         entry = kept.get(case.name) or _examine(case, call)
         if entry["error"]:
@@ -58,10 +58,8 @@ def main(argv: Sequence[str]) -> int | None:
         score = verdicts.judge(case.effect, library, entry["diagnosis"])
         seconds.append(entry["seconds"])
         _show(case, score, seconds[-1])
-        if score.kind != "none" and score.before**2 < least:
-            weak[case.effect] += 1
-        else:
-            scores.append((case, score))
+        is_weak = score.kind != "none" and score.before**2 < least
+        (weak if is_weak else scores).append((case, score))
     if not scores:
         raise InputError(f"{call.out}: no case could be diagnosed in which the effect shows")
     figures = verdicts.summary([score for _, score in scores])
@@ -69,7 +67,8 @@ def main(argv: Sequence[str]) -> int | None:
     missed += [f"{name} cannot be diagnosed" for name in failures]
     report = {
         "cases": len(cases),
-        "too_weak": dict(weak),
+        "too_weak": len(weak),
+        "too_weak_by_effect": _by(weak, lambda case: case.effect),
         "failures": failures,
         **figures,
         "by_effect": _by(scores, lambda case: case.effect),
@@ -172,7 +171,7 @@ def _by(scores: Sequence[tuple[Case, verdicts.Score]], key: Any) -> dict[str, di
 
 
 def _print(report: dict[str, Any]) -> None:
-    for title in ("by_effect", "by_strength"):
+    for title in ("by_effect", "by_strength", "too_weak_by_effect"):
         print()
         tables.row(title.replace("_", " "), BY_COLUMNS)
         for name, entry in report[title].items():
@@ -180,8 +179,7 @@ def _print(report: dict[str, Any]) -> None:
     print("\nconfusion: truth, and what was said")
     for truth, row in report["confusion"].items():
         print(f"{truth:<28}  " + ", ".join(f"{label} {count}" for label, count in row.items()))
-    weak = ", ".join(f"{name} {count}" for name, count in report["too_weak"].items())
-    print(f"\ntoo weak to show, not counted: {weak or 'none'}")
+    print()
     for name, value in report.items():
         if isinstance(value, int | float):
             tables.row(name, [value])

@@ -141,7 +141,8 @@ def test_grid_is_walked_once(exam, tmp_path, capsys, monkeypatch):
         for name in ("air_drag_10_0", "air_drag_80_0", "none_0")
     ]
     figures = json.loads((tmp_path / "figures.json").read_text())
-    assert figures["too_weak"] == {"air_drag": 1}
+    assert figures["too_weak"] == 1
+    assert figures["too_weak_by_effect"]["air_drag"]["known"] == 1
     assert (figures["known"], figures["named_right"], figures["false_alarms"]) == (1, 1, 1)
     assert figures["by_strength"].keys() == {"0.8"}
     assert command.run(module.main, options) == 0
