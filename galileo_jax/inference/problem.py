@@ -1,5 +1,6 @@
 """The inverse problem of one clip: its data, and a model of it."""
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ import numpy as np
 from galileo_jax.effects.effect import Effect, Surroundings
 from galileo_jax.observation import Observation
 from galileo_jax.parameters import Parameter
+from galileo_jax.rollout.chunks import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
@@ -48,19 +50,10 @@ class Problem:
         """What the camera would see, in JAX: `[parameter]` to `[object, 2, frame]`, m."""
         position, velocity = in_jax(self.engine)(theta[None])
         model = self.model
-        times = np.arange(model.num_records + 1) * model.record_dt_s
-        effects = model.effects + model.nuisances
+        kind = (model.effects + model.nuisances, model.names, model.record_dt_s)
         frames = jnp.asarray(self.observation.times_s)
-        return _seen_one(
-            effects,
-            model.names,
-            theta,
-            times,
-            position[0],
-            velocity[0],
-            frames,
-            model.scene.surroundings,
-        )
+        surroundings = model.scene.surroundings
+        return _seen_one(kind, theta, position[0], velocity[0], frames, surroundings)
 
     def simulate(self, theta: np.ndarray) -> np.ndarray:
         """What the camera would see: `[parameter]` to `[object, 2, frame]`, m."""
@@ -68,17 +61,16 @@ class Problem:
 
     def simulate_batch(self, theta: np.ndarray) -> np.ndarray:
         """`simulate` of `[batch, parameter]`: `[batch, object, 2, frame]`."""
-        position, velocity = self.engine.simulate(theta)
-        times = np.arange(position.shape[-1]) * self.model.record_dt_s
+        motion = padded_motion(*self.engine.simulate(theta))
+        times = self.observation.times_s
+        frames = np.pad(times, (0, rounded_up(len(times), FRAMES) - len(times)), mode="edge")
         model = self.model
-        effects = model.effects + model.nuisances
-        frames = jnp.asarray(self.observation.times_s)
-        surroundings = model.scene.surroundings
-        return np.asarray(
-            _seen_batch(
-                effects, model.names, theta, times, position, velocity, frames, surroundings
-            )
+        kind = (model.effects + model.nuisances, model.names, model.record_dt_s)
+        scene = model.scene.surroundings
+        found = in_chunks(
+            MOTIONS, lambda *rows: _seen_batch(kind, *rows, frames, scene), theta, *motion
         )
+        return found[..., : len(times)]
 
     def whiten(self, predicted_m: jax.Array, noise_scale: Any) -> jax.Array:
         """Whitened residuals, unit normal if the model is right: `[object * 2 * frame]`."""
@@ -104,15 +96,16 @@ def seen(
     return position
 
 
-def _seen_one(effects, names, theta, record_times, position, velocity, times_s, scene):
+def _seen_one(kind, theta, position, velocity, times_s, scene):
+    effects, names, record_dt_s = kind
+    times = jnp.arange(position.shape[-1]) * record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
-    motion = Trajectory(record_times, position, velocity, position[:, 0])
+    motion = Trajectory(times, position, velocity, position[:, 0])
     return seen(effects, names, theta, motion, times_s, scene)
 
 
-_seen_batch = jax.jit(
-    lambda effects, names, theta, record_times, position, velocity, times_s, scene: jax.vmap(
-        lambda t, p, v: _seen_one(effects, names, t, record_times, p, v, times_s, scene)
-    )(theta, position, velocity),
-    static_argnums=(0, 1),
-)
+@functools.partial(jax.jit, static_argnums=0)
+def _seen_batch(kind, theta, position, velocity, times_s, scene):
+    return jax.vmap(lambda t, p, v: _seen_one(kind, t, p, v, times_s, scene))(
+        theta, position, velocity
+    )

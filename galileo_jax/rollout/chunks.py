@@ -1,10 +1,27 @@
-"""Batches of any size through programs compiled for a few."""
+"""Batches and lengths of any size through programs compiled for a few."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
 import numpy as np
+
+
+# Sizes are rounded up to multiples of these, so that few programs serve all clips.
+FRAMES, MODES, RECORDS = 64, 64, 512
+MOTIONS = (16, 64, 256)  # of batches of rollouts
+
+
+def rounded_up(size: int, multiple: int) -> int:
+    """The next multiple."""
+    return -(-size // multiple) * multiple
+
+
+def padded_motion(position: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Motions `[..., record]` as long as programs are compiled for; at rest beyond their end."""
+    count = position.shape[-1]
+    missing = [(0, 0)] * (position.ndim - 1) + [(0, rounded_up(count, RECORDS) - count)]
+    return np.pad(position, missing, mode="edge"), np.pad(velocity, missing)
 
 
 def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any) -> Any:

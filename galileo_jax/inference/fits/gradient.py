@@ -35,7 +35,14 @@ from galileo_jax.effects.effect import Surroundings
 from galileo_jax.inference.problem import Problem, seen
 from galileo_jax.inference.trials import NOISE_SD, Trials
 from galileo_jax.parameters import PriorTable, inverse
-from galileo_jax.rollout.chunks import in_chunks
+from galileo_jax.rollout.chunks import (
+    FRAMES,
+    MODES,
+    MOTIONS,
+    in_chunks,
+    padded_motion,
+    rounded_up,
+)
 from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 
@@ -347,8 +354,7 @@ class GradientFitter:
         self._num_rollouts += len(z)
         theta = clip.theta(z, free)
         position, velocity = clip.problem.engine.simulate(theta)
-        missing = [(0, 0)] * 3 + [(0, clip.num_records - position.shape[-1])]
-        return theta, np.pad(position, missing, mode="edge"), np.pad(velocity, missing)
+        return theta, *padded_motion(position, velocity)
 
     def _costs(self, points: Batch) -> np.ndarray:
         """chi2 / 2 and the prior's part, `[point]`."""
@@ -491,7 +497,6 @@ class _Clip:
     priors: PriorTable
     absent: np.ndarray
     data: Padded
-    num_records: int
 
     @classmethod
     def of(cls, trials: Trials, index: int) -> "_Clip":
@@ -503,7 +508,6 @@ class _Clip:
             priors=PriorTable.of(parameters),
             absent=np.array([p.absent for p in parameters]),
             data=_padded(problem),
-            num_records=_up(problem.model.num_records + 1, RECORDS),
         )
 
     @property
@@ -609,18 +613,13 @@ def _solve(kinds, dampings, size, z, free, noise, index, motions, clips):
 
 _forward = jax.jit(lambda priors, z: priors.forward(z))
 
-# Sizes are rounded up to these (or multiples of them), so that few programs serve all clips.
-FRAMES, MODES, RECORDS, FREE = 64, 64, 512, 4
-POINTS, MOTIONS = (4, 16), (16, 64, 256)
-
-
-def _up(size: int, multiple: int) -> int:
-    return -(-size // multiple) * multiple
+POINTS = (4, 16)  # sizes of compiled batches of hypotheses
+FREE = 4  # numbers of free parameters are rounded up to multiples
 
 
 def _free_index(free: np.ndarray) -> np.ndarray:
     """Where each point's free parameters stand, `[point, free]`; the count of all = none."""
-    width = _up(int(free.sum(axis=1).max()), FREE)
+    width = rounded_up(int(free.sum(axis=1).max()), FREE)
     index = np.full((len(free), width), free.shape[1])
     for row, own in zip(index, free, strict=True):
         found = np.flatnonzero(own)
@@ -631,8 +630,8 @@ def _free_index(free: np.ndarray) -> np.ndarray:
 def _padded(problem: Problem) -> Padded:
     """Pads with frames that count for nothing and modes without gain."""
     times, data = problem.observation.times_s, problem.data
-    frames = _up(len(times), FRAMES) - len(times)
-    modes = _up(len(data.gain), MODES) - len(data.gain)
+    frames = rounded_up(len(times), FRAMES) - len(times)
+    modes = rounded_up(len(data.gain), MODES) - len(data.gain)
     whitening = Whitening(
         np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),
         np.pad(data.inverse_root, [(0, 0), (0, 0), (0, 0), (0, frames)]),

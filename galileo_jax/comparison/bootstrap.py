@@ -1,0 +1,92 @@
+"""The parametric bootstrap: what residuals look like when the fitted model is the truth.
+
+    1. From the fit, draw data: the predicted positions, and errors from the covariance with
+       which they were fitted; and draw the prior's centre, which is data, too.
+    2. Refit each replicate: Gauss-Newton steps with the fit's Jacobian, each checked with true
+       rollouts, so that no residual is taken from a linear model.
+
+Rollouts of all replicates are one batch.
+"""
+
+import numpy as np
+
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.trials import Trials
+
+NUM_STEPS = 2
+
+
+def whitened(trials: Trials, theta: np.ndarray, noise_scale: np.ndarray) -> list[np.ndarray]:
+    """Whitened residuals of each clip, `[point, value]`.
+
+    Args:
+      trials: the clips.
+      theta: `[point, parameter]`, in their units.
+      noise_scale: `[clip]`.
+    """
+    found = []
+    for clip, problem in enumerate(trials.problems):
+        predicted = problem.simulate_batch(trials.of_clip(theta, clip))
+        found.append(_whiten_batch(problem, predicted, float(noise_scale[clip])))
+    return found
+
+
+def replicates(
+    trials: Trials, fit: GradientFit, noise_scale: np.ndarray, count: int, seed: int
+) -> list[np.ndarray]:
+    """Whitened residuals of refitted replicates, of each clip `[replicate, value]`.
+
+    Args:
+      trials: the clips.
+      fit: whose hypothesis, parameters and Jacobian are taken as true.
+      noise_scale: `[clip]`, at which residuals are whitened; the fit's own may differ.
+      count: how many.
+      seed: of the draws.
+    """
+    generator = np.random.default_rng([seed, 31])
+    free = np.flatnonzero(fit.free[: len(trials.model_parameters)])
+    sizes = [problem.observation.mask.size * 2 for problem in trials.problems]
+    ends = np.cumsum(sizes)[:-1]
+    fitted_scale = trials.theta(fit.z)[len(trials.model_parameters) :]
+    # The Jacobian was whitened at the fit's own noise scale.
+    rows = np.repeat(fitted_scale / noise_scale, sizes)
+    jacobian = fit.jacobian[:, free] * rows[:, None]
+    masks = [
+        np.repeat(problem.observation.mask[:, None], 2, axis=1).reshape(-1)
+        for problem in trials.problems
+    ]
+    noise = generator.standard_normal((count, sum(sizes))) * np.concatenate(masks)
+    centre = generator.standard_normal((count, len(free)))
+    gain = np.linalg.inv(jacobian.T @ jacobian + np.eye(len(free)))
+    base = np.concatenate(_at(trials, fit, fit.z[None], noise_scale), axis=1)
+
+    moved = np.zeros((count, len(free)))
+    residual, cost = noise, np.full(count, np.inf)
+    best = noise
+    for _ in range(NUM_STEPS):
+        moved = moved - (residual @ jacobian + (moved - centre)) @ gain
+        z = np.tile(fit.z, (count, 1))
+        z[:, free] += moved
+        true = np.concatenate(_at(trials, fit, z, noise_scale), axis=1)
+        residual = noise + true - base
+        now = np.sum(residual**2, axis=1) + np.sum((moved - centre) ** 2, axis=1)
+        improves = now < cost
+        best, cost = np.where(improves[:, None], residual, best), np.where(improves, now, cost)
+    return np.split(best, ends, axis=1)
+
+
+def _at(
+    trials: Trials, fit: GradientFit, z: np.ndarray, noise_scale: np.ndarray
+) -> list[np.ndarray]:
+    return whitened(trials, trials.theta(z, fit.free), noise_scale)
+
+
+def _whiten_batch(problem: Problem, predicted: np.ndarray, noise_scale: float) -> np.ndarray:
+    """`GaussianLikelihood.whiten` of `[point, object, 2, frame]`: `[point, value]`."""
+    data = problem.data
+    y = np.einsum("oijt,bojt->boit", data.inverse_root, data.observed_m - predicted)
+    y = y.reshape(len(predicted), -1)
+    basis = data.basis.reshape(len(data.gain), -1)
+    shrink = 1 - noise_scale / np.sqrt(noise_scale**2 + data.gain**2)
+    return (y - ((y @ basis.T) * shrink) @ basis) / noise_scale

@@ -1,0 +1,196 @@
+"""Is the model adequate for these data, and where does it fail?
+
+Many local tests (`local_tests`) make one global p-value: each statistic is standardised by its
+distribution over the parametric bootstrap's replicates (`bootstrap`), the largest of them is
+the global statistic, and its p-value is that of the same maximum over the replicates. That is
+calibrated without assuming that the rollout is linear or the tests independent, and corrected
+for having looked in many places (Westfall and Young 1993; arXiv 2412.15100). Beyond what the
+replicates reach, a Gumbel distribution fitted to them is used.
+
+Nuisances count as well: one that is pulled many of its prior's standard deviations away is a
+failure of the model that residuals no longer show.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from galileo_jax.comparison.bootstrap import replicates, whitened
+from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
+from galileo_jax.comparison.phases import phases
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.result import error_of
+from galileo_jax.inference.trials import Trials
+
+NUM_REPLICATES = 200
+ADEQUATE_P = 0.01
+# Residuals are judged by the tracker's own noise, or what the fit says of it if that is more:
+# a camera that sees still objects better than it states still blurs moving ones. The tracker
+# knows its noise within thirty per cent, so that beyond the upper bound it is no noise.
+NOISE_SCALE_RANGE = (1.0, 1.5)
+
+
+@dataclass(frozen=True)
+class Place:
+    """One cell in numbers.
+
+    Attributes:
+      clip, object, axis, phase: where.
+      rmse: of the velocity's residuals, m/s.
+      noise: what tracking errors alone give, m/s.
+      z: the largest of its statistics, in standard deviations of the replicates.
+      whiteness: correlation of neighbouring whitened residuals.
+    """
+
+    clip: str
+    object: str
+    axis: str
+    phase: str
+    rmse: float
+    noise: float
+    z: float
+    whiteness: float
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A nuisance outside of what its prior allows: `z` prior standard deviations away."""
+
+    parameter: str
+    value: float
+    unit: str
+    z: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A fitted hypothesis against the data.
+
+    Attributes:
+      p_value: global, of the model being adequate.
+      where: all cells, the worst first.
+      pulls: nuisances outside their priors, the worst first.
+      error: rmse, noise, l1, l2 (m/s) and chi2_per_dof.
+      labels: of each clip `[object, frame]`, indices into `phases.PHASES`.
+      white: of each clip `[object, 2, frame]`, whitened residuals.
+    """
+
+    p_value: float
+    where: tuple[Place, ...]
+    pulls: tuple[Pull, ...]
+    error: dict[str, float]
+    labels: tuple[np.ndarray, ...]
+    white: tuple[np.ndarray, ...]
+
+    @property
+    def is_adequate(self) -> bool:
+        """Whether the data do not contradict the model."""
+        return self.p_value >= ADEQUATE_P
+
+
+def compare(trials: Trials, fit: GradientFit, seed: int) -> Comparison:
+    """Compares a fitted hypothesis with the data; the same seed gives the same result."""
+    theta = trials.theta(fit.z, fit.free)
+    scales = np.array([trials.noise_scale(theta, c) for c in range(len(trials.problems))])
+    scales = np.clip(scales, *NOISE_SCALE_RANGE)
+    measured = whitened(trials, theta[None], scales)
+    drawn = replicates(trials, fit, scales, NUM_REPLICATES, seed)
+    labels, cells = [], []
+    for clip, problem in enumerate(trials.problems):
+        label = phases(problem, trials.of_clip(theta, clip))
+        observation = problem.observation
+        labels.append(label)
+        cells.extend(find_cells(clip, observation.names, observation.mask, label))
+    of_cells = [_standardised(measured[c.clip], drawn[c.clip], c) for c in cells]
+    p_local, p_pull, pulls = 1.0, 1.0, _pulls(trials, fit, theta)
+    if of_cells:
+        # One row per replicate: its largest statistic of all cells.
+        highest = np.max(np.concatenate([d for _, d in of_cells], axis=1), axis=1)
+        p_local = _tail(max(float(m.max()) for m, _ in of_cells), highest)
+    if pulls:
+        p_pull = 2 * len(pulls) * float(stats.norm.sf(max(abs(p.z) for p in pulls)))
+    p = float(np.clip(2 * min(p_local, p_pull), 0.0, 1.0))
+    places = [
+        _place(trials, theta, scales, measured, cell, float(own.max()))
+        for cell, (own, _) in zip(cells, of_cells, strict=True)
+    ]
+    return Comparison(
+        p_value=p,
+        where=tuple(sorted(places, key=lambda place: -place.z)),
+        pulls=tuple(sorted(pulls, key=lambda pull: -abs(pull.z))),
+        error=error_of(trials, theta, _num_used(fit)),
+        labels=tuple(labels),
+        white=tuple(
+            w[0].reshape(len(p.observation.names), 2, -1)
+            for w, p in zip(measured, trials.problems, strict=True)
+        ),
+    )
+
+
+def _standardised(
+    measured: np.ndarray, drawn: np.ndarray, cell: Cell
+) -> tuple[np.ndarray, np.ndarray]:
+    """A cell's statistics `[3]` and the replicates' `[replicate, 3]`, in standard deviations."""
+    found, expected = statistics(measured, cell)[0], statistics(drawn, cell)
+    mean, sd = expected.mean(axis=0), expected.std(axis=0)
+    sd = np.maximum(sd, 1e-9)
+    return (found - mean) / sd, (expected - mean) / sd
+
+
+def _tail(value: float, drawn: np.ndarray) -> float:
+    """How likely a draw is as large as `value`."""
+    counted = (1 + np.sum(drawn >= value)) / (1 + len(drawn))
+    if counted > 5 / len(drawn):
+        return float(counted)
+    scale = np.sqrt(6) / np.pi * drawn.std()
+    return float(stats.gumbel_r.sf(value, drawn.mean() - np.euler_gamma * scale, scale))
+
+
+def _pulls(trials: Trials, fit: GradientFit, theta: np.ndarray) -> list[Pull]:
+    """All nuisances but the noise scale, which residuals judge."""
+    count = len(trials.model_parameters)
+    return [
+        Pull(parameter.name, float(theta[i]), parameter.unit, float(fit.z[i]))
+        for i, parameter in enumerate(trials.parameters[:count])
+        if parameter.role == "nuisance" and fit.free[i]
+    ]
+
+
+def _num_used(fit: GradientFit) -> float:
+    count = len(fit.steps)
+    return float(np.sum(fit.free[:count]) - np.trace(fit.covariance[:count, :count]))
+
+
+def _place(
+    trials: Trials,
+    theta: np.ndarray,
+    scales: np.ndarray,
+    measured: list[np.ndarray],
+    cell: Cell,
+    z: float,
+) -> Place:
+    problem = trials.problems[cell.clip]
+    observation = problem.observation
+    i, a = observation.names.index(cell.object), ("x", "y").index(cell.axis)
+    frames = len(observation.times_s)
+    index = cell.index % frames
+    predicted = problem.simulate(trials.of_clip(theta, cell.clip))[i, a]
+    residual = (observation.position_m[i, a] - predicted)[index]
+    follows = np.diff(index) == 1
+    dt = np.diff(observation.times_s[index])[follows]
+    speed = np.diff(residual)[follows] / dt
+    variance = scales[cell.clip] ** 2 * observation.covariance_m2[i, a, a, index]
+    noise = (variance[1:] + variance[:-1])[follows] / dt**2
+    white = measured[cell.clip][0, cell.index]
+    neighbours = float(np.sum(white[1:] * white[:-1]) / max(np.sum(white**2), 1e-12))
+    return Place(
+        clip=problem.name,
+        object=cell.object,
+        axis=cell.axis,
+        phase=cell.phase,
+        rmse=float(np.sqrt(np.mean(speed**2))) if speed.size else 0.0,
+        noise=float(np.sqrt(np.mean(noise))) if noise.size else 0.0,
+        z=z,
+        whiteness=neighbours,
+    )

@@ -1,0 +1,85 @@
+"""Local tests: statistics of whitened residuals, cell by cell.
+
+A cell is an object, an axis and a phase. In each of them a model that is right leaves white
+unit noise; what is missing shows as too much of it (power), as a smooth deviation (the energy
+in the slowest cosines) or as neighbours that agree (whiteness). Whole tracks are looked at in
+the same way, because a deviation may span phases.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import dct
+
+from galileo_jax.comparison.phases import PHASES
+
+AXES = ("x", "y")
+MIN_FRAMES = 5
+SLOW_SHARE, MAX_SLOW = 0.25, 6  # cosines that count as slow
+WHOLE = "whole"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Where a statistic looks.
+
+    Attributes:
+      clip: index of the clip.
+      object: its name.
+      axis: "x" or "y".
+      phase: of `PHASES`, or "whole".
+      index: of its values in a clip's whitened residuals, in the order of time.
+    """
+
+    clip: int
+    object: str
+    axis: str
+    phase: str
+    index: np.ndarray
+
+
+def find_cells(clip: int, names: Sequence[str], mask: np.ndarray, labels: np.ndarray) -> list[Cell]:
+    """The cells of one clip with enough frames.
+
+    Args:
+      clip: its index.
+      names: of the objects.
+      mask: `[object, frame]`, where the object was seen.
+      labels: `[object, frame]`, indices into `PHASES`.
+    """
+    frames = mask.shape[1]
+    found = []
+    for i, name in enumerate(names):
+        for a, axis in enumerate(AXES):
+            first = (i * len(AXES) + a) * frames
+            for phase in (*PHASES, WHOLE):
+                chosen = mask[i] & (
+                    np.ones(frames, bool) if phase == WHOLE else labels[i] == PHASES.index(phase)
+                )
+                index = first + np.flatnonzero(chosen)
+                if len(index) >= MIN_FRAMES:
+                    found.append(Cell(clip, name, axis, phase, index))
+    return found
+
+
+def statistics(white: np.ndarray, cell: Cell) -> np.ndarray:
+    """Power, slowness and whiteness of one cell, each about normal if the model is right.
+
+    Args:
+      white: `[replicate, value]`, whitened residuals of the clip.
+      cell: where to look.
+
+    Returns:
+      `[replicate, 3]`; sums of squares as their cube roots (Wilson and Hilferty 1931).
+    """
+    values = white[:, cell.index]
+    count = len(cell.index)
+    slow = min(MAX_SLOW, max(1, int(SLOW_SHARE * count)))
+    spectrum = np.asarray(dct(values, axis=1, norm="ortho"))[:, :slow]
+    power = np.cbrt(np.mean(values**2, axis=1))
+    slowness = np.cbrt(np.mean(spectrum**2, axis=1))
+    neighbours = np.sum(values[:, 1:] * values[:, :-1], axis=1)
+    # Against the stated noise where there is less: a tracker's faint memory is no physics.
+    whiteness = neighbours / np.maximum(np.sum(values**2, axis=1), count)
+    return np.stack([power, slowness, whiteness], axis=1)

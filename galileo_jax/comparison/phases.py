@@ -1,0 +1,60 @@
+"""Phases of a motion: where along the way a model fails is half of what is wrong with it."""
+
+import numpy as np
+
+from galileo_jax.inference.problem import Problem
+
+PHASES = ("held", "ramp", "foot", "table", "collision", "after", "at rest")
+COLLISION_S = 0.05  # either side of the hit
+RESTS_M_S = 2e-3
+
+
+def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
+    """The phase of every object in every frame, from the fitted motion.
+
+    held: before the release; ramp, foot (its length spans the foot), table; collision: near
+    the first hit; after it; at rest: where nothing moves any more, or not yet.
+
+    Args:
+      problem: the clip and its model.
+      theta: `[model parameter]`, in their units.
+
+    Returns:
+      `[object, frame]`, indices into `PHASES`.
+    """
+    model = problem.model
+    scene = model.scene.surroundings
+    named = model.by_name(theta)
+    times = np.asarray(problem.observation.times_s)
+    for effect in model.effects + model.nuisances:
+        times = np.asarray(effect.time(times, named, scene))
+    position, velocity = (a[0] for a in problem.engine.simulate(theta[None]))
+    recorded = np.arange(position.shape[-1]) * model.record_dt_s
+    label = np.empty((len(scene.names), len(times)), int)
+    hit_s = _hit_s(position, recorded, scene.half_length_m)
+    for i in range(len(scene.names)):
+        x = np.interp(times, recorded, position[i, 0])
+        speed = np.interp(times, recorded, np.hypot(*velocity[i]))
+        label[i] = PHASES.index("table")
+        if scene.comes_down[i] or not scene.has_table:
+            beyond = x - scene.corner_m[i]  # -inf without a table
+            half = scene.half_length_m[i]
+            label[i][beyond < half] = PHASES.index("foot")
+            label[i][beyond < -half] = PHASES.index("ramp")
+        label[i][speed < RESTS_M_S] = PHASES.index("at rest")
+        if hit_s is not None:
+            label[i][times > hit_s] = PHASES.index("after")
+            label[i][np.abs(times - hit_s) <= COLLISION_S] = PHASES.index("collision")
+        label[i][times <= 0] = PHASES.index("held")
+    return label
+
+
+def _hit_s(
+    position: np.ndarray, times_s: np.ndarray, half_length_m: tuple[float, ...]
+) -> float | None:
+    """When objects 1 and 2 first touch; None where they do not."""
+    if len(position) < 2:
+        return None
+    gap = position[1, 0] - position[0, 0] - half_length_m[0] - half_length_m[1]
+    touching = np.flatnonzero(gap < 1e-4)
+    return float(times_s[touching[0]]) if touching.size else None
