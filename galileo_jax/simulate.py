@@ -336,7 +336,7 @@ def _parser() -> command.Parser:
         metavar="NAME[:PARAMETER=VALUE,...]",
         help="an effect, in SI units; what is left out is drawn (may be given several times)",
     )
-    hide.add_argument("--strength", type=_number(float, 0, 1), help="0: just seen, 1: strong")
+    hide.add_argument("--strength", type=_number(float, 0, 1), help="0: weak, 1: strong")
     hide.add_argument("--effects-from", type=Path, action="append", default=[], metavar="FILE.py")
     hide.add_argument(
         "--faults",

@@ -29,7 +29,8 @@ class Range(NamedTuple):
     is_per_mass: bool = False
 
 
-# On a ramp of 10 to 20 degrees, followed to 0.3 px at 900 px/m, weak ones are a few sigmas.
+# On a ramp of 10 to 20 degrees, followed to 0.3 px at 900 px/m, many weak ones
+# hide behind friction and nuisances; the exam counts those that show.
 STRENGTHS = {
     "air_drag": Range(0.4, 2.0, is_per_mass=True),
     "constant_force": Range(0.5, 1.5, is_signed=True, is_per_mass=True),
@@ -37,15 +38,15 @@ STRENGTHS = {
     "friction_patch": Range(0.12, 0.40),
     "initial_push": Range(0.15, 0.60),
     "magnetic_brake": Range(1.5, 6.0, is_per_mass=True),
-    "ramp_angle": Range(math.radians(0.7), math.radians(2.5), is_signed=True),
+    "ramp_angle": Range(math.radians(1.0), math.radians(2.5), is_signed=True),
     "release_delay": Range(0.08, 0.40),
     "restitution": Range(0.20, 0.80),
     "rolling": Range(0.30, 1.00),
     "scale_error": Range(0.03, 0.10, is_signed=True),
-    "spring_tether": Range(1.0, 4.0, is_per_mass=True),
+    "spring_tether": Range(0.5, 2.5, is_per_mass=True),
     "stribeck": Range(0.7, 2.5),
-    "surface_friction": Range(0.06, 0.25),
-    "table_tilt": Range(math.radians(0.5), math.radians(2.0), is_signed=True),
+    "surface_friction": Range(0.08, 0.30),
+    "table_tilt": Range(math.radians(0.8), math.radians(2.5), is_signed=True),
     "viscous_drag": Range(0.3, 1.5, is_per_mass=True),
 }
 OTHERS = {
