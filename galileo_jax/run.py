@@ -30,6 +30,7 @@ from galileo_jax.rollout.model import Model
 from galileo_jax.scene.scene import build_scene
 
 RESULT, OBSERVATION = "result.json", "observation.csv"
+LONGER = 1.15
 CLIP, POSTERIOR = "clip.yaml", "posterior.nc"
 
 
@@ -65,7 +66,9 @@ def make_problem(
 ) -> Problem:
     """A clip with a model of it: the base model, or one with effects."""
     scene = build_scene(clip, observation)
-    model = Model(scene, float(observation.times_s[-1]), effects)
+    # An effect may run the clock faster: the frame rate's does.
+    margin = LONGER if effects else 1.0
+    model = Model(scene, margin * float(observation.times_s[-1]), effects)
     return Problem(observation, model, make_engine(engine, model), clip.path.stem)
 
 

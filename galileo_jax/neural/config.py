@@ -20,8 +20,11 @@ class TrainConfig(BaseModel):
       seed: of data and weights.
       samples: simulated experiments; the last `validation_share` of them validate.
       batch: samples a step.
-      learning_rate, cut, patience, cuts: Adam's rate is multiplied by `cut` after `patience`
-        epochs without a better validation loss, `cuts` times; the next plateau is the end.
+      learning_rate: Adam's, to begin with.
+      schedule: "plateau": the rate is multiplied by `cut` after `patience` epochs without a
+        better validation loss, `cuts` times, and the next plateau is the end; "cosine": it
+        stays for a third of `max_epochs`, and falls to zero along a cosine from there on.
+      cut, patience, cuts: of schedule "plateau".
       max_epochs: the end at the latest.
       engine: that makes the data.
       frames: displacements in a profile (thesis).
@@ -35,9 +38,10 @@ class TrainConfig(BaseModel):
     validation_share: Share = 0.1
     batch: Count
     learning_rate: Annotated[float, Field(gt=0)]
-    cut: Share
-    patience: Count
-    cuts: Annotated[int, Field(ge=0)]
+    schedule: Literal["plateau", "cosine"] = "plateau"
+    cut: Share = 0.1
+    patience: Count = 10
+    cuts: Annotated[int, Field(ge=0)] = 3
     max_epochs: Count
     engine: Literal["auto", "rigid", "c", "mjx"] = "auto"
     frames: Annotated[int, Field(ge=25, le=400)] = 60

@@ -73,7 +73,8 @@ def cnn_posterior(
             middle[i] = means[i]
     distance = float(network.distance(summary.features.astype(jnp.float32)))
     usual = float(network.usual_distance[...])
-    is_usual = distance <= usual
+    # Of a clip in which nothing moves the network is not asked.
+    is_usual = distance <= usual or not bool(summary.moves)
     notes: dict[str, Any] = {
         "status": "read off by the network" + ("" if is_usual else "; see the warning"),
         "cnn": {"distance": round(distance, 3), "usual_distance": round(usual, 3)},

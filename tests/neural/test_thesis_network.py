@@ -4,7 +4,12 @@ import pytest
 from flax import nnx
 
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.thesis_network import ThesisNetwork, count_parameters
+from galileo_jax.neural.thesis_network import (
+    Convolution,
+    ThesisNetwork,
+    average_pool,
+    count_parameters,
+)
 from galileo_jax.neural.thesis_task import CM, ThesisTask
 from tests.ramp_model import HIT
 
@@ -70,3 +75,16 @@ def _key():
     import jax
 
     return jax.random.key(0)
+
+
+def test_convolution_and_pool_are_the_usual_ones():
+    import jax
+
+    x = jax.random.normal(_key(), (2, 4, 30, 3))
+    ours = Convolution(3, 5, nnx.Rngs(0))
+    usual = nnx.Conv(3, 5, (1, 7), padding="VALID", rngs=nnx.Rngs(0))
+    usual.kernel[...] = ours.filters.kernel[...].reshape(1, 7, 3, 5)
+    usual.bias[...] = ours.filters.bias[...]
+    assert np.allclose(ours(x), usual(x), atol=1e-5)
+    pooled = nnx.avg_pool(x[:, :, :29], (2, 2), (2, 2))
+    assert np.allclose(average_pool(x[:, :, :29]), pooled, atol=1e-6)

@@ -7,7 +7,7 @@ from galileo_jax.errors import InputError
 from galileo_jax.neural.checkpoint import NETWORK, load_network
 from galileo_jax.neural.config import load_config
 from galileo_jax.neural.dataset import load_or_make
-from galileo_jax.neural.training import train
+from galileo_jax.neural.training import cosine_rate, train
 from tests.neural.test_thesis_network import config
 
 
@@ -114,3 +114,12 @@ def test_a_file_that_is_no_network_is_refused(tmp_path):
     (tmp_path / NETWORK).write_text("no")
     with pytest.raises(InputError, match="not a trained network"):
         load_network(tmp_path / NETWORK)
+
+
+def test_the_cosine_schedule_holds_and_then_falls_to_zero(tmp_path):
+    settings = config(schedule="cosine", max_epochs=6)
+    rates = [cosine_rate(epoch, settings) for epoch in range(7)]
+    assert rates[:3] == [1e-3] * 3
+    assert rates == sorted(rates, reverse=True) and rates[-1] == pytest.approx(0)
+    progress = run(tmp_path, settings)
+    assert progress.epoch == 6 and progress.learning_rate == pytest.approx(0)

@@ -177,16 +177,26 @@ class GradientFitter:
         on_stage("refining")
         return self._polish(found.take([np.argmin(costs)]), num_steps)[0]
 
-    def fit_from(self, starts: np.ndarray, free: np.ndarray) -> list[GradientFit]:
-        """Fits several hypotheses at once, each from its own start.
+    def fit_from(
+        self, starts: np.ndarray, free: np.ndarray, owner: np.ndarray
+    ) -> list[GradientFit]:
+        """Fits several hypotheses at once, each from one or more starts.
 
         Args:
-          starts: `[hypothesis, model parameter]`, z.
-          free: `[hypothesis, model parameter]`, see `Trials.free`.
+          starts: `[start, model parameter]`, z.
+          free: `[start, model parameter]`, see `Trials.free`.
+          owner: `[start]`, which hypothesis each belongs to, ascending from 0.
+
+        Returns:
+          One fit per hypothesis, of its best start.
         """
         self._num_rollouts = 0
-        found, _, num_steps = self._search(self._batch(starts, free))
-        return self._polish(found, num_steps)
+        found, costs, num_steps = self._search(self._batch(starts, free))
+        best = []
+        for hypothesis in range(int(owner.max()) + 1):
+            own = np.flatnonzero(owner == hypothesis)
+            best.append(own[np.argmin(costs[own])])
+        return self._polish(found.take(np.array(best)), num_steps)
 
     def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""

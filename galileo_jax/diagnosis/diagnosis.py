@@ -1,0 +1,111 @@
+"""What a diagnosis says: diagnosis.json by contract (DESIGN.md 2.4), and what pictures need."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from galileo_jax.comparison.compare import Comparison
+from galileo_jax.diagnosis.candidates import Hypothesis
+
+Status = Literal["none", "named", "ambiguous", "unknown"]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One hypothesis in the race.
+
+    Attributes:
+      effects: all of its effects.
+      hypothesis: the fit.
+      error: rmse, noise, chi2_per_dof, ... as in result.json.
+      score_z: of the score test at zero strength, in standard deviations.
+      log_evidence: over that of the model without it.
+      probability: among all candidates and the model without any of them.
+      p_value: of its adequacy; None where it was not compared (too improbable).
+      confounded_with: candidates that these data do not tell from it.
+    """
+
+    effects: tuple[str, ...]
+    hypothesis: Hypothesis
+    error: dict[str, float]
+    score_z: float
+    log_evidence: float
+    probability: float
+    p_value: float | None
+    confounded_with: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """The effects, joined by +."""
+        return "+".join(self.effects)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What is missing.
+
+    Attributes:
+      status: none, named, ambiguous or unknown.
+      effects: one effect (or set) where it is named, all that explain the data equally well
+        where it is ambiguous.
+      advice: what would tell more, one sentence each.
+    """
+
+    status: Status
+    effects: tuple[str, ...]
+    advice: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Round:
+    """One round of the loop: a model, how it was fitted, how it compares with the data."""
+
+    hypothesis: Hypothesis
+    comparison: Comparison
+
+
+@dataclass(frozen=True)
+class MissingForce:
+    """The acceleration that no effect explains, inferred without a form.
+
+    Attributes:
+      time_s: `[time]`, since the release.
+      acceleration_m_s2, sd_m_s2: `[object, time]`, along the path.
+      path_m, speed_m_s: `[object, time]`, where and how fast the objects are then.
+      formula: the simplest that fits, of each object.
+      share_explained: by the formula, of the acceleration's variance, of each object.
+    """
+
+    time_s: np.ndarray
+    acceleration_m_s2: np.ndarray
+    sd_m_s2: np.ndarray
+    path_m: np.ndarray
+    speed_m_s: np.ndarray
+    formula: tuple[str, ...]
+    share_explained: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The whole of a diagnosis.
+
+    Attributes:
+      rounds: of the loop; the first is the model without effects (or with those given).
+      candidates: of the first round, the most probable first.
+      verdict: what is missing.
+      missing: the missing force, where the verdict is unknown.
+      left_one_out: per clip of a series, the rmse (m/s) predicted from the others, before and
+        after; empty for one clip.
+    """
+
+    rounds: tuple[Round, ...]
+    candidates: tuple[Candidate, ...]
+    verdict: Verdict
+    missing: MissingForce | None = None
+    left_one_out: tuple[tuple[str, float, float], ...] = ()
+
+    @property
+    def base(self) -> Comparison:
+        """The model without the missing effect against the data."""
+        return self.rounds[0].comparison

@@ -1,0 +1,144 @@
+"""The network that ships with the package, on tracks and clips that it has not seen."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.errors import InputError
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.trials import Trials
+from galileo_jax.neural.estimate import TRAINED, cnn_posterior, trained_network
+from galileo_jax.observation import Observation
+from galileo_jax.run import make_trials
+from tests.ramp_model import HIT
+from tests.reference_ramp import Experiment, solve
+
+NOISE_M = 3e-5
+LARGEST_FILE = 4e6  # bytes
+
+
+def trials_of(experiment: Experiment, fps: float = 30.0, frames: int = 90) -> Trials:
+    times = np.arange(frames) / fps
+    exact = solve(experiment, times).position_m
+    count = len(exact)
+    noise = NOISE_M * np.random.default_rng(0).standard_normal(exact.shape)
+    names = ("object1", "object2")[:count]
+    observation = Observation(
+        names=names,
+        times_s=times,
+        position_m=exact + noise,
+        covariance_m2=np.broadcast_to(
+            NOISE_M**2 * np.eye(2)[None, ..., None], (count, 2, 2, frames)
+        ).copy(),
+        mask=np.ones((count, frames), bool),
+    )
+    objects = tuple(
+        ClipObject(name=name, shape="box", size_m=(length, 0.06, height))
+        for name, (length, height) in zip(names, experiment.size_m, strict=False)
+    )
+    clip = Clip(
+        path=Path("made.yaml"),
+        track=Path("made.csv"),
+        scenario="ramp",
+        fps=fps,
+        ramp_angle_deg=float(np.rad2deg(experiment.angle_rad)),
+        objects=objects,
+        frame_count=frames,
+    )
+    return make_trials([clip], [observation])
+
+
+def phi(posterior: Posterior) -> np.ndarray:
+    m1, m2 = posterior["m1"], posterior["m2"]
+    return (m1 - m2) / (m1 + m2)
+
+
+@pytest.mark.parametrize(
+    ("experiment", "fps"),
+    [
+        (HIT, 30.0),
+        (HIT, 60.0),
+        (dataclasses.replace(HIT, friction=(0.2, 0.1), mass_kg=(0.3, 0.4)), 30.0),
+        (dataclasses.replace(HIT, angle_rad=np.deg2rad(12), friction=(0.06, 0.2)), 30.0),
+    ],
+)
+def test_one_network_serves_clips_of_all_kinds(experiment, fps, x64):
+    posterior, _, notes = cnn_posterior(trials_of(experiment, fps), seed=0)
+    k1, k2 = experiment.friction
+    m1, m2 = experiment.mass_kg
+    for drawn, true, close in (
+        (posterior["k1"], k1, 0.005),
+        (posterior["k2"], k2, 0.02),
+        (phi(posterior), (m1 - m2) / (m1 + m2), 0.05),
+    ):
+        assert abs(drawn.mean() - true) < close
+        low, high = np.quantile(drawn, [0.001, 0.999])
+        assert low < true < high
+    assert posterior.is_converged and "warnings" not in notes
+
+
+def test_same_seed_same_draws_and_masses_make_the_ratio(x64):
+    trials = trials_of(HIT)
+    first, second = (cnn_posterior(trials, seed=3)[0] for _ in range(2))
+    assert np.array_equal(first.draws, second.draws)
+    # Only the ratio shows: each mass alone stays as unknown as before.
+    assert np.std(np.log(first["m1"])) > 0.4
+
+
+def test_what_a_clip_cannot_tell_stays_open(x64):
+    far = dataclasses.replace(HIT, object2_x_m=1.5)
+    posterior, _, _ = cnn_posterior(trials_of(far), seed=0)
+    assert abs(posterior["k1"].mean() - 0.1) < 0.005
+    assert np.std(posterior["k2"]) > 0.25
+    assert np.std(np.log(posterior["m1"] / posterior["m2"])) > 0.8
+    stands, _, _ = cnn_posterior(trials_of(dataclasses.replace(HIT, friction=(0.6, 0.2))), seed=0)
+    assert stands["k1"].min() > np.tan(HIT.angle_rad) and stands["k1"].max() > 0.95
+
+
+def test_a_single_object_is_enough_for_its_friction(x64):
+    alone = dataclasses.replace(HIT, object2_x_m=None)
+    posterior, _, _ = cnn_posterior(trials_of(alone), seed=0)
+    assert "k2" not in posterior.names
+    assert abs(posterior["k1"].mean() - 0.1) < 0.005
+
+
+def test_a_clip_unlike_the_training_clips_is_told(x64):
+    strange = dataclasses.replace(HIT, gravity=3.0, size_m=((0.25, 0.25), (0.06, 0.06)))
+    strange = dataclasses.replace(strange, object2_x_m=0.5)
+    posterior, _, notes = cnn_posterior(trials_of(strange, fps=10.0), seed=0)
+    assert not posterior.is_converged
+    assert "unlike those that the network was trained on" in notes["warnings"][0]
+
+
+def test_other_models_are_refused(x64):
+    trials = trials_of(HIT)
+    with pytest.raises(InputError, match="one clip expected"):
+        cnn_posterior(Trials(trials.problems * 2), seed=0)
+
+
+def test_the_packages_network_is_small_and_of_the_right_preset():
+    assert TRAINED.stat().st_size < LARGEST_FILE
+    trained_network()
+
+
+@pytest.mark.slow
+@pytest.mark.video
+def test_shared_clips_k1(shared_data, tmp_path):
+    from galileo_jax import command, fit
+
+    errors = []
+    for truth_path in sorted((shared_data / "ramp").glob("plain_coulomb_none_[0-2].truth.json")):
+        name = truth_path.name.removesuffix(".truth.json")
+        clip = truth_path.with_name(f"{name}.yaml")
+        argv = [str(clip), "--method", "cnn", "--out", str(tmp_path / name)]
+        assert command.run(fit.main, argv) == 0
+        result = json.loads((tmp_path / name / "result.json").read_text())
+        assert result["method"] == "cnn" and (tmp_path / name / "posterior.nc").is_file()
+        errors.append(
+            abs(result["parameters"]["k1"]["mean"] - json.loads(truth_path.read_text())["k1"])
+        )
+    assert np.median(errors) < 0.01
