@@ -131,9 +131,6 @@ _THESIS = {
     "samples": 100,
     "batch": 1,
     "learning_rate": 1.0,
-    "cut": 0.5,
-    "patience": 1,
-    "cuts": 0,
     "max_epochs": 1,
 }
 

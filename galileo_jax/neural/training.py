@@ -1,10 +1,11 @@
 """The training loop: epochs of Adam, a rate cut at plateaus, checkpoints, resume.
 
-rate <- rate * cut      after `patience` epochs without a better validation loss;
-                        training goes on from the best weights
-end                     at the plateau after the last cut
+plateau     rate <- rate * cut after `patience` epochs without a better validation loss, and
+            on from the best weights; the end is the plateau after the last cut
+cosine      the rate stays for a third of all epochs, and falls to zero from there on
 """
 
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -79,6 +80,13 @@ def is_done(progress: Progress, config: TrainConfig) -> bool:
     return progress.cuts > config.cuts or progress.epoch >= config.max_epochs
 
 
+def cosine_rate(epoch: int, config: TrainConfig) -> float:
+    """The rate of an epoch, counted from 0, with schedule "cosine"."""
+    hold = config.max_epochs / 3
+    share = max(0.0, (epoch - hold) / (config.max_epochs - hold))
+    return config.learning_rate * 0.5 * (1 + math.cos(math.pi * share))
+
+
 def split(data: Arrays, config: TrainConfig) -> tuple[Arrays, Arrays]:
     """Training and validation samples."""
     count = round(config.samples * (1 - config.validation_share))
@@ -94,12 +102,14 @@ def _after_epoch(
     progress = progress._replace(
         epoch=progress.epoch + 1, losses=(*progress.losses, (loss, validation))
     )
+    if config.schedule == "cosine":
+        progress = progress._replace(learning_rate=cosine_rate(progress.epoch, config))
     if validation < progress.best:
         return state._replace(best_weights=state.weights), progress._replace(
             best=validation, stale=0
         )
     progress = progress._replace(stale=progress.stale + 1)
-    if progress.stale < config.patience:
+    if progress.stale < config.patience or config.schedule == "cosine":
         return state, progress
     return state._replace(weights=state.best_weights), progress._replace(
         learning_rate=progress.learning_rate * config.cut, stale=0, cuts=progress.cuts + 1
