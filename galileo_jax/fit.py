@@ -40,7 +40,7 @@ def main(argv: Sequence[str]) -> int | None:
     if call.preset == "thesis" and len(clips) > 1:
         raise InputError("--preset thesis: one clip expected")
     truth = read_truth(clips[0])
-    _import_ahead()
+    import_ahead()
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
     measured = [measure(clip) for clip in clips]
@@ -71,7 +71,7 @@ def chosen_effects(call: argparse.Namespace) -> "tuple[Effect, ...]":
     return make_effects([name for name in call.effects.split(",") if name])
 
 
-def _import_ahead() -> None:
+def import_ahead() -> None:
     """Imports what the fit needs while the video is tracked: OpenCV leaves a core free."""
 
     def load() -> None:
@@ -97,9 +97,7 @@ def fit_clips(
 
     jax.config.update("jax_enable_x64", True)
     jax_cache.enable()
-    from galileo_jax.inference.result import make_result
-    from galileo_jax.report import write_report
-    from galileo_jax.run import Run, make_trials, save_run
+    from galileo_jax.run import make_trials
 
     clips, observations = [m.clip for m in measured], [m.observation for m in measured]
     trials = make_trials(clips, observations, call.engine, chosen_effects(call))
@@ -110,34 +108,79 @@ def fit_clips(
     if call.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in call.effects_from]
 
+    result = write_fit(
+        measured,
+        trials,
+        posterior,
+        z_best,
+        out,
+        files=[str(path) for path in call.clips],
+        method=call.method,
+        seed=call.seed,
+        timings=timings,
+        notes=notes,
+    )
+    (out / CHECKPOINT).unlink(missing_ok=True)
+    return result
+
+
+def write_fit(
+    measured: Sequence[Measured],
+    trials: "Trials",
+    posterior: "Posterior",
+    z_best: np.ndarray,
+    out: Path,
+    *,
+    files: Sequence[str],
+    method: str,
+    seed: int,
+    timings: Mapping[str, float],
+    notes: dict[str, Any],
+) -> dict[str, Any]:
+    """Writes runs and reports of a finished fit, and returns result.json.
+
+    Args:
+      measured: the clips.
+      trials: the model of them that was fitted.
+      posterior: what is known of its parameters.
+      z_best: the best z.
+      out: the folder; of several clips each has a run of its own below it.
+      files: the clips as they were named in the call.
+      method: of the fit.
+      seed: of everything random.
+      timings: by stage, s.
+      notes: what else the method has to say.
+    """
+    from galileo_jax.inference.result import make_result
+    from galileo_jax.report import write_report
+    from galileo_jax.run import Run, save_run
+
     def told(some: "Trials", draws: "Posterior", z: np.ndarray, names: list[str]) -> dict[str, Any]:
         return make_result(
             some,
             draws,
             z,
             clips=names,
-            method=call.method,
-            seed=call.seed,
+            method=method,
+            seed=seed,
             timings_s={key: round(value, 3) for key, value in timings.items()},
             notes=notes,
         )
 
-    result = told(trials, posterior, z_best, [str(path) for path in call.clips])
-    if len(clips) == 1:
-        save_run(out, clips[0], observations[0], posterior, result)
-        write_report(Run(out, clips[0], trials.problems[0], posterior, result))
-    else:
-        for i, one in enumerate(measured):
-            alone, own = (
-                trials.alone(i),
-                posterior.chosen(trials.columns_of(i), trials.alone(i).names),
-            )
-            told_of = told(alone, own, z_best[trials.columns_of(i)], [str(call.clips[i])])
-            save_run(out / one.name, one.clip, one.observation, own, told_of)
-            write_report(Run(out / one.name, one.clip, trials.problems[i], own, told_of))
-        posterior.to_netcdf(out / "posterior.nc")
-        write_json(out / "result.json", result)
-    (out / CHECKPOINT).unlink(missing_ok=True)
+    result = told(trials, posterior, z_best, list(files))
+    if len(measured) == 1:
+        clip, observation = measured[0].clip, measured[0].observation
+        save_run(out, clip, observation, posterior, result)
+        write_report(Run(out, clip, trials.problems[0], posterior, result))
+        return result
+    for i, one in enumerate(measured):
+        alone, columns = trials.alone(i), trials.columns_of(i)
+        own = posterior.chosen(columns, alone.names)
+        told_of = told(alone, own, z_best[columns], [files[i]])
+        save_run(out / one.name, one.clip, one.observation, own, told_of)
+        write_report(Run(out / one.name, one.clip, trials.problems[i], own, told_of))
+    posterior.to_netcdf(out / "posterior.nc")
+    write_json(out / "result.json", result)
     return result
 
 

@@ -1,0 +1,152 @@
+"""`galileo compare`: is the model adequate for a clip, and where does it fail?"""
+
+import argparse
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from galileo_jax import __version__, command, jax_cache
+from galileo_jax.errors import InputError
+from galileo_jax.files import write_json
+from galileo_jax.fit import chosen_effects, import_ahead, out_folder
+from galileo_jax.measured import load_clips, measure
+from galileo_jax.rollout.engine_names import ENGINES
+
+if TYPE_CHECKING:
+    from galileo_jax.comparison.compare import Comparison
+    from galileo_jax.inference.trials import Trials
+
+NUM_CELLS = 6
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What is compared: the clips with a model, how they were named, and where results go."""
+
+    trials: "Trials"
+    clips: list[str]
+    out: Path
+
+
+def main(argv: Sequence[str]) -> int | None:
+    """Compares a model with clips, or a run with its own; writes compare.json and a page."""
+    call = _parser().parse_args(argv)
+    began = time.perf_counter()
+    runs = [path for path in call.clips if Path(path).is_dir()]
+    if runs and len(call.clips) > 1:
+        raise InputError(f"{runs[0]}: a run is compared alone; clips are given as files")
+    compared = _of_run(Path(runs[0]), call) if runs else _of_clips(call)
+    trials = compared.trials
+    from galileo_jax.comparison.compare import compare
+    from galileo_jax.comparison.document import comparison_document
+    from galileo_jax.inference.fits.gradient import Code, GradientFitter
+    from galileo_jax.report.along import along_paths
+    from galileo_jax.report.comparison_page import write_comparison_page
+
+    with command.console().status("fitting") as status:
+        fit = GradientFitter(trials).fit(call.seed, on_stage=status.update)
+        if fit.code is Code.FAILED:
+            raise InputError(f"{compared.clips[0]}: {fit.code}")
+        status.update("comparing with replicates of the fitted model")
+        comparison = compare(trials, fit, call.seed)
+        status.update("drawing")
+        shown = along_paths(trials, fit, comparison, call.seed)
+        page, title = compared.out / "report.html", ", ".join(p.name for p in trials.problems)
+        write_comparison_page(page, title, trials.all_effects, comparison, shown)
+    document: dict[str, Any] = {
+        "clips": compared.clips,
+        "effects": list(trials.all_effects),
+        **comparison_document(comparison),
+        "converged": fit.code is Code.CONVERGED,
+        "engine": trials.problems[0].engine.name,
+        "seconds": round(time.perf_counter() - began, 3),
+        "version": __version__,
+        "seed": call.seed,
+    }
+    write_json(compared.out / "compare.json", document)
+    print("\n".join(_told(trials, comparison)))
+    command.console().print(f"{compared.out}/compare.json, {page}", soft_wrap=True)
+    return None
+
+
+def _of_clips(call: argparse.Namespace) -> Compared:
+    """Clips as they are, with the effects asked for."""
+    clips = load_clips(call.clips, call.pixels_per_metre)
+    out = out_folder(call, clips)
+    effects = chosen_effects(call)
+    import_ahead()
+    measured = [measure(clip) for clip in clips]
+    _prepare_jax()
+    from galileo_jax.run import make_trials
+
+    trials = make_trials(clips, [one.observation for one in measured], call.engine, effects)
+    return Compared(trials, list(call.clips), out if call.out else out / "compare")
+
+
+def _of_run(folder: Path, call: argparse.Namespace) -> Compared:
+    """A finished fit: its observations and its effects; of several clips the runs below it."""
+    if call.effects or call.effects_from or call.pixels_per_metre:
+        raise InputError(f"{folder}: a run has its own effects and scale; give its clip to change")
+    _prepare_jax()
+    from galileo_jax.inference.trials import Trials
+    from galileo_jax.run import CLIP, RESULT, load_run
+
+    folders = [folder]
+    if (folder / RESULT).is_file() and not (folder / CLIP).is_file():
+        named = json.loads((folder / RESULT).read_text(encoding="utf-8"))["clips"]
+        folders = [folder / Path(clip).stem for clip in named]
+    runs = [load_run(each, call.engine) for each in folders]
+    out = Path(call.out) if call.out else folder / "compare"
+    clips = [clip for run in runs for clip in run.result["clips"]]
+    return Compared(Trials(tuple(run.problem for run in runs)), clips, out)
+
+
+def _prepare_jax() -> None:
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    jax_cache.enable()
+
+
+def _told(trials: "Trials", comparison: "Comparison") -> list[str]:
+    """The verdict, the worst cells and the nuisances outside their priors."""
+    from galileo_jax.comparison.document import pulled
+    from galileo_jax.report import findings
+
+    several = len(trials.problems) > 1
+    width = max(len(problem.name) for problem in trials.problems) + 2 if several else 0
+    lines = [
+        findings.adequacy(comparison, trials.all_effects),
+        "",
+        f"{'clip' if several else '':<{width}}{'object':<10}{'axis':<6}{'phase':<11}"
+        f"{'rmse':>8}{'noise':>8} m/s{'z':>7}",
+    ]
+    for place in comparison.where[:NUM_CELLS]:
+        lines.append(
+            f"{place.clip if several else '':<{width}}{place.object:<10}{place.axis:<6}"
+            f"{place.phase:<11}{place.rmse:>8.4f}{place.noise:>8.4f}{place.z:>11.1f}"
+        )
+    return lines + [findings.pull_text(pull) for pull in pulled(comparison)]
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="galileo compare", description=__doc__)
+    parser.add_argument(
+        "clips", nargs="+", metavar="CLIP|RUN", help="video, its yaml, a csv track, or a run"
+    )
+    parser.add_argument("--effects", default="", help="a,b: effects in the model")
+    parser.add_argument(
+        "--effects-from", action="append", default=[], metavar="FILE", help="more effects (Python)"
+    )
+    parser.add_argument("--out", help="folder (default runs/CLIP/compare, RUN/compare)")
+    parser.add_argument("--seed", type=command.whole_number(0), default=0)
+    parser.add_argument("--engine", choices=ENGINES, default="auto")
+    parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(command.run(main))

@@ -1,0 +1,24 @@
+"""compare.json: a comparison in the contract's words (DESIGN.md 2.4)."""
+
+from dataclasses import asdict
+from typing import Any
+
+from galileo_jax.comparison.compare import Comparison, Pull
+
+PULLED_Z = 3.0  # of a prior's standard deviations; one nuisance in four hundred is by chance
+
+
+def comparison_document(comparison: Comparison) -> dict[str, Any]:
+    """What the comparison says, for JSON: all cells, and the nuisances outside their priors."""
+    return {
+        "adequate": comparison.is_adequate,
+        "p_value": comparison.p_value,
+        "where": [asdict(place) for place in comparison.where],
+        "pulls": [asdict(pull) for pull in pulled(comparison)],
+        "error": dict(comparison.error),
+    }
+
+
+def pulled(comparison: Comparison) -> list[Pull]:
+    """The nuisances outside their priors."""
+    return [pull for pull in comparison.pulls if abs(pull.z) > PULLED_Z]

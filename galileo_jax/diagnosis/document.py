@@ -1,0 +1,101 @@
+"""diagnosis.json by contract (DESIGN.md 2.4)."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.comparison.document import comparison_document
+from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.laplace import laplace_posterior
+from galileo_jax.inference.result import IDENTIFIED_SD_Z, summarise
+from galileo_jax.inference.trials import Trials
+
+
+def diagnosis_document(trials: Trials, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
+    """The contract's dictionary.
+
+    Args:
+      trials: those diagnosed, with the whole library.
+      diagnosis: what was found.
+      seed: of the posteriors' draws.
+    """
+    named = trials.problems[0].observation.names
+    document = comparison_document(diagnosis.base) | {
+        "candidates": [_candidate(trials, c, seed) for c in diagnosis.candidates],
+        "verdict": {
+            "status": diagnosis.verdict.status,
+            "effects": list(diagnosis.verdict.effects),
+            "advice": list(diagnosis.verdict.advice),
+        },
+        "history": [history_row(trials, each, seed) for each in diagnosis.rounds],
+    }
+    if diagnosis.missing is not None:
+        document["missing_force"] = _missing_force(diagnosis.missing, named)
+    if diagnosis.left_one_out:
+        document["left_one_out"] = [
+            {"clip": clip, "rmse_before": before, "rmse_after": after}
+            for clip, before, after in diagnosis.left_one_out
+        ]
+    return document
+
+
+def history_row(trials: Trials, one: Round, seed: int) -> dict[str, Any]:
+    """One round: effects, errors, p and what is said of the friction coefficients with them."""
+    error = one.comparison.error
+    entries = parameter_entries(trials, one.hypothesis.fit, seed)
+    return {
+        "effects": list(one.hypothesis.effects),
+        "rmse": error["rmse"],
+        "noise": error["noise"],
+        "chi2_per_dof": error["chi2_per_dof"],
+        "p_value": one.comparison.p_value,
+        **{name: entry for name, entry in entries.items() if name in ("k1", "k2")},
+    }
+
+
+def parameter_entries(trials: Trials, fit: GradientFit, seed: int) -> dict[str, dict[str, Any]]:
+    """Entries as in result.json of all that the hypothesis leaves free, nuisances left out."""
+    posterior = laplace_posterior(trials, fit, seed)
+    spread = np.sqrt(np.diagonal(fit.covariance))
+    return {
+        parameter.name: {
+            **summarise(posterior[parameter.name].reshape(-1)),
+            "unit": parameter.unit,
+            "identified": bool(spread[i] < IDENTIFIED_SD_Z),
+        }
+        for i, parameter in enumerate(trials.parameters)
+        if fit.free[i] and parameter.role != "nuisance"
+    }
+
+
+def _candidate(trials: Trials, candidate: Candidate, seed: int) -> dict[str, Any]:
+    return {
+        "effect": candidate.name,
+        "parameters": parameter_entries(trials, candidate.hypothesis.fit, seed),
+        "rmse": candidate.error["rmse"],
+        "chi2_per_dof": candidate.error["chi2_per_dof"],
+        "score": candidate.log_evidence,
+        "score_test_z": candidate.score_z,
+        "probability": candidate.probability,
+        "p_value": candidate.p_value,
+        "confounded_with": list(candidate.confounded_with),
+    }
+
+
+def _missing_force(missing: MissingForce, names: Sequence[str]) -> dict[str, Any]:
+    return {
+        "time_s": missing.time_s.tolist(),
+        "objects": {
+            name: {
+                "acceleration_m_s2": missing.acceleration_m_s2[i].tolist(),
+                "sd_m_s2": missing.sd_m_s2[i].tolist(),
+                "path_m": missing.path_m[i].tolist(),
+                "speed_m_s": missing.speed_m_s[i].tolist(),
+                "formula": missing.formula[i],
+                "share_explained": missing.share_explained[i],
+            }
+            for i, name in enumerate(names)
+        },
+    }

@@ -1,0 +1,33 @@
+"""A hypothesis by itself: the fit as the model with only its effects would have found it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.trials import Trials
+
+
+def by_itself(fit: GradientFit, whole: Trials, part: Trials) -> GradientFit:
+    """The same fit in the parameters of fewer effects; those left out are pinned in it.
+
+    Args:
+      fit: of `whole`.
+      whole: trials with the whole library.
+      part: of the same clips with the fit's own effects.
+
+    Raises:
+      ValueError: the fit has an effect that `part` has not.
+    """
+    columns = np.array([whole.names.index(name) for name in part.names])
+    if np.delete(fit.free, columns).any():
+        raise ValueError("the fit has parameters that the smaller model has not")
+    model = columns[: len(part.model_parameters)]
+    return replace(
+        fit,
+        z=fit.z[columns],
+        free=fit.free[columns],
+        covariance=fit.covariance[np.ix_(columns, columns)],
+        steps=fit.steps[model],
+        jacobian=fit.jacobian[:, model],
+    )

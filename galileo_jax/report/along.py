@@ -1,0 +1,179 @@
+"""Each object's motion along its path, measured against fitted: what pictures of a failure show."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from galileo_jax.comparison.compare import Comparison, Place
+from galileo_jax.comparison.local_tests import AXES, WHOLE
+from galileo_jax.comparison.phases import PHASES
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.laplace import laplace_posterior
+from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.trials import Trials
+from galileo_jax.report.fitted import Phase
+
+NUM_DRAWS = 60
+MARKED_Z = 3.0  # below it a cell is no place where the model fails
+LEAST_STRETCH = 3  # frames
+
+
+@dataclass(frozen=True)
+class Along:
+    """One object of one clip; arrays are `[frame]`.
+
+    Attributes:
+      clip, name: of the clip and of the object.
+      index: of the object.
+      times_s: of the frames.
+      measured_m: along the path, NaN where it was not seen; 0 at the foot (incline: the start).
+      predicted_m: of the fit; the constant offset of the followed point is in it.
+      low_m, high_m: where 95 % of the posterior's draws are.
+      noise_m: tracking error, as the comparison scaled it.
+      along, across: residuals along the path and across it, in units of the noise.
+      phases: of the motion.
+      stretch_s: where it fails worst, None where it does not.
+      worst: the cell of that stretch.
+    """
+
+    clip: str
+    name: str
+    index: int
+    times_s: np.ndarray
+    measured_m: np.ndarray
+    predicted_m: np.ndarray
+    low_m: np.ndarray
+    high_m: np.ndarray
+    noise_m: np.ndarray
+    along: np.ndarray
+    across: np.ndarray
+    phases: tuple[Phase, ...]
+    stretch_s: tuple[float, float] | None
+    worst: Place | None
+
+    @property
+    def largest(self) -> float:
+        """The largest residual, in units of the noise."""
+        return float(np.nanmax(np.abs([self.along, self.across]), initial=0.0))
+
+
+def along_paths(
+    trials: Trials, fit: GradientFit, comparison: Comparison, seed: int
+) -> tuple[Along, ...]:
+    """All objects of all clips."""
+    drawn = laplace_posterior(trials, fit, seed).flat()
+    drawn = drawn[np.random.default_rng(seed).choice(len(drawn), NUM_DRAWS, replace=False)]
+    theta = trials.theta(fit.z, fit.free)
+    found = []
+    for clip, problem in enumerate(trials.problems):
+        best = problem.simulate(trials.of_clip(theta, clip))
+        draws = problem.simulate_batch(trials.of_clip(drawn, clip))
+        draws = draws[np.isfinite(draws).all(axis=(1, 2, 3))]
+        scale = trials.noise_scale(theta, clip)
+        for i in range(len(problem.observation.names)):
+            found.append(_object(problem, i, best, draws, scale, clip, comparison))
+    return tuple(found)
+
+
+def _object(
+    problem: Problem,
+    index: int,
+    best: np.ndarray,
+    draws: np.ndarray,
+    scale: float,
+    clip: int,
+    comparison: Comparison,
+) -> Along:
+    observation = problem.observation
+    seen, times = observation.mask[index], observation.times_s
+    tangent = _tangent(problem, index, best[index])
+    difference = np.where(seen, observation.position_m[index] - best[index], np.nan)
+    offset = np.nanmedian(difference, axis=1) if seen.any() else np.zeros(2)
+    path = _path(problem, index, best[index], tangent)
+    moved = np.einsum("at,bat->bt", tangent, draws[:, index] - best[index])
+    low, high = np.quantile(moved, [0.025, 0.975], axis=0) if len(moved) else (0 * path, 0 * path)
+    covariance = observation.covariance_m2[index]
+    noise = scale * np.sqrt(np.einsum("at,abt,bt->t", tangent, covariance, tangent))
+    white = np.where(seen, comparison.white[clip][index], np.nan)
+    normal = np.stack([-tangent[1], tangent[0]])
+    labels = comparison.labels[clip][index]
+    worst = _worst(comparison, problem.name, observation.names[index])
+    return Along(
+        clip=problem.name,
+        name=observation.names[index],
+        index=index,
+        times_s=times,
+        measured_m=path + np.sum(tangent * (difference - offset[:, None]), axis=0),
+        predicted_m=path,
+        low_m=path + low,
+        high_m=path + high,
+        noise_m=noise,
+        along=np.sum(tangent * white, axis=0),
+        across=np.sum(normal * white, axis=0),
+        phases=_phases(labels, times),
+        stretch_s=None if worst is None else worst_stretch(white, labels, times, worst),
+        worst=worst,
+    )
+
+
+def worst_stretch(
+    white: np.ndarray, labels: np.ndarray, times_s: np.ndarray, worst: Place
+) -> tuple[float, float] | None:
+    """When the residuals of a cell deviate most, to one side: the window of largest |sum| / sqrt n.
+
+    Args:
+      white: `[2, frame]`, NaN where nothing was seen.
+      labels: `[frame]`, indices into `PHASES`.
+      times_s: `[frame]`.
+      worst: the cell.
+    """
+    values = white[AXES.index(worst.axis)]
+    chosen = np.isfinite(values)
+    if worst.phase != WHOLE:
+        chosen &= labels == PHASES.index(worst.phase)
+    frames = np.flatnonzero(chosen)
+    if len(frames) < LEAST_STRETCH:
+        return None
+    sums = np.concatenate([[0.0], np.cumsum(values[frames])])
+    first, last = np.triu_indices(len(frames) + 1, LEAST_STRETCH)
+    strongest = np.argmax(np.abs(sums[last] - sums[first]) / np.sqrt(last - first))
+    return (
+        float(times_s[frames[first[strongest]]]),
+        float(times_s[frames[last[strongest] - 1]]),
+    )
+
+
+def _tangent(problem: Problem, index: int, centre_m: np.ndarray) -> np.ndarray:
+    """The path's direction at `centre_m` `[2, frame]`, as declared."""
+    scene = problem.model.scene.surroundings
+    is_on_ramp = centre_m[0] < scene.corner_m[index]  # always, without a table
+    slope = np.where(is_on_ramp, scene.angle_rad, 0.0)
+    return np.stack([np.cos(slope), -np.sin(slope)])
+
+
+def _path(problem: Problem, index: int, centre_m: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    scene = problem.model.scene.surroundings
+    if scene.has_table:
+        origin = np.array([scene.corner_m[index], scene.half_height_m[index]])
+    else:
+        origin = np.array(scene.start_m[index])
+    return np.sum(tangent * (centre_m - origin[:, None]), axis=0)
+
+
+def _worst(comparison: Comparison, clip: str, name: str) -> Place | None:
+    """The object's worst cell, where the model fails there."""
+    if comparison.is_adequate:
+        return None
+    own = [p for p in comparison.where if (p.clip, p.object) == (clip, name) and p.z > MARKED_Z]
+    return own[0] if own else None
+
+
+def _phases(labels: np.ndarray, times_s: np.ndarray) -> tuple[Phase, ...]:
+    borders: Sequence[int] = [0, *(np.flatnonzero(np.diff(labels)) + 1), len(labels) - 1]
+    return tuple(
+        Phase(PHASES[labels[start]], float(times_s[start]), float(times_s[end]))
+        for start, end in pairwise(borders)
+        if end > start
+    )

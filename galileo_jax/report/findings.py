@@ -1,0 +1,87 @@
+"""What a comparison and a diagnosis found, in plain sentences: for the terminal and the pages."""
+
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from galileo_jax.comparison.compare import Comparison, Place, Pull
+from galileo_jax.diagnosis.diagnosis import Diagnosis
+
+SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
+NO_EFFECTS = "no effects"
+
+
+def p_text(p: float | None) -> str:
+    """A p-value without places that mean nothing."""
+    if p is None:
+        return ""
+    return f"< {SMALLEST_P:.0e}" if p < SMALLEST_P else f"{p:.2g}"
+
+
+def effects_text(effects: Sequence[str]) -> str:
+    """The effects of a model."""
+    return ", ".join(effects) or NO_EFFECTS
+
+
+def value_text(entry: Mapping[str, Any]) -> str:
+    """A parameter's mean, standard deviation and unit."""
+    unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
+    return f"{entry['mean']:.4g} +- {entry['sd']:.2g}{unit}"
+
+
+def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
+    """Whether the model is adequate, in one sentence."""
+    p = comparison.p_value
+    equals = f"p {p_text(p)}" if p < SMALLEST_P else f"p = {p_text(p)}"
+    model = f"with {effects_text(effects)} " if effects else ""
+    if comparison.is_adequate:
+        return f"The model {model}is adequate: what it leaves over is noise ({equals})."
+    return f"The model {model}is not adequate: the data contradict it ({equals})."
+
+
+def place_text(place: Place) -> str:
+    """One cell in words."""
+    return f"{place.object}, {place.axis}, {place.phase}"
+
+
+def pull_text(pull: Pull) -> str:
+    """One nuisance outside its prior, in words."""
+    unit = "" if pull.unit == "1" else f" {pull.unit}"
+    return (
+        f"{pull.parameter} is bent to {pull.value:.4g}{unit}, "
+        f"{abs(pull.z):.1f} standard deviations of its prior away"
+    )
+
+
+def verdict(diagnosis: Diagnosis) -> str:
+    """What is missing, in one sentence."""
+    found, first = diagnosis.verdict, diagnosis.base
+    if found.status == "none":
+        return f"The model is fine: nothing is missing (p = {p_text(first.p_value)})."
+    if found.status == "named":
+        names = " and ".join(found.effects)
+        verb = "explains" if len(found.effects) == 1 else "together explain"
+        chosen = {candidate.effects: candidate for candidate in diagnosis.candidates}
+        p = chosen[found.effects].p_value if found.effects in chosen else None
+        with_it = f" (p {p_text(first.p_value)} without, {p_text(p)} with)" if p is not None else ""
+        return f"{names} {verb} the data{with_it}."
+    if found.status == "ambiguous":
+        names = ", ".join(found.effects)
+        return f"These cannot be told apart here: {names}; each of them explains the data."
+    where = "; see the missing force" if diagnosis.missing is not None else ""
+    return f"Something I do not know: no effect that I know explains the data{where}."
+
+
+def how_to_go_on(
+    diagnosis: Diagnosis, clips: Sequence[str], effects_from: Sequence[str] = ()
+) -> str:
+    """The command that comes next."""
+    files = shlex.join(clips)
+    more = "".join(f" --effects-from {shlex.quote(path)}" for path in effects_from)
+    found = diagnosis.verdict
+    if found.status == "none":
+        return f"galileo fit {files}"
+    if found.status == "unknown":
+        return f"galileo diagnose {files}{more} --effects-from my_effect.py"
+    effects = found.effects if found.status == "named" else found.effects[0].split("+")
+    return f"galileo fit {files}{more} --effects {','.join(effects)}"
