@@ -17,7 +17,7 @@ from galileo_jax.neural.checkpoint import load_network
 from galileo_jax.neural.galileo_task import Estimates, estimate
 from galileo_jax.neural.posterior_network import PosteriorNetwork
 from galileo_jax.neural.seen import Seen, see
-from galileo_jax.neural.summary import Summary, summarise
+from galileo_jax.neural.summary import DECLARED, Summary, summarise
 from galileo_jax.parameters import inverse
 from galileo_jax.rollout.model import MASS_PRIOR
 
@@ -71,18 +71,15 @@ def cnn_posterior(
     for i, parameter in enumerate(trials.parameters):
         if parameter.role == "main":
             middle[i] = means[i]
-    distance = float(network.distance(summary.features.astype(jnp.float32)))
-    usual = float(network.usual_distance[...])
-    # Of a clip in which nothing moves the network is not asked.
-    is_usual = distance <= usual or not bool(summary.moves)
+    complaint = _complaint(network, summary)
+    is_usual = not complaint
     notes: dict[str, Any] = {
         "status": "read off by the network" + ("" if is_usual else "; see the warning"),
-        "cnn": {"distance": round(distance, 3), "usual_distance": round(usual, 3)},
     }
-    if not is_usual:
+    if complaint:
         notes["warnings"] = [
-            f"this clip is unlike those that the network was trained on (distance {distance:.2f}, "
-            f"999 in 1000 are below {usual:.2f}): do not trust its intervals; take --method grad"
+            f"this clip is unlike those that the network was trained on ({complaint}): do not "
+            "trust its intervals; take --method grad"
         ]
     posterior = Posterior(
         names=trials.names,
@@ -96,6 +93,26 @@ def cnn_posterior(
 
 
 _summarise = jax.jit(summarise)
+
+
+def _complaint(network: PosteriorNetwork, summary: Summary) -> str:
+    """In what a clip is unlike all training clips; empty where it is not.
+
+    It sees clips beyond the trained range, and whole pictures that do not occur there. A
+    hidden effect that merely looks like other friction is not seen: that is what `diagnose`
+    is for.
+    """
+    if not bool(summary.moves):
+        return ""  # the network is not asked
+    features = summary.features.astype(jnp.float32)
+    places = np.flatnonzero(np.asarray(network.outside(features)))
+    if places.size:
+        declared = [DECLARED[place] for place in places.tolist() if place in DECLARED]
+        return f"{', '.join(declared) or 'its motion'} out of their range"
+    distance, usual = float(network.distance(features)), float(network.usual_distance[...])
+    if distance > usual:
+        return f"distance {distance:.2f}, 999 in 1000 are below {usual:.2f}"
+    return ""
 
 
 def _estimate(network: PosteriorNetwork, seen: Seen, summary: Summary, seed: int) -> Estimates:

@@ -29,6 +29,7 @@ TEST_NOISE_M = 2.2e-5  # 0.02 px at 900 px/m: the tracker's on the shared clips,
 INTERVAL = (0.05, 0.95)
 SHRINK = 0.01  # of the features' covariance towards the unit matrix
 USUAL = 0.999
+MARGIN = 0.03  # of the training features' range
 
 
 class Estimates(NamedTuple):
@@ -165,6 +166,9 @@ def _standardise(network: PosteriorNetwork, features: np.ndarray) -> None:
     mean, sd = features.mean(0), features.std(0)
     network.mean[...] = jnp.asarray(mean)
     network.sd[...] = jnp.asarray(np.where(sd > 1e-6, sd, 1.0))
+    low, high = features.min(0), features.max(0)
+    network.low[...] = jnp.asarray(low - MARGIN * (high - low))
+    network.high[...] = jnp.asarray(high + MARGIN * (high - low))
     values = np.asarray(network.standardised(jnp.asarray(features)), np.float64)
     covariance = values.T @ values / len(values)
     covariance = (1 - SHRINK) * covariance + SHRINK * np.eye(len(mean))

@@ -51,6 +51,7 @@ class PosteriorNetwork(nnx.Module):
 
     Attributes:
       mean, sd: `[feature]`, of the training features.
+      low, high: `[feature]`, the range of the training features and a little more.
       whitening: `[feature, feature]`, of the standardised training features.
       usual_distance: hardly a training clip is farther from the others.
     """
@@ -83,6 +84,8 @@ class PosteriorNetwork(nnx.Module):
         )
         self.mean = Constant(jnp.zeros(num_features))
         self.sd = Constant(jnp.ones(num_features))
+        self.low = Constant(jnp.full(num_features, -jnp.inf))
+        self.high = Constant(jnp.full(num_features, jnp.inf))
         self.whitening = Constant(jnp.eye(num_features))
         self.usual_distance = Constant(jnp.asarray(jnp.inf))
 
@@ -95,6 +98,10 @@ class PosteriorNetwork(nnx.Module):
         """How unlike the training clips, root mean square of whitened features: `[...]`."""
         white = self.standardised(features) @ self.whitening[...]
         return jnp.sqrt(jnp.mean(white**2, axis=-1))
+
+    def outside(self, features: jax.Array) -> jax.Array:
+        """Which features no training clip comes near, `[..., feature]`."""
+        return (features < self.low[...]) | (features > self.high[...])
 
     def trunk(self, features: jax.Array, profile: jax.Array) -> jax.Array:
         """What conditions the density, `[batch, width]`."""

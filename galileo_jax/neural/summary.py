@@ -30,6 +30,19 @@ CAMERA_SD_M_S2 = 0.01
 CAMERA_RATIO_SD = 0.02
 FOOT_SD, REBOUND, REBOUND_SD = 0.05, 0.012, 0.02
 
+# What features (by their place) say of the scene itself; for warnings.
+DECLARED = {
+    1: "the ramp's angle",
+    2: "the frame rate",
+    5: "object 1's tracking noise",
+    6: "object 2's tracking noise",
+    7: "object 1's length",
+    8: "object 2's length",
+    9: "object 1's height",
+    10: "object 2's height",
+    11: "the way to the foot",
+}
+
 
 class Line(NamedTuple):
     """A fitted parabola `value + slope (t - at) + curve (t - at)^2 / 2`."""

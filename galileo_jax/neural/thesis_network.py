@@ -8,6 +8,7 @@ NUM_ROWS = 4  # x and y of both objects
 KERNEL, POOL = 7, 2
 FILTERS = (6, 16)
 DENSE = (64, 32, 4)
+RANGES = (1.0, 0.3, 1.0, 0.3)  # of m1 (kg), k1, m2 (kg), k2, from 0
 
 
 def num_values(frames: int) -> int:
@@ -74,5 +75,5 @@ def count_parameters(network: nnx.Module) -> int:
 
 
 def mean_absolute_error(network: ThesisNetwork, batch: dict[str, jax.Array]) -> jax.Array:
-    """The thesis's loss, in kg and 1 alike."""
-    return jnp.mean(jnp.abs(network(batch["profile"]) - batch["target"]))
+    """The thesis's loss, each number in units of its range: frictions count like masses."""
+    return jnp.mean(jnp.abs(network(batch["profile"]) - batch["target"]) / jnp.asarray(RANGES))

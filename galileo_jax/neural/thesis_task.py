@@ -10,17 +10,17 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.effects.effect import Surroundings
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Arrays
-from galileo_jax.neural.thesis_network import ThesisNetwork, mean_absolute_error
+from galileo_jax.neural.thesis_network import RANGES, ThesisNetwork, mean_absolute_error
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine
 from galileo_jax.scene.scene import compile_scene
 from galileo_jax.truth import Truth
 
+# Object 2 stands so close that it is nearly always hit; the thesis does not tell its distances.
 NAMES = ("m1", "k1", "m2", "k2")
-LARGEST = np.array([1.0, 0.3, 1.0, 0.3])
 RAMP_ANGLE_DEG, FPS = 20.0, 30.0
-SIZE_M, RELEASE_M, OBJECT2_M = (0.06, 0.06, 0.06), 0.5, 0.25
+SIZE_M, RELEASE_M, OBJECT2_M = (0.06, 0.06, 0.06), 0.5, 0.15
 THESIS_MAE = dict(zip(NAMES, (0.1686, 0.0004, 0.1605, 0.0232), strict=True))
 CM = 100.0
 
@@ -42,7 +42,7 @@ class ThesisTask:
     def draw(self, key: jax.Array, count: int) -> np.ndarray:
         """Masses and frictions from the thesis's priors, `[count, 4]`."""
         drawn = np.asarray(jax.random.uniform(key, (count, len(NAMES))))
-        return LARGEST * np.maximum(drawn, 1e-3)  # a body of no mass at all has no motion
+        return np.array(RANGES) * np.maximum(drawn, 1e-3)  # a body of no mass at all has no motion
 
     def positions(self, theta: np.ndarray) -> np.ndarray:
         """Centres in every frame, `[count, object, 2, frames + 1]`, m."""

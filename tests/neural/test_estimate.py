@@ -106,12 +106,22 @@ def test_a_single_object_is_enough_for_its_friction(x64):
     assert abs(posterior["k1"].mean() - 0.1) < 0.005
 
 
-def test_a_clip_unlike_the_training_clips_is_told(x64):
-    strange = dataclasses.replace(HIT, gravity=3.0, size_m=((0.25, 0.25), (0.06, 0.06)))
-    strange = dataclasses.replace(strange, object2_x_m=0.5)
-    posterior, _, notes = cnn_posterior(trials_of(strange, fps=10.0), seed=0)
+@pytest.mark.parametrize(
+    ("changes", "fps", "complaint"),
+    [
+        ({"angle_rad": np.deg2rad(45)}, 30.0, "the ramp's angle out of their range"),
+        ({"release_m": 2.0}, 30.0, "the way to the foot"),
+        ({}, 10.0, "the frame rate"),
+        ({"size_m": ((0.25, 0.25), (0.06, 0.06)), "object2_x_m": 0.5}, 30.0, "length"),
+    ],
+)
+def test_a_clip_unlike_the_training_clips_is_told(changes, fps, complaint, x64):
+    strange = dataclasses.replace(HIT, **changes)
+    posterior, _, notes = cnn_posterior(trials_of(strange, fps), seed=0)
     assert not posterior.is_converged
-    assert "unlike those that the network was trained on" in notes["warnings"][0]
+    (warning,) = notes["warnings"]
+    assert "unlike those that the network was trained on" in warning
+    assert complaint in warning
 
 
 def test_other_models_are_refused(x64):

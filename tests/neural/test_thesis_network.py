@@ -10,7 +10,7 @@ from galileo_jax.neural.thesis_network import (
     average_pool,
     count_parameters,
 )
-from galileo_jax.neural.thesis_task import CM, ThesisTask
+from galileo_jax.neural.thesis_task import CM, OBJECT2_M, ThesisTask
 from tests.ramp_model import HIT
 
 THESIS_PARAMETERS = 13_252
@@ -57,7 +57,7 @@ def test_profiles_are_displacements_of_the_closed_form(x64):
     task = ThesisTask(config())
     theta = np.array([[0.5, 0.1, 0.3, 0.2]])
     made = np.diff(task.positions(theta)[0], axis=-1)
-    experiment = replace(HIT, mass_kg=(0.5, 0.3), friction=(0.1, 0.2))
+    experiment = replace(HIT, mass_kg=(0.5, 0.3), friction=(0.1, 0.2), object2_x_m=OBJECT2_M)
     exact = np.diff(solve(experiment, np.arange(61) / 30).position_m, axis=-1)
     assert np.abs(made - exact).max() < 1e-9
     assert task.make(_key(), 3)["profile"].shape == (3, 4, 60)

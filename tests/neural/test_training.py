@@ -7,6 +7,7 @@ from galileo_jax.errors import InputError
 from galileo_jax.neural.checkpoint import NETWORK, load_network
 from galileo_jax.neural.config import load_config
 from galileo_jax.neural.dataset import load_or_make
+from galileo_jax.neural.thesis_network import RANGES
 from galileo_jax.neural.training import cosine_rate, train
 from tests.neural.test_thesis_network import config
 
@@ -54,7 +55,8 @@ def test_it_learns_and_leaves_a_network(tmp_path):
     network, kept = load_network(tmp_path / NETWORK)
     assert kept == config()
     data = load_or_make(Toy(config()), config(), tmp_path / "data", shards)
-    error = np.abs(np.asarray(network(data["profile"][180:])) - data["target"][180:]).mean()
+    error = np.abs(np.asarray(network(data["profile"][180:])) - data["target"][180:])
+    error = (error / np.array(RANGES)).mean()
     assert np.isclose(error, progress.best, rtol=1e-4)
 
 
