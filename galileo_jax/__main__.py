@@ -9,6 +9,8 @@ from galileo_jax.errors import InputError
 
 VERBS = (
     ("fit", "estimate masses and friction from clips"),
+    ("compare", "see whether the model is adequate, and where it fails"),
+    ("diagnose", "learn which effect is missing, add it, watch the error fall"),
     ("track", "follow the objects of a clip; csv and an overlay to check by eye"),
     ("label", "write points and scale into a clip's yaml"),
     ("simulate", "make a clip with known truth"),

@@ -93,6 +93,8 @@ def _object(
     offset = np.nanmedian(difference, axis=1) if seen.any() else np.zeros(2)
     path = _path(problem, index, best[index], tangent)
     moved = np.einsum("at,bat->bt", tangent, draws[:, index] - best[index])
+    # Each draw, like the fit, up to the constant offset of the point that was followed.
+    moved = moved - np.median(moved, axis=1, keepdims=True)
     low, high = np.quantile(moved, [0.025, 0.975], axis=0) if len(moved) else (0 * path, 0 * path)
     covariance = observation.covariance_m2[index]
     noise = scale * np.sqrt(np.einsum("at,abt,bt->t", tangent, covariance, tangent))

@@ -35,9 +35,8 @@ def write_comparison_page(
         f'<h1>{escape(title)}</h1>\n<p class="soft">compared with the model, '
         f"{escape(findings.effects_text(effects))}</p>",
         f"<p{warn}><strong>{escape(findings.adequacy(comparison, effects))}</strong></p>",
-        f"<p>chi2 per degree of freedom {error['chi2_per_dof']:.2f}; velocity error "
-        f"{error['rmse']:.4f} m/s, of which tracking noise alone would give "
-        f"{error['noise']:.4f} m/s.</p>",
+        f"<p>chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
+        f"{error['rmse']:.4f} m/s.</p>",
         items(findings.pull_text(pull) for pull in pulled(comparison)),
         failures("Where it fails", shown),
         cells(comparison, several=len({one.clip for one in shown}) > 1),

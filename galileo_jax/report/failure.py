@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from galileo_jax.comparison.local_tests import WHOLE
 from galileo_jax.report.along import Along
 from galileo_jax.report.figure import COLOURS, INK, style
 from galileo_jax.report.profiles import shade_phases
@@ -45,6 +46,7 @@ def failure_figure(one: Along) -> "Figure":
         for axes in (place, speed):
             axes.tick_params(labelbottom=False)
         shade_phases(residual, one.phases, one.times_s)
+        figure.align_ylabels()
     return figure
 
 
@@ -71,7 +73,8 @@ def before_after_figure(before: Along, after: Along, titles: tuple[str, str]) ->
 def _title(one: Along) -> str:
     if one.worst is None:
         return one.name
-    return f"{one.name}: worst at {one.worst.axis}, {one.worst.phase} (z = {one.worst.z:.0f})"
+    where = "" if one.worst.phase == WHOLE else f", {one.worst.phase}"
+    return f"{one.name}: worst in {one.worst.axis}{where} (z = {one.worst.z:.0f})"
 
 
 def _against(

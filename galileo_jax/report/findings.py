@@ -6,6 +6,7 @@ from typing import Any
 
 from galileo_jax.comparison.compare import Comparison, Place, Pull
 from galileo_jax.diagnosis.diagnosis import Diagnosis
+from galileo_jax.report.statements import number
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
 NO_EFFECTS = "no effects"
@@ -18,6 +19,11 @@ def p_text(p: float | None) -> str:
     return f"< {SMALLEST_P:.0e}" if p < SMALLEST_P else f"{p:.2g}"
 
 
+def p_equals(p: float) -> str:
+    """The same with its name."""
+    return f"p {p_text(p)}" if p < SMALLEST_P else f"p = {p_text(p)}"
+
+
 def effects_text(effects: Sequence[str]) -> str:
     """The effects of a model."""
     return ", ".join(effects) or NO_EFFECTS
@@ -26,13 +32,13 @@ def effects_text(effects: Sequence[str]) -> str:
 def value_text(entry: Mapping[str, Any]) -> str:
     """A parameter's mean, standard deviation and unit."""
     unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-    return f"{entry['mean']:.4g} +- {entry['sd']:.2g}{unit}"
+    sd = entry["sd"]
+    return f"{number(entry['mean'], sd)} +- {number(sd, sd)}{unit}"
 
 
 def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
     """Whether the model is adequate, in one sentence."""
-    p = comparison.p_value
-    equals = f"p {p_text(p)}" if p < SMALLEST_P else f"p = {p_text(p)}"
+    equals = p_equals(comparison.p_value)
     model = f"with {effects_text(effects)} " if effects else ""
     if comparison.is_adequate:
         return f"The model {model}is adequate: what it leaves over is noise ({equals})."
@@ -57,14 +63,14 @@ def verdict(diagnosis: Diagnosis) -> str:
     """What is missing, in one sentence."""
     found, first = diagnosis.verdict, diagnosis.base
     if found.status == "none":
-        return f"The model is fine: nothing is missing (p = {p_text(first.p_value)})."
+        return f"The model is fine: nothing is missing ({p_equals(first.p_value)})."
     if found.status == "named":
         names = " and ".join(found.effects)
         verb = "explains" if len(found.effects) == 1 else "together explain"
         chosen = {candidate.effects: candidate for candidate in diagnosis.candidates}
         p = chosen[found.effects].p_value if found.effects in chosen else None
-        with_it = f" (p {p_text(first.p_value)} without, {p_text(p)} with)" if p is not None else ""
-        return f"{names} {verb} the data{with_it}."
+        told = "" if p is None else f" ({p_equals(first.p_value)} without, {p_equals(p)} with)"
+        return f"{names} {verb} the data{told}."
     if found.status == "ambiguous":
         names = ", ".join(found.effects)
         return f"These cannot be told apart here: {names}; each of them explains the data."
@@ -85,3 +91,18 @@ def how_to_go_on(
         return f"galileo diagnose {files}{more} --effects-from my_effect.py"
     effects = found.effects if found.status == "named" else found.effects[0].split("+")
     return f"galileo fit {files}{more} --effects {','.join(effects)}"
+
+
+def strengths(
+    effects: Sequence[str], parameters: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Mapping[str, Any]]:
+    """The entries of the effects' strengths; one per clip where each clip has its own."""
+    found = {}
+    for effect in effects:
+        own = [
+            name
+            for name in parameters
+            if name == effect or name.removeprefix(f"{effect}_").isdecimal()
+        ]
+        found |= {name: parameters[name] for name in own}
+    return found
