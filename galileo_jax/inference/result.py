@@ -72,15 +72,18 @@ def velocity_error(
     }
 
 
-def error_of(trials: Trials, theta: np.ndarray, num_used: float) -> dict[str, float]:
+def error_of(
+    trials: Trials, theta: np.ndarray, num_used: float, pull: float = 0.0
+) -> dict[str, float]:
     """`velocity_error` and chi2 per degree of freedom at parameters `theta` `[parameter]`.
 
     Args:
       trials: the clips.
       theta: in the parameters' units, noise scales last.
       num_used: how many numbers' worth the parameters were fitted with.
+      pull: of the nuisances, which are data, too: the sum of their squared prior deviations.
     """
-    scales, predictions, chi2, count = [], [], 0.0, 0.0
+    scales, predictions, chi2, count = [], [], pull, 0.0
     for clip, problem in enumerate(trials.problems):
         scale = float(np.clip(trials.noise_scale(theta, clip), *NOISE_SCALE_RANGE))
         predicted = problem.simulate(trials.of_clip(theta, clip))
@@ -141,7 +144,9 @@ def make_result(
         notes = notes | {"warnings": [SCALE_WARNING]}
     # Every parameter takes from the residuals what the data told of it.
     effective = float(np.sum(1 - np.clip(spread[: len(trials.model_parameters)] ** 2, 0, 1)))
-    error = error_of(trials, trials.theta(z_best), effective)
+    nuisance = [p.role == "nuisance" for p in trials.model_parameters]
+    pull = float(np.sum(z_best[: len(nuisance)][nuisance] ** 2))
+    error = error_of(trials, trials.theta(z_best), effective, pull)
     status = {"converged": posterior.is_converged, **notes}
     return {
         "clips": clips,

@@ -5,8 +5,9 @@ from typing import ClassVar
 from galileo_jax.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.parameters import LogNormal, Parameter
 
-# Most plastic impacts return about a hundredth; Bullet's boxes, told to be plastic, up to 0.13.
-PRIOR = LogNormal(median=0.01, sd=1.2)
+# Most plastic impacts return about a hundredth; Bullet's boxes, told to be plastic, up to 0.05.
+# More than a tenth is an effect with a name, restitution.
+PRIOR = LogNormal(median=0.01, sd=0.8)
 
 
 class ImpactRestitution(Effect):

@@ -104,6 +104,7 @@ class GradientFit:
         values as in `Problem.whiten`; 0 where pinned.
       code: how it ended.
       stats: rollouts and steps it took.
+      pull: how far the nuisances are from their priors' middle: the sum of their squared z.
     """
 
     z: np.ndarray
@@ -116,6 +117,7 @@ class GradientFit:
     jacobian: np.ndarray
     code: Code
     stats: dict[str, float]
+    pull: float
 
 
 class Batch(NamedTuple):
@@ -145,6 +147,7 @@ class GradientFitter:
         self._count = len(trials.model_parameters)
         parameters = trials.model_parameters
         self._is_simulated = np.array([p.step is not None for p in parameters])
+        self._is_nuisance = np.array([p.role == "nuisance" for p in parameters])
         self._num_rollouts = 0
 
     def compile(self) -> None:
@@ -296,6 +299,7 @@ class GradientFitter:
                     jacobian=at_unit,
                     code=Code.FAILED if failed else code,
                     stats={"num_steps": num_steps, "num_rollouts": self._num_rollouts},
+                    pull=float(np.sum(points.z[i][self._is_nuisance] ** 2)),
                 )
             )
         return fits

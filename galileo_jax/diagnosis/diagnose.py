@@ -1,0 +1,198 @@
+"""The loop: compare, ask which effect is missing, add it, and watch the error fall.
+
+1. Fit the model without effects; compare it with the data. Adequate: the verdict is none.
+2. Fit every effect of the library as a candidate, in one batch; rank by evidence (Laplace),
+   which charges for every parameter and, through the candidates' equal shares of the
+   prior, for how many were tried. Compare the best with the data, too.
+3. Candidates that are adequate and whose evidence is within a factor of the best's cannot
+   be told from it: one is named, several are ambiguous.
+4. Where no single effect is adequate, the best is joined by each of the others.
+5. Where no pair is adequate either, the verdict is unknown, and the missing force is
+   inferred without a form (`missing_force`).
+"""
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from galileo_jax.comparison.compare import Comparison, compare
+from galileo_jax.diagnosis.advice import advice
+from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
+from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.result import error_of
+from galileo_jax.inference.trials import Trials
+
+# Evidence of one candidate over another, in nats, at which the other is given up: one in twenty.
+DECISIVE = 3.0
+NUM_COMPARED = 6  # of the best candidates
+PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
+LEAST_GAIN = 5.0  # in nats, for another effect to be added
+
+
+def diagnose(
+    trials: Trials,
+    *,
+    seed: int = 0,
+    add: str = "auto",
+    on_stage: Callable[[str], None] = lambda _: None,
+    on_round: Callable[[Round], None] = lambda _: None,
+) -> Diagnosis:
+    """Diagnoses trials whose models have the whole library.
+
+    Args:
+      trials: one clip or several of the same objects; `all_effects` are the candidates.
+      seed: of starts and replicates; the same seed gives the same diagnosis.
+      add: "auto": add what the verdict names, until the model is adequate or nothing helps;
+        "none": only say what is missing; a name: add that effect, whatever the verdict.
+      on_stage: told what is being done.
+      on_round: told each round of the loop.
+
+    Raises:
+      ValueError: `add` names no effect of the trials' models.
+    """
+    fitter = GradientFitter(trials)
+    on_stage("fitting the model without effects")
+    base = Hypothesis((), fitter.fit(seed, effects=()))
+    on_stage("comparing it with the data")
+    first = Round(base, compare(trials, base.fit, seed))
+    on_round(first)
+    rounds = [first]
+    if add not in ("auto", "none"):
+        trials.free([add])  # raises for unknown names
+    on_stage(f"fitting {len(trials.all_effects)} candidates")
+    singles = [(name,) for name in trials.all_effects]
+    candidates = _candidates(fitter, base, singles, seed)
+    if add not in ("auto", "none"):
+        chosen = next(c for c in candidates if c.effects == (add,))
+        rounds.append(_round(trials, chosen.hypothesis, seed, on_round))
+    if first.comparison.is_adequate:
+        return Diagnosis(tuple(rounds), candidates, Verdict("none", ()))
+
+    on_stage("comparing the best candidates with the data")
+    candidates, compared = _compared(trials, candidates, seed)
+    verdict = _verdict(candidates)
+    if verdict is None:
+        on_stage("fitting pairs of effects")
+        best = candidates[0]
+        pairs = [(*best.effects, name) for name in trials.all_effects if name not in best.effects]
+        joined = _candidates(fitter, best.hypothesis, pairs, seed, base)
+        joined, compared_pairs = _compared(trials, joined, seed)
+        compared |= compared_pairs
+        verdict = _verdict(joined)
+        gain = joined[0].log_evidence - best.log_evidence
+        if verdict is not None and gain > LEAST_GAIN:
+            candidates = (*joined, *candidates)
+        else:
+            verdict = Verdict("unknown", ())
+    if add == "auto" and verdict.status != "unknown":
+        chosen = candidates[0]
+        extra = Round(chosen.hypothesis, compared[chosen.effects])
+        on_round(extra)
+        rounds.append(extra)
+    elif add == "auto":
+        # What helps most is shown, though it does not explain the data.
+        best = candidates[0]
+        if best.log_evidence > LEAST_GAIN:
+            rounds.append(Round(best.hypothesis, compared[best.effects]))
+            on_round(rounds[-1])
+    verdict = replace(verdict, advice=advice(verdict, trials))
+    return Diagnosis(tuple(rounds), candidates, verdict)
+
+
+def _round(
+    trials: Trials, hypothesis: Hypothesis, seed: int, on_round: Callable[[Round], None]
+) -> Round:
+    extra = Round(hypothesis, compare(trials, hypothesis.fit, seed))
+    on_round(extra)
+    return extra
+
+
+def _candidates(
+    fitter: GradientFitter,
+    start: Hypothesis,
+    sets: Sequence[tuple[str, ...]],
+    seed: int,
+    base: Hypothesis | None = None,
+) -> tuple[Candidate, ...]:
+    """Fits and ranks candidates; evidence counts from `base` (default: `start`)."""
+    base = base or start
+    trials = fitter.trials
+    found = fit_candidates(fitter, start, sets, seed)
+    scores = score_tests(trials, start, sets)
+    evidence = np.array([h.fit.log_evidence for h in found]) - base.fit.log_evidence
+    weight = np.append(evidence + np.log((1 - PRIOR_NONE) / len(found)), np.log(PRIOR_NONE))
+    weight = np.exp(weight - weight.max())
+    probability = weight / weight.sum()
+    count = len(trials.model_parameters)
+    made = []
+    for i in np.argsort(-evidence):
+        fit = found[i].fit
+        used = float(np.sum(fit.free[:count]) - np.trace(fit.covariance[:count, :count]))
+        made.append(
+            Candidate(
+                effects=found[i].effects,
+                hypothesis=found[i],
+                error=error_of(trials, trials.theta(fit.z, fit.free), used, fit.pull),
+                score_z=float(scores[i]),
+                log_evidence=float(evidence[i]),
+                probability=float(probability[i]),
+                p_value=None,
+                confounded_with=(),
+            )
+        )
+    return tuple(made)
+
+
+def _compared(
+    trials: Trials, candidates: tuple[Candidate, ...], seed: int
+) -> tuple[tuple[Candidate, ...], dict[tuple[str, ...], Comparison]]:
+    """The best candidates with their p-values and with whom they are confounded."""
+    compared, done = {}, []
+    top = candidates[0].log_evidence
+    for i, candidate in enumerate(candidates):
+        # The best is always looked at; others only where they could be confused with it.
+        if i == 0 or (i < NUM_COMPARED and top - candidate.log_evidence < 2 * DECISIVE):
+            found = compare(trials, candidate.hypothesis.fit, seed)
+            compared[candidate.effects] = found
+            candidate = replace(candidate, p_value=found.p_value)
+        done.append(candidate)
+    names = {c.effects: _rivals(c, done) for c in done}
+    return tuple(replace(c, confounded_with=names[c.effects]) for c in done), compared
+
+
+def _rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]:
+    """Candidates that explain the data as well as this one."""
+    if candidate.p_value is None:
+        return ()
+    return tuple(
+        other.name
+        for other in all_of
+        if other.effects != candidate.effects
+        and other.p_value is not None
+        and abs(other.log_evidence - candidate.log_evidence) < DECISIVE
+    )
+
+
+def _verdict(candidates: Sequence[Candidate]) -> Verdict | None:
+    """Named or ambiguous; None where no candidate is adequate."""
+    adequate = [c for c in candidates if c.p_value is not None and _explains(c)]
+    if not adequate or candidates[0].log_evidence < 0:
+        return None
+    top = max(c.log_evidence for c in adequate)
+    if candidates[0].log_evidence - top > DECISIVE:
+        return None
+    equal = [c for c in adequate if top - c.log_evidence < DECISIVE]
+    if len(equal) == 1:
+        return Verdict("named", equal[0].effects)
+    names = tuple(itertools.chain(c.name for c in equal))
+    return Verdict("ambiguous", names)
+
+
+def _explains(candidate: Candidate) -> bool:
+    return candidate.p_value is not None and candidate.p_value >= EXPLAINS_P
+
+
+EXPLAINS_P = 1e-3  # below it even the best candidate leaves something unexplained
