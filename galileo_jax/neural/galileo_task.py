@@ -16,7 +16,7 @@ from galileo_jax.neural.posterior_network import (
     to_u,
 )
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
-from galileo_jax.neural.summary import summarise
+from galileo_jax.neural.summary import NUM_CHANNELS, NUM_FEATURES, summarise
 from galileo_jax.neural.task import Arrays
 from galileo_jax.neural.thesis_task import FPS, ThesisTask
 from galileo_jax.neural.world import Truth, draw, targets
@@ -51,10 +51,7 @@ class GalileoTask:
 
     def network(self, seed: int, data: Arrays | None = None) -> PosteriorNetwork:
         """A new network; `data` set its idea of what is usual."""
-        shapes = jax.eval_shape(_sample, jax.random.key(0))
-        network = PosteriorNetwork(
-            shapes["features"].shape[0], shapes["profile"].shape[0], NUM_FRAMES, nnx.Rngs(seed)
-        )
+        network = PosteriorNetwork(NUM_FEATURES, NUM_CHANNELS, NUM_FRAMES, nnx.Rngs(seed))
         if data is not None:
             _standardise(network, data["features"])
         return network

@@ -30,6 +30,7 @@ CAMERA_SD_M_S2 = 0.01
 CAMERA_RATIO_SD = 0.02
 FOOT_SD, REBOUND, REBOUND_SD = 0.05, 0.012, 0.02
 
+NUM_FEATURES, NUM_CHANNELS = 67, 8
 # What features (by their place) say of the scene itself; for warnings.
 DECLARED = {
     1: "the ramp's angle",

@@ -8,7 +8,7 @@ import pytest
 from jax.scipy.special import ndtr
 
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
-from galileo_jax.neural.summary import Summary, summarise
+from galileo_jax.neural.summary import NUM_CHANNELS, NUM_FEATURES, Summary, summarise
 from tests.ramp_model import HIT
 from tests.reference_ramp import Experiment, solve
 
@@ -61,6 +61,8 @@ def check(summary: Summary, experiment: Experiment, times: float = 1.0) -> None:
 def test_without_noise_the_closed_form_is_found_again(name, x64):
     summary = run(seen_of(CASES[name]))
     assert summary.moves and summary.is_hit
+    assert summary.features.shape == (NUM_FEATURES,)
+    assert summary.profile.shape == (NUM_CHANNELS, NUM_FRAMES)
     check(summary, CASES[name])
 
 
