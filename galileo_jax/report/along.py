@@ -1,6 +1,5 @@
 """Each object's motion along its path, measured against fitted: what pictures of a failure show."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -173,7 +172,7 @@ def _worst(comparison: Comparison, clip: str, name: str) -> Place | None:
 
 
 def _phases(labels: np.ndarray, times_s: np.ndarray) -> tuple[Phase, ...]:
-    borders: Sequence[int] = [0, *(np.flatnonzero(np.diff(labels)) + 1), len(labels) - 1]
+    borders = [0, *map(int, np.flatnonzero(np.diff(labels)) + 1), len(labels) - 1]
     return tuple(
         Phase(PHASES[labels[start]], float(times_s[start]), float(times_s[end]))
         for start, end in pairwise(borders)

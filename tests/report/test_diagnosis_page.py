@@ -1,0 +1,133 @@
+"""The page of a diagnosis: every verdict is told, scripts run, nothing comes from outside."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.comparison.compare import Place
+from galileo_jax.comparison.phases import PHASES
+from galileo_jax.diagnosis.document import diagnosis_document
+from galileo_jax.report import findings
+from galileo_jax.report.along import along_paths, worst_stretch
+from galileo_jax.report.comparison_page import write_comparison_page
+from galileo_jax.report.diagnosis_page import Told, write_diagnosis_page
+from tests.found import comparison_of, diagnosis_of, fit_of, make_trials
+from tests.precision import in_64_bit
+from tests.report.browser import opened
+
+STATUSES = ("none", "named", "ambiguous", "unknown")
+SAYS = {
+    "none": "The model is fine",
+    "named": "air_drag explains the data (p = 1e-09 without, p = 0.4 with)",
+    "ambiguous": "These cannot be told apart here: air_drag, viscous_drag",
+    "unknown": "see the missing force",
+}
+GO_ON = "galileo fit a.yaml --effects air_drag"
+HOSTILE = '</script><b>&"clip'
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
+@pytest.fixture(scope="module")
+def trials(tmp_path_factory):
+    with in_64_bit():
+        return make_trials(tmp_path_factory.mktemp("clip"))
+
+
+def write(trials, status: str, page: Path) -> str:
+    diagnosis = diagnosis_of(trials, status)
+    record = diagnosis_document(trials, diagnosis, 0)
+    told = Told(diagnosis, record, GO_ON, "air_drag", (("box", "sphere"),), 0)
+    write_diagnosis_page(page, HOSTILE, trials, told)
+    return page.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("status", STATUSES)
+def test_tells_the_verdict_and_needs_nothing_from_outside(status, trials, tmp_path):
+    page = write(trials, status, tmp_path / "report.html")
+    assert SAYS[status] in page and GO_ON in page and "Truth: air_drag" in page
+    assert ("The missing force" in page) == (status == "unknown")
+    assert ("0.99 sin(6 t)" in page) == (status == "unknown")
+    assert ("Added: air_drag" in page) == (status in ("named", "ambiguous"))
+    references = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert all(text.startswith(("#", "data:image/")) for text in references)
+    assert "@import" not in page and not re.search(r"url\((?!#)", page)
+    assert "<h1>&lt;/script&gt;&lt;b&gt;&amp;" in page, "names are escaped"
+
+
+@pytest.mark.parametrize("status", ["named", "unknown"])
+def test_opens_in_a_browser(status, trials, tmp_path):
+    write(trials, status, tmp_path / "report.html")
+    document, complaints = opened(tmp_path / "report.html", tmp_path / "profile")
+    assert complaints == []
+    moved = re.findall(r'data-of="([^"]*)" data-object="(\d)"[^>]*transform="translate', document)
+    models = ["no effects", "air_drag"] if status == "named" else ["no effects"]
+    assert sorted(moved) == sorted((name, i) for name in [*models, "measured"] for i in "01")
+    assert "0.00 s" in document, "the clock"
+
+
+def test_a_comparison_opens_in_a_browser(trials, tmp_path):
+    comparison = comparison_of(trials, 1e-9)
+    shown = along_paths(trials, fit_of(trials, ()), comparison, 0)
+    page = tmp_path / "report.html"
+    write_comparison_page(page, HOSTILE, (), comparison, shown)
+    document, complaints = opened(page, tmp_path / "profile")
+    assert complaints == []
+    assert "The model is not adequate" in document and document.count("<svg") == 2
+    assert "release_instant is bent to -0.05 s, 4.9 standard deviations" in document
+    assert "foot_transition" not in document, "inside its prior"
+
+
+def test_the_same_diagnosis_gives_the_same_page(trials, tmp_path):
+    first = write(trials, "named", tmp_path / "a.html")
+    assert write(trials, "named", tmp_path / "b.html") == first
+
+
+def test_the_worst_stretch_is_where_the_residuals_were_bent(trials):
+    comparison = comparison_of(trials, 1e-9)
+    bent, quiet = along_paths(trials, fit_of(trials, ()), comparison, 0)
+    times = bent.times_s
+    assert bent.stretch_s == pytest.approx((times[10], times[14]))
+    assert bent.worst is not None and bent.worst.phase == "ramp"
+    assert quiet.stretch_s is None, "object 2 is as the model has it"
+    fine = along_paths(trials, fit_of(trials, ()), comparison_of(trials, 0.5), 0)
+    assert all(one.stretch_s is None for one in fine), "an adequate model fails nowhere"
+
+
+def test_a_stretch_keeps_to_its_phase():
+    white = np.zeros((2, 30))
+    white[0, 5:9], white[0, 20:29] = 3.0, 9.0
+    labels = np.where(np.arange(30) < 15, PHASES.index("ramp"), PHASES.index("table"))
+    place = place_in("ramp")
+    assert worst_stretch(white, labels, np.arange(30.0), place) == (5.0, 8.0)
+    assert worst_stretch(white, labels, np.arange(30.0), place_in("whole")) == (20.0, 28.0)
+    assert worst_stretch(white, labels, np.arange(30.0), place_in("held")) is None
+
+
+def place_in(phase: str) -> Place:
+    return Place("clip", "object1", "x", phase, 0.0, 0.0, 9.0, 0.0)
+
+
+def test_a_fit_at_the_truth_lies_on_the_measured_path(trials):
+    for one in along_paths(trials, fit_of(trials, ()), comparison_of(trials, 0.5), 0):
+        assert np.nanmax(np.abs(one.measured_m - one.predicted_m)) < 6e-3  # its foot is no bevel
+        assert (one.low_m <= one.high_m).all()
+        assert one.noise_m == pytest.approx(np.full_like(one.noise_m, 2e-4), rel=0.1)
+
+
+def test_how_to_go_on(trials):
+    clips, mine = ["a b.yaml"], ["my.py"]
+    cases = {
+        "none": "galileo fit 'a b.yaml'",
+        "named": "galileo fit 'a b.yaml' --effects-from my.py --effects air_drag",
+        "ambiguous": "galileo fit 'a b.yaml' --effects-from my.py --effects air_drag",
+        "unknown": "galileo diagnose 'a b.yaml' --effects-from my.py --effects-from my_effect.py",
+    }
+    for status, expected in cases.items():
+        assert findings.how_to_go_on(diagnosis_of(trials, status), clips, mine) == expected
