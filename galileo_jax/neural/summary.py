@@ -21,6 +21,7 @@ import jax.numpy as jnp
 from galileo_jax.neural.seen import Seen
 from galileo_jax.parameters import Uniform
 from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
+from galileo_jax.similarity import discrepancy
 
 AT_FOOT = 1.2  # half lengths either side of the foot where an object stands on two edges
 MOVED_SD, MOVED_M = 6.0, 3e-4  # beyond doubt
@@ -28,6 +29,7 @@ LEAST_FRAMES = 4
 # What a camera does to the two kinds of slopes (discrepancy.py), so that errors start realistic.
 CAMERA_SD_M_S2 = 0.01
 CAMERA_RATIO_SD = 0.02
+QUARTIC = 0.02  # of t^4 / 4, what no parabola fits, root mean square
 FOOT_SD, REBOUND, REBOUND_SD = 0.05, 0.012, 0.02
 
 NUM_FEATURES, NUM_CHANNELS = 67, 8
@@ -74,6 +76,8 @@ class Summary(NamedTuple):
       centre, scale: `[3]`, estimates of `world.targets` and their errors, in the same space; 0
         and 1 (the prior) where there is none.
       features: `[feature]`, all that may tell how good the estimates are; of order one.
+      misfit: how far from its parabola object 1 is on the ramp, root mean square, in units of
+        tracking noise and what a camera's keystone makes of a parabola.
       profile: `[channel, frame]`, velocities of both objects, masks, and residuals of the fits.
     """
 
@@ -83,6 +87,7 @@ class Summary(NamedTuple):
     scale: jax.Array
     features: jax.Array
     profile: jax.Array
+    misfit: jax.Array
 
 
 def parabola(t: jax.Array, y: jax.Array, mask: jax.Array, noise: jax.Array) -> Line:
@@ -344,4 +349,10 @@ def summarise(seen: Seen) -> Summary:
     model1 = jnp.where(after[0] & is_hit, x1 - stopping1, model1)
     residual = jnp.arcsinh(jnp.stack([model1, model2]) / noise[:, None]) / 3
     profile = jnp.concatenate([velocity, mask.astype(t.dtype), jnp.where(mask, residual, 0.0)])
-    return Summary(moves, is_hit & moves, centre, scale, features, jnp.nan_to_num(profile))
+    way = jnp.where(going, gone1, 0.0).max()
+    off = jnp.where(going, along - ramp(t), 0.0)
+    rms = jnp.sqrt((off**2).sum() / jnp.maximum(going.sum() - 3, 1))
+    misfit = rms / jnp.hypot(noise[0], QUARTIC * discrepancy.KEYSTONE_SD * way**2)
+    misfit = jnp.where(going.sum() >= 2 * LEAST_FRAMES, misfit, 0.0)
+    profile = jnp.nan_to_num(profile)
+    return Summary(moves, is_hit & moves, centre, scale, features, profile, misfit)

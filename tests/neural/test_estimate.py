@@ -124,6 +124,22 @@ def test_a_clip_unlike_the_training_clips_is_told(changes, fps, complaint, x64):
     assert complaint in warning
 
 
+def test_a_force_that_grows_on_the_way_is_told(x64):
+    trials = trials_of(HIT)
+    (problem,) = trials.problems
+    seen = problem.observation
+    # As drag does: 5 mm less after the first half second, growing with its cube.
+    less = 0.005 * (seen.times_s / 0.5) ** 3 * np.array([[np.cos(0.35)], [-np.sin(0.35)]])
+    position = seen.position_m.copy()
+    position[0] -= np.where(seen.position_m[0, :1] < 0, less, 0.0)
+    dragged = dataclasses.replace(seen, position_m=position)
+    posterior, _, notes = cnn_posterior(
+        Trials((dataclasses.replace(problem, observation=dragged),)), seed=0
+    )
+    assert not posterior.is_converged
+    assert "not evenly accelerated" in notes["warnings"][0]
+
+
 def test_other_models_are_refused(x64):
     trials = trials_of(HIT)
     with pytest.raises(InputError, match="one clip expected"):

@@ -83,6 +83,7 @@ def test_convolution_and_pool_are_the_usual_ones():
     x = jax.random.normal(_key(), (2, 4, 30, 3))
     ours = Convolution(3, 5, nnx.Rngs(0))
     usual = nnx.Conv(3, 5, (1, 7), padding="VALID", rngs=nnx.Rngs(0))
+    assert usual.bias is not None and ours.filters.bias is not None
     usual.kernel[...] = ours.filters.kernel[...].reshape(1, 7, 3, 5)
     usual.bias[...] = ours.filters.bias[...]
     assert np.allclose(ours(x), usual(x), atol=1e-5)
