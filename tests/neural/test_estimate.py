@@ -128,8 +128,8 @@ def test_a_force_that_grows_on_the_way_is_told(x64):
     trials = trials_of(HIT)
     (problem,) = trials.problems
     seen = problem.observation
-    # As drag does: 5 mm less after the first half second, growing with its cube.
-    less = 0.005 * (seen.times_s / 0.5) ** 3 * np.array([[np.cos(0.35)], [-np.sin(0.35)]])
+    # As drag does: 2 cm less after the first half second, growing with its cube.
+    less = 0.02 * (seen.times_s / 0.5) ** 3 * np.array([[np.cos(0.35)], [-np.sin(0.35)]])
     position = seen.position_m.copy()
     position[0] -= np.where(seen.position_m[0, :1] < 0, less, 0.0)
     dragged = dataclasses.replace(seen, position_m=position)
