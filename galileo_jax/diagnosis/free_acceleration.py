@@ -18,7 +18,7 @@ import numpy as np
 from galileo_jax.effects.effect import Effect, Force, State, Surroundings, Theta
 from galileo_jax.parameters import Normal, Parameter
 
-NUM_KNOTS, NUM_KNOTS_AFTER = 16, 8  # of object 1 at first, and of all else
+NUM_KNOTS, NUM_KNOTS_AFTER = 14, 8  # of object 1 at first, and of all else
 SD_M_S2 = 2.0
 LENGTH = 2.0  # of the covariance, in knots
 
@@ -38,7 +38,8 @@ def splines(time_s: Array, begin_s: Array, end_s: Array, num_knots: int) -> Arra
 
     Args:
       time_s: `[...]`, s.
-      begin_s, end_s: `[...]`, s; where the first and the last interval end.
+      begin_s: `[...]`, s; where the first interval begins.
+      end_s: `[...]`, s; where the last one ends.
       num_knots: how many splines.
 
     Returns:

@@ -19,12 +19,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.diagnosis.formula import NOT_SIMPLE, Formula, Sight, find_formula
 from galileo_jax.diagnosis.free_acceleration import FreeAcceleration, Span
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.diagnosis.free_fit import FreeFit, free_fit
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.trials import Trials
 from galileo_jax.rollout.engines import make_engine
@@ -35,6 +34,7 @@ NUM_TIMES, NUM_DRAWS = 200, 400
 MOVES_M_S = 0.01
 LONGER = 1.05  # than the hypothesis says, the objects may move
 SHORTEST_S = 0.05  # of a piece
+NUM_SPANS = 2  # pieces by the hypothesis, then by the fit with the acceleration
 
 
 def infer_missing_force(trials: Trials, hypothesis: Hypothesis, seed: int) -> MissingForce:
@@ -47,8 +47,8 @@ def infer_missing_force(trials: Trials, hypothesis: Hypothesis, seed: int) -> Mi
 
     Returns:
       The first clip's, NaN where an object is at rest or not seen. Its zero is the hypothesis
-      with friction, masses and nuisances where the formula has them; where there is no
-      formula, the hypothesis' fit itself. The formula is that of all clips, and so is the
+      with friction, masses and nuisances where the formula has them; where no formula was
+      found for what is missing, the hypothesis' fit itself. The formula is that of all clips, and so is the
       share it explains: of the misfit that an acceleration of any form takes away.
     """
     views = [_view(trials, hypothesis, clip) for clip in range(len(trials.problems))]
@@ -75,7 +75,6 @@ class _View:
       trials: the clip alone, its model with the free acceleration.
       before: `[parameter]`, z of the hypothesis, no acceleration.
       fit: with the free acceleration.
-      residual: `[value]`, whitened, at the fit and its noise.
       effect: the free acceleration.
       time_s: `[time]`.
       path_m, speed_m_s: `[object, time]`, of the fit.
@@ -84,8 +83,7 @@ class _View:
 
     trials: Trials
     before: np.ndarray
-    fit: GradientFit
-    residual: np.ndarray
+    fit: FreeFit
     effect: FreeAcceleration
     time_s: np.ndarray
     path_m: np.ndarray
@@ -113,7 +111,9 @@ class _View:
     def target(self) -> np.ndarray:
         """The residuals, linear in all parameters, where these are all in their middle."""
         jacobian = self.fit.jacobian
-        return self.residual - jacobian @ np.where(self.free, self.fit.z[: jacobian.shape[1]], 0)
+        return self.fit.residual - jacobian @ np.where(
+            self.free, self.fit.z[: jacobian.shape[1]], 0
+        )
 
     def shows(self, index: int) -> np.ndarray:
         """How an object's acceleration shows in the target, `[value, time]`."""
@@ -129,48 +129,68 @@ def _view(trials: Trials, hypothesis: Hypothesis, clip: int) -> _View:
     column = trials.columns_of(clip)
     z, free = hypothesis.fit.z[column], hypothesis.fit.free[column]
     alone = trials.alone(clip)
-    effect = FreeAcceleration(_spans(problem, alone.theta(z, free)[:-1]))
-    model = replace(problem.model, effects=(*problem.model.effects, effect))
-    engine = make_engine(problem.engine.name, model)
-    extended = Trials((replace(problem, model=model, engine=engine),))
-    where = np.array([extended.names.index(name) for name in alone.names])
-    before = np.zeros(len(extended.names))
-    is_free = np.zeros(len(extended.names), bool)
-    before[where], is_free[where] = np.where(free, z, 0.0), free
-    acceleration = [name for i in range(len(effect.spans_s)) for name in effect.knots(i)]
-    is_free[[extended.names.index(name) for name in acceleration]] = True
-    fitter = GradientFitter(extended)
-    fit = fitter.fit_from(before[None, :-1], is_free[None, :-1], np.zeros(1, int))[0]
-    theta = extended.theta(fit.z, fit.free)
-    residual = whitened(extended, theta[None], theta[-1:])[0][0]
-    end_s = max(spans[-1][1] for spans in effect.spans_s)
-    time_s, path, speed = _motion(extended.problems[0], theta[:-1], end_s)
-    seen = _seen(problem, time_s)
-    moves = seen & (np.abs(speed) > MOVES_M_S)
-    for i, spans in enumerate(effect.spans_s):
-        moves[i] &= (time_s >= spans[0][0]) & (time_s <= spans[-1][1])
-    return _View(extended, before, fit, residual, effect, time_s, path, speed, moves)
+    spans = _spans(problem, alone.theta(z, free)[:-1])
+    for _ in range(NUM_SPANS):
+        effect = FreeAcceleration(spans)
+        model = replace(problem.model, effects=(*problem.model.effects, effect))
+        engine = make_engine(problem.engine.name, model)
+        extended = Trials((replace(problem, model=model, engine=engine),))
+        where = np.array([extended.names.index(name) for name in alone.names])
+        before = np.zeros(len(extended.names))
+        is_free = np.zeros(len(extended.names), bool)
+        before[where], is_free[where] = np.where(free, z, 0.0), free
+        acceleration = [name for i in range(len(spans)) for name in effect.knots(i)]
+        is_free[[extended.names.index(name) for name in acceleration]] = True
+        fit = free_fit(extended, before, is_free)
+        theta = extended.theta(fit.z, fit.free)
+        spans = _spans(extended.problems[0], theta[:-1])
+    time_s, path, speed = _motion(
+        extended.problems[0], theta[:-1], max(own[-1][1] for own in effect.spans_s)
+    )
+    moves = _seen(problem, time_s) & (np.abs(speed) > MOVES_M_S)
+    for i, own in enumerate(effect.spans_s):
+        moves[i] &= (time_s >= own[0][0]) & (time_s <= own[-1][1])
+    return _View(extended, before, fit, effect, time_s, path, speed, moves)
 
 
 def _spans(problem: Problem, theta: np.ndarray) -> tuple[tuple[Span, ...], ...]:
-    """When each object moves, by the hypothesis; all the time where it says never.
+    """When each object moves by a rollout, in pieces; all the time where it says never.
 
-    Object 1 has a second piece from when object 2 begins to move.
+    Object 1 has a piece on the ramp, one on the table, and one from when object 2 begins to
+    move.
     """
     last = float(problem.observation.times_s[-1])
-    _, velocity = problem.engine.simulate(theta[None])
+    position, velocity = problem.engine.simulate(theta[None])
     times = np.arange(velocity.shape[-1]) * problem.model.record_dt_s
+    scene = problem.model.scene.surroundings
+    speeds = np.hypot(velocity[0, :, 0], velocity[0, :, 1])
+    moved = np.hypot(*(position[0] - position[0, ..., :1]).transpose(1, 0, 2))
     found = []
-    for speed in np.hypot(velocity[0, :, 0], velocity[0, :, 1]):
-        moving = times[(speed > MOVES_M_S) & (times <= last)]
-        begin, end = (moving[0], moving[-1]) if moving.size > 2 else (0.0, last)
-        found.append((float(begin), float(min(last, begin + LONGER * (end - begin)))))
+    for way, speed in zip(moved, speeds, strict=True):
+        moving = np.flatnonzero((speed > MOVES_M_S) & (times <= last))
+        begin, end = (moving[0], moving[-1]) if moving.size > 2 else (0, len(times) - 1)
+        # Records are 4 ms apart; a knock is in between.
+        since = min(way[begin] / max(speed[begin], MOVES_M_S), times[1])
+        start = max(float(times[begin] - since), 0.0)
+        found.append((start, float(min(last, start + LONGER * (times[end] - start)))))
     (begin, end), *others = found
-    hit = min((span[0] for span in others), default=end)
-    rest = tuple((span,) for span in others)
-    if hit > begin + SHORTEST_S and end > hit + SHORTEST_S:
-        return (((begin, hit), (hit, end)), *rest)
-    return (((begin, end),), *rest)
+    events = [start for start, _ in others]
+    beyond = position[0, 0, 0] - scene.corner_m[0]
+    if scene.comes_down[0] and (beyond >= 0).any():
+        events.append(float(_first_s(beyond, times)))
+    edges = [begin]
+    for event in sorted(events):
+        if event > edges[-1] + SHORTEST_S and end > event + SHORTEST_S:
+            edges.append(event)
+    pieces = tuple(zip(edges, [*edges[1:], end], strict=True))
+    return (pieces, *((span,) for span in others))
+
+
+def _first_s(value: np.ndarray, times_s: np.ndarray) -> float:
+    """When `value` `[time]` first reaches zero."""
+    reached = int(np.argmax(value >= 0))
+    pair = slice(max(reached - 1, 0), reached + 1)
+    return float(np.interp(0.0, value[pair], times_s[pair]))
 
 
 def _motion(
@@ -201,8 +221,9 @@ def _seen(problem: Problem, time_s: np.ndarray) -> np.ndarray:
     """Whether each object has been seen before and is seen again, `[object, time]`."""
     times = np.asarray(problem.observation.times_s)
     frames = [times[mask] for mask in problem.observation.mask]
-    return np.stack([(time_s >= own[0]) & (time_s <= own[-1]) if own.size else time_s < 0
-                     for own in frames])
+    return np.stack(
+        [(time_s >= own[0]) & (time_s <= own[-1]) if own.size else time_s < 0 for own in frames]
+    )
 
 
 def _sight(view: _View, index: int) -> Sight:
@@ -237,20 +258,19 @@ def _told(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The acceleration over the model that goes with the formulas and its sd, `[object, time]`."""
     fit, trials = view.fit, view.trials
-    with_knots = generator.multivariate_normal(
-        fit.z, fit.covariance, NUM_DRAWS, method="svd"
+    with_knots = np.tile(fit.z, (NUM_DRAWS, 1))
+    with_knots[:, :-1] = generator.multivariate_normal(
+        fit.z[:-1], fit.covariance, NUM_DRAWS, method="svd"
     )
     whole = _accelerations(view, trials.theta(with_knots, fit.free))
     base = _accelerations(view, trials.theta(_bases(view, formulas, generator), fit.free))
     held = _accelerations(view, trials.theta(view.before[None], fit.free))
-    has_formula = np.array([bool(formula.terms) for formula in formulas])
-    missing = whole - np.where(has_formula[:, None], base, held)
+    is_explained = np.array([formula.text != NOT_SIMPLE for formula in formulas])
+    missing = whole - np.where(is_explained[:, None], base, held)
     return missing.mean(axis=0), missing.std(axis=0)
 
 
-def _bases(
-    view: _View, formulas: Sequence[Formula], generator: np.random.Generator
-) -> np.ndarray:
+def _bases(view: _View, formulas: Sequence[Formula], generator: np.random.Generator) -> np.ndarray:
     """Draws of all but the knots with the formulas in the model, `[draw, parameter]`, z.
 
     Coefficients of formulas are free. An object without one keeps its free acceleration.
