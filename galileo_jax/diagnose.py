@@ -163,7 +163,7 @@ def _write_model(
     out: Path,
     timings: dict[str, float],
 ) -> None:
-    """A run of the last round's model, as `fit --effects` would leave it."""
+    """A run of the last round's model, as `fit --effects` would leave it but for its page."""
     from galileo_jax.diagnosis.last_model import by_itself
     from galileo_jax.effects.registry import make_effects
     from galileo_jax.inference.laplace import laplace_posterior
@@ -191,6 +191,7 @@ def _write_model(
         seed=call.seed,
         timings=timings,
         notes=notes,
+        with_pages=False,
     )
 
 

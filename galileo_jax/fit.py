@@ -136,6 +136,7 @@ def write_fit(
     seed: int,
     timings: Mapping[str, float],
     notes: dict[str, Any],
+    with_pages: bool = True,
 ) -> dict[str, Any]:
     """Writes runs and reports of a finished fit, and returns result.json.
 
@@ -150,6 +151,7 @@ def write_fit(
       seed: of everything random.
       timings: by stage, s.
       notes: what else the method has to say.
+      with_pages: whether every run gets its report.
     """
     from galileo_jax.inference.result import make_result
     from galileo_jax.report import write_report
@@ -171,14 +173,16 @@ def write_fit(
     if len(measured) == 1:
         clip, observation = measured[0].clip, measured[0].observation
         save_run(out, clip, observation, posterior, result)
-        write_report(Run(out, clip, trials.problems[0], posterior, result))
+        if with_pages:
+            write_report(Run(out, clip, trials.problems[0], posterior, result))
         return result
     for i, one in enumerate(measured):
         alone, columns = trials.alone(i), trials.columns_of(i)
         own = posterior.chosen(columns, alone.names)
         told_of = told(alone, own, z_best[columns], [files[i]])
         save_run(out / one.name, one.clip, one.observation, own, told_of)
-        write_report(Run(out / one.name, one.clip, trials.problems[i], own, told_of))
+        if with_pages:
+            write_report(Run(out / one.name, one.clip, trials.problems[i], own, told_of))
     posterior.to_netcdf(out / "posterior.nc")
     write_json(out / "result.json", result)
     return result

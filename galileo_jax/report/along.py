@@ -25,6 +25,7 @@ class Along:
 
     Attributes:
       clip, name: of the clip and of the object.
+      title: of a picture: the object, and its clip where there are several.
       index: of the object.
       times_s: of the frames.
       measured_m: along the path, NaN where it was not seen; 0 at the foot (incline: the start).
@@ -39,6 +40,7 @@ class Along:
 
     clip: str
     name: str
+    title: str
     index: int
     times_s: np.ndarray
     measured_m: np.ndarray
@@ -71,8 +73,9 @@ def along_paths(
         draws = problem.simulate_batch(trials.of_clip(drawn, clip))
         draws = draws[np.isfinite(draws).all(axis=(1, 2, 3))]
         scale = trials.noise_scale(theta, clip)
-        for i in range(len(problem.observation.names)):
-            found.append(_object(problem, i, best, draws, scale, clip, comparison))
+        for i, name in enumerate(problem.observation.names):
+            title = name if len(trials.problems) == 1 else f"{problem.name}, {name}"
+            found.append(_object(problem, i, best, draws, scale, clip, comparison, title))
     return tuple(found)
 
 
@@ -84,6 +87,7 @@ def _object(
     scale: float,
     clip: int,
     comparison: Comparison,
+    title: str,
 ) -> Along:
     observation = problem.observation
     seen, times = observation.mask[index], observation.times_s
@@ -104,6 +108,7 @@ def _object(
     return Along(
         clip=problem.name,
         name=observation.names[index],
+        title=title,
         index=index,
         times_s=times,
         measured_m=path + np.sum(tangent * (difference - offset[:, None]), axis=0),

@@ -60,7 +60,7 @@ def before_after_figure(before: Along, after: Along, titles: tuple[str, str]) ->
         for one, title, bottom in zip((before, after), titles, (0.56, 0.12), strict=True):
             axes = figure.add_axes((LEFT, bottom, WIDTH, 0.36))
             _residuals(axes, one, largest)
-            axes.set(title=f"{one.name}, {title}", ylabel="residual / noise")
+            axes.set(title=f"{one.title}: {title}", ylabel="residual / noise")
             _mark(axes, one)
             shade_phases(axes, one.phases, one.times_s)
             if bottom < 0.5:
@@ -72,9 +72,9 @@ def before_after_figure(before: Along, after: Along, titles: tuple[str, str]) ->
 
 def _title(one: Along) -> str:
     if one.worst is None:
-        return one.name
+        return one.title
     where = "" if one.worst.phase == WHOLE else f", {one.worst.phase}"
-    return f"{one.name}: worst in {one.worst.axis}{where} (z = {one.worst.z:.0f})"
+    return f"{one.title}: worst in {one.worst.axis}{where} (z = {one.worst.z:.0f})"
 
 
 def _against(
