@@ -84,8 +84,9 @@ def test_a_wrong_call_is_one_line(words, said, tmp_path, capfd, monkeypatch):
     clip = build_good_track(tmp_path)
     (tmp_path / "folder").mkdir()
     named = {"CLIP": str(clip), "FOLDER": str(tmp_path / "folder")}
+    call = [str(named.get(word, word)) for word in words]
     monkeypatch.chdir(tmp_path)
-    assert command.run(compare.main, [named.get(word, word) for word in words]) == 2
+    assert command.run(compare.main, call) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert said in line
     assert not Path("runs").exists()
