@@ -15,6 +15,7 @@ Brunton, Proctor and Kutz (2016), 10.1073/pnas.1517384113 (laws by sparse regres
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +29,7 @@ AS_GOOD = 6.0  # a formula with a BIC so near to the best's is told as well
 EXPLAINED = 0.8  # a formula that leaves more than a fifth is none
 CERTAIN = 3.0  # log Bayes factor from which on there is something to explain
 
-LENGTHS_M = np.geomspace(0.08, 0.8, 48)
+LENGTHS_M = np.geomspace(0.08, 0.8, 160)  # over a metre of way no phase is missed
 SPEEDS_M_S = (0.1, 0.2, 0.4)
 PLACES, WIDTHS_M = 24, (0.02, 0.04, 0.08)
 TIMES, WIDTHS_S = 24, (0.03, 0.06, 0.12)
@@ -143,13 +144,18 @@ class _Fit(NamedTuple):
 
 
 def _pursue(sights: Sequence[Sight], target: np.ndarray, terms: Sequence[Term]) -> list[_Fit]:
-    """Matching pursuit's fits with one term, two, and so on; with one, all."""
+    """Matching pursuit's fits with one term, two, and so on; of plain terms all with one or two.
+
+    The pursuit takes terms one by one: what only a pair explains (1 - v) it may miss.
+    """
     columns = np.concatenate([_columns(sight, terms) for sight in sights])
     size = np.linalg.norm(columns, axis=0)
     is_seen = size > 1e-6 * size.max()
     kept = [term for term, seen in zip(terms, is_seen, strict=True) if seen]
     columns = columns[:, is_seen] / size[is_seen]
-    chosen = [[i] for i, term in enumerate(kept) if not term.scanned]
+    plain = [i for i, term in enumerate(kept) if not term.scanned]
+    chosen = [[i] for i in plain]
+    chosen += [list(pair) for pair in combinations(plain, 2)]
     path = orthogonal_mp(columns, target, n_nonzero_coefs=MAX_TERMS, return_path=True)
     chosen += [np.flatnonzero(step).tolist() for step in np.reshape(path, (len(kept), -1)).T]
     fits = []
@@ -201,8 +207,8 @@ def _waves() -> list[Term]:
         turn = 2 * np.pi / w
         scanned = (float(w),)
         found += [
-            Term(f"sin(2π q/{w:.2g})", lambda t, q, v, k=turn: np.sin(k * q), scanned),
-            Term(f"cos(2π q/{w:.2g})", lambda t, q, v, k=turn: np.cos(k * q), scanned),
+            Term(f"sin(2π q/{w:.3g})", lambda t, q, v, k=turn: np.sin(k * q), scanned),
+            Term(f"cos(2π q/{w:.3g})", lambda t, q, v, k=turn: np.cos(k * q), scanned),
         ]
     return found
 

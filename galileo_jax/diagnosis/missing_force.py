@@ -48,8 +48,9 @@ def infer_missing_force(trials: Trials, hypothesis: Hypothesis, seed: int) -> Mi
     Returns:
       The first clip's, NaN where an object is at rest or not seen. Its zero is the hypothesis
       with friction, masses and nuisances where the formula has them; where no formula was
-      found for what is missing, the hypothesis' fit itself. The formula is that of all clips, and so is the
-      share it explains: of the misfit that an acceleration of any form takes away.
+      found for what is missing, the hypothesis' fit itself. The formula is that of all clips,
+      and so is the share it explains: of the misfit that an acceleration of any form takes
+      away.
     """
     views = [_view(trials, hypothesis, clip) for clip in range(len(trials.problems))]
     count = len(views[0].path_m)

@@ -1,0 +1,77 @@
+"""The formula's search, on sights that are made up: the data see the acceleration itself."""
+
+import re
+
+import numpy as np
+import pytest
+
+from galileo_jax.diagnosis.formula import NOT_SIMPLE, NOTHING, Sight, find_formula
+
+NUM_TIMES = 200
+NOISE_M_S2 = 0.05
+
+
+def sight(truth, seed=0):
+    """An object speeds up, then slows down; its acceleration is measured at every time."""
+    t = np.linspace(0.0, 1.0, NUM_TIMES)
+    v = 2.4 * np.minimum(t, 1.0 - t)
+    q = np.cumsum(v) * (t[1] - t[0]) - 0.35
+    noise = np.random.default_rng(seed).standard_normal(NUM_TIMES)
+    target = truth(t, q, v) / NOISE_M_S2 + noise
+    gain = float(target @ target) - NUM_TIMES
+    return Sight(t, q, v, target, np.eye(NUM_TIMES) / NOISE_M_S2, NUM_TIMES, gain / 2 - 40)
+
+
+@pytest.mark.parametrize(
+    ("truth", "pattern"),
+    [
+        (lambda t, q, v: -0.62 * v * abs(v), r"v\|v\|"),
+        (lambda t, q, v: 0.7 - 1.1 * v, "v"),
+        (lambda t, q, v: 0.8 * t, "t"),
+        (lambda t, q, v: -1.5 * q, "q"),
+        (lambda t, q, v: 0.6 * np.sin(2 * np.pi * q / 0.25), r"sin\(2π q/0\.2[45]\d?\)"),
+        (
+            lambda t, q, v: 2.0 * np.exp(-(((t - 0.52) / 0.06) ** 2)),
+            r"exp\(-\(\(t-0\.5\d\)/0\.06\)²\)",
+        ),
+    ],
+    ids=["drag", "viscous", "heating", "spring", "ripple", "gust"],
+)
+def test_finds_what_is_there(truth, pattern):
+    found = find_formula([sight(truth)])
+    assert any(re.fullmatch(pattern, term.text) for term in found.terms)
+    assert found.share_explained > 0.95
+    made = sight(truth)
+    place = made.time_s, made.path_m, made.speed_m_s
+    np.testing.assert_allclose(found.curve(*place), truth(*place), atol=4 * NOISE_M_S2)
+
+
+def test_coefficient_and_text():
+    found = find_formula([sight(lambda t, q, v: -0.62 * v * abs(v))])
+    assert found.text.startswith("-0.62 v|v|")
+    assert found.coefficients == (pytest.approx(-0.62, abs=0.02),)
+
+
+def test_two_clips_have_one_formula():
+    def drag(t, q, v):
+        return -0.62 * v * abs(v)
+
+    alone, both = (
+        find_formula([sight(drag, seed) for seed in range(count)]).coefficients for count in (1, 2)
+    )
+    assert len(alone) == len(both) == 1
+    assert alone != both
+
+
+def test_nothing_is_nothing():
+    found = [find_formula([sight(lambda t, q, v: 0 * t, seed)]) for seed in range(20)]
+    assert [formula.text for formula in found] == [NOTHING] * 20
+    assert found[0].share_explained == 0.0
+
+
+def test_what_is_not_simple_is_said_to_be():
+    jumps = np.repeat(np.random.default_rng(3).choice([-1.0, 1.0], 20), NUM_TIMES // 20)
+    found = find_formula([sight(lambda t, q, v: jumps)])
+    assert found.text == NOT_SIMPLE
+    assert found.terms == ()
+    assert found.share_explained < 0.8

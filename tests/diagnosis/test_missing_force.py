@@ -1,0 +1,122 @@
+"""Truths with a hidden effect, models without: the missing acceleration and its formula."""
+
+import json
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.hidden_cases import EXOTIC_FILE, make_clips
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.free_acceleration import FreeAcceleration, splines
+from galileo_jax.diagnosis.missing_force import infer_missing_force
+from galileo_jax.effects.effect import State, Surroundings
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.run import make_trials
+from tests.precision import in_64_bit
+
+NOISE_M = 3.3e-4  # 0.3 px at 900 px/m
+LEAST_COVERED = 0.85  # of the times, by a band for 95 %: neighbours err together
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
+@pytest.fixture(scope="module")
+def infer(tmp_path_factory):
+    """From a seed and what is hidden to the missing force and the truth."""
+
+    @cache
+    def made(seed: int, *hidden: str):
+        folder = Path(tmp_path_factory.mktemp("clip"))
+        call = ["--track-only", "--solver", "fine", "--angle", "20", "--fps", "60"]
+        call += ["--track-noise", repr(NOISE_M), "--seed", str(seed), "--out", f"{folder}/c.csv"]
+        assert make_clips([*call, *hidden]) == 0
+        clip = load_clip(folder / "c.yaml")
+        assert clip.track is not None
+        trials = make_trials([clip], [read_observation_csv(clip.track)])
+        fit = GradientFitter(trials).fit(seed=0)
+        missing = infer_missing_force(trials, Hypothesis((), fit), seed=0)
+        return missing, json.loads((folder / "c.truth.json").read_text())
+
+    return made
+
+
+def covered(missing, index, true):
+    """The share of the times at which the 95 % band has the true acceleration, m/s^2."""
+    seen = np.isfinite(missing.acceleration_m_s2[index])
+    off = missing.acceleration_m_s2[index] - true
+    return np.mean(np.abs(off[seen]) < 1.96 * missing.sd_m_s2[index, seen])
+
+
+def test_air_drag_is_found_and_written_down(infer):
+    missing, truth = infer(1, "--effect", "air_drag", "--strength", "0.7")
+    constant = truth["effect_parameters"]["air_drag"]
+    for i in range(2):
+        speed = missing.speed_m_s[i]
+        true = -constant / truth[f"m{i + 1}"] * speed * np.abs(speed)
+        assert covered(missing, i, true) > LEAST_COVERED
+    found = re.match(r"a1 = (-[\d.]+) v\|v\|($|  or)", missing.formula[0])
+    assert found
+    assert float(found[1]) == pytest.approx(-constant / truth["m1"], rel=0.08)
+    assert missing.share_explained[0] > 0.9
+
+
+def test_air_drag_shows_only_in_motion(infer):
+    missing, _ = infer(1, "--effect", "air_drag", "--strength", "0.7")
+    assert missing.acceleration_m_s2.shape == (2, len(missing.time_s))
+    at_rest = missing.speed_m_s == 0
+    assert at_rest.any()
+    assert np.isnan(missing.acceleration_m_s2[at_rest]).all()
+    np.testing.assert_array_equal(np.isnan(missing.sd_m_s2), np.isnan(missing.acceleration_m_s2))
+
+
+@pytest.mark.slow
+def test_ripple_in_the_friction_is_a_wave_of_the_place(infer):
+    hidden = ["--effects-from", str(EXOTIC_FILE), "--effect", "exotic_ripple", "--strength", "0.7"]
+    missing, truth = infer(2, *hidden)
+    length = truth["effect_parameters"]["exotic_ripple_length"]
+    found = re.search(r"(?:sin|cos)\(2π q/([\d.]+)\)", missing.formula[0])
+    assert found
+    assert float(found[1]) == pytest.approx(length, rel=0.08)
+
+
+@pytest.mark.slow
+def test_nothing_missing_is_nothing(infer):
+    missing, _ = infer(3)
+    assert missing.formula == ("a1 = nothing", "a2 = nothing")
+    assert missing.share_explained == (0.0, 0.0)
+    assert covered(missing, 0, 0.0) > LEAST_COVERED
+
+
+def test_splines_add_up_to_one():
+    times = np.linspace(-0.5, 1.5, 41)
+    basis = splines(times, np.asarray(0.1), np.asarray(0.9), 8)
+    assert basis.shape == (41, 8)
+    np.testing.assert_allclose(basis.sum(axis=1), 1.0)
+
+
+def test_knots_follow_a_curve_that_jumps_between_pieces():
+    effect = FreeAcceleration((((0.0, 0.6), (0.6, 1.0)),))
+    times = np.linspace(0.0, 0.999, 300)
+    wanted = np.where(times < 0.6, -(times**2), 0.5 - times)
+    theta = {"m1": np.asarray(0.5)}
+    values = effect.knot_values(times, wanted[:, None], 0)[:, 0]
+    scene = Surroundings(
+        ("a",), 0.3, 9.81, (0.03,), (0.03,), (0.0,), ((0, 0),), (-0.5,), True, (True,)
+    )
+    for parameter in effect.parameters(scene):
+        theta[parameter.name] = np.asarray(parameter.absent)
+    for name, z in zip(effect.knots(0), values, strict=True):
+        prior = next(p.prior for p in effect.parameters(scene) if p.name == name)
+        theta[name] = np.asarray(prior.forward(z))
+    force, still = effect.force(theta, scene), np.zeros(1)
+    made = [force(State(still, still, np.asarray(t), still < 1))[0] for t in times]
+    np.testing.assert_allclose(made, 0.5 * wanted, atol=2e-3)
