@@ -109,13 +109,14 @@ def diagnosis_of(trials: Trials, status: str) -> Diagnosis:
 
 def _missing() -> MissingForce:
     times = np.linspace(0, 1.5, 20)
-    wave = np.stack([np.sin(6 * times), 0 * times])
+    wave = np.stack([np.sin(6 * times), np.nan * times])  # object 2 rests
+    wave[0, :3] = np.nan
     return MissingForce(
         time_s=times,
         acceleration_m_s2=wave,
         sd_m_s2=0.1 + 0 * wave,
         path_m=np.stack([times - 0.5, 0 * times]),
         speed_m_s=np.stack([times, 0 * times]),
-        formula=("0.99 sin(6 t)", "0"),
+        formula=("a1 = 0.99 sin(6 t)", "a2 = nothing"),
         share_explained=(0.98, 0.0),
     )

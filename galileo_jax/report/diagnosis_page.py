@@ -18,7 +18,7 @@ from galileo_jax.report.animation import SCRIPT, animation
 from galileo_jax.report.comparison_page import cells, failures
 from galileo_jax.report.failure import before_after_figure
 from galileo_jax.report.figure import to_inline, to_svg
-from galileo_jax.report.missing_force import missing_force_figure
+from galileo_jax.report.missing_force import is_told, missing_force_figure
 from galileo_jax.report.shell import document, figure_section, items, table
 from galileo_jax.report.statements import number
 
@@ -170,18 +170,20 @@ def _missing(told: Told, names: Sequence[str]) -> str:
     missing = told.diagnosis.missing
     if missing is None:
         return ""
-    pictures = {
-        name: to_inline(to_svg(missing_force_figure(missing, i, name), f"missing_{name}"), name)
-        for i, name in enumerate(names)
-    }
-    said = "; ".join(
-        f"{name}: {missing.formula[i]} ({100 * missing.share_explained[i]:.0f} % of it explained)"
-        for i, name in enumerate(names)
-    )
+    pictures, said = {}, []
+    for i, name in enumerate(names):
+        if not is_told(missing, i):
+            continue
+        svg = to_svg(missing_force_figure(missing, i, name), f"missing_{name}")
+        pictures[name] = to_inline(svg, escape(name, quote=True))
+        share = missing.share_explained[i]
+        explains = f" (explains {100 * share:.0f} % of what is missing)" if share > 0 else ""
+        said.append(f"{name}: {missing.formula[i]}{explains}")
     return figure_section(
         "The missing force",
         "The acceleration along the path that the model would need, inferred without a form, with "
-        f"its 95 % band. The simplest formula that fits: {said}.",
+        "its 95 % band, in m/s², of q (m past the foot), v (m/s) and t (s since the release). The "
+        f"simplest formula that fits: {'; '.join(said)}.",
         pictures,
     )
 

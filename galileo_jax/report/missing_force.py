@@ -11,6 +11,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SIZE_IN = (4.8, 6.4)
+NUM_POINTS = 70  # of the scattered ones
+
+
+def is_told(missing: MissingForce, index: int) -> bool:
+    """Whether anything is known of what this object lacks: it was seen moving."""
+    return bool(np.isfinite(missing.acceleration_m_s2[index]).any())
 
 
 def missing_force_figure(missing: MissingForce, index: int, name: str) -> "Figure":
@@ -18,6 +24,8 @@ def missing_force_figure(missing: MissingForce, index: int, name: str) -> "Figur
     from matplotlib.figure import Figure
 
     value, sd = missing.acceleration_m_s2[index], missing.sd_m_s2[index]
+    known = np.flatnonzero(np.isfinite(value))
+    chosen = known[:: max(1, len(known) // NUM_POINTS)]
     colour = COLOURS[index]
     with style(f"missing_{name}"):
         figure = Figure(figsize=SIZE_IN)
@@ -39,10 +47,12 @@ def missing_force_figure(missing: MissingForce, index: int, name: str) -> "Figur
                 axes.set_title(name)
             else:
                 axes.errorbar(
-                    values, value, yerr=1.96 * sd, fmt="o", color=colour, markersize=2.6,
-                    elinewidth=0.4,
+                    values[chosen], value[chosen], yerr=1.96 * sd[chosen], fmt="o", color=colour,
+                    markersize=2.6, elinewidth=0.4,
                 )  # fmt: skip
-            spread = 3 * float(np.median(sd))
-            axes.set_ylim(min(0.0, value.min()) - spread, max(0.0, value.max()) + spread)
+            spread = 3 * float(np.median(sd[known]))
+            axes.set_ylim(
+                min(0.0, value[known].min()) - spread, max(0.0, value[known].max()) + spread
+            )
             axes.set(xlabel=label, ylabel="missing, m/s²")
     return figure
