@@ -19,7 +19,8 @@ from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.trials import Trials
 from galileo_jax.parameters import inverse
 
-NUM_STARTS, NUM_REFINED = 32, 2
+NUM_STARTS = 48
+NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1
 SMALL_QUANTILE_Z = -2.0
@@ -61,8 +62,9 @@ def fit_candidates(
     costs = fitter.search_costs(z, free[of])
     chosen = []
     for i in range(len(candidates)):
-        own = np.flatnonzero(of == i)
-        chosen.extend(own[np.argsort(costs[own])[:NUM_REFINED]])
+        for way in range(NUM_WAYS):
+            own = np.flatnonzero(of == i)[way::NUM_WAYS]
+            chosen.append(own[np.argmin(costs[own])])
     fits = fitter.fit_from(z[chosen], free[of[chosen]], of[chosen])
     return [Hypothesis(tuple(e), fit) for e, fit in zip(candidates, fits, strict=True)]
 
@@ -109,7 +111,7 @@ def _strength(trials: Trials, effect: str) -> tuple[np.ndarray, float]:
 
 
 def _starts(trials: Trials, base: GradientFit, free: np.ndarray, seed: int) -> np.ndarray:
-    """Starts in z: new parameters over their priors, the others near the base fit or at rest."""
+    """Starts in z: new parameters over their priors, the others in one of three ways."""
     count = len(trials.model_parameters)
     generator = np.random.default_rng([seed, 41])
     starts = np.tile(base.z[:count], (NUM_STARTS, 1))
@@ -117,14 +119,14 @@ def _starts(trials: Trials, base: GradientFit, free: np.ndarray, seed: int) -> n
     share = np.stack([generator.permutation(NUM_STARTS) for _ in new], axis=1)
     share = (share + generator.random(share.shape)) / NUM_STARTS
     starts[:, new] = ndtri(np.clip(share, 0.02, 0.98))
-    # What the base fit bent to make up for the effect is let go again in half of the starts.
     parameters = trials.model_parameters
-    rest = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
-    rest = np.clip(rest, -1.0, 1.0)
+    zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
+    rest = np.clip(zero, -1.0, 1.0)
     nuisance = np.array([p.role == "nuisance" for p in parameters])
-    half = np.arange(NUM_STARTS) % 2 == 1
-    starts[np.ix_(half, nuisance)] = rest[nuisance]
     main = np.array([p.role != "nuisance" for p in parameters]) & base.free[:count]
     spread = generator.standard_normal((NUM_STARTS, int(main.sum())))
-    starts[:, main] += np.where(half[:, None], SPREAD_Z, 0.1) * spread
+    way = np.arange(NUM_STARTS) % NUM_WAYS
+    # Near the base fit; with the nuisances that it bent let go; and with all else let go, too.
+    starts[np.ix_(way > 0, nuisance)] = rest[nuisance]
+    starts[:, main] += np.where(way[:, None] == 2, SPREAD_Z, 0.1 * (way[:, None] == 1)) * spread
     return np.where(free, starts, 0.0)

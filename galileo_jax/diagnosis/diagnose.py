@@ -21,14 +21,20 @@ from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
-from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.result import error_of
 from galileo_jax.inference.trials import Trials
 
 # Evidence of one candidate over another, in nats, at which the other is given up: one in twenty.
 DECISIVE = 3.0
 NUM_COMPARED = 6  # of the best candidates
+# A candidate explains the data if the comparison shows no misfit, or hardly any of what was there:
+# a camera that sees hundredths of a pixel finds fault with every model.
+EXPLAINS_P, LEFT_SHARE = 1e-3, 0.01
 PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
+# In nats, at which a candidate is believed although the comparison shows no misfit: tests that
+# look everywhere see less than one that knows where to look.
+CONVINCING = 10.0
 LEAST_GAIN = 5.0  # in nats, for another effect to be added
 
 
@@ -68,12 +74,12 @@ def diagnose(
     if add not in ("auto", "none"):
         chosen = next(c for c in candidates if c.effects == (add,))
         rounds.append(_round(trials, chosen.hypothesis, seed, on_round))
-    if first.comparison.is_adequate:
+    if first.comparison.is_adequate and candidates[0].log_evidence < CONVINCING:
         return Diagnosis(tuple(rounds), candidates, Verdict("none", ()))
 
     on_stage("comparing the best candidates with the data")
     candidates, compared = _compared(trials, candidates, seed)
-    verdict = _verdict(candidates)
+    verdict = _verdict(candidates, base.fit)
     if verdict is None:
         on_stage("fitting pairs of effects")
         best = candidates[0]
@@ -81,7 +87,7 @@ def diagnose(
         joined = _candidates(fitter, best.hypothesis, pairs, seed, base)
         joined, compared_pairs = _compared(trials, joined, seed)
         compared |= compared_pairs
-        verdict = _verdict(joined)
+        verdict = _verdict(joined, base.fit)
         gain = joined[0].log_evidence - best.log_evidence
         if verdict is not None and gain > LEAST_GAIN:
             candidates = (*joined, *candidates)
@@ -176,9 +182,9 @@ def _rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...
     )
 
 
-def _verdict(candidates: Sequence[Candidate]) -> Verdict | None:
+def _verdict(candidates: Sequence[Candidate], base: GradientFit) -> Verdict | None:
     """Named or ambiguous; None where no candidate is adequate."""
-    adequate = [c for c in candidates if c.p_value is not None and _explains(c)]
+    adequate = [c for c in candidates if c.p_value is not None and _explains(c, base)]
     if not adequate or candidates[0].log_evidence < 0:
         return None
     top = max(c.log_evidence for c in adequate)
@@ -191,8 +197,11 @@ def _verdict(candidates: Sequence[Candidate]) -> Verdict | None:
     return Verdict("ambiguous", names)
 
 
-def _explains(candidate: Candidate) -> bool:
-    return candidate.p_value is not None and candidate.p_value >= EXPLAINS_P
-
-
-EXPLAINS_P = 1e-3  # below it even the best candidate leaves something unexplained
+def _explains(candidate: Candidate, base: GradientFit) -> bool:
+    """Whether what a candidate leaves unexplained does not matter."""
+    assert candidate.p_value is not None
+    if candidate.p_value >= EXPLAINS_P:
+        return True
+    fit = candidate.hypothesis.fit
+    left, before = (f.chi2 / f.num_values - 1.0 for f in (fit, base))
+    return before > 0 and left < LEFT_SHARE * before

@@ -5,7 +5,8 @@
        second block, for all starts (and, in a diagnosis, all hypotheses) in one batch. A step:
          a. one batch of rollouts gives the motions and their slopes (differences) at z;
          b. optimistix (Gauss-Newton) solves, for several dampings at once (vmapped), the
-            problem in which the motion is linear in z but clock and camera are exact;
+            problem in which the motion is linear in z but clock and camera are exact; where
+            there are many hypotheses, all is taken as linear: more steps, each far cheaper;
          c. one batch of rollouts tries all dampings; the best is taken.
     3. At the fit, with steps of half a posterior standard deviation: slopes, noise scale, one
        or two steps more.
@@ -74,7 +75,7 @@ class Settings:
     num_starts: int = 64
     num_refined: int = 4
     search_sd_m: float = 0.001
-    max_polish_steps: int = 20
+    max_polish_steps: int = 15
     max_steps: int = 15
     enough: float = 0.5
     settled: float = 0.5
@@ -248,7 +249,7 @@ class GradientFitter:
                 w * (b / s)[:, None] for w, b, s in zip(white, before.T, scales.T, strict=True)
             ]
             cost = _cost(scaled, here.z)
-            moved, after = self._try(here, motions, jacobian, cost)
+            moved, after = self._try(here, motions, jacobian, scaled, cost)
             z[active] = moved
             num_steps += 1
             drifts = np.abs(scales / before - 1).max(axis=1) > 0.1
@@ -334,23 +335,17 @@ class GradientFitter:
     ) -> tuple[np.ndarray, np.ndarray]:
         """One Levenberg-Marquardt step of every point: the best of all dampings, or none."""
         steps = np.broadcast_to(steps, points.z.shape)
-        motions, jacobian, _ = self._slopes(points, steps, is_central)
-        return self._try(points, motions, jacobian, costs)
+        motions, jacobian, white = self._slopes(points, steps, is_central)
+        return self._try(points, motions, jacobian, white, costs)
 
     def _try(
-        self, points: Batch, motions: tuple, jacobian: list, costs: np.ndarray
+        self, points: Batch, motions: tuple, jacobian: list, white: list, costs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        size = np.sqrt(1 + sum(np.sum(j**2, axis=1) for j in jacobian))
-        index = _free_index(points.free)
-        size = np.take_along_axis(np.pad(size, [(0, 0), (0, 1)]), index, axis=1)
-        kinds = tuple(clip.kind for clip in self._clips)
-        arrays = tuple(clip.arrays for clip in self._clips)
-        # [point, damping, parameter]
-        tried = in_chunks(
-            POINTS,
-            lambda *rows: _solve(kinds, DAMPINGS, *rows, arrays),
-            *(size, points.z, points.free, points.noise, index, motions),
-        )
+        """The best of all dampings' proposals, or the point itself."""
+        if len(points.z) <= POINTS[0]:
+            tried = self._propose_near(points, motions, jacobian)
+        else:
+            tried = _propose_linear(points, jacobian, white)
         tried = np.where(np.isfinite(tried), tried, points.z[:, None])
         count, dampings, _ = tried.shape
         owner = np.repeat(np.arange(count), dampings)
@@ -362,6 +357,19 @@ class GradientFitter:
         improves = lowest < costs
         z = np.where(improves[:, None], tried[rows, best], points.z)
         return z, np.where(improves, lowest, costs)
+
+    def _propose_near(self, points: Batch, motions: tuple, jacobian: list) -> np.ndarray:
+        """Of few points: the damped problems with clock and camera exact, by optimistix."""
+        size = np.sqrt(1 + sum(np.sum(j**2, axis=1) for j in jacobian))
+        index = _free_index(points.free)
+        size = np.take_along_axis(np.pad(size, [(0, 0), (0, 1)]), index, axis=1)
+        kinds = tuple(clip.kind for clip in self._clips)
+        arrays = tuple(clip.arrays for clip in self._clips)
+        return in_chunks(
+            POINTS[:1],
+            lambda *rows: _solve(kinds, DAMPINGS, *rows, arrays),
+            *(size, points.z, points.free, points.noise, index, motions),
+        )
 
     def _simulate(self, clip: "_Clip", z: np.ndarray, free: np.ndarray, noise: np.ndarray):
         """`[point, ...]`: parameters in their units, centres and velocities."""
@@ -455,13 +463,18 @@ class GradientFitter:
         """Scattered starts in z: all but nuisances in a Latin hypercube, those at rest."""
         parameters = self.trials.model_parameters
         count = self.settings.num_starts
-        rest = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
-        rest = np.clip(rest, -1.0, 1.0)  # an absent positive strength is infinitely far
+        zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
+        rest = np.clip(zero, -1.0, 1.0)
         scattered = [i for i, p in enumerate(parameters) if p.role != "nuisance" and free[i]]
         generator = np.random.default_rng(seed)
         ranks = np.stack([generator.permutation(count) for _ in scattered], axis=1)
         share = (ranks + generator.random(ranks.shape)) / count
         starts = np.tile(rest, (count, 1))
+        # A positive nuisance has no slope at nothing: from there its other valley is not found.
+        positive = [
+            i for i, p in enumerate(parameters) if p.role == "nuisance" and not np.isfinite(zero[i])
+        ]
+        starts[:, positive] = generator.standard_normal((count, len(positive)))
         angle = self.trials.problems[0].model.scene.surroundings.angle_rad
         for column, i in enumerate(scattered):
             u = share[:, column]
@@ -654,6 +667,19 @@ def _padded(problem: Problem) -> Padded:
         data.num_values,
     )
     return Padded(np.pad(times, (0, frames), mode="edge"), whitening)
+
+
+def _propose_linear(points: Batch, jacobian: list, white: list) -> np.ndarray:
+    """Of many points: the damped linear problems' solutions, `[point, damping, parameter]`."""
+    normal = sum(np.einsum("bvi,bvj->bij", j, j) for j in jacobian)
+    slope = sum(np.einsum("bvi,bv->bi", j, w) for j, w in zip(jacobian, white, strict=True))
+    tried = np.repeat(points.z[:, None], len(DAMPINGS), axis=1)
+    for i, own in enumerate(points.free):
+        block = normal[i][np.ix_(own, own)] + np.eye(int(own.sum()))
+        damped = block + DAMPINGS[:, None, None] * np.diag(np.diag(block))
+        right = -(slope[i][own] + points.z[i][own])
+        tried[i][:, own] += np.linalg.solve(damped, right[None, :, None])[..., 0]
+    return tried
 
 
 def _cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
