@@ -24,6 +24,7 @@ NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best 
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1
 SMALL_QUANTILE_Z = -2.0
+NUM_REFITTED = 3
 SPREAD_Z = 0.7  # of starts round the fit without the candidate
 
 
@@ -66,6 +67,9 @@ def fit_candidates(
             own = np.flatnonzero(of == i)[way::NUM_WAYS]
             chosen.append(own[np.argmin(costs[own])])
     fits = fitter.fit_from(z[chosen], free[of[chosen]], of[chosen])
+    # The winners are looked at once more: their order must not hang on a side valley.
+    for i in np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]:
+        fits[i] = max(fits[i], fitter.refit(fits[i]), key=lambda fit: fit.log_evidence)
     return [Hypothesis(tuple(e), fit) for e, fit in zip(candidates, fits, strict=True)]
 
 

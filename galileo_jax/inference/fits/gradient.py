@@ -53,6 +53,7 @@ DAMPINGS = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
 # Of a parameter's coarse step: below it MuJoCo's contacts are rough; above it a step may leave a
 # plateau (nothing moves) over its edge, and the plateau would look steep.
 SMALLEST_STEP, LARGEST_STEP = 0.02, 4.0
+VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
 
 
@@ -149,6 +150,9 @@ class GradientFitter:
         parameters = trials.model_parameters
         self._is_simulated = np.array([p.step is not None for p in parameters])
         self._is_nuisance = np.array([p.role == "nuisance" for p in parameters])
+        zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
+        self._rest = np.clip(zero, -1.0, 1.0)
+        self._is_positive_nuisance = self._is_nuisance & ~np.isfinite(zero)
         self._num_rollouts = 0
 
     def compile(self) -> None:
@@ -179,7 +183,13 @@ class GradientFitter:
         best = np.argsort(self._costs(starts))[: self.settings.num_refined]
         found, costs, num_steps = self._search(starts.take(best))
         on_stage("refining")
-        return self._polish(found.take([np.argmin(costs)]), num_steps)[0]
+        return self._best_variant(found.z[np.argmin(costs)], free, num_steps)
+
+    def refit(self, fit: GradientFit) -> GradientFit:
+        """Fits again from a fit, with its positive nuisances moved: the better of both."""
+        self._num_rollouts = 0
+        count = self._count
+        return self._best_variant(fit.z[:count], fit.free[:count], 0)
 
     def fit_from(
         self, starts: np.ndarray, free: np.ndarray, owner: np.ndarray
@@ -205,6 +215,19 @@ class GradientFitter:
     def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
         return self._costs(self._batch(z, free))
+
+    def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
+        """Polishes z and variants of it; the most evident fit.
+
+        A small coefficient of restitution decides whether bodies part and meet again, so that
+        the misfit has a valley on either side.
+        """
+        positive = self._is_positive_nuisance & free
+        variants = [z]
+        if positive.any():
+            variants += [np.where(positive, other, z) for other in VARIANTS_Z]
+        fits = self._polish(self._batch(np.stack(variants), free), num_steps)
+        return max(fits, key=lambda fit: fit.log_evidence)
 
     def _batch(self, z: np.ndarray, free: np.ndarray) -> Batch:
         free = np.broadcast_to(free, z.shape)
@@ -463,18 +486,11 @@ class GradientFitter:
         """Scattered starts in z: all but nuisances in a Latin hypercube, those at rest."""
         parameters = self.trials.model_parameters
         count = self.settings.num_starts
-        zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
-        rest = np.clip(zero, -1.0, 1.0)
         scattered = [i for i, p in enumerate(parameters) if p.role != "nuisance" and free[i]]
         generator = np.random.default_rng(seed)
         ranks = np.stack([generator.permutation(count) for _ in scattered], axis=1)
         share = (ranks + generator.random(ranks.shape)) / count
-        starts = np.tile(rest, (count, 1))
-        # A positive nuisance has no slope at nothing: from there its other valley is not found.
-        positive = [
-            i for i, p in enumerate(parameters) if p.role == "nuisance" and not np.isfinite(zero[i])
-        ]
-        starts[:, positive] = generator.standard_normal((count, len(positive)))
+        starts = np.tile(self._rest, (count, 1))
         angle = self.trials.problems[0].model.scene.surroundings.angle_rad
         for column, i in enumerate(scattered):
             u = share[:, column]
