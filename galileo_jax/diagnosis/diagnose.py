@@ -21,6 +21,7 @@ from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
+from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.result import error_of
 from galileo_jax.inference.trials import Trials
@@ -105,7 +106,11 @@ def diagnose(
             rounds.append(Round(best.hypothesis, compared[best.effects]))
             on_round(rounds[-1])
     verdict = replace(verdict, advice=advice(verdict, trials))
-    return Diagnosis(tuple(rounds), candidates, verdict)
+    missing = None
+    if verdict.status == "unknown":
+        on_stage("inferring the missing force without a form")
+        missing = infer_missing_force(trials, base, seed)
+    return Diagnosis(tuple(rounds), candidates, verdict, missing)
 
 
 def _round(
