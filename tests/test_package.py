@@ -36,7 +36,7 @@ def test_unknown_verb_is_one_line_and_exit_code_2(argv, capsys):
     out, err = capsys.readouterr()
     assert out == ""
     assert err.count("\n") == 1
-    assert "known: fit, track" in err
+    assert "known: fit, compare, diagnose, track" in err
 
 
 @pytest.mark.parametrize("verb", [verb for verb, _ in __main__.VERBS])

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 AXES = ("x", "y")
+SHADED = ("held", "foot", "collision", "after the hit")
 LETTER = 0.021  # of the panel's width, what a phase's name takes
 
 
@@ -57,13 +58,13 @@ def position_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
 
 
 def shade_phases(axes: "Axes", phases: Sequence[Phase], times_s: np.ndarray) -> None:
-    """Shades every other phase and names those wide enough."""
+    """Shades the passages between phases, and what follows the hit; names those wide enough."""
     whole = float(times_s[-1] - times_s[0])
     axes.set_xlim(times_s[0] - 0.02 * whole, times_s[-1] + 0.02 * whole)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.14 * (high - low))  # room for the names
-    for i, phase in enumerate(phases):
-        if i % 2:
+    for phase in phases:
+        if phase.name in SHADED:
             axes.axvspan(phase.start_s, phase.end_s, color=INK, alpha=0.06, linewidth=0)
         if phase.end_s - phase.start_s > LETTER * len(phase.name) * whole:
             axes.text(
