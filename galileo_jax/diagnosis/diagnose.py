@@ -21,6 +21,7 @@ from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
+from galileo_jax.diagnosis.left_out import left_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.result import error_of
@@ -110,7 +111,13 @@ def diagnose(
     if verdict.status == "unknown":
         on_stage("inferring the missing force without a form")
         missing = infer_missing_force(trials, base, seed)
-    return Diagnosis(tuple(rounds), candidates, verdict, missing)
+    left_out: tuple[tuple[str, float, float], ...] = ()
+    if len(trials.problems) > 1 and len(rounds) > 1:
+        on_stage("predicting each clip from the others")
+        before = left_out_rmse(trials, rounds[0].hypothesis)
+        after = left_out_rmse(trials, rounds[-1].hypothesis)
+        left_out = tuple(zip((p.name for p in trials.problems), before, after, strict=True))
+    return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out)
 
 
 def _round(

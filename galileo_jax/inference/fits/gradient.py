@@ -588,7 +588,7 @@ class _Clip:
         return rows.reshape(-1, jacobian.shape[1])
 
 
-def _white(kind: Kind, theta, position, velocity, noise, data: Padded, scene):
+def _white(kind: Kind, theta, position, velocity, noise, data: Any, scene):
     """Whitened residuals of one motion, `[value]`."""
     times = jnp.arange(position.shape[-1]) * kind.record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
@@ -687,8 +687,10 @@ def _padded(problem: Problem) -> Padded:
 
 def _propose_linear(points: Batch, jacobian: list, white: list) -> np.ndarray:
     """Of many points: the damped linear problems' solutions, `[point, damping, parameter]`."""
-    normal = sum(np.einsum("bvi,bvj->bij", j, j) for j in jacobian)
-    slope = sum(np.einsum("bvi,bv->bi", j, w) for j, w in zip(jacobian, white, strict=True))
+    normal = _normal(jacobian)
+    slope = np.sum(
+        [np.einsum("bvi,bv->bi", j, w) for j, w in zip(jacobian, white, strict=True)], axis=0
+    )
     tried = np.repeat(points.z[:, None], len(DAMPINGS), axis=1)
     for i, own in enumerate(points.free):
         block = normal[i][np.ix_(own, own)] + np.eye(int(own.sum()))
@@ -698,13 +700,18 @@ def _propose_linear(points: Batch, jacobian: list, white: list) -> np.ndarray:
     return tried
 
 
+def _normal(jacobian: Sequence[np.ndarray]) -> np.ndarray:
+    """J^T J of all clips, `[point, parameter, parameter]`."""
+    return np.sum([np.einsum("bvi,bvj->bij", j, j) for j in jacobian], axis=0)
+
+
 def _cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
     return 0.5 * (sum(np.sum(w**2, axis=1) for w in white) + np.sum(z**2, axis=1))
 
 
 def _covariances(jacobian: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
     """Laplace covariances of z, `[point, parameter, parameter]`; 0 where pinned."""
-    normal = sum(np.einsum("bvi,bvj->bij", j, j) for j in jacobian)
+    normal = _normal(jacobian)
     covariance = np.zeros(normal.shape)
     for i, own in enumerate(free):
         block = np.ix_(own, own)
