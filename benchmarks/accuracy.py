@@ -24,6 +24,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
 from galileo_jax.errors import InputError
+from galileo_jax.measured import Measured
 from galileo_jax.observation import Observation, observe
 from galileo_jax.tracking import track_clip
 
@@ -98,9 +99,8 @@ def _fit(path: Path, call: argparse.Namespace) -> dict[str, Any]:
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     options = [str(path), "--method", call.method, "--seed", str(call.seed)]
     with tempfile.TemporaryDirectory() as folder:
-        return fit.fit_clip(
-            clip,
-            _observe(clip, call.tracks),
+        return fit.fit_clips(
+            [Measured(clip, _observe(clip, call.tracks))],
             fit._parser().parse_args(options),
             Path(folder),
             timings,

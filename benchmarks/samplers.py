@@ -33,6 +33,8 @@ import tables
 from galileo_jax import command, jax_cache
 from galileo_jax.errors import InputError
 from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.trials import Trials
+from galileo_jax.rollout.engine_names import ENGINES
 
 NOISE_M_S = 0.01
 STUCK = 1.5
@@ -82,11 +84,11 @@ def main(argv: Sequence[str]) -> int | None:
     for seed in range(call.seed, call.seed + call.num):
         case = synthetic_tracks.make_case(seed, call.source, noise_m, call.engine)
         for name in methods:
-            answer = METHODS[name](case.problem, seed)
+            answer = METHODS[name](case.trials, seed)
             found = scoring.score(answer.estimates, case.values, True, True)
             answers[name].append(answer)
             scores[name].append(found)
-            chi2[name].append(_velocity_chi2(case.problem, answer))
+            chi2[name].append(_velocity_chi2(case.trials, answer))
             cells: list[Any] = []
             for entry in found.values():
                 cells += [entry.error, entry.is_covered]
@@ -123,44 +125,45 @@ def main(argv: Sequence[str]) -> int | None:
     return None
 
 
-def fit_grad(problem: Problem, seed: int) -> Answer:
-    fit, seconds = _warm_fit(problem, seed)
-    return _of_draws(problem, fit, _laplace(problem, fit, seed), seconds, fit.stats["num_rollouts"])
+def fit_grad(trials: Trials, seed: int) -> Answer:
+    fit, seconds = _warm_fit(trials, seed)
+    return _of_draws(trials, fit, _laplace(trials, fit, seed), seconds, fit.stats["num_rollouts"])
 
 
-def fit_mh(problem: Problem, seed: int) -> Answer:
+def fit_mh(trials: Trials, seed: int) -> Answer:
     from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
     from galileo_jax.inference.samplers.driver import Settings
 
-    fit, seconds = _warm_fit(problem, seed)
+    fit, seconds = _warm_fit(trials, seed)
     began = time.perf_counter()
-    posterior = metropolis_posterior(problem, fit, seed)
+    posterior = metropolis_posterior(trials, fit, seed)
     seconds += time.perf_counter() - began
     steps = Settings().warmup_steps + posterior.draws.shape[1]
     rollouts = fit.stats["num_rollouts"] + NUM_CHAINS * (1 + steps)
-    return _of_draws(problem, fit, posterior, seconds, rollouts)
+    return _of_draws(trials, fit, posterior, seconds, rollouts)
 
 
-def fit_thesis(problem: Problem, seed: int) -> Answer:
+def fit_thesis(trials: Trials, seed: int) -> Answer:
     from galileo_jax.inference.thesis_preset import thesis_posterior
 
     began = time.perf_counter()
-    posterior, best = thesis_posterior(problem, seed, "thesis_gaussian", "coin", "best")
+    posterior, best = thesis_posterior(trials, seed, "thesis_gaussian", "coin", "best")
     seconds = time.perf_counter() - began
-    theta = problem.theta(np.zeros(len(problem.names)))[:-1].copy()
-    theta[[problem.names.index(name) for name in MAIN]] = [best[name] for name in MAIN]
+    theta = _middle(trials)
+    theta[[trials.names.index(name) for name in MAIN]] = [best[name] for name in MAIN]
     values = {"k1": best["k1"], "k2": best["k2"], "mass_ratio": best["m1"] / best["m2"]}
     estimates = {name: {"mean": value, "identified": True} for name, value in values.items()}
     count = int(np.prod(posterior.draws.shape[:2]) + posterior.draws.shape[0])
     return Answer(estimates, theta, len(MAIN), seconds, count, math.nan, posterior.is_converged)
 
 
-def fit_sysid(problem: Problem, seed: int) -> Answer:
+def fit_sysid(trials: Trials, seed: int) -> Answer:
     from mujoco import minimize
 
     low, high = np.array([0.05, 0.005, 0.05, 0.005]), np.array([1.5, 0.6, 1.5, 0.6])
-    where = [problem.names.index(name) for name in MAIN]
-    rest = problem.theta(np.zeros(len(problem.names)))[:-1]
+    (problem,) = trials.problems
+    where = [trials.names.index(name) for name in MAIN]
+    rest = _middle(trials)
     observed = problem.observation.velocity_m_s
     rng = np.random.default_rng(seed)
     count = 0
@@ -211,7 +214,7 @@ def fit_sysid(problem: Problem, seed: int) -> Answer:
     return Answer(estimates, theta, len(MAIN), seconds, count, math.nan, chi2 <= STUCK)
 
 
-METHODS: dict[str, Callable[[Problem, int], Answer]] = {
+METHODS: dict[str, Callable[[Trials, int], Answer]] = {
     "grad": fit_grad,
     "mh": fit_mh,
     "thesis": fit_thesis,
@@ -219,28 +222,28 @@ METHODS: dict[str, Callable[[Problem, int], Answer]] = {
 }
 
 
-def _warm_fit(problem: Problem, seed: int):
+def _warm_fit(trials: Trials, seed: int):
     from galileo_jax.inference.fits.gradient import GradientFitter
 
-    fitter = GradientFitter(problem)
+    fitter = GradientFitter(trials)
     fitter.compile()
     began = time.perf_counter()
     fit = fitter.fit(seed)
     return fit, time.perf_counter() - began
 
 
-def _laplace(problem: Problem, fit, seed: int):
+def _laplace(trials: Trials, fit, seed: int):
     from galileo_jax.inference.laplace import laplace_posterior
 
-    return laplace_posterior(problem, fit, seed)
+    return laplace_posterior(trials, fit, seed)
 
 
-def _of_draws(problem: Problem, fit, posterior, seconds: float, rollouts: float) -> Answer:
+def _of_draws(trials: Trials, fit, posterior, seconds: float, rollouts: float) -> Answer:
     from galileo_jax.inference.convergence import convergence
     from galileo_jax.inference.result import make_result
 
     result = make_result(
-        problem, posterior, fit.z, clips=[], method="", seed=0, timings_s={}, notes={}
+        trials, posterior, fit.z, clips=[], method="", seed=0, timings_s={}, notes={}
     )
     ratio = posterior["m1"] / posterior["m2"]
     ess = math.nan
@@ -249,13 +252,18 @@ def _of_draws(problem: Problem, fit, posterior, seconds: float, rollouts: float)
         ess = min(convergence(values).ess_bulk for values in draws)
     return Answer(
         scoring.of_result(result),
-        problem.theta(fit.z)[:-1],
-        len(problem.model.parameters),
+        trials.of_clip(trials.theta(fit.z), 0),
+        len(trials.model_parameters),
         seconds,
         rollouts,
         ess,
         posterior.is_converged,
     )
+
+
+def _middle(trials: Trials) -> np.ndarray:
+    """The model's parameters at their priors' middle."""
+    return trials.of_clip(trials.theta(np.zeros(len(trials.names))), 0)
 
 
 def _centres(problem: Problem, theta: np.ndarray) -> np.ndarray:
@@ -268,16 +276,11 @@ def _centres(problem: Problem, theta: np.ndarray) -> np.ndarray:
     return position[..., i] * (1 - share) + position[..., i + 1] * share
 
 
-def _velocity_chi2(problem: Problem, answer: Answer) -> float:
+def _velocity_chi2(trials: Trials, answer: Answer) -> float:
     """Squared velocity residuals at the best parameters per degree of freedom."""
-    import jax.numpy as jnp
-
-    from galileo_jax.parameters import inverse
-
-    z = inverse(problem.model.parameters, jnp.asarray(answer.best))
-    steps = jnp.asarray(problem.coarse_steps)
-    velocity = np.diff(np.asarray(problem.predict(z, steps)), axis=-1)
-    white = velocity * synthetic_tracks.FPS - problem.observation.velocity_m_s
+    (problem,) = trials.problems
+    velocity = np.diff(problem.simulate(answer.best), axis=-1) * synthetic_tracks.FPS
+    white = velocity - problem.observation.velocity_m_s
     return float(np.sum((white / NOISE_M_S) ** 2) / (white.size - answer.num_free))
 
 
@@ -306,7 +309,7 @@ def _parser() -> command.Parser:
     parser.add_argument("--seed", type=int, default=0, help="the first track's seed")
     parser.add_argument("--source", choices=synthetic_tracks.SOURCES, default="exact")
     parser.add_argument("--methods", default="grad,sysid", help=",".join(METHODS))
-    parser.add_argument("--engine", default="auto", help="c, mjx or auto")
+    parser.add_argument("--engine", default="auto", choices=ENGINES)
     return parser
 
 

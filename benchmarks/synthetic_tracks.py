@@ -8,8 +8,9 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.trials import Trials
 from galileo_jax.observation import Observation
-from galileo_jax.run import make_problem
+from galileo_jax.run import make_trials
 from galileo_jax.truth import Truth, draw_truth, roll_out
 
 # The oracle shares nothing with the package and lives beside the tests that it serves.
@@ -26,13 +27,18 @@ class Case:
 
     Attributes:
       truth: what it was made with.
-      problem: the observation, with the base model, ready for inference.
+      trials: the observation alone, with the base model, ready for inference.
       clean_m: `[object, 2, frame]`, the centres without noise.
     """
 
     truth: Truth
-    problem: Problem
+    trials: Trials
     clean_m: np.ndarray
+
+    @property
+    def problem(self) -> Problem:
+        """The trials' only one."""
+        return self.trials.problems[0]
 
     @property
     def values(self) -> dict[str, float]:
@@ -48,7 +54,7 @@ def make_case(seed: int, source: str, noise_m: float, engine: str = "auto") -> C
       seed: same seed, same case.
       source: "exact": closed form; "engine": the project's own rollouts.
       noise_m: standard deviation of each coordinate in each frame, declared as it is.
-      engine: which the problem uses.
+      engine: which the trials use.
     """
     rng = np.random.default_rng([seed, 2])
     truth = draw_truth(rng, RAMP_ANGLE_DEG, {})
@@ -72,7 +78,7 @@ def make_case(seed: int, source: str, noise_m: float, engine: str = "auto") -> C
         objects=truth.objects,
         frame_count=NUM_FRAMES,
     )
-    return Case(truth, make_problem(clip, observation, engine), centres)
+    return Case(truth, make_trials([clip], [observation], engine), centres)
 
 
 def _solve_exactly(truth: Truth, times_s: np.ndarray):

@@ -6,7 +6,6 @@ from typing import Any
 import jax
 import numpy as np
 
-
 # Sizes are rounded up to multiples of these, so that few programs serve all clips.
 FRAMES, MODES, RECORDS = 64, 64, 512
 MOTIONS = (16, 64, 256)  # of batches of rollouts

@@ -51,8 +51,8 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
     found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
     found.append(ROLL_SD_RAD * np.stack([-y, x], axis=1))
     found.append(SCALE_SD * position)
-    for i, corner in enumerate(scene.corner_m):
-        if scene.comes_down[i]:
+    for i, comes_down in enumerate(scene.comes_down):
+        if comes_down:
             share = _share_past_foot(position[i, 0], scene, i)
             cos, sin = math.cos(scene.angle_rad), math.sin(scene.angle_rad)
             edge = scene.half_length_m[i] / 2 * (1 - cos)
@@ -124,8 +124,8 @@ def crossing_sd_m(observation: Observation, scene: Surroundings) -> np.ndarray:
     """
     position = np.nan_to_num(observation.position_m)
     extra = np.zeros((position.shape[0], position.shape[2]))
-    for i, corner in enumerate(scene.corner_m):
-        if scene.comes_down[i]:
+    for i, comes_down in enumerate(scene.comes_down):
+        if comes_down:
             share = _share_past_foot(position[i, 0], scene, i)
             size = scene.half_length_m[i] / 4 * math.sin(scene.angle_rad)
             extra[i] = size * np.where((share > 0) & (share < 1), 1.0, 0.0)
