@@ -52,6 +52,12 @@ def load_clips(paths: Sequence[str], pixels_per_metre: float | None = None) -> l
                 f"{first.scenario} with {len(first.objects)}; clips given together are trials of "
                 "the same objects"
             )
+        for one, other in zip(first.objects, clip.objects, strict=True):
+            if one.mass_kg != other.mass_kg:
+                raise InputError(
+                    f"{clip.path}: {other.name}.mass_kg: {other.mass_kg}, but {first.path}: "
+                    f"{one.mass_kg}; clips given together are trials of the same objects"
+                )
     return clips
 
 

@@ -25,7 +25,7 @@ SCENARIOS: dict[str, Scenario] = {
     for scenario in (
         Scenario("ramp", "object 1 slides down a ramp onto a table", True, (1, 2)),
         Scenario("incline", "one object slides down a board, no table", True, (1, 1)),
-        Scenario("fall", "objects fall freely", False, (1, None)),
+        Scenario("fall", "one object is dropped", False, (1, 1)),
         Scenario("flight", "objects are thrown", False, (1, None)),
         Scenario("multi", "several objects slide and collide", False, (1, None)),
         Scenario("spring", "an object hangs on or is pushed by a spring", False, (1, None)),

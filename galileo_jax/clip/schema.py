@@ -27,6 +27,7 @@ SIZE_MEANING: dict[str, str] = {
 
 MIN_SIZE_M, MAX_SIZE_M = 0.001, 2.0
 MIN_SCALE_PX_PER_M, MAX_SCALE_PX_PER_M = 5.0, 100_000.0
+MIN_MASS_KG, MAX_MASS_KG = 1e-5, 100.0
 MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
 MIN_FPS, MAX_FPS = 1.0, 1_000_000.0
 MIN_RAMP_ANGLE_DEG = 1.0  # below it nothing slides; it is an angle in radians
@@ -51,6 +52,17 @@ def _metres(value: float) -> float:
         raise wrong(f"{value:g} m is too large for an object; metres expected; {hint}")
     if value < MIN_SIZE_M:
         raise wrong(f"{value:g} m is smaller than a millimetre; metres expected")
+    return value
+
+
+def _kilograms(value: float) -> float:
+    if value <= 0:
+        raise wrong(f"{value:g} is not a mass; kilograms above 0 expected")
+    if value > MAX_MASS_KG:
+        hint = _suggestion(value, (0.001, "g"))
+        raise wrong(f"{value:g} kg is too heavy for an object; kilograms expected; {hint}")
+    if value < MIN_MASS_KG:
+        raise wrong(f"{value:g} kg is less than ten milligrams; kilograms expected")
     return value
 
 
@@ -155,6 +167,7 @@ def short(value: Any) -> str:
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Metres = Annotated[Number, AfterValidator(_metres)]
+Kilograms = Annotated[Number, AfterValidator(_kilograms)]
 Point = tuple[Number, Number]
 File = Annotated[Path | None, BeforeValidator(_path)]
 
@@ -167,6 +180,8 @@ class ClipObject(BaseModel):
       shape: box, cylinder, torus or sphere.
       size_m: box (length along travel, depth, height), cylinder (radius, length), torus
         (ring radius, tube radius), sphere (radius), m; None = not known.
+      mass_kg: weighed; None = not known. A motion along a slope does not tell it, and with it
+        forces that do not grow with the mass (drag) get their unit.
       point_px: its centre as marked by eye, pixels (x right, y down), in `first_frame`;
         None = to be found.
       first_frame: the first frame in which the object moves by itself; frames before are
@@ -178,6 +193,7 @@ class ClipObject(BaseModel):
     name: Annotated[str, Field(strict=True), AfterValidator(_name)]
     shape: Annotated[Shape, _one_of(get_args(Shape))]
     size_m: tuple[Metres, ...] | None = None
+    mass_kg: Kilograms | None = None
     point_px: Annotated[Point, AfterValidator(_point_px)] | None = None
     first_frame: Annotated[int, Field(strict=True, ge=0)] = 0
 

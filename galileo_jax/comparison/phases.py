@@ -4,7 +4,7 @@ import numpy as np
 
 from galileo_jax.inference.problem import Problem
 
-PHASES = ("held", "ramp", "foot", "table", "collision", "after", "at rest")
+PHASES = ("held", "ramp", "foot", "table", "collision", "after", "at rest", "fall")
 COLLISION_S = 0.05  # either side of the hit
 RESTS_M_S = 2e-3
 
@@ -13,7 +13,8 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     """The phase of every object in every frame, from the fitted motion.
 
     held: before the release; ramp, foot (its length spans the foot), table; collision: near
-    the first hit; after it; at rest: where nothing moves any more, or not yet.
+    the first hit; after it; at rest: where nothing moves any more, or not yet; fall: without
+    anything to slide on.
 
     Args:
       problem: the clip and its model.
@@ -41,6 +42,8 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
             half = scene.half_length_m[i]
             label[i][beyond < half] = PHASES.index("foot")
             label[i][beyond < -half] = PHASES.index("ramp")
+        if not scene.has_surface:
+            label[i] = PHASES.index("fall")
         label[i][speed < RESTS_M_S] = PHASES.index("at rest")
         if hit_s is not None:
             label[i][times > hit_s] = PHASES.index("after")

@@ -50,8 +50,9 @@ _ARRAYS = (
     "corner_m",
     "start_m",
     "start_path_m",
+    "mass_kg",
 )
-_STATIC = ("names", "has_table", "comes_down", "is_scale_known", "release_s")
+_STATIC = ("names", "has_table", "comes_down", "is_scale_known", "release_s", "has_surface")
 
 
 @jax.tree_util.register_pytree_with_keys_class
@@ -64,7 +65,7 @@ class Surroundings:
 
     Attributes:
       names: of the objects.
-      angle_rad: the ramp's; 0 without a ramp.
+      angle_rad: the ramp's; in a fall, which is a path straight down, pi / 2.
       gravity: m/s^2.
       half_length_m, half_height_m: `[object]`, along the travel and across it.
       corner_m: `[object]`, x at which each centre's path bends from ramp to table; inf
@@ -76,6 +77,8 @@ class Surroundings:
       release_s: when the release was, after the first frame: expected, and its standard
         deviation.
       is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
+      has_surface: whether objects slide on something; not in a fall.
+      mass_kg: `[object]`, as weighed, None where not; empty: none is.
     """
 
     names: tuple[str, ...]
@@ -90,6 +93,8 @@ class Surroundings:
     comes_down: tuple[bool, ...]
     release_s: tuple[float, float] = (0.0, 0.01)
     is_scale_known: bool = True
+    has_surface: bool = True
+    mass_kg: tuple[float | None, ...] = ()
 
     def tree_flatten_with_keys(self):
         """Splits into traced numbers and static facts."""

@@ -23,9 +23,10 @@ def add_model_error(draws: np.ndarray, names: tuple[str, ...], seed: int) -> np.
     """
     generator = np.random.default_rng([seed, 20])
     widened = draws.copy()
-    k1 = names.index("k1")
-    allowed = FRICTION_SD * generator.standard_normal(draws.shape[:-1])
-    widened[..., k1] = np.clip(draws[..., k1] + allowed, 1e-9, 1 - 1e-9)
+    if "k1" in names:
+        k1 = names.index("k1")
+        allowed = FRICTION_SD * generator.standard_normal(draws.shape[:-1])
+        widened[..., k1] = np.clip(draws[..., k1] + allowed, 1e-9, 1 - 1e-9)
     if "m2" not in names:
         return widened
     m1, m2, k2 = names.index("m1"), names.index("m2"), names.index("k2")

@@ -19,7 +19,7 @@ class Phase:
     """A stretch of one object's motion.
 
     Attributes:
-      name: "ramp", "foot", "table", "at rest" or "after the hit".
+      name: "ramp", "foot", "table", "fall", "at rest" or "after the hit".
       start_s, end_s: on the clip's clock.
     """
 
@@ -106,7 +106,9 @@ def _phases(run: Run, centre_m: np.ndarray, index: int, hit: float | None) -> tu
     surroundings = run.problem.model.scene.surroundings
     times = run.problem.observation.times_s
     corner, half = surroundings.corner_m[index], surroundings.half_length_m[index]
-    if surroundings.start_m[index][0] < corner:
+    if not surroundings.has_surface:
+        labels = np.full(len(times), "fall")
+    elif surroundings.start_m[index][0] < corner:
         beyond = centre_m[0] - corner  # -inf where there is no table
         labels = np.select([beyond < -half, beyond < half], ["ramp", "foot"], "table")
     else:

@@ -75,10 +75,12 @@ def view_of(run: Run, positions_m: np.ndarray) -> View:
 def surfaces(scene: Scene, view: View) -> list[tuple[tuple[float, float], float, float]]:
     """Ramp and table as (upper end that is nearest the foot, length, angle of its direction).
 
-    Lengths reach to the view's edges; the angle is counter-clockwise, rad.
+    Lengths reach to the view's edges; the angle is counter-clockwise, rad. None in a fall.
     """
     surroundings = scene.surroundings
     angle = surroundings.angle_rad
+    if not surroundings.has_surface:
+        return []
     if scene.has_table:
         longest = (-view.left_m) / math.cos(angle)
         start_x = surroundings.start_m[0][0]

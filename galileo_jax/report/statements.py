@@ -43,8 +43,10 @@ def _reason(name: str, run: Run, fitted: Fitted) -> str:
             return f"nothing moves: k1 is at least tan(angle) = {limit:.3f}, more cannot be said"
         return "nothing moves"
     if name in ("m1", "m2"):
+        if run.clip.objects[int(name[1:]) - 1].mass_kg is not None:
+            return "declared as weighed; it does not show in the motion"
         if not has_two:
-            return "the mass of a sliding object does not show in its motion"
+            return "the mass of a single object does not show in its motion"
         if ratio is not None and ratio["identified"]:
             return (
                 "only the ratio of the masses shows in such a clip; doubling both changes nothing"

@@ -13,7 +13,7 @@ def make_engine(name: str, model: Model) -> Engine:
     faster on every device (benchmarks/rollouts.py). MuJoCo's engines check it.
 
     Raises:
-      InputError: unknown name; lists the known.
+      InputError: unknown name (lists the known), or a scene that MuJoCo's engines do not have.
     """
     if name not in ENGINES:
         raise InputError(f"engine: unknown value {name!r}; known: {', '.join(ENGINES)}")
@@ -23,6 +23,8 @@ def make_engine(name: str, model: Model) -> Engine:
         from galileo_jax.rollout.engine_rigid import EngineRigid
 
         return EngineRigid(model)
+    if not model.scene.surroundings.has_surface:
+        raise InputError(f"engine: {name!r} has no scene of a fall; rigid or auto expected")
     if name == "mjx":
         from galileo_jax.rollout.engine_mjx import EngineMJX
 

@@ -14,6 +14,7 @@ SUBSTEPS = 4  # solver steps per recorded step: forces of effects are held const
 
 # A hand-sized object; only mass ratios are visible, so that the prior decides the sum.
 MASS_PRIOR = LogNormal(median=0.4, sd=0.7)
+WEIGHED_SD = 0.001  # of a declared mass, as a share of it
 FRICTION_PRIOR = Uniform(0.0, 1.0)
 
 
@@ -35,13 +36,17 @@ class Model:
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Masses and frictions, then the effects' parameters, then the nuisances."""
+        """Masses, frictions (none in a fall), then the effects' parameters, then the nuisances."""
         found: list[Parameter] = []
-        for i in range(len(self.scene.names)):
-            found.append(Parameter(f"m{i + 1}", "kg", MASS_PRIOR, 0.4, "main", 0.1))
-            found.append(Parameter(f"k{i + 1}", "1", FRICTION_PRIOR, 0.0, "main", 0.02))
+        scene = self.scene.surroundings
+        weighed = scene.mass_kg or (None,) * len(scene.names)
+        for i, mass in enumerate(weighed):
+            prior = MASS_PRIOR if mass is None else LogNormal(mass, WEIGHED_SD)
+            found.append(Parameter(f"m{i + 1}", "kg", prior, prior.median, "main", 0.1))
+            if scene.has_surface:
+                found.append(Parameter(f"k{i + 1}", "1", FRICTION_PRIOR, 0.0, "main", 0.02))
         for effect in self.effects + self.nuisances:
-            found.extend(effect.parameters(self.scene.surroundings))
+            found.extend(effect.parameters(scene))
         return tuple(found)
 
     @cached_property

@@ -64,8 +64,11 @@ def dynamics(
     """Puts parameters (each `[...]`) and effects together."""
     count = len(scene.names)
     mass = xp.stack([theta[f"m{i + 1}"] for i in range(count)], axis=-1)
-    given = xp.stack([theta[f"k{i + 1}"] for i in range(count)], axis=-1)
-    friction = xp.maximum(given, LEAST_FRICTION)
+    if scene.has_surface:
+        given = xp.stack([theta[f"k{i + 1}"] for i in range(count)], axis=-1)
+        friction = xp.maximum(given, LEAST_FRICTION)
+    else:
+        friction = xp.zeros(mass.shape)
     lead = mass.shape[:-1]
     start = xp.broadcast_to(xp.asarray(scene.start_path_m), mass.shape)
     for effect in effects:
@@ -142,12 +145,14 @@ def to_plane(
 
 
 def pitch(position: Array, scene: Surroundings) -> Array:
-    """How far each drawn object is turned, rad: -angle on the ramp, 0 on the table.
+    """How far each drawn object is turned, rad: -angle on the ramp, 0 on the table, in a fall.
 
     While an object's length spans the foot it turns evenly per metre. `position`:
     `[..., object, 2]`; returns `[..., object]`.
     """
     xp = position.__array_namespace__()
+    if not scene.has_surface:
+        return xp.zeros(position.shape[:-1])
     if not scene.has_table:
         return xp.zeros(position.shape[:-1]) - scene.angle_rad
     half = xp.asarray(scene.half_length_m)

@@ -18,6 +18,8 @@ from galileo_jax.observation import Observation
 # Where nothing else is declared; an incline's dynamics do not depend on it.
 UNKNOWN_BOX_M: tuple[float, ...] = (0.04, 0.04, 0.04)
 UNKNOWN_ROUND_M: tuple[float, ...] = (0.02, 0.01)
+SIMULATED = ("ramp", "incline", "fall")
+EARLY_SHARE = 0.3  # of a fall, before the air makes itself felt
 BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do not climb
 
 
@@ -68,18 +70,23 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
     """Sets `scenes/ramp.xml` to the clip: angle, sizes, start positions, gravity.
 
     Object 1 starts on the ramp where it is first seen (projected onto the surface), every
-    other object on the table. `incline` is the same scene without the table.
+    other object on the table. `incline` is the same scene without the table; `fall` is an
+    incline straight down, without a board.
 
     Raises:
       InputError: the scenario has no scene here, or an object is never seen.
     """
-    if clip.scenario not in ("ramp", "incline"):
+    if clip.scenario not in SIMULATED:
         raise InputError(
             f"{clip.path}: scenario: {clip.scenario!r} cannot be simulated yet; "
-            "known: ramp, incline"
+            f"known: {', '.join(SIMULATED)}"
         )
-    assert clip.ramp_angle_deg is not None  # the clip's own validation
-    angle = math.radians(clip.ramp_angle_deg)
+    has_surface = clip.scenario != "fall"
+    if has_surface:
+        assert clip.ramp_angle_deg is not None  # the clip's own validation
+        angle = math.radians(clip.ramp_angle_deg)
+    else:
+        angle = math.pi / 2
     has_table = clip.scenario == "ramp"
     half = [extents(declared) for declared in clip.objects]
     starts = []
@@ -109,6 +116,8 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         comes_down=tuple(has_table and x < c for (x, _), c in zip(starts, corner, strict=True)),
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.pixels_per_metre is not None or clip.video is None,
+        has_surface=has_surface,
+        mass_kg=tuple(declared.mass_kg for declared in clip.objects),
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
 
@@ -127,17 +136,19 @@ def start_paths(
 def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float, float]:
     """When object 1 is let go: expected, and its standard deviation, s.
 
-    On a ramp clip it is the first frame, within a third of a frame. On an incline clip it is
-    where the motion begins: from rest the distance grows as (t - release)^2, so that its root
-    is a straight line which meets zero at the release.
+    On a ramp clip it is the first frame, within a third of a frame. On others it is where the
+    motion begins: from rest the distance grows as (t - release)^2, so that its root is a
+    straight line which meets zero at the release.
     """
     frame_s = 1.0 / clip.fps
-    if clip.scenario != "incline":
+    if clip.scenario == "ramp":
         return clip.objects[0].first_frame * frame_s, frame_s / 3
     seen = np.flatnonzero(observation.mask[0])
     times, place = observation.times_s[seen], observation.position_m[0][:, seen]
     gone = (place[0] - place[0, 0]) * math.cos(angle) - (place[1] - place[1, 0]) * math.sin(angle)
     moving = gone > 0.05 * gone.max()
+    if clip.scenario == "fall":
+        moving &= gone < EARLY_SHARE * gone.max()
     if gone.max() <= 0 or moving.sum() < 3:
         return float(times[0]), frame_s
     slope, intercept = np.polyfit(times[moving], np.sqrt(gone[moving]), 1)
@@ -162,12 +173,18 @@ def compile_scene(
     spec = mujoco.MjSpec.from_file(str(scene_path("ramp.xml")))
     spec.option.gravity = [0, 0, -surroundings.gravity]
     has_table = math.isfinite(surroundings.corner_m[0])
-    if not has_table:
+    if not surroundings.has_surface:
+        for pair in list(spec.pairs):
+            if "ramp" in (pair.geomname1, pair.geomname2):
+                spec.delete(pair)
+        spec.delete(spec.geom("ramp"))
+    elif not has_table:
         # The board is where the object is seen to stand, whatever its height.
         (x, y), height = surroundings.start_m[0], surroundings.half_height_m[0]
         sin, cos = math.sin(surroundings.angle_rad), math.cos(surroundings.angle_rad)
         spec.geom("ramp").pos = [x - height * sin, 0, y - height * cos]
-    spec.geom("ramp").alt.euler = [0, math.degrees(surroundings.angle_rad), 0]
+    if surroundings.has_surface:
+        spec.geom("ramp").alt.euler = [0, math.degrees(surroundings.angle_rad), 0]
     for i, name in enumerate(("object1", "object2")):
         if i >= len(surroundings.names):
             spec.delete(spec.body(name))

@@ -17,6 +17,7 @@ from galileo_jax.observation import Observation
 POINT_SD_M = 0.003  # how far a marked point is from the centre
 OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table
 KEYSTONE_SD = 0.006  # 1/m; half a degree of yaw or tilt, 1.5 m away
+CAMERA_M = 1.5  # a longer fall is seen from further away, at least its own length
 ROLL_SD_RAD = 0.002
 SCALE_SD = 0.001
 IMPULSE_SD = 0.01  # of a hit's impulse: rigid bodies against compliant contacts, at most
@@ -25,6 +26,8 @@ HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # compliant faces part more slowly tha
 # Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
 # millimetre; how fast they go along it shows none of that.
 WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
+# Nothing holds a falling body to its line: where it is across it says nothing of the fall.
+ASIDE_SD_M = 1.0
 SMALLEST_MODE = 1e-3  # of a family's largest variance; what is smaller is left out
 MOVED_M = 0.002  # an object that has gone so far has been hit
 
@@ -44,11 +47,17 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
     for i in range(count):
         for axis in range(2):
             offset = np.zeros((count, 2, frames))
-            offset[i, axis] = OFFSET_SD_M
+            # Paths begin where the object is first seen, within that frame's error.
+            seen = int(np.argmax(observation.mask[i]))
+            error = observation.covariance_m2[i, axis, axis, seen]
+            offset[i, axis] = math.sqrt(OFFSET_SD_M**2 + error)
             found.append(offset)
     x, y = position[:, 0], position[:, 1]
-    found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
-    found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
+    if scene.has_surface:
+        found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
+        found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
+    else:
+        found.append(_bent_scale(y, observation))
     found.append(ROLL_SD_RAD * np.stack([-y, x], axis=1))
     found.append(SCALE_SD * position)
     for i, comes_down in enumerate(scene.comes_down):
@@ -62,7 +71,10 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
                 step = np.zeros((count, 2, frames))
                 step[i, axis] = sd * share
                 found.append(step)
-    found.extend(_wobble(position, observation, scene))
+    if scene.has_surface:
+        found.extend(_wobble(position, observation, scene))
+    else:
+        found.extend(_aside(position))
     found.extend(_after_hit(position, observation))
     return np.stack(found)
 
@@ -84,6 +96,26 @@ def _wobble(
             wobble = np.zeros_like(position)
             wobble[i] = pattern * across
             found.append(wobble)
+    return found
+
+
+def _bent_scale(y: np.ndarray, observation: Observation) -> np.ndarray:
+    """Keystone of a fall, whose scale was set for its whole length: right at both ends."""
+    ends = y[observation.mask].max(), y[observation.mask].min()
+    keystone = KEYSTONE_SD * CAMERA_M / max(CAMERA_M, ends[0] - ends[1])
+    bend = keystone * (y - ends[0]) * (y - ends[1])
+    return np.stack([np.zeros_like(y), bend], axis=1)
+
+
+def _aside(position: np.ndarray) -> list[np.ndarray]:
+    """For each object and frame any place across a fall."""
+    count, _, frames = position.shape
+    found = []
+    for i in range(count):
+        for frame in range(frames):
+            aside = np.zeros_like(position)
+            aside[i, 0, frame] = ASIDE_SD_M
+            found.append(aside)
     return found
 
 

@@ -17,6 +17,8 @@ from galileo_jax.effects.registry import register
 from galileo_jax.parameters import LogNormal, Parameter
 
 PRIOR = LogNormal(median=0.3, sd=1.2)
+# A ball: 3e-4 (table tennis, golf) to 0.015 (basketball).
+FALL_PRIOR = LogNormal(median=0.003, sd=1.5)
 
 
 @register
@@ -27,7 +29,8 @@ class AirDrag(Effect):
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The drag constant c."""
-        return (Parameter("air_drag", "kg/m", PRIOR, 0.0, "effect", 0.1),)
+        prior = PRIOR if scene.has_surface else FALL_PRIOR
+        return (Parameter("air_drag", "kg/m", prior, 0.0, "effect", 0.1),)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The force -c v |v|."""

@@ -27,12 +27,16 @@ class FrictionPatch(Effect):
     name: ClassVar[str] = "friction_patch"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much rougher it is there, where it starts and how long it is."""
+        """How much rougher it is there, where it starts and how long it is; none in a fall."""
+        if not scene.has_surface:
+            return ()
         strength = Parameter("friction_patch", "1", PRIOR, 0.0, "effect", 0.05)
         return (strength, *zone_parameters(self.name, scene))
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
         """The coefficients at the places."""
+        if not scene.has_surface:
+            return None
         rougher = scene.only(theta["friction_patch"], 0)
 
         def law(state: State, k: Array) -> Array:

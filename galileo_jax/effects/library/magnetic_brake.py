@@ -28,12 +28,16 @@ class MagneticBrake(Effect):
     name: ClassVar[str] = "magnetic_brake"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The drag constant b, where the zone starts and how long it is."""
+        """The drag constant b, where the zone starts and how long it is; none in a fall."""
+        if not scene.has_surface:
+            return ()
         strength = Parameter("magnetic_brake", "kg/s", PRIOR, 0.0, "effect", 0.1)
         return (strength, *zone_parameters(self.name, scene))
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
+    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
         """The force -b v inside."""
+        if not scene.has_surface:
+            return None
         constant = scene.only(theta["magnetic_brake"], 0)
 
         def brake(state: State):

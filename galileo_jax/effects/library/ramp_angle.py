@@ -26,8 +26,9 @@ class RampAngle(Effect):
     name: ClassVar[str] = "ramp_angle"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much steeper the ramp is; none where nothing is on it."""
-        if scene.has_table and not any(scene.comes_down):
+        """How much steeper the ramp is; none where nothing is on it, or in a fall."""
+        is_empty = scene.has_table and not any(scene.comes_down)
+        if is_empty or not scene.has_surface:
             return ()
         return (Parameter("ramp_angle", "rad", PRIOR, 0.0, "effect", 0.05),)
 

@@ -27,9 +27,13 @@ class Rolling(Effect):
     name: ClassVar[str] = "rolling"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The share beta."""
+        """The share beta; none in a fall."""
+        if not scene.has_surface:
+            return ()
         return (Parameter("rolling", "1", PRIOR, 0.0, "effect", 0.1),)
 
-    def inertia(self, theta: Theta, scene: Surroundings) -> Array:
+    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
         """The share, of object 1."""
+        if not scene.has_surface:
+            return None
         return scene.only(theta["rolling"], 0)

@@ -28,11 +28,15 @@ class StaticFriction(Effect):
     name: ClassVar[str] = "static_friction"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The extra coefficient s."""
+        """The extra coefficient s; none in a fall."""
+        if not scene.has_surface:
+            return ()
         return (Parameter("static_friction", "1", PRIOR, 0.0, "effect", 0.1),)
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
         """The coefficients at the speeds."""
+        if not scene.has_surface:
+            return None
         extra = theta["static_friction"][..., None]
 
         def law(state: State, k: Array) -> Array:

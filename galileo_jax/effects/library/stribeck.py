@@ -27,15 +27,19 @@ class Stribeck(Effect):
     name: ClassVar[str] = "stribeck"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much more friction there is at low speed, and up to which speed."""
+        """How much more friction there is at low speed, and up to which; none in a fall."""
+        if not scene.has_surface:
+            return ()
         usual = SPEED_PRIOR.median  # means nothing while the strength is absent
         return (
             Parameter("stribeck", "1", PRIOR, 0.0, "effect", 0.1),
             Parameter("stribeck_speed", "m/s", SPEED_PRIOR, usual, "effect", 0.1),
         )
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
         """The coefficients at the speeds."""
+        if not scene.has_surface:
+            return None
         excess = scene.only(theta["stribeck"], 0)
         speed = theta["stribeck_speed"][..., None]
 

@@ -16,6 +16,8 @@ from galileo_jax.effects.registry import register
 from galileo_jax.parameters import LogNormal, Parameter
 
 PRIOR = LogNormal(median=0.3, sd=1.2)
+# Of the size of the air's on a ball at 10 m/s.
+FALL_PRIOR = LogNormal(median=0.03, sd=1.5)
 
 
 @register
@@ -26,7 +28,8 @@ class ViscousDrag(Effect):
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The drag constant b."""
-        return (Parameter("viscous_drag", "kg/s", PRIOR, 0.0, "effect", 0.1),)
+        prior = PRIOR if scene.has_surface else FALL_PRIOR
+        return (Parameter("viscous_drag", "kg/s", prior, 0.0, "effect", 0.1),)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The force -b v."""
