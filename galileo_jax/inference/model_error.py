@@ -1,17 +1,15 @@
-"""What the simulator itself does not know, added to every posterior.
+"""What a simulator of rigid bodies does not know, added to every posterior.
 
-Compliant contacts give the impulse of a rigid plastic hit within about half a per cent, and
-what object 2 then loses to friction within some 1.5 per cent (tests/rollout compares with the
-closed form). A camera that sees hundredths of a pixel measures better than that, and an
-interval from the likelihood alone would be too narrow. k1 gets 1e-4,
-chosen in view of the clips in docs/benchmarks.md; in the first third of a second, while the
-contact settles, benchmarks/contact.py finds up to 4e-4.
+Real faces are not quite square and real friction not quite constant: the impulse of a hit is
+taken to be known within a few tenths of a per cent, friction within half a per cent after it and
+1e-4 before. Chosen in view of the clips in docs/benchmarks.md, whose tracking is good to
+hundredths of a pixel; an interval from the likelihood alone would there be too narrow.
 """
 
 import numpy as np
 
-IMPULSE_SD = 0.005
-FRICTION_AFTER_HIT_SD = 0.015
+IMPULSE_SD = 0.003
+FRICTION_AFTER_HIT_SD = 0.006
 FRICTION_SD = 1e-4
 
 
