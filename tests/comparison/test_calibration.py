@@ -1,0 +1,116 @@
+"""The comparison under the model: p-values are no smaller than chance makes them."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from galileo_jax.comparison import compare as module
+from galileo_jax.comparison.compare import compare
+from galileo_jax.inference.fits.gradient import GradientFitter, Settings
+from galileo_jax.inference.trials import Trials
+from galileo_jax.parameters import inverse
+from galileo_jax.similarity.discrepancy import crossing_sd_m, modes
+from tests.oracle_trials import make_trials
+from tests.precision import in_64_bit
+from tests.ramp_model import HIT
+
+NUM_TRACKS, NUM_REPLICATES = 40, 64
+# Of 40 tracks two are below 0.05 by chance; the seeds are fixed, so that this is no lottery.
+MOST_BELOW = 3
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
+def fit_near_truth(trials):
+    """Starts at the truth and refines: that it is found from afar is tested elsewhere."""
+    values = {"m1": HIT.mass_kg[0], "m2": HIT.mass_kg[1]}
+    values |= {"k1": HIT.friction[0], "k2": HIT.friction[1]}
+    parameters = trials.model_parameters
+    theta = np.array([values.get(p.name, p.absent) for p in parameters])
+    start = np.clip(np.asarray(inverse(parameters, jnp.asarray(theta))), -1.0, 1.0)[None]
+    fitter = GradientFitter(trials, Settings(max_steps=0))
+    return fitter.fit_from(start, np.ones(start.shape, bool), np.zeros(1, int))[0]
+
+
+def disturbed(trials, away_m):
+    """The only clip, with its positions moved by `[object, 2, frame]`."""
+    (problem,) = trials.problems
+    seen = problem.observation
+    return Trials(
+        (replace(problem, observation=replace(seen, position_m=seen.position_m + away_m)),)
+    )
+
+
+def draw_imperfections(trials, seed):
+    """What the likelihood allows for beside the tracker's noise: modes, and the foot."""
+    (problem,) = trials.problems
+    seen, scene = problem.observation, problem.model.scene.surroundings
+    generator = np.random.default_rng([seed, 8])
+    patterns = modes(seen, scene)
+    common = np.tensordot(generator.standard_normal(len(patterns)), patterns, axes=1)
+    crossing = crossing_sd_m(seen, scene)[:, None]
+    return common + crossing * generator.standard_normal(seen.position_m.shape)
+
+
+def compare_all(make):
+    """Comparisons of `NUM_TRACKS` tracks."""
+    with in_64_bit(), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "NUM_REPLICATES", NUM_REPLICATES)
+        tracks = [make(seed) for seed in range(NUM_TRACKS)]
+        return [compare(trials, fit_near_truth(trials), s) for s, trials in enumerate(tracks)]
+
+
+@pytest.fixture(scope="module")
+def imperfect():
+    """Of tracks as the likelihood says they are."""
+
+    def make(seed):
+        trials = make_trials([HIT], seed)
+        return disturbed(trials, draw_imperfections(trials, seed))
+
+    return compare_all(make)
+
+
+def test_p_values_under_the_model_are_not_too_small(imperfect):
+    p = np.array([comparison.p_value for comparison in imperfect])
+    assert ((p >= 0) & (p <= 1)).all()
+    assert np.sum(p < 0.05) <= MOST_BELOW, np.sort(p)[:8]
+    assert np.sum(p < module.ADEQUATE_P) <= 1, np.sort(p)[:8]
+
+
+def test_p_values_under_the_model_are_not_all_large(imperfect):
+    """The smaller of two p-values, doubled: a good half of them is 1, the rest is not."""
+    p = np.array([comparison.p_value for comparison in imperfect])
+    assert np.sum(p < 1) > NUM_TRACKS / 5, np.sort(p)
+
+
+def test_a_perfect_track_is_adequate():
+    """Only the tracker's noise, none of the imperfections that are allowed for."""
+    trials = make_trials([HIT])
+    found = compare(trials, fit_near_truth(trials), 0)
+    assert found.is_adequate
+    z = [place.z for place in found.where]
+    assert z == sorted(z, reverse=True)
+    assert found.white[0].shape == (2, 2, found.labels[0].shape[1])
+    assert 0.7 < found.error["chi2_per_dof"] < 1.5
+
+
+def test_a_deviation_is_seen_where_it_is():
+    """A millimetre to and fro along the ramp, which no parameter makes."""
+    trials = make_trials([HIT])
+    times = trials.problems[0].observation.times_s
+    away = np.zeros((2, 2, len(times)))
+    slope = np.array([np.cos(HIT.angle_rad), -np.sin(HIT.angle_rad)])
+    bump = np.where((times > 0.2) & (times < 0.6), np.sin((times - 0.2) * 10 * np.pi), 0.0)
+    away[0] = 1e-3 * slope[:, None] * bump
+    wrong = disturbed(trials, away)
+    found = compare(wrong, fit_near_truth(wrong), 0)
+    assert not found.is_adequate
+    assert found.where[0].object == "object1"
+    assert found.where[0].phase in ("ramp", "whole")
