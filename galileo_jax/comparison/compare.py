@@ -119,7 +119,7 @@ def compare(trials: Trials, fit: GradientFit, seed: int) -> Comparison:
         p_value=p,
         where=tuple(sorted(places, key=lambda place: -place.z)),
         pulls=tuple(sorted(pulls, key=lambda pull: -abs(pull.z))),
-        error=error_of(trials, theta, _num_used(fit), fit.pull),
+        error=error_of(trials, theta, _num_used(fit), fit.pull, NOISE_SCALE_RANGE),
         labels=tuple(labels),
         white=tuple(
             w[0].reshape(len(p.observation.names), 2, -1)

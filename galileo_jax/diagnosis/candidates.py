@@ -19,7 +19,7 @@ from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.trials import Trials
 from galileo_jax.parameters import inverse
 
-NUM_STARTS = 48
+NUM_STARTS = 96
 NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.comparison.compare import Comparison, compare
+from galileo_jax.comparison.compare import NOISE_SCALE_RANGE, Comparison, compare
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
@@ -81,7 +81,9 @@ def diagnose(
 
     on_stage("comparing the best candidates with the data")
     candidates, compared = _compared(trials, candidates, seed)
-    verdict = _verdict(candidates, base.fit)
+    # Where nothing shows but to those who know where to look, more candidates stay possible.
+    decisive = DECISIVE * (2.0 if first.comparison.is_adequate else 1.0)
+    verdict = _verdict(candidates, base.fit, decisive)
     if verdict is None:
         on_stage("fitting pairs of effects")
         best = candidates[0]
@@ -89,7 +91,7 @@ def diagnose(
         joined = _candidates(fitter, best.hypothesis, pairs, seed, base)
         joined, compared_pairs = _compared(trials, joined, seed)
         compared |= compared_pairs
-        verdict = _verdict(joined, base.fit)
+        verdict = _verdict(joined, base.fit, decisive)
         gain = joined[0].log_evidence - best.log_evidence
         if verdict is not None and gain > LEAST_GAIN:
             candidates = (*joined, *candidates)
@@ -153,7 +155,9 @@ def _candidates(
             Candidate(
                 effects=found[i].effects,
                 hypothesis=found[i],
-                error=error_of(trials, trials.theta(fit.z, fit.free), used, fit.pull),
+                error=error_of(
+                    trials, trials.theta(fit.z, fit.free), used, fit.pull, NOISE_SCALE_RANGE
+                ),
                 score_z=float(scores[i]),
                 log_evidence=float(evidence[i]),
                 probability=float(probability[i]),
@@ -194,15 +198,15 @@ def _rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...
     )
 
 
-def _verdict(candidates: Sequence[Candidate], base: GradientFit) -> Verdict | None:
+def _verdict(candidates: Sequence[Candidate], base: GradientFit, decisive: float) -> Verdict | None:
     """Named or ambiguous; None where no candidate is adequate."""
     adequate = [c for c in candidates if c.p_value is not None and _explains(c, base)]
     if not adequate or candidates[0].log_evidence < 0:
         return None
     top = max(c.log_evidence for c in adequate)
-    if candidates[0].log_evidence - top > DECISIVE:
+    if candidates[0].log_evidence - top > decisive:
         return None
-    equal = [c for c in adequate if top - c.log_evidence < DECISIVE]
+    equal = [c for c in adequate if top - c.log_evidence < decisive]
     if len(equal) == 1:
         return Verdict("named", equal[0].effects)
     names = tuple(itertools.chain(c.name for c in equal))

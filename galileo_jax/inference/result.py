@@ -73,7 +73,11 @@ def velocity_error(
 
 
 def error_of(
-    trials: Trials, theta: np.ndarray, num_used: float, pull: float = 0.0
+    trials: Trials,
+    theta: np.ndarray,
+    num_used: float,
+    pull: float = 0.0,
+    scale_range: tuple[float, float] = NOISE_SCALE_RANGE,
 ) -> dict[str, float]:
     """`velocity_error` and chi2 per degree of freedom at parameters `theta` `[parameter]`.
 
@@ -82,10 +86,11 @@ def error_of(
       theta: in the parameters' units, noise scales last.
       num_used: how many numbers' worth the parameters were fitted with.
       pull: of the nuisances, which are data, too: the sum of their squared prior deviations.
+      scale_range: within which fitted noise scales are believed.
     """
     scales, predictions, chi2, count = [], [], pull, 0.0
     for clip, problem in enumerate(trials.problems):
-        scale = float(np.clip(trials.noise_scale(theta, clip), *NOISE_SCALE_RANGE))
+        scale = float(np.clip(trials.noise_scale(theta, clip), *scale_range))
         predicted = problem.simulate(trials.of_clip(theta, clip))
         chi2 += float(np.sum(np.asarray(problem.whiten(jnp.asarray(predicted), scale)) ** 2))
         count += float(GaussianLikelihood.degrees(scale, problem.data))
