@@ -33,11 +33,13 @@ NUM_COMPARED = 6  # of the best candidates
 # A candidate explains the data if the comparison shows no misfit, or hardly any of what was there:
 # a camera that sees hundredths of a pixel finds fault with every model.
 EXPLAINS_P, LEFT_SHARE = 1e-3, 0.01
+# Two effects have enough freedom to come near anything: a pair must leave nothing at all.
+PAIR_P = 0.05
 PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
 # In nats, at which a candidate is believed although the comparison shows no misfit: tests that
 # look everywhere see less than one that knows where to look.
 CONVINCING = 10.0
-LEAST_GAIN = 5.0  # in nats, for another effect to be added
+LEAST_GAIN = 10.0  # in nats, for another effect to be added
 
 
 def diagnose(
@@ -93,7 +95,8 @@ def diagnose(
         compared |= compared_pairs
         verdict = _verdict(joined, base.fit, decisive)
         gain = joined[0].log_evidence - best.log_evidence
-        if verdict is not None and gain > LEAST_GAIN:
+        is_clean = joined[0].p_value is not None and joined[0].p_value >= PAIR_P
+        if verdict is not None and gain > LEAST_GAIN and is_clean:
             candidates = (*joined, *candidates)
         else:
             verdict = Verdict("unknown", ())
