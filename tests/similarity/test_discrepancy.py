@@ -1,0 +1,68 @@
+"""What the modes may explain and what not: wobble across the path, nothing before a hit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from galileo_jax.similarity.discrepancy import WOBBLE_SD_M, modes
+from tests.oracle_trials import observe
+from tests.ramp_model import HIT, make_surroundings
+from tests.reference_ramp import solve
+
+SCENE = make_surroundings(HIT)
+STOPS = replace(HIT, friction=(0.34, 0.2))  # before object 2
+
+
+def covariance(observation):
+    """`[object, 2, frame, object, 2, frame]`, m^2."""
+    patterns = modes(observation, SCENE)
+    return np.einsum("moit,mpju->oitpju", patterns, patterns)
+
+
+@pytest.fixture(scope="module")
+def hit():
+    return observe(HIT, 0, noise_m=0.0)
+
+
+def along_and_across(observation):
+    """Unit vectors `[2, 2, frame]` of object 1's path."""
+    x, corner = observation.position_m[0, 0], SCENE.corner_m[0]
+    slope = np.where(x < corner, HIT.angle_rad, 0.0)
+    along = np.stack([np.cos(slope), -np.sin(slope)])
+    return along, np.stack([np.sin(slope), np.cos(slope)])
+
+
+def test_wobble_is_across_the_path_and_of_its_size(hit, monkeypatch):
+    """The modes with it less those without: all of it across, none along."""
+    whole = covariance(hit)
+    monkeypatch.setattr("galileo_jax.similarity.discrepancy.WOBBLE_SD_M", 0.0)
+    wobble = (whole - covariance(hit))[0, :, :, 0]
+    along, across = along_and_across(hit)
+    frames = range(len(hit.times_s))
+    for t in frames:
+        assert across[:, t] @ wobble[:, t, :, t] @ across[:, t] == pytest.approx(
+            WOBBLE_SD_M**2, rel=0.05
+        )
+        assert abs(along[:, t] @ wobble[:, t, :, t] @ along[:, t]) < 1e-3 * WOBBLE_SD_M**2
+    # Neighbours in time wobble together, and the ends of the clip do not.
+    first, last = frames[0], frames[-1]
+    near = across[:, first] @ wobble[:, first, :, first + 1] @ across[:, first + 1]
+    far = across[:, first] @ wobble[:, first, :, last] @ across[:, last]
+    assert near > 0.8 * WOBBLE_SD_M**2
+    assert abs(far) < 0.05 * WOBBLE_SD_M**2
+
+
+def test_a_hit_loosens_only_what_follows(hit):
+    """Object 2 stands still until then: nothing of a hit's modes is in its first frames."""
+    stops = observe(STOPS, 0, noise_m=0.0)
+    assert len(modes(hit, SCENE)) > len(modes(stops, SCENE))
+    hit_s = solve(HIT, hit.times_s).hit_s
+    assert hit_s is not None
+    frame = 1 / 30
+    calm, moved = hit.times_s < hit_s - frame, hit.times_s > hit_s + 2 * frame
+    x = covariance(hit)[1, 0, :, 1, 0, :]
+    # Of displacements from the first frame: offsets and keystone are common to both.
+    spread = np.diag(x) - 2 * x[0] + x[0, 0]
+    assert np.abs(spread[calm]).max() < 1e-4**2
+    assert spread[moved].min() > 1e-4**2
