@@ -30,6 +30,7 @@ MIN_SCALE_PX_PER_M, MAX_SCALE_PX_PER_M = 5.0, 100_000.0
 MIN_MASS_KG, MAX_MASS_KG = 1e-5, 100.0
 MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
 MIN_FPS, MAX_FPS = 1.0, 1_000_000.0
+MAX_ANGLE_SD_DEG = 10.0
 MIN_RAMP_ANGLE_DEG = 1.0  # below it nothing slides; it is an angle in radians
 
 
@@ -116,6 +117,12 @@ def _ramp_angle_deg(value: float) -> float:
             f"{value:g} is too flat to slide; degrees expected; "
             f"did you mean {degrees:.4g} ({value:g} radians)?"
         )
+    return value
+
+
+def _ramp_angle_sd_deg(value: float) -> float:
+    if not 0 <= value <= MAX_ANGLE_SD_DEG:
+        raise wrong(f"{value:g} is outside [0, {MAX_ANGLE_SD_DEG:g}] degrees")
     return value
 
 
@@ -208,6 +215,7 @@ class ClipFile(BaseModel):
     scenario: Annotated[str, _one_of(tuple(SCENARIOS))]
     fps: Annotated[Number, AfterValidator(_fps)]
     ramp_angle_deg: Annotated[Number, AfterValidator(_ramp_angle_deg)] | None = None
+    ramp_angle_sd_deg: Annotated[Number, AfterValidator(_ramp_angle_sd_deg)] = 0.0
     direction: Annotated[Direction, _one_of(get_args(Direction))] = "right"
     pixels_per_metre: Annotated[Number, AfterValidator(_pixels_per_metre)] | None = None
     origin_px: Point | None = None
@@ -225,6 +233,7 @@ class Clip(ClipFile):
       scenario: a name in `SCENARIOS`.
       fps: true frames per second; declared, or for a csv track without it 1 / median step.
       ramp_angle_deg: in [1, 90) degrees; None where the scenario has no ramp.
+      ramp_angle_sd_deg: how well it is known (one standard deviation); 0 = taken at its word.
       direction: which way object 1 travels in the image.
       pixels_per_metre: None = unknown.
       origin_px: foot of the ramp at table level, pixels, x right, y down; None = unknown.

@@ -52,7 +52,15 @@ _ARRAYS = (
     "start_path_m",
     "mass_kg",
 )
-_STATIC = ("names", "has_table", "comes_down", "is_scale_known", "release_s", "has_surface")
+_STATIC = (
+    "names",
+    "has_table",
+    "comes_down",
+    "is_scale_known",
+    "release_s",
+    "has_surface",
+    "angle_sd_rad",
+)
 
 
 @jax.tree_util.register_pytree_with_keys_class
@@ -78,6 +86,7 @@ class Surroundings:
         deviation.
       is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
       has_surface: whether objects slide on something; not in a fall.
+      angle_sd_rad: how well the ramp's angle is known; 0: taken at its word.
       mass_kg: `[object]`, as weighed, None where not; empty: none is.
     """
 
@@ -94,6 +103,7 @@ class Surroundings:
     release_s: tuple[float, float] = (0.0, 0.01)
     is_scale_known: bool = True
     has_surface: bool = True
+    angle_sd_rad: float = 0.0
     mass_kg: tuple[float | None, ...] = ()
 
     def tree_flatten_with_keys(self):

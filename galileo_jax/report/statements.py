@@ -15,6 +15,7 @@ MEANINGS = {
     "mass_ratio": "m1 / m2",
     "phi": "(m1 - m2) / (m1 + m2)",
     "pixels_per_metre": "scale of the picture",
+    "declared_angle": "ramp's angle, over what was declared",
     "foot_transition": "factor on the speed kept at the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
     "release_instant": "release after the first frame",

@@ -117,6 +117,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.pixels_per_metre is not None or clip.video is None,
         has_surface=has_surface,
+        angle_sd_rad=math.radians(clip.ramp_angle_sd_deg),
         mass_kg=tuple(declared.mass_kg for declared in clip.objects),
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)

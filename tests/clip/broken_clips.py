@@ -261,6 +261,22 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "three_objects_on_a_ramp": _text(
         GOOD_YAML + "  - {name: object3, shape: box}\n", "objects", "at most 2", "multi"
     ),
+    "mass_in_grams": _edit(
+        "    point_px: [73.1",
+        "    mass_kg: 250\n    point_px: [73.1",
+        "objects[0].mass_kg",
+        "did you mean 0.25 (250 g)?",
+    ),
+    "mass_is_zero": _edit(
+        "    point_px: [73.1", "    mass_kg: 0\n    point_px: [73.1", "mass_kg", "above 0"
+    ),
+    "mass_with_its_unit": _edit(
+        "    point_px: [73.1",
+        "    mass_kg: 45 g\n    point_px: [73.1",
+        "objects[0].mass_kg",
+        "not a number",
+    ),
+    "fall_with_a_ramp": _edit("scenario: ramp", "scenario: fall", "ramp_angle_deg", "leave it out"),
     # places
     "point_outside_the_frame": _edit(
         "[205.0, 141.0]", "[2050.0, 141.0]", "objects[1].point_px", f"{_WIDTH} x {_HEIGHT}"

@@ -7,6 +7,7 @@ import pytest
 
 from galileo_jax.effects.effect import Surroundings
 from galileo_jax.effects.nuisances import NUISANCES
+from galileo_jax.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.effects.nuisances.pixel_scale import PixelScale
 from galileo_jax.effects.nuisances.release_instant import ReleaseInstant
@@ -95,3 +96,12 @@ def test_pixel_scale_only_where_it_is_unknown():
     )
     start = np.asarray(unknown.start_m[0])[:, None]
     assert twice[0] - start == pytest.approx(2 * (position[0] - start))
+
+
+def test_an_angle_that_is_known_within_tenths_may_be_steeper():
+    known, doubted = DeclaredAngle(), replace(INCLINE, angle_sd_rad=0.005)
+    assert known.parameters(INCLINE) == ()
+    (parameter,) = known.parameters(doubted)
+    assert (parameter.role, parameter.prior.encode()) == ("nuisance", (0, 0.0, 0.005))
+    ramp, table = known.tilt({"declared_angle": np.array([0.01])}, doubted) or (None, None)
+    assert ramp == pytest.approx([0.01]) and table == pytest.approx([0.0])

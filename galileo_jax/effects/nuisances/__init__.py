@@ -4,6 +4,7 @@ They are effects like any other; only their parameters' role differs (DESIGN.md 
 """
 
 from galileo_jax.effects.effect import Effect
+from galileo_jax.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.effects.nuisances.pixel_scale import PixelScale
@@ -13,6 +14,7 @@ from galileo_jax.effects.nuisances.start_offset import StartOffset
 NUISANCES: tuple[Effect, ...] = (
     StartOffset(),
     FootTransition(),
+    DeclaredAngle(),
     ImpactRestitution(),
     ReleaseInstant(),
     PixelScale(),
