@@ -8,7 +8,7 @@
             problem in which the motion is linear in z but clock and camera are exact; where
             there are many hypotheses, all is taken as linear: more steps, each far cheaper;
          c. one batch of rollouts tries all dampings; the best is taken.
-    3. At the fit, with steps of half a posterior standard deviation: slopes, noise scale, one
+    3. At the fit, with steps of half a conditional standard deviation: slopes, noise scale, one
        or two steps more.
     4. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace.
 
@@ -50,9 +50,11 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, White
 # Against the columns' sizes. Valleys are narrow (masses against friction): most of the range is
 # needed below 1e-2, where steps along them differ.
 DAMPINGS = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
-# Of a parameter's coarse step: below it MuJoCo's contacts are rough; above it a step may leave a
-# plateau (nothing moves) over its edge, and the plateau would look steep.
-SMALLEST_STEP, LARGEST_STEP = 0.02, 4.0
+# Of a parameter's coarse step: below the smallest MuJoCo's contacts are rough, and the rigid
+# engine rounds; above the largest a step may leave a plateau (nothing moves) over its edge, and
+# the plateau would look steep.
+SMALLEST_STEP, LARGEST_STEP = {"rigid": 1e-3}, 4.0
+SMALLEST_ROUGH_STEP = 0.2
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
 
@@ -149,6 +151,8 @@ class GradientFitter:
         self._count = len(trials.model_parameters)
         parameters = trials.model_parameters
         self._is_simulated = np.array([p.step is not None for p in parameters])
+        engine = trials.problems[0].engine.name
+        self._smallest_step = SMALLEST_STEP.get(engine, SMALLEST_ROUGH_STEP)
         self._is_nuisance = np.array([p.role == "nuisance" for p in parameters])
         zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
         self._rest = np.clip(zero, -1.0, 1.0)
@@ -265,7 +269,7 @@ class GradientFitter:
             covariance = _covariances(jacobian, here.free)
             before = here.noise
             scales = self._noise_scales(white, before, covariance, here.free)
-            steps[active] = self._half_sd(covariance)
+            steps[active] = self._half_sd(jacobian)
             noise[active] = scales
             here = here._replace(noise=scales)
             scaled = [
@@ -476,11 +480,15 @@ class GradientFitter:
                 scales[i, c] = np.sqrt((total[i] + wide) / (left + wide))
         return scales
 
-    def _half_sd(self, covariance: np.ndarray) -> np.ndarray:
-        """Difference steps in z: half the posterior's sd, within what slopes are good for."""
+    def _half_sd(self, jacobian: list) -> np.ndarray:
+        """Difference steps in z: half a conditional sd, within what slopes are good for.
+
+        Conditional, the others held: along a ridge (all masses by the same factor) the
+        marginal sd is large, and differences over it would bend the ridge.
+        """
         coarse = self.trials.coarse_steps
-        half = 0.5 * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-        return np.clip(half, SMALLEST_STEP * coarse, LARGEST_STEP * coarse)
+        half = 0.5 / np.sqrt(1 + np.sum([np.sum(j**2, axis=1) for j in jacobian], axis=0))
+        return np.clip(half, self._smallest_step * coarse, LARGEST_STEP * coarse)
 
     def _starts(self, seed: int, free: np.ndarray) -> np.ndarray:
         """Scattered starts in z: all but nuisances in a Latin hypercube, those at rest."""
