@@ -9,6 +9,8 @@ from galileo_jax.jax_cache import cache_folder
 
 # Before anything imports jax; the commands' own subprocesses inherit it.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
+# Small matrices: BLAS's threads wait for each other longer than they compute.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 if folder := cache_folder():
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
