@@ -1,11 +1,11 @@
-# make demo | test | lint | setup | clean. Each does the set-up it needs, once.
+# make demo | test | test-all | lint | setup | clean. Each does the set-up it needs, once.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test lint setup clean
+.PHONY: demo test test-all lint setup clean
 
 demo: $(READY)
 	$(BIN)/galileo simulate --seed 7 --out demo/clip.mp4
@@ -14,6 +14,9 @@ demo: $(READY)
 	@echo "reports: demo/grad/report.html demo/mh/report.html"
 
 test: $(READY)
+	$(BIN)/python -m pytest -m "not slow"
+
+test-all: $(READY)
 	$(BIN)/python -m pytest
 
 lint: $(READY)
