@@ -126,8 +126,8 @@ def test_where_the_ball_is_across_its_fall_says_nothing(tmp_path):
     problem = problem_of(write_fall(tmp_path))
     seen = problem.observation.position_m
     swing = 0.5 * np.sin(np.arange(FRAMES) / 4.0)
-    assert np.sum(problem.whiten(jnp.asarray(seen + [[swing, 0 * swing]]), 1.0) ** 2) < FRAMES
-    assert np.sum(problem.whiten(jnp.asarray(seen + [[0 * swing, 0.1 * swing]]), 1.0) ** 2) > 1e3
+    assert np.sum(problem.whiten(seen + jnp.asarray([[swing, 0 * swing]]), 1.0) ** 2) < FRAMES
+    assert np.sum(problem.whiten(seen + jnp.asarray([[0 * swing, 0.1 * swing]]), 1.0) ** 2) > 1e3
 
 
 @pytest.mark.parametrize("engine", ["c", "mjx"])
