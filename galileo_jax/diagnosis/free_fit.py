@@ -11,10 +11,11 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from galileo_jax.comparison.bootstrap import whitened
-from galileo_jax.inference.fits.gradient import DAMPINGS, SMALLEST_STEP
+from galileo_jax.inference.fits.gradient import DAMPINGS
 from galileo_jax.inference.trials import NOISE_SD, Trials
 
 MAX_STEPS, ENOUGH = 25, 0.1
+SMALL_STEP = 0.02  # of differences, as a share of a parameter's coarse step
 
 
 class FreeFit(NamedTuple):
@@ -81,7 +82,7 @@ def _slopes(
     size of one's own sd would move the whole motion by centimetres.
     """
     own = np.flatnonzero(free[:-1])
-    steps = SMALLEST_STEP * trials.coarse_steps
+    steps = SMALL_STEP * trials.coarse_steps
     offsets = np.zeros((len(own), len(z)))
     offsets[np.arange(len(own)), own] = steps[own]
     white = _white(trials, np.concatenate([z[None], z + offsets, z - offsets]), free, scale)
