@@ -32,7 +32,7 @@ DECISIVE = 3.0
 NUM_COMPARED = 6  # of the best candidates
 # A candidate explains the data if the comparison shows no misfit, or hardly any of what was there:
 # a camera that sees hundredths of a pixel finds fault with every model.
-EXPLAINS_P, LEFT_SHARE = 1e-3, 0.01
+EXPLAINS_P, LEFT_SHARE = 1e-5, 0.01
 # Two effects have enough freedom to come near anything: a pair must leave nothing at all.
 PAIR_P = 0.05
 PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
