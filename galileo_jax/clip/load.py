@@ -225,7 +225,8 @@ def _check_objects(file: ClipFile, fail: Any) -> None:
     scenario = SCENARIOS[file.scenario]
     if scenario.has_ramp and file.ramp_angle_deg is None:
         fail("ramp_angle_deg", f"missing; scenario {file.scenario} needs it, in degrees")
-    if not scenario.has_ramp and file.ramp_angle_deg is not None:
+    is_alone = scenario.num_objects[1] == 1  # several objects may slide beside a ramp
+    if is_alone and not scenario.has_ramp and file.ramp_angle_deg is not None:
         fail(
             "ramp_angle_deg",
             f"{file.ramp_angle_deg:g} given; scenario {file.scenario} ({scenario.meaning}) has no "
