@@ -68,8 +68,14 @@ def fit_candidates(
             chosen.append(own[np.argmin(costs[own])])
     fits = fitter.fit_from(z[chosen], free[of[chosen]], of[chosen])
     # The winners are looked at once more: their order must not hang on a side valley.
-    for i in np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]:
-        fits[i] = max(fits[i], fitter.refit(fits[i]), key=lambda fit: fit.log_evidence)
+    # The search's coarse noise cannot say which of a candidate's starts ends best, either.
+    winners = np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]
+    rows = np.concatenate([np.array(chosen)[of[chosen] == i] for i in winners])
+    again = fitter.fit_from(z[rows], free[of[rows]], np.arange(len(rows)))
+    for i in winners:
+        tried = [fit for row, fit in zip(rows, again, strict=True) if of[row] == i]
+        tried += [fits[i], fitter.refit(fits[i])]
+        fits[i] = max(tried, key=lambda fit: fit.log_evidence)
     return [Hypothesis(tuple(e), fit) for e, fit in zip(candidates, fits, strict=True)]
 
 
