@@ -119,7 +119,7 @@ def compare(trials: Trials, fit: GradientFit, seed: int) -> Comparison:
         p_value=p,
         where=tuple(sorted(places, key=lambda place: -place.z)),
         pulls=tuple(sorted(pulls, key=lambda pull: -abs(pull.z))),
-        error=error_of(trials, theta, _num_used(fit), fit.pull, NOISE_SCALE_RANGE),
+        error=error_of(trials, theta, fit.num_used, fit.pull, NOISE_SCALE_RANGE),
         labels=tuple(labels),
         white=tuple(
             w[0].reshape(len(p.observation.names), 2, -1)
@@ -155,11 +155,6 @@ def _pulls(trials: Trials, fit: GradientFit, theta: np.ndarray) -> list[Pull]:
         for i, parameter in enumerate(trials.parameters[:count])
         if parameter.role == "nuisance" and fit.free[i]
     ]
-
-
-def _num_used(fit: GradientFit) -> float:
-    count = len(fit.steps)
-    return float(np.sum(fit.free[:count]) - np.trace(fit.covariance[:count, :count]))
 
 
 def _place(

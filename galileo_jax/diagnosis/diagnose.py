@@ -11,7 +11,6 @@
    inferred without a form (`missing_force`).
 """
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -149,17 +148,15 @@ def _candidates(
     weight = np.append(evidence + np.log((1 - PRIOR_NONE) / len(found)), np.log(PRIOR_NONE))
     weight = np.exp(weight - weight.max())
     probability = weight / weight.sum()
-    count = len(trials.model_parameters)
     made = []
     for i in np.argsort(-evidence):
         fit = found[i].fit
-        used = float(np.sum(fit.free[:count]) - np.trace(fit.covariance[:count, :count]))
         made.append(
             Candidate(
                 effects=found[i].effects,
                 hypothesis=found[i],
                 error=error_of(
-                    trials, trials.theta(fit.z, fit.free), used, fit.pull, NOISE_SCALE_RANGE
+                    trials, trials.theta(fit.z, fit.free), fit.num_used, fit.pull, NOISE_SCALE_RANGE
                 ),
                 score_z=float(scores[i]),
                 log_evidence=float(evidence[i]),
@@ -212,8 +209,7 @@ def _verdict(candidates: Sequence[Candidate], base: GradientFit, decisive: float
     equal = [c for c in adequate if top - c.log_evidence < decisive]
     if len(equal) == 1:
         return Verdict("named", equal[0].effects)
-    names = tuple(itertools.chain(c.name for c in equal))
-    return Verdict("ambiguous", names)
+    return Verdict("ambiguous", tuple(c.name for c in equal))
 
 
 def _explains(candidate: Candidate, base: GradientFit) -> bool:

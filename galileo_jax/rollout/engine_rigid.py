@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.effects.effect import Effect, Surroundings
-from galileo_jax.rollout.chunks import in_chunks
+from galileo_jax.rollout.chunks import MOTIONS, in_chunks
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
 
@@ -25,7 +25,6 @@ MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few boun
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 TOUCH_M, TOUCH_M_S = 1e-9, 1e-9
 PAST_FOOT_M = 1e-12
-SIZES = (16, 64, 256)  # of compiled batches
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
 
 
@@ -61,7 +60,7 @@ class EngineRigid:
 
     def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
-        return in_chunks(SIZES, lambda part: self.traceable(jnp.asarray(part)), np.asarray(theta))
+        return in_chunks(MOTIONS, lambda part: self.traceable(jnp.asarray(part)), np.asarray(theta))
 
     def traceable(self, theta: jax.Array) -> tuple[jax.Array, jax.Array]:
         """`simulate` in JAX: can be jitted, vmapped and differentiated."""

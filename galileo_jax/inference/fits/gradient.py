@@ -53,8 +53,7 @@ DAMPINGS = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
 # Of a parameter's coarse step: below the smallest MuJoCo's contacts are rough, and the rigid
 # engine rounds; above the largest a step may leave a plateau (nothing moves) over its edge, and
 # the plateau would look steep.
-SMALLEST_STEP, LARGEST_STEP = {"rigid": 1e-3}, 4.0
-SMALLEST_ROUGH_STEP = 0.2
+SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
 
@@ -123,6 +122,12 @@ class GradientFit:
     stats: dict[str, float]
     pull: float
 
+    @property
+    def num_used(self) -> float:
+        """How many numbers' worth of the data the parameters were fitted with."""
+        count = len(self.steps)
+        return float(np.sum(self.free[:count]) - np.trace(self.covariance[:count, :count]))
+
 
 class Batch(NamedTuple):
     """Points of several hypotheses.
@@ -151,8 +156,8 @@ class GradientFitter:
         self._count = len(trials.model_parameters)
         parameters = trials.model_parameters
         self._is_simulated = np.array([p.step is not None for p in parameters])
-        engine = trials.problems[0].engine.name
-        self._smallest_step = SMALLEST_STEP.get(engine, SMALLEST_ROUGH_STEP)
+        is_smooth = trials.problems[0].engine.name == "rigid"
+        self._smallest_step = SMALLEST_STEP if is_smooth else SMALLEST_ROUGH_STEP
         self._is_nuisance = np.array([p.role == "nuisance" for p in parameters])
         zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
         self._rest = np.clip(zero, -1.0, 1.0)
