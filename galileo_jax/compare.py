@@ -12,8 +12,7 @@ from galileo_jax import __version__, command, jax_cache
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.fit import chosen_effects, import_ahead, out_folder
-from galileo_jax.measured import load_clips, measure
-from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.measured import add_clip_options, load_clips, measure
 
 if TYPE_CHECKING:
     from galileo_jax.comparison.compare import Comparison
@@ -138,13 +137,7 @@ def _parser() -> command.Parser:
         "clips", nargs="+", metavar="CLIP|RUN", help="video, its yaml, a csv track, or a run"
     )
     parser.add_argument("--effects", default="", help="a,b: effects in the model")
-    parser.add_argument(
-        "--effects-from", action="append", default=[], metavar="FILE", help="more effects (Python)"
-    )
-    parser.add_argument("--out", help="folder (default runs/CLIP/compare, RUN/compare)")
-    parser.add_argument("--seed", type=command.whole_number(0), default=0)
-    parser.add_argument("--engine", choices=ENGINES, default="auto")
-    parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
+    add_clip_options(parser, out="folder (default runs/CLIP/compare, RUN/compare)")
     return parser
 
 

@@ -12,8 +12,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.fit import import_ahead, out_folder, write_fit
-from galileo_jax.measured import Measured, load_clips, measure
-from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.measured import Measured, add_clip_options, load_clips, measure
 
 if TYPE_CHECKING:
     from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
@@ -259,13 +258,7 @@ def _parser() -> command.Parser:
     parser.add_argument(
         "--add", default="auto", metavar="auto|none|NAME", help="what to add to the model"
     )
-    parser.add_argument(
-        "--effects-from", action="append", default=[], metavar="FILE", help="more effects (Python)"
-    )
-    parser.add_argument("--out", help="folder (default runs/CLIP/diagnosis)")
-    parser.add_argument("--seed", type=command.whole_number(0), default=0)
-    parser.add_argument("--engine", choices=ENGINES, default="auto")
-    parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
+    add_clip_options(parser, out="folder (default runs/CLIP/diagnosis)")
     return parser
 
 

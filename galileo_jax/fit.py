@@ -17,8 +17,7 @@ from galileo_jax import command, jax_cache
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
-from galileo_jax.measured import Measured, load_clips, measure
-from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.measured import Measured, add_clip_options, load_clips, measure
 
 if TYPE_CHECKING:
     from galileo_jax.effects.effect import Effect
@@ -329,13 +328,7 @@ def _parser() -> command.Parser:
     parser.add_argument("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
     parser.add_argument("--method", choices=METHODS, default="grad")
     parser.add_argument("--effects", default="", help="a,b: effects in the model")
-    parser.add_argument(
-        "--effects-from", action="append", default=[], metavar="FILE", help="more effects (Python)"
-    )
-    parser.add_argument("--out", help="folder of the run (default runs/CLIP)")
-    parser.add_argument("--seed", type=command.whole_number(0), default=0)
-    parser.add_argument("--engine", choices=ENGINES, default="auto")
-    parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
+    add_clip_options(parser, out="folder of the run (default runs/CLIP)")
     group = parser.add_argument_group("--method mh")
     group.add_argument("--sampler", choices=("mixture", "random_walk"), default="mixture")
     group.add_argument(

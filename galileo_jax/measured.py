@@ -10,6 +10,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.errors import InputError
 from galileo_jax.observation import Observation, observe
+from galileo_jax.rollout.engine_names import ENGINES
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,17 @@ class Measured:
     def name(self) -> str:
         """The clip's, without folder and suffix."""
         return self.clip.path.stem
+
+
+def add_clip_options(parser: command.Parser, out: str) -> None:
+    """Adds what `fit`, `compare` and `diagnose` have in common; `out` is the help of --out."""
+    parser.add_argument(
+        "--effects-from", action="append", default=[], metavar="FILE", help="more effects (Python)"
+    )
+    parser.add_argument("--out", help=out)
+    parser.add_argument("--seed", type=command.whole_number(0), default=0)
+    parser.add_argument("--engine", choices=ENGINES, default="auto")
+    parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
 
 
 def load_clips(paths: Sequence[str], pixels_per_metre: float | None = None) -> list[Clip]:
