@@ -1,6 +1,9 @@
-"""Effects that the library does not have: a diagnosis should say `unknown`.
+"""Effects that the library does not have: a diagnosis should say `unknown`, or `ambiguous`.
 
     galileo simulate --effects-from benchmarks/exotic_effects.py --effect exotic_gust ...
+
+Ripple, gust and heating have the shape of one of the forms without a name (`effects/forms`); bump,
+drying, dying wind and root drag were written after these, and have not.
 
 A sticky spot is not among them: any short stretch that brakes is a `friction_patch`, and
 naming it so is right.
@@ -111,3 +114,71 @@ class Heating(Effect):
             return k * (1.0 + theta["exotic_heating"] * state.time_s)
 
         return law
+
+
+@register
+class Drying(Effect):
+    """Friction that jumps at one moment: k (1 + d) after t1, within 0.05 s, for all objects."""
+
+    name: ClassVar[str] = "exotic_drying"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Share d and time t1."""
+        return (
+            unknown("exotic_drying", "1", LogNormal(0.5, 0.3)),
+            unknown("exotic_drying_time", "s", Uniform(0.3, 0.5), 0.4),
+        )
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
+        """The coefficients at the time."""
+
+        def law(state: State, k: Array) -> Array:
+            late = (state.time_s - theta["exotic_drying_time"]) / 0.05
+            share = 0.5 * (1.0 + k.__array_namespace__().tanh(late))
+            return k * (1.0 + theta["exotic_drying"] * share)
+
+        return law
+
+
+@register
+class DyingWind(Effect):
+    """Wind along the path that dies down: F exp(-t / 0.3 s) on object 1."""
+
+    name: ClassVar[str] = "exotic_dying_wind"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Force at the release."""
+        return (unknown("exotic_dying_wind", "N", LogNormal(0.4, 0.4)),)
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
+        """The force at the time."""
+        size = scene.only(theta["exotic_dying_wind"], 0)
+
+        def wind(state: State) -> Array:
+            time = state.time_s + 0.0 * size
+            return size * size.__array_namespace__().exp(-time / 0.3)
+
+        return wind
+
+
+@register
+class RootDrag(Effect):
+    """Drag that grows with the root of the speed, on all objects: F = -c m sqrt(|v|) sign(v)."""
+
+    name: ClassVar[str] = "exotic_root_drag"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Coefficient c, m^0.5 s^-1.5."""
+        return (unknown("exotic_root_drag", "m^0.5 s^-1.5", LogNormal(0.6, 0.4)),)
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
+        """The force at the speeds."""
+
+        def drag(state: State) -> Array:
+            speed = state.speed_m_s
+            xp = speed.__array_namespace__()
+            mass = xp.stack(scene.mass(theta), axis=-1)
+            root = xp.sqrt(abs(speed) + 1e-9)
+            return -theta["exotic_root_drag"][..., None] * mass * speed / root
+
+        return drag

@@ -21,7 +21,15 @@ from galileo_jax.observation import observe
 from galileo_jax.tracking import track_clip
 
 EXOTIC_FILE = Path(__file__).with_name("exotic_effects.py")
-EXOTICS = ("exotic_bump", "exotic_gust", "exotic_heating", "exotic_ripple")
+EXOTICS = (
+    "exotic_bump",
+    "exotic_drying",
+    "exotic_dying_wind",
+    "exotic_gust",
+    "exotic_heating",
+    "exotic_ripple",
+    "exotic_root_drag",
+)
 ANGLES_DEG = (20.0, 10.0, 15.0)
 
 

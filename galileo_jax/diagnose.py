@@ -100,6 +100,7 @@ def _diagnose(
     jax_cache.enable()
     from galileo_jax.diagnosis.diagnose import diagnose
     from galileo_jax.diagnosis.document import diagnosis_document, history_row
+    from galileo_jax.effects.forms import FORM_NAMES
     from galileo_jax.effects.registry import effect_names
     from galileo_jax.inference.fits.gradient import Code
     from galileo_jax.run import make_trials
@@ -107,15 +108,19 @@ def _diagnose(
     clips, observations = [m.clip for m in measured], [m.observation for m in measured]
 
     def trials_with(names: Sequence[str]) -> "Trials":
+        from galileo_jax.effects.forms import FORMS
         from galileo_jax.effects.registry import make_effects
 
-        return make_trials(clips, observations, call.engine, make_effects(names))
+        forms = tuple(form for form in FORMS if form.name in names)
+        effects = make_effects([name for name in names if name not in FORM_NAMES])
+        return make_trials(clips, observations, call.engine, (*effects, *forms))
 
-    trials = trials_with(effect_names())
+    names = (*effect_names(), *FORM_NAMES)
+    trials = trials_with(names)
     if absent := _without_place(trials):
         if call.add in absent:
             raise InputError(f"--add: {call.add} has no place in {clips[0].path}")
-        trials = trials_with([name for name in effect_names() if name not in absent])
+        trials = trials_with([name for name in names if name not in absent])
     rows: list[dict[str, Any]] = []
     with command.console().status("starting") as status:
 

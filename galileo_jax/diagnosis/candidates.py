@@ -19,7 +19,7 @@ from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.trials import Trials
 from galileo_jax.parameters import inverse
 
-NUM_STARTS = 96
+STARTS_PER_PARAMETER, MOST_STARTS = 32, 96
 NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1
@@ -58,7 +58,7 @@ def fit_candidates(
     starts, owner = [], []
     for i, row in enumerate(free):
         starts.append(_starts(trials, base.fit, row, seed))
-        owner.append(np.full(NUM_STARTS, i))
+        owner.append(np.full(len(starts[-1]), i))
     z, of = np.concatenate(starts), np.concatenate(owner)
     costs = fitter.search_costs(z, free[of])
     chosen = []
@@ -124,18 +124,19 @@ def _starts(trials: Trials, base: GradientFit, free: np.ndarray, seed: int) -> n
     """Starts in z: new parameters over their priors, the others in one of three ways."""
     count = len(trials.model_parameters)
     generator = np.random.default_rng([seed, 41])
-    starts = np.tile(base.z[:count], (NUM_STARTS, 1))
     new = np.flatnonzero(free & ~base.free[:count])
-    share = np.stack([generator.permutation(NUM_STARTS) for _ in new], axis=1)
-    share = (share + generator.random(share.shape)) / NUM_STARTS
+    size = min(STARTS_PER_PARAMETER * len(new), MOST_STARTS)
+    starts = np.tile(base.z[:count], (size, 1))
+    share = np.stack([generator.permutation(size) for _ in new], axis=1)
+    share = (share + generator.random(share.shape)) / size
     starts[:, new] = ndtri(np.clip(share, 0.02, 0.98))
     parameters = trials.model_parameters
     zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
     rest = np.clip(zero, -1.0, 1.0)
     nuisance = np.array([p.role == "nuisance" for p in parameters])
     main = np.array([p.role != "nuisance" for p in parameters]) & base.free[:count]
-    spread = generator.standard_normal((NUM_STARTS, int(main.sum())))
-    way = np.arange(NUM_STARTS) % NUM_WAYS
+    spread = generator.standard_normal((size, int(main.sum())))
+    way = np.arange(size) % NUM_WAYS
     # Near the base fit; with the nuisances that it bent let go; and with all else let go, too.
     starts[np.ix_(way > 0, nuisance)] = rest[nuisance]
     starts[:, main] += np.where(way[:, None] == 2, SPREAD_Z, 0.1 * (way[:, None] == 1)) * spread

@@ -6,7 +6,9 @@
    prior, for how many were tried. Compare the best with the data, too.
 3. Candidates that are adequate and whose evidence is within a factor of the best's cannot
    be told from it: one is named, several are ambiguous.
-4. Where no single effect is adequate, the best is joined by each of the others.
+   The forms without a name (`effects/forms`) are candidates, too: what they explain as well is
+   not named, and what they alone explain is unknown.
+4. Where no single effect is adequate, the best is joined by those whose slopes stand out most.
 5. Where no pair is adequate either, the verdict is unknown, and the missing force is
    inferred without a form (`missing_force`).
 """
@@ -22,7 +24,8 @@ from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_t
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.left_out import left_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.effects.forms import FORM_NAMES
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter, Settings
 from galileo_jax.inference.result import error_of
 from galileo_jax.inference.trials import Trials
 
@@ -39,6 +42,7 @@ PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
 # look everywhere see less than one that knows where to look.
 CONVINCING = 10.0
 LEAST_GAIN = 10.0  # in nats, for another effect to be added
+NUM_JOINED = 8  # of the other effects, to the best: those with the largest scores
 
 
 def diagnose(
@@ -52,7 +56,8 @@ def diagnose(
     """Diagnoses trials whose models have the whole library.
 
     Args:
-      trials: one clip or several of the same objects; `all_effects` are the candidates.
+      trials: one clip or several of the same objects; `all_effects` (of the library, and the
+        forms without a name) are the candidates.
       seed: of starts and replicates; the same seed gives the same diagnosis.
       add: "auto": add what the verdict names, until the model is adequate or nothing helps;
         "none": only say what is missing; a name: add that effect, whatever the verdict.
@@ -62,22 +67,24 @@ def diagnose(
     Raises:
       ValueError: `add` names no effect of the trials' models.
     """
-    fitter = GradientFitter(trials)
+    fitter = GradientFitter(trials, Settings(num_exact=0))
     on_stage("fitting the model without effects")
     base = Hypothesis((), fitter.fit(seed, effects=()))
     on_stage("comparing it with the data")
     first = Round(base, compare(trials, base.fit, seed))
     on_round(first)
     rounds = [first]
+    library = [name for name in trials.all_effects if name not in FORM_NAMES]
     if add not in ("auto", "none"):
         trials.free([add])  # raises for unknown names
-    on_stage(f"fitting {len(trials.all_effects)} candidates")
+    on_stage(f"fitting {len(library)} candidates")
     singles = [(name,) for name in trials.all_effects]
     candidates = _candidates(fitter, base, singles, seed)
     if add not in ("auto", "none"):
         chosen = next(c for c in candidates if c.effects == (add,))
         rounds.append(_round(trials, chosen.hypothesis, seed, on_round))
-    if first.comparison.is_adequate and candidates[0].log_evidence < CONVINCING:
+    named = [c for c in candidates if not c.is_form]
+    if first.comparison.is_adequate and named[0].log_evidence < CONVINCING:
         return Diagnosis(tuple(rounds), candidates, Verdict("none", ()))
 
     on_stage("comparing the best candidates with the data")
@@ -87,8 +94,8 @@ def diagnose(
     verdict = _verdict(candidates, base.fit, decisive)
     if verdict is None:
         on_stage("fitting pairs of effects")
-        best = candidates[0]
-        pairs = [(*best.effects, name) for name in trials.all_effects if name not in best.effects]
+        best = named[0]
+        pairs = _pairs(trials, best, [name for name in library if name not in best.effects])
         joined = _candidates(fitter, best.hypothesis, pairs, seed, base)
         joined, compared_pairs = _compared(trials, joined, seed)
         compared |= compared_pairs
@@ -100,16 +107,19 @@ def diagnose(
         else:
             verdict = Verdict("unknown", ())
     if add == "auto" and verdict.status != "unknown":
-        chosen = candidates[0]
+        chosen = next(c for c in candidates if c.name in verdict.effects)
         extra = Round(chosen.hypothesis, compared[chosen.effects])
         on_round(extra)
         rounds.append(extra)
     elif add == "auto":
         # What helps most is shown, though it does not explain the data.
-        best = candidates[0]
+        best = named[0]
         if best.log_evidence > LEAST_GAIN:
-            rounds.append(Round(best.hypothesis, compared[best.effects]))
-            on_round(rounds[-1])
+            if best.effects in compared:
+                rounds.append(Round(best.hypothesis, compared[best.effects]))
+                on_round(rounds[-1])
+            else:
+                rounds.append(_round(trials, best.hypothesis, seed, on_round))
     verdict = replace(verdict, advice=advice(verdict, trials))
     missing = None
     if verdict.status == "unknown":
@@ -185,6 +195,13 @@ def _compared(
     return tuple(replace(c, confounded_with=names[c.effects]) for c in done), compared
 
 
+def _pairs(trials: Trials, best: Candidate, others: Sequence[str]) -> list[tuple[str, ...]]:
+    """The best with each of those others whose score stands out most."""
+    pairs = [(*best.effects, name) for name in others]
+    order = np.argsort(-score_tests(trials, best.hypothesis, pairs))
+    return [pairs[i] for i in order[:NUM_JOINED]]
+
+
 def _rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]:
     """Candidates that explain the data as well as this one."""
     if candidate.p_value is None:
@@ -199,7 +216,7 @@ def _rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...
 
 
 def _verdict(candidates: Sequence[Candidate], base: GradientFit, decisive: float) -> Verdict | None:
-    """Named or ambiguous; None where no candidate is adequate."""
+    """Named or ambiguous, or unknown where only forms are adequate; None where nothing is."""
     adequate = [c for c in candidates if c.p_value is not None and _explains(c, base)]
     if not adequate or candidates[0].log_evidence < 0:
         return None
@@ -207,9 +224,13 @@ def _verdict(candidates: Sequence[Candidate], base: GradientFit, decisive: float
     if candidates[0].log_evidence - top > decisive:
         return None
     equal = [c for c in adequate if top - c.log_evidence < decisive]
-    if len(equal) == 1:
+    names = [c.name for c in equal if not c.is_form]
+    forms = [c.name for c in equal if c.is_form][:1]
+    if not names:
+        return Verdict("unknown", ())
+    if len(names) == 1 and not forms:
         return Verdict("named", equal[0].effects)
-    return Verdict("ambiguous", tuple(c.name for c in equal))
+    return Verdict("ambiguous", (*names, *forms))
 
 
 def _explains(candidate: Candidate, base: GradientFit) -> bool:

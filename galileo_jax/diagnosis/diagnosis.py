@@ -7,6 +7,7 @@ import numpy as np
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.effects.forms import FORM_NAMES
 
 Status = Literal["none", "named", "ambiguous", "unknown"]
 
@@ -40,6 +41,11 @@ class Candidate:
         """The effects, joined by +."""
         return "+".join(self.effects)
 
+    @property
+    def is_form(self) -> bool:
+        """Whether it is a form without a name."""
+        return any(name in FORM_NAMES for name in self.effects)
+
 
 @dataclass(frozen=True)
 class Verdict:
@@ -48,7 +54,7 @@ class Verdict:
     Attributes:
       status: none, named, ambiguous or unknown.
       effects: one effect (or set) where it is named, all that explain the data equally well
-        where it is ambiguous.
+        where it is ambiguous; a form without a name stands last.
       advice: what would tell more, one sentence each.
     """
 

@@ -1,6 +1,8 @@
 """Batches and lengths of any size through programs compiled for a few."""
 
-from collections.abc import Callable, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import jax
@@ -8,7 +10,7 @@ import numpy as np
 
 # Sizes are rounded up to multiples of these, so that few programs serve all clips.
 FRAMES, MODES, RECORDS = 64, 64, 512
-MOTIONS = (16, 64, 256)  # of batches of rollouts
+MOTIONS = (16, 64)  # of batches of rollouts
 
 
 def rounded_up(size: int, multiple: int) -> int:
@@ -33,17 +35,32 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
 
     Returns:
       What one call for the whole batch would, as NumPy arrays. The last part repeats its first
-      row until it has one of the sizes.
+      row until it has one of the sizes. Parts run side by side, one per core.
     """
     count = len(jax.tree.leaves(batches[0])[0])
-    parts, begin = [], 0
+
+    def part(begin: int, end: int, size: int) -> Any:
+        index = np.concatenate([np.arange(begin, end), np.full(size - (end - begin), begin)])
+        out = function(*jax.tree.map(lambda leaf: np.asarray(leaf)[index], batches))
+        return jax.tree.map(lambda leaf: np.asarray(leaf)[: end - begin], out)
+
+    # XLA runs small operations, one after the other, on a single core.
+    with ThreadPoolExecutor(_num_cores()) as pool:
+        parts = list(pool.map(lambda cut: part(*cut), _cuts(count, sizes)))
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)
+
+
+def _num_cores() -> int:
+    """Of those that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _cuts(count: int, sizes: Sequence[int]) -> Iterator[tuple[int, int, int]]:
+    """Begin, end and padded size of each part."""
+    begin = 0
     while begin < count:
         left = count - begin
         size = next((size for size in sizes if size >= left), sizes[-1])
-        taken = min(size, left)
-        index = np.arange(begin, begin + taken)
-        index = np.concatenate([index, np.full(size - taken, begin)])
-        out = function(*jax.tree.map(lambda leaf, rows=index: np.asarray(leaf)[rows], batches))
-        parts.append(jax.tree.map(lambda leaf, kept=taken: np.asarray(leaf)[:kept], out))
-        begin += taken
-    return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)
+        end = begin + min(size, left)
+        yield begin, end, size
+        begin = end

@@ -55,6 +55,11 @@ DAMPINGS = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
 # the plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
+# A fit that is so many nats behind another, and makes up less than this share of it in a step, is
+# left where it is.
+BEHIND, CATCHES_UP = 100.0, 0.1
+# Starts of one hypothesis, in nats of the search's coarse noise, and after how many steps.
+BEHIND_IN_SEARCH, STEPS_BEFORE_GIVING_UP = 20.0, 3
 FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
 
 
@@ -70,6 +75,8 @@ class Settings:
       max_steps: Levenberg-Marquardt steps from one start.
       max_polish_steps: with slopes at the posterior's scale.
       enough: stop where a step lowers chi2 / 2 by less.
+      num_exact: up to so many points at once, optimistix solves the steps with clock and camera
+        exact; its program takes some seconds to build, so that 0 is quicker for a library.
       settled: converged where neither a step with slopes at the posterior's scale nor a walk of
         one or three sd along the softest directions lowers chi2 / 2 by more.
     """
@@ -80,6 +87,7 @@ class Settings:
     max_polish_steps: int = 15
     max_steps: int = 15
     enough: float = 0.5
+    num_exact: int = 4
     settled: float = 0.5
 
 
@@ -154,6 +162,7 @@ class GradientFitter:
         self.trials, self.settings = trials, settings
         self._clips = tuple(_Clip.of(trials, c) for c in range(len(trials.problems)))
         self._count = len(trials.model_parameters)
+        self._num_values = np.array([p.data.num_values for p in trials.problems], float)
         parameters = trials.model_parameters
         self._is_simulated = np.array([p.step is not None for p in parameters])
         is_smooth = trials.problems[0].engine.name == "rigid"
@@ -214,7 +223,7 @@ class GradientFitter:
           One fit per hypothesis, of its best start.
         """
         self._num_rollouts = 0
-        found, costs, num_steps = self._search(self._batch(starts, free))
+        found, costs, num_steps = self._search(self._batch(starts, free), owner)
         best = []
         for hypothesis in range(int(owner.max()) + 1):
             own = np.flatnonzero(owner == hypothesis)
@@ -243,8 +252,14 @@ class GradientFitter:
         noise = np.tile([clip.search_noise(self.settings) for clip in self._clips], (len(z), 1))
         return Batch(np.where(free, z, 0.0), free, noise)
 
-    def _search(self, points: Batch) -> tuple[Batch, np.ndarray, int]:
-        """Levenberg-Marquardt with coarse slopes from every point."""
+    def _search(
+        self, points: Batch, owner: np.ndarray | None = None
+    ) -> tuple[Batch, np.ndarray, int]:
+        """Levenberg-Marquardt with coarse slopes from every point.
+
+        Of points with the same `owner` (default: each has its own), those far behind are given up.
+        """
+        owner = np.arange(len(points.z)) if owner is None else owner
         z, num_steps = points.z.copy(), 0
         costs = self._costs(points)
         active = np.arange(len(z))
@@ -256,6 +271,10 @@ class GradientFitter:
             z[active], costs[active] = moved, after
             num_steps += 1
             active = active[gain >= self.settings.enough]
+            if num_steps >= STEPS_BEFORE_GIVING_UP:
+                lowest = np.full(owner.max() + 1, np.inf)
+                np.minimum.at(lowest, owner, costs)
+                active = active[costs[active] - lowest[owner[active]] < BEHIND_IN_SEARCH]
             if not active.size:
                 break
         return Batch(z, points.free, points.noise), costs, num_steps
@@ -267,6 +286,7 @@ class GradientFitter:
         count = len(z)
         steps = np.tile(self.trials.coarse_steps, (count, 1))
         is_settled = np.zeros(count, bool)
+        misfit = np.full(count, np.inf)  # with what the noise scale costs
         active = np.arange(count)
         for _ in range(settings.max_polish_steps):
             here = Batch(z, points.free, noise).take(active)
@@ -294,7 +314,10 @@ class GradientFitter:
                 settled = after[chosen] - lowest < settings.settled
                 is_settled[active[chosen[settled]]] = True
                 z[active[chosen[~settled]]] = best[~settled]
-            active = active[~is_settled[active]]
+            misfit[active] = after + np.log(scales) @ self._num_values
+            behind = misfit[active] - misfit.min()
+            gives_up = (behind > BEHIND) & (cost - after < CATCHES_UP * behind)
+            active = active[~is_settled[active] & ~gives_up]
             if not active.size:
                 break
         return self._finish(Batch(z, points.free, noise), steps, is_settled, num_steps)
@@ -374,7 +397,7 @@ class GradientFitter:
         self, points: Batch, motions: tuple, jacobian: list, white: list, costs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """The best of all dampings' proposals, or the point itself."""
-        if len(points.z) <= POINTS[0]:
+        if len(points.z) <= self.settings.num_exact:
             tried = self._propose_near(points, motions, jacobian)
         else:
             tried = _propose_linear(points, jacobian, white)

@@ -1,0 +1,100 @@
+"""Forms without a name: in no list of names, nothing at absent, and what they do when present."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from galileo_jax.effects import effect_names
+from galileo_jax.effects.effect import State
+from galileo_jax.effects.forms import FORM_NAMES, FORMS
+from galileo_jax.rollout.motion import dynamics
+from tests.effects.motion import INCLINE, PAIR
+
+K = np.array([0.2, 0.3])
+STATE = State(np.array([-0.3, 0.1]), np.array([0.5, 0.2]), 0.4, np.array([True, False]))
+
+
+def theta(**given):
+    found = {p.name: np.asarray(p.absent) for form in FORMS for p in form.parameters(PAIR)}
+    masses = {"m1": np.asarray(0.5), "m2": np.asarray(0.25)}
+    return found | masses | {name: np.asarray(value) for name, value in given.items()}
+
+
+def named(name):
+    return next(form for form in FORMS if form.name == name)
+
+
+def test_they_have_no_place_among_the_names():
+    assert not set(FORM_NAMES) & set(effect_names())
+
+
+@pytest.mark.parametrize("form", FORMS, ids=FORM_NAMES)
+def test_parameters(form):
+    strength, *others = form.parameters(PAIR)
+    assert strength.name == form.name and strength.absent == 0.0
+    assert all(p.name.startswith(f"{form.name}_") for p in others)
+    assert all(p.role == "effect" for p in (strength, *others))
+
+
+def test_friction_grows_with_time():
+    law = named("friction_with_time").friction(theta(friction_with_time=0.5), PAIR)
+    assert law(STATE, K) == pytest.approx(K * 1.2)
+
+
+def test_friction_grows_with_place_and_is_never_negative():
+    law = named("friction_with_place").friction(theta(friction_with_place=2.0), PAIR)
+    assert law(STATE, K) == pytest.approx(K * [0.4, 1.2])
+    assert (law(STATE._replace(path_m=np.array([-0.6, 0.1])), K) >= 0).all()
+
+
+def test_friction_waves_in_place():
+    values = theta(
+        friction_waves_in_place=0.05,
+        friction_waves_in_place_later=0.02,
+        friction_waves_in_place_length=0.4,
+    )
+    law = named("friction_waves_in_place").friction(values, PAIR)
+    # Three quarters of a wave before the foot, and a quarter past it.
+    assert law(STATE, K) == pytest.approx(K + 0.02)
+
+
+def test_force_waves_in_time():
+    values = theta(force_waves_in_time=1.5, force_waves_in_time_period=0.4)
+    force = named("force_waves_in_time").force(values, PAIR)
+    assert force(STATE) == pytest.approx(np.array([0.5, 0.25]) * 1.5)
+    assert force(STATE._replace(time_s=0.6)) == pytest.approx(np.array([0.5, 0.25]) * -1.5)
+
+
+def test_force_at_a_time():
+    values = theta(force_at_a_time=2.0, force_at_a_time_moment=0.3, force_at_a_time_duration=0.1)
+    force = named("force_at_a_time").force(values, PAIR)
+    assert force(STATE) == pytest.approx(np.array([0.5 * 2.0 * np.exp(-1.0), 0.0]))
+
+
+@pytest.mark.parametrize("scene", [PAIR, INCLINE], ids=["pair", "incline"])
+@pytest.mark.parametrize("form", FORMS, ids=FORM_NAMES)
+def test_absent_is_nothing_at_all_with_a_finite_slope(form, scene):
+    count = len(scene.names)
+    state = State(*(jnp.asarray(v)[:count] for v in STATE[:2]), STATE[2], STATE[3][:count])
+    k = jnp.asarray(K)[:count]
+    usual = {name: jnp.asarray(value) for name, value in theta().items()}
+
+    def after(values):
+        law, force = form.friction(values, scene), form.force(values, scene)
+        return (k if law is None else law(state, k)), (0 * k if force is None else force(state))
+
+    friction, pull = after(usual)
+    assert (friction == k).all() and (pull == 0.0).all()
+    slopes = jax.tree.leaves(jax.jacfwd(after)(usual))
+    assert all(np.isfinite(slope).all() for slope in slopes)
+
+
+def test_a_fall_has_no_friction_to_change():
+    fall = replace(INCLINE, has_surface=False)
+    without = {form.name for form in FORMS if not form.parameters(fall)}
+    assert without == {"friction_waves_in_place", "friction_with_place", "friction_with_time"}
+    law = dynamics(FORMS, fall, {"m1": jnp.ones(())} | theta(), jnp)
+    assert np.isfinite(law.drive(STATE._replace(path_m=np.zeros(1), speed_m_s=np.zeros(1)))).all()
