@@ -228,15 +228,19 @@ def _told(
     diagnosis: "Diagnosis", record: dict[str, Any], go_on: str, hidden: str | None
 ) -> list[str]:
     """Candidates, the verdict, and how to go on."""
+    from galileo_jax.inference.fits.gradient import BEHIND, Code
     from galileo_jax.report import findings
 
-    lines = ["", f"{'candidates':<26}{'probability':>12}{'evidence':>10}{'p':>9}  strength"]
+    lines = ["", f"{'candidates':<26}{'probability':>12}{'evidence':>12}{'p':>9}  strength"]
     for made, told in list(zip(diagnosis.candidates, record["candidates"], strict=True))[
         :NUM_CANDIDATES
     ]:
         strengths = findings.strengths(made.effects, told["parameters"]).values()
+        is_behind = diagnosis.candidates[0].log_evidence - told["score"] > BEHIND
+        is_settled = made.hypothesis.fit.code is Code.CONVERGED
+        evidence = "far behind" if is_behind and not is_settled else f"{told['score']:+.1f}"
         lines.append(
-            f"{told['effect']:<26}{told['probability']:>12.3f}{told['score']:>+10.1f}"
+            f"{told['effect']:<26}{told['probability']:>12.3f}{evidence:>12}"
             f"{findings.p_text(told['p_value']):>9}  "
             + ", ".join(findings.value_text(entry) for entry in strengths)
         )

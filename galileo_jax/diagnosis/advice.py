@@ -1,6 +1,7 @@
 """What measurement would tell apart what this one does not."""
 
 from galileo_jax.diagnosis.diagnosis import Verdict
+from galileo_jax.effects.forms import FORM_MEANINGS
 from galileo_jax.inference.trials import Trials
 
 # Groups of effects that imitate each other, and what separates them.
@@ -44,7 +45,10 @@ def advice(verdict: Verdict, trials: Trials) -> tuple[str, ...]:
     """Sentences for the user: what would tell more. Empty where nothing is open."""
     several = len(trials.problems) > 1
     if verdict.status == "unknown":
+        form = verdict.form
+        known = () if form is None else (f"it has the form of {FORM_MEANINGS[form]} ({form})",)
         return (
+            *known,
             "look at the missing acceleration against time, speed and place: an effect of your own "
             "takes ten lines (docs/effects.md), then run diagnose with --effects-from",
         )
@@ -56,6 +60,12 @@ def advice(verdict: Verdict, trials: Trials) -> tuple[str, ...]:
         for group, how in SEPARATES
         if len(named & group) > 1
     ]
+    if forms := named & set(FORM_MEANINGS):
+        meant = " or ".join(FORM_MEANINGS[form] for form in sorted(forms))
+        said.append(
+            f"it may as well be {meant}: release from another height, for what belongs to a place "
+            "stays there, and what belongs to a speed comes with it"
+        )
     if not said:
         said = ["release object 1 from another height, or use another angle of the ramp"]
     if not several:

@@ -41,6 +41,9 @@ PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
 # In nats, at which a candidate is believed although the comparison shows no misfit: tests that
 # look everywhere see less than one that knows where to look.
 CONVINCING = 10.0
+# A form must be better than a name by this share of what either gains: engines and real bodies differ
+# from the model by some share of every force, and a form with three parameters bends to that.
+FORM_SHARE = 0.05
 LEAST_GAIN = 10.0  # in nats, for another effect to be added
 NUM_JOINED = 8  # of the other effects, to the best: those with the largest scores
 
@@ -216,21 +219,23 @@ def _rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...
 
 
 def _verdict(candidates: Sequence[Candidate], base: GradientFit, decisive: float) -> Verdict | None:
-    """Named or ambiguous, or unknown where only forms are adequate; None where nothing is."""
+    """Named or ambiguous, or unknown where only a form will do; None where nothing does."""
+    best = candidates[0].log_evidence
     adequate = [c for c in candidates if c.p_value is not None and _explains(c, base)]
-    if not adequate or candidates[0].log_evidence < 0:
+    if not adequate or best < 0:
         return None
-    top = max(c.log_evidence for c in adequate)
-    if candidates[0].log_evidence - top > decisive:
+    names, forms = ([c for c in adequate if c.is_form == is_form] for is_form in (False, True))
+    margin = max(decisive, FORM_SHARE * best)
+    top = max((c.log_evidence for c in names), default=-np.inf)
+    if forms and forms[0].log_evidence - top > margin:
+        return Verdict("unknown", (), forms[0].name)
+    if best - top > (margin if candidates[0].is_form else decisive):
         return None
-    equal = [c for c in adequate if top - c.log_evidence < decisive]
-    names = [c.name for c in equal if not c.is_form]
-    forms = [c.name for c in equal if c.is_form][:1]
-    if not names:
-        return Verdict("unknown", ())
-    if len(names) == 1 and not forms:
-        return Verdict("named", equal[0].effects)
-    return Verdict("ambiguous", (*names, *forms))
+    equal = [c.name for c in names if top - c.log_evidence < decisive]
+    alike = [c.name for c in forms if abs(top - c.log_evidence) < decisive]
+    if len(equal) == 1 and not alike:
+        return Verdict("named", next(c.effects for c in names if c.name == equal[0]))
+    return Verdict("ambiguous", (*equal, *alike[:1]))
 
 
 def _explains(candidate: Candidate, base: GradientFit) -> bool:

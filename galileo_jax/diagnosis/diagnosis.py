@@ -55,11 +55,14 @@ class Verdict:
       status: none, named, ambiguous or unknown.
       effects: one effect (or set) where it is named, all that explain the data equally well
         where it is ambiguous; a form without a name stands last.
+      form: where it is unknown: the form without a name that explains the data; None if not
+        even that is known.
       advice: what would tell more, one sentence each.
     """
 
     status: Status
     effects: tuple[str, ...]
+    form: str | None = None
     advice: tuple[str, ...] = ()
 
 

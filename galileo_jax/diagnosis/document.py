@@ -27,6 +27,7 @@ def diagnosis_document(trials: Trials, diagnosis: Diagnosis, seed: int) -> dict[
         "verdict": {
             "status": diagnosis.verdict.status,
             "effects": list(diagnosis.verdict.effects),
+            "form": diagnosis.verdict.form,
             "advice": list(diagnosis.verdict.advice),
         },
         "history": [history_row(trials, each, seed) for each in diagnosis.rounds],

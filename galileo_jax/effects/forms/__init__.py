@@ -14,14 +14,14 @@ patch of friction has that of a gust.
 They are effects like any other but in no list of names: `fit --effects` does not know them.
 """
 
-from galileo_jax.effects.effect import Effect
 from galileo_jax.effects.forms.force_at_a_time import ForceAtATime
 from galileo_jax.effects.forms.force_waves_in_time import ForceWavesInTime
+from galileo_jax.effects.forms.form import Form
 from galileo_jax.effects.forms.friction_waves_in_place import FrictionWavesInPlace
 from galileo_jax.effects.forms.friction_with_place import FrictionWithPlace
 from galileo_jax.effects.forms.friction_with_time import FrictionWithTime
 
-FORMS: tuple[Effect, ...] = (
+FORMS: tuple[Form, ...] = (
     ForceAtATime(),
     ForceWavesInTime(),
     FrictionWavesInPlace(),
@@ -31,3 +31,4 @@ FORMS: tuple[Effect, ...] = (
 """In the order in which their hooks are applied, after the library's."""
 
 FORM_NAMES = tuple(form.name for form in FORMS)
+FORM_MEANINGS = {form.name: form.meaning for form in FORMS}

@@ -6,7 +6,8 @@ a(t) = force_at_a_time exp(-((t - moment) / duration)^2),    F = m a
 import math
 from typing import ClassVar
 
-from galileo_jax.effects.effect import Array, Effect, Force, State, Surroundings, Theta
+from galileo_jax.effects.effect import Array, Force, State, Surroundings, Theta
+from galileo_jax.effects.forms.form import Form
 from galileo_jax.parameters import LogNormal, Normal, Parameter, Uniform
 
 PRIOR = Normal(0.0, 2.0)
@@ -15,10 +16,11 @@ LAST_FALLS = 6.0  # moments are looked for until so many times the free fall thr
 LEAST_WAY_M = 0.2
 
 
-class ForceAtATime(Effect):
+class ForceAtATime(Form):
     """An acceleration of object 1 at one moment of each trial."""
 
     name: ClassVar[str] = "force_at_a_time"
+    meaning: ClassVar[str] = "a push or pull on object 1 at one moment"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How strong, when, and how long."""

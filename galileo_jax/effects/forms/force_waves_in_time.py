@@ -8,17 +8,19 @@ A = force_waves_in_time, B = force_waves_in_time_later.
 import math
 from typing import ClassVar
 
-from galileo_jax.effects.effect import Array, Effect, Force, State, Surroundings, Theta
+from galileo_jax.effects.effect import Array, Force, State, Surroundings, Theta
+from galileo_jax.effects.forms.form import Form
 from galileo_jax.parameters import LogNormal, Normal, Parameter
 
 PRIOR = Normal(0.0, 1.0)
 PERIOD_PRIOR = LogNormal(median=0.2, sd=0.7)
 
 
-class ForceWavesInTime(Effect):
+class ForceWavesInTime(Form):
     """An acceleration of all objects that waves in time."""
 
     name: ClassVar[str] = "force_waves_in_time"
+    meaning: ClassVar[str] = "a force that comes and goes with time"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two strengths, a quarter of a period apart, and the period."""

@@ -8,17 +8,19 @@ A = friction_waves_in_place, B = friction_waves_in_place_later, q along the path
 import math
 from typing import ClassVar
 
-from galileo_jax.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
+from galileo_jax.effects.effect import Array, Friction, State, Surroundings, Theta
+from galileo_jax.effects.forms.form import Form
 from galileo_jax.parameters import LogNormal, Normal, Parameter
 
 PRIOR = Normal(0.0, 0.1)
 LENGTH_PRIOR = LogNormal(median=0.2, sd=0.7)
 
 
-class FrictionWavesInPlace(Effect):
+class FrictionWavesInPlace(Form):
     """Coefficients of all objects that wave along the path."""
 
     name: ClassVar[str] = "friction_waves_in_place"
+    meaning: ClassVar[str] = "friction that waves along the path"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two strengths, a quarter of a wave apart, and its length; none in a fall."""

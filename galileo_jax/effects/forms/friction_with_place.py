@@ -5,16 +5,18 @@ k(q) = max(0, k (1 + friction_with_place q))    for every object, q along the pa
 
 from typing import ClassVar
 
-from galileo_jax.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
+from galileo_jax.effects.effect import Array, Friction, State, Surroundings, Theta
+from galileo_jax.effects.forms.form import Form
 from galileo_jax.parameters import Normal, Parameter
 
 PRIOR = Normal(0.0, 1.0)
 
 
-class FrictionWithPlace(Effect):
+class FrictionWithPlace(Form):
     """Coefficients of all objects that change along the path."""
 
     name: ClassVar[str] = "friction_with_place"
+    meaning: ClassVar[str] = "friction that grows or falls along the path"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per metre; none in a fall."""

@@ -5,16 +5,18 @@ k(t) = max(0, k (1 + friction_with_time t))    for every object, t since the rel
 
 from typing import ClassVar
 
-from galileo_jax.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
+from galileo_jax.effects.effect import Array, Friction, State, Surroundings, Theta
+from galileo_jax.effects.forms.form import Form
 from galileo_jax.parameters import Normal, Parameter
 
 PRIOR = Normal(0.0, 1.0)
 
 
-class FrictionWithTime(Effect):
+class FrictionWithTime(Form):
     """Coefficients of all objects that change with time."""
 
     name: ClassVar[str] = "friction_with_time"
+    meaning: ClassVar[str] = "friction that grows or falls with time"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per second; none in a fall."""
