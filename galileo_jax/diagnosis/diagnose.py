@@ -41,8 +41,8 @@ PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
 # In nats, at which a candidate is believed although the comparison shows no misfit: tests that
 # look everywhere see less than one that knows where to look.
 CONVINCING = 10.0
-# A form must be better than a name by this share of what either gains: engines and real bodies differ
-# from the model by some share of every force, and a form with three parameters bends to that.
+# A form must be better than a name by this share of what it gains: engines and real bodies differ from
+# the model by some share of every force, and a form with three parameters bends to that.
 FORM_SHARE = 0.05
 LEAST_GAIN = 10.0  # in nats, for another effect to be added
 NUM_JOINED = 8  # of the other effects, to the best: those with the largest scores
@@ -187,9 +187,11 @@ def _compared(
     """The best candidates with their p-values and with whom they are confounded."""
     compared, done = {}, []
     top = candidates[0].log_evidence
+    first = {candidates[0].name, *[c.name for c in candidates if not c.is_form][:1]}
     for i, candidate in enumerate(candidates):
         # The best is always looked at; others only where they could be confused with it.
-        if i == 0 or (i < NUM_COMPARED and top - candidate.log_evidence < 2 * DECISIVE):
+        is_near = i < NUM_COMPARED and top - candidate.log_evidence < 2 * DECISIVE
+        if candidate.name in first or is_near:
             found = compare(trials, candidate.hypothesis.fit, seed)
             compared[candidate.effects] = found
             candidate = replace(candidate, p_value=found.p_value)
