@@ -41,8 +41,8 @@ PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
 # In nats, at which a candidate is believed although the comparison shows no misfit: tests that
 # look everywhere see less than one that knows where to look.
 CONVINCING = 10.0
-# A form must be better than a name by this share of what it gains: engines and real bodies differ from
-# the model by some share of every force, and a form with three parameters bends to that.
+# A form must be better than a name by this share of what it gains: engines and real bodies differ
+# from the model by a share of every force, and a form with three parameters bends to that.
 FORM_SHARE = 0.05
 LEAST_GAIN = 10.0  # in nats, for another effect to be added
 NUM_JOINED = 8  # of the other effects, to the best: those with the largest scores
