@@ -5,6 +5,11 @@ along the effect's slope, what the other parameters take up already left out? It
 rollout each. Then a joint fit with all other parameters, from several starts, and the evidence
 of the hypothesis by Laplace's method: it charges for every parameter by how much of its prior
 the data rule out.
+
+Where an effect is (its place, moment, wavelength) is a question with many wrong answers near
+the right one. Two kinds of starts answer it: scattered ones; and matched ones, the shapes whose
+slopes at no strength take most of the misfit away (a matched filter: the score test over all
+shapes). The best of either kind is refined.
 """
 
 from collections.abc import Sequence
@@ -25,6 +30,9 @@ NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best 
 PROBE_Z = 0.1
 SMALL_QUANTILE_Z = -2.0
 NUM_REFITTED = 3
+NUM_SHAPES, NUM_MATCHED = 96, 3  # tried per candidate whose effect has a shape; kept as starts
+SHOWS = 1e-9  # a slope below does not
+MOST_Z = 2.5  # of a matched strength's prior
 SPREAD_Z = 0.7  # of starts round the fit without the candidate
 
 
@@ -55,27 +63,22 @@ def fit_candidates(
     trials = fitter.trials
     count = len(trials.model_parameters)
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
-    starts, owner = [], []
-    for i, row in enumerate(free):
-        starts.append(_starts(trials, base.fit, row, seed))
-        owner.append(np.full(len(starts[-1]), i))
-    z, of = np.concatenate(starts), np.concatenate(owner)
-    costs = fitter.search_costs(z, free[of])
-    chosen = []
-    for i in range(len(candidates)):
-        for way in range(NUM_WAYS):
-            own = np.flatnonzero(of == i)[way::NUM_WAYS]
-            chosen.append(own[np.argmin(costs[own])])
-    fits = fitter.fit_from(z[chosen], free[of[chosen]], of[chosen])
+    chosen = _scattered(fitter, base.fit, free, seed)
+    matched = [_matched(trials, base.fit, effects, seed) for effects in candidates]
+    z = np.concatenate([np.concatenate([a, b]) for a, b in zip(chosen, matched, strict=True)])
+    sizes = [(len(a), len(b)) for a, b in zip(chosen, matched, strict=True)]
+    of = np.repeat(np.arange(len(sizes)), [a + b for a, b in sizes])
+    kind = np.concatenate([np.repeat([0, 1], pair) for pair in sizes])
+    found = fitter.fit_from(z, free[of], 2 * of + kind)
+    fits = [max(pair, key=_evidence) for pair in zip(found[::2], found[1::2], strict=True)]
     # The winners are looked at once more: their order must not hang on a side valley.
     # The search's coarse noise cannot say which of a candidate's starts ends best, either.
     winners = np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]
-    rows = np.concatenate([np.array(chosen)[of[chosen] == i] for i in winners])
+    rows = np.flatnonzero(np.isin(of, winners))
     again = fitter.fit_from(z[rows], free[of[rows]], np.arange(len(rows)))
     for i in winners:
         tried = [fit for row, fit in zip(rows, again, strict=True) if of[row] == i]
-        tried += [fits[i], fitter.refit(fits[i])]
-        fits[i] = max(tried, key=lambda fit: fit.log_evidence)
+        fits[i] = max([*tried, fits[i], fitter.refit(fits[i])], key=_evidence)
     return [Hypothesis(tuple(e), fit) for e, fit in zip(candidates, fits, strict=True)]
 
 
@@ -102,11 +105,9 @@ def score_tests(
         sizes.append(size)
     white = np.concatenate(whitened(trials, np.stack(probes), scale), axis=1)
     residual, slopes = white[0], white[1:] - white[:1]
-    used = base.fit.jacobian[:, base.fit.free[:count]]
-    basis, _ = np.linalg.qr(used)
-    slopes = slopes - (slopes @ basis) @ basis.T
+    residual, slopes = _beside(base.fit, residual, slopes)
     length = np.linalg.norm(slopes, axis=1)
-    return np.abs(slopes @ residual) / np.where(length > 1e-9, length, np.inf)
+    return np.abs(slopes @ residual) / np.where(length > SHOWS, length, np.inf)
 
 
 def _strength(trials: Trials, effect: str) -> tuple[np.ndarray, float]:
@@ -120,6 +121,79 @@ def _strength(trials: Trials, effect: str) -> tuple[np.ndarray, float]:
     return np.array(own if first.per_clip else own[:1]), float(first.prior.forward(jnp.asarray(at)))
 
 
+def _evidence(fit: GradientFit) -> float:
+    return fit.log_evidence
+
+
+def _scattered(
+    fitter: GradientFitter, base: GradientFit, free: np.ndarray, seed: int
+) -> list[np.ndarray]:
+    """For each hypothesis the best of its scattered starts in each way, `[way, z]`."""
+    starts = [_starts(fitter.trials, base, row, seed) for row in free]
+    of = np.repeat(np.arange(len(free)), [len(own) for own in starts])
+    costs = fitter.search_costs(np.concatenate(starts), free[of])
+    chosen = []
+    for i, own in enumerate(starts):
+        cost = costs[of == i]
+        ways = [np.arange(way, len(own), NUM_WAYS) for way in range(NUM_WAYS)]
+        chosen.append(own[[way[np.argmin(cost[way])] for way in ways]])
+    return chosen
+
+
+def _matched(trials: Trials, base: GradientFit, effects: Sequence[str], seed: int) -> np.ndarray:
+    """The shapes of the last effect that match the base fit's residuals best, `[start, z]`.
+
+    For each shape the strength is the one that its slope at no strength asks for.
+    """
+    count = len(trials.model_parameters)
+    where, size = _strength(trials, effects[-1])
+    free = trials.free(effects)[:count]
+    new = np.flatnonzero(free & ~base.free[:count])
+    shape = np.setdiff1d(new, where)
+    number = NUM_SHAPES if len(shape) else 1
+    generator = np.random.default_rng([seed, 43])
+    z = np.tile(base.z, (number, 1))
+    z[:, shape] = ndtri(np.clip(_latin(generator, number, len(shape)), 0.02, 0.98))
+    here = trials.theta(base.z, base.free)
+    probes = np.array(trials.theta(z, np.append(free, base.free[count:])))
+    probes[:, where] = size
+    white = np.concatenate(whitened(trials, np.vstack([here, probes]), here[count:]), axis=1)
+    residual, slopes = _beside(base, white[0], white[1:] - white[:1])
+    power = np.sum(slopes**2, axis=1)
+    along = slopes @ residual
+    gain = np.where(power > SHOWS, along**2 / np.maximum(power, SHOWS), 0.0)
+    best = np.argsort(-gain)[:NUM_MATCHED]
+    # As far as the slope goes: the strength at which the residuals along it would vanish.
+    wanted = probes[best]
+    wanted[:, where] = (-along / np.maximum(power, SHOWS))[best, None] * size
+    priors = [trials.model_parameters[i].prior for i in where]
+    for column, prior in zip(where, priors, strict=True):
+        found = np.asarray(prior.inverse(jnp.asarray(wanted[:, column])))
+        z[best, column] = np.clip(np.nan_to_num(found, nan=-MOST_Z), -MOST_Z, MOST_Z)
+    return np.where(free, z[best, :count], 0.0)
+
+
+def _beside(
+    base: GradientFit, residual: np.ndarray, slopes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals and slopes without what the parameters that are there can take up.
+
+    The priors' residuals count among both: a nuisance that is bent is a misfit, too.
+    """
+    free = base.free[: base.jacobian.shape[1]]
+    used = np.vstack([base.jacobian[:, free], np.eye(int(free.sum()))])
+    basis, _ = np.linalg.qr(used)
+    whole = np.append(residual, base.z[: len(free)][free])
+    padded = np.pad(slopes, [(0, 0), (0, int(free.sum()))])
+    return whole - basis @ (basis.T @ whole), padded - (padded @ basis) @ basis.T
+
+
+def _latin(generator: np.random.Generator, size: int, num: int) -> np.ndarray:
+    """A Latin hypercube in the unit cube, `[point, axis]`."""
+    ranks = np.array([generator.permutation(size) for _ in range(num)]).reshape(num, size).T
+    return (ranks + generator.random(ranks.shape)) / size
+
+
 def _starts(trials: Trials, base: GradientFit, free: np.ndarray, seed: int) -> np.ndarray:
     """Starts in z: new parameters over their priors, the others in one of three ways."""
     count = len(trials.model_parameters)
@@ -127,9 +201,7 @@ def _starts(trials: Trials, base: GradientFit, free: np.ndarray, seed: int) -> n
     new = np.flatnonzero(free & ~base.free[:count])
     size = min(STARTS_PER_PARAMETER * len(new), MOST_STARTS)
     starts = np.tile(base.z[:count], (size, 1))
-    share = np.stack([generator.permutation(size) for _ in new], axis=1)
-    share = (share + generator.random(share.shape)) / size
-    starts[:, new] = ndtri(np.clip(share, 0.02, 0.98))
+    starts[:, new] = ndtri(np.clip(_latin(generator, size, len(new)), 0.02, 0.98))
     parameters = trials.model_parameters
     zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
     rest = np.clip(zero, -1.0, 1.0)
