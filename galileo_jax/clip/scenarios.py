@@ -27,7 +27,7 @@ SCENARIOS: dict[str, Scenario] = {
         Scenario("incline", "one object slides down a board, no table", True, (1, 1)),
         Scenario("fall", "one object is dropped", False, (1, 1)),
         Scenario("flight", "objects are thrown", False, (1, None)),
-        Scenario("multi", "several objects slide and collide", False, (1, None)),
+        Scenario("multi", "object 1 slides down a ramp onto a table, into others", True, (1, None)),
         Scenario("spring", "an object hangs on or is pushed by a spring", False, (1, None)),
         Scenario("liquid", "objects move in a liquid", False, (1, None)),
     )

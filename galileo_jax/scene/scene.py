@@ -18,8 +18,10 @@ from galileo_jax.observation import Observation
 # Where nothing else is declared; an incline's dynamics do not depend on it.
 UNKNOWN_BOX_M: tuple[float, ...] = (0.04, 0.04, 0.04)
 UNKNOWN_ROUND_M: tuple[float, ...] = (0.02, 0.01)
-SIMULATED = ("ramp", "incline", "fall")
+SIMULATED = ("ramp", "multi", "incline", "fall")
 EARLY_SHARE = 0.3  # of a fall, before the air makes itself felt
+# Of the objects beyond the file's two, in turn.
+SHAPE_RGBA = ([0.35, 0.60, 0.30, 1], [0.62, 0.45, 0.70, 1], [0.80, 0.36, 0.22, 1])
 BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do not climb
 
 
@@ -70,11 +72,12 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
     """Sets `scenes/ramp.xml` to the clip: angle, sizes, start positions, gravity.
 
     Object 1 starts on the ramp where it is first seen (projected onto the surface), every
-    other object on the table. `incline` is the same scene without the table; `fall` is an
-    incline straight down, without a board.
+    other object on the table, in the order of the travel. `incline` is the same scene without
+    the table; `fall` is an incline straight down, without a board.
 
     Raises:
-      InputError: the scenario has no scene here, or an object is never seen.
+      InputError: the scenario has no scene here, an object is never seen, or one stands before
+        the one declared before it.
     """
     if clip.scenario not in SIMULATED:
         raise InputError(
@@ -87,7 +90,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         angle = math.radians(clip.ramp_angle_deg)
     else:
         angle = math.pi / 2
-    has_table = clip.scenario == "ramp"
+    has_table = clip.scenario in ("ramp", "multi")
     half = [extents(declared) for declared in clip.objects]
     starts = []
     for i, (name, (_, height)) in enumerate(zip(observation.names, half, strict=True)):
@@ -102,6 +105,11 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
             starts.append(_on_ramp(along, height, angle))
         else:
             starts.append((float(x), height))
+            if x < starts[i - 1][0]:
+                raise InputError(
+                    f"{clip.path}: objects[{i}]: {name} stands before {observation.names[i - 1]}; "
+                    "objects in the order of the travel expected"
+                )
     corner = tuple(h * math.tan(angle / 2) if has_table else math.inf for _, h in half)
     surroundings = Surroundings(
         names=observation.names,
@@ -186,19 +194,23 @@ def compile_scene(
         spec.geom("ramp").pos = [x - height * sin, 0, y - height * cos]
     if surroundings.has_surface:
         spec.geom("ramp").alt.euler = [0, math.degrees(surroundings.angle_rad), 0]
-    for i, name in enumerate(("object1", "object2")):
-        if i >= len(surroundings.names):
-            spec.delete(spec.body(name))
-            continue
+    count = len(surroundings.names)
+    if count < 2:
+        spec.delete(spec.body("object2"))
+    for i in range(2, count):
+        _add_object(spec, i)
+    for i in range(count):
+        name = f"object{i + 1}"
         length, height = surroundings.half_length_m[i], surroundings.half_height_m[i]
         x, y = surroundings.start_m[i]
         spec.body(name).pos = [x, 0, y]
         spec.geom(f"{name}_sled").size = [height, 0, 0]
-        forward = 1 if i == 0 else -1
         # Bumpers meet at the height of object 1's centre, so that a push has no lift.
         lift = surroundings.half_height_m[0] - height
-        spec.geom(f"{name}_bumper").size = [BUMPER_RADIUS_M, 0, 0]
-        spec.geom(f"{name}_bumper").pos = [forward * (length - BUMPER_RADIUS_M), 0, lift]
+        for face, forward in (("front", 1), ("back", -1)):
+            if (bumper := spec.geom(f"{name}_{face}")) is not None:
+                bumper.size = [BUMPER_RADIUS_M, 0, 0]
+                bumper.pos = [forward * (length - BUMPER_RADIUS_M), 0, lift]
         shape = spec.geom(f"{name}_shape")
         _draw(shape, shapes[i], declared[i], length, height)
     if not has_table:
@@ -207,6 +219,39 @@ def compile_scene(
                 spec.delete(pair)
         spec.delete(spec.geom("table"))
     return Scene(spec=spec, model=spec.compile(), surroundings=surroundings)
+
+
+def _add_object(spec: mujoco.MjSpec, i: int) -> None:
+    """Adds object i (counted from 0) behind the last one, as object 2 stands in the file."""
+    name, before = f"object{i + 1}", f"object{i}"
+    like, table, hit = (
+        spec.body("object2"),
+        spec.pair("object2_table"),
+        spec.pair("object1_object2"),
+    )
+    body = spec.worldbody.add_body(name=name, mass=like.mass, inertia=like.inertia)
+    body.explicitinertial = True
+    for joint in like.joints:
+        axis = joint.name.removeprefix("object2")
+        body.add_joint(name=f"{name}{axis}", type=joint.type, axis=joint.axis)
+    for part, kind in (("sled", "sled"), ("back", "bumper"), ("shape", "shape")):
+        body.add_geom(spec.find_default(kind), name=f"{name}_{part}")
+    spec.geom(f"{name}_shape").rgba = SHAPE_RGBA[i % len(SHAPE_RGBA)]
+    spec.body(before).add_geom(spec.find_default("bumper"), name=f"{before}_front")
+    _add_pair(spec, table, f"{name}_table", "table", f"{name}_sled")
+    _add_pair(spec, hit, f"{before}_{name}", f"{before}_front", f"{name}_back")
+
+
+def _add_pair(spec: mujoco.MjSpec, like: mujoco.MjsPair, name: str, one: str, other: str) -> None:
+    spec.add_pair(
+        name=name,
+        geomname1=one,
+        geomname2=other,
+        condim=like.condim,
+        friction=like.friction,
+        solref=like.solref,
+        solimp=like.solimp,
+    )
 
 
 def _draw(

@@ -36,6 +36,7 @@ def write_clip(folder, frames, points):
     content = {
         "video": video.name,
         "scenario": "multi",
+        "ramp_angle_deg": 20.0,
         "fps": 30.0,
         "pixels_per_metre": SCALE,
         "origin_px": [20.0, 93.0],
@@ -107,7 +108,8 @@ def test_csv_track_is_refused(tmp_path):
     rows = "\n".join(f"{0.1 * i},{0.01 * i},0.0,0.001" for i in range(8))
     table.write_text(f"time_s,object1_x_m,object1_y_m,object1_sd_m\n{rows}\n")
     (tmp_path / "walk.yaml").write_text(
-        "track: walk.csv\nscenario: multi\nobjects:\n  - {name: object1, shape: box}\n"
+        "track: walk.csv\nscenario: multi\nramp_angle_deg: 20.0\n"
+        "objects:\n  - {name: object1, shape: box}\n"
     )
     with pytest.raises(InputError, match="tracked already"):
         main([str(tmp_path / "walk.yaml")])
