@@ -28,6 +28,7 @@ from galileo_jax.observation import Observation
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.model import Model
 from galileo_jax.scene.scene import build_scene
+from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
 RESULT, OBSERVATION = "result.json", "observation.csv"
 LONGER = 1.15
@@ -63,13 +64,14 @@ def make_problem(
     observation: Observation,
     engine: str = "auto",
     effects: tuple[Effect, ...] = (),
+    noise: NoiseModel = "camera",
 ) -> Problem:
     """A clip with a model of it: the base model, or one with effects."""
     scene = build_scene(clip, observation)
     # An effect may run the clock faster: the frame rate's does.
     margin = LONGER if effects else 1.0
     model = Model(scene, margin * float(observation.times_s[-1]), effects)
-    return Problem(observation, model, make_engine(engine, model), clip.path.stem)
+    return Problem(observation, model, make_engine(engine, model), clip.path.stem, noise)
 
 
 def make_trials(
@@ -77,11 +79,12 @@ def make_trials(
     observations: Sequence[Observation],
     engine: str = "auto",
     effects: tuple[Effect, ...] = (),
+    noise: NoiseModel = "camera",
 ) -> Trials:
     """Clips of the same objects with the same model."""
     return Trials(
         tuple(
-            make_problem(clip, observation, engine, effects)
+            make_problem(clip, observation, engine, effects, noise)
             for clip, observation in zip(clips, observations, strict=True)
         )
     )

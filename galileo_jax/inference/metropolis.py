@@ -27,6 +27,7 @@ def metropolis_posterior(
     *,
     sampler: str = "mixture",
     settings: Settings = Settings(),  # noqa: B008
+    num_chains: int = NUM_CHAINS,
     checkpoint: Path | None = None,
     identity: str = "",
     on_block: Callable[[Progress], None] | None = None,
@@ -39,6 +40,7 @@ def metropolis_posterior(
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
       settings: how long.
+      num_chains: how many.
       checkpoint: file that interrupted chains go on from; see `samplers.sample`.
       identity: of what is sampled; a checkpoint of anything else is refused.
       on_block: called with the progress.
@@ -49,7 +51,7 @@ def metropolis_posterior(
     """
     start_key, key = jax.random.split(jax.random.key(seed))
     mode, covariance = jnp.asarray(fit.z), jnp.asarray(fit.covariance)
-    starts = dispersed_starts(start_key, mode, covariance, NUM_CHAINS)
+    starts = dispersed_starts(start_key, mode, covariance, num_chains)
     sd = np.sqrt(np.diag(fit.covariance))
     watched = [
         (i, parameter.name)

@@ -32,6 +32,21 @@ SMALLEST_MODE = 1e-3  # of a family's largest variance; what is smaller is left 
 MOVED_M = 0.002  # an object that has gone so far has been hit
 
 
+def offsets(observation: Observation) -> list[np.ndarray]:
+    """The modes of a track as a whole: with these alone, displacements are what counts."""
+    count, _, frames = observation.position_m.shape
+    found = []
+    for i in range(count):
+        for axis in range(2):
+            offset = np.zeros((count, 2, frames))
+            # Paths begin where the object is first seen, within that frame's error.
+            seen = int(np.argmax(observation.mask[i]))
+            error = observation.covariance_m2[i, axis, axis, seen]
+            offset[i, axis] = math.sqrt(OFFSET_SD_M**2 + error)
+            found.append(offset)
+    return found
+
+
 def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
     """The patterns times their standard deviations, `[mode, object, 2, frame]`, m.
 
@@ -42,15 +57,7 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
     """
     position = np.nan_to_num(observation.position_m)
     count, _, frames = position.shape
-    found = []
-    for i in range(count):
-        for axis in range(2):
-            offset = np.zeros((count, 2, frames))
-            # Paths begin where the object is first seen, within that frame's error.
-            seen = int(np.argmax(observation.mask[i]))
-            error = observation.covariance_m2[i, axis, axis, seen]
-            offset[i, axis] = math.sqrt(OFFSET_SD_M**2 + error)
-            found.append(offset)
+    found = offsets(observation)
     x, y = position[:, 0], position[:, 1]
     if scene.has_surface:
         found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
