@@ -28,6 +28,7 @@ def metropolis_posterior(
     sampler: str = "mixture",
     settings: Settings = Settings(),  # noqa: B008
     num_chains: int = NUM_CHAINS,
+    starts: np.ndarray | None = None,
     checkpoint: Path | None = None,
     identity: str = "",
     on_block: Callable[[Progress], None] | None = None,
@@ -41,6 +42,7 @@ def metropolis_posterior(
       sampler: a name in the samplers' registry.
       settings: how long.
       num_chains: how many.
+      starts: `[chain, parameter]`, where they begin, in z; default: dispersed round the fit.
       checkpoint: file that interrupted chains go on from; see `samplers.sample`.
       identity: of what is sampled; a checkpoint of anything else is refused.
       on_block: called with the progress.
@@ -51,7 +53,8 @@ def metropolis_posterior(
     """
     start_key, key = jax.random.split(jax.random.key(seed))
     mode, covariance = jnp.asarray(fit.z), jnp.asarray(fit.covariance)
-    starts = dispersed_starts(start_key, mode, covariance, num_chains)
+    if starts is None:
+        starts = np.asarray(dispersed_starts(start_key, mode, covariance, num_chains))
     sd = np.sqrt(np.diag(fit.covariance))
     watched = [
         (i, parameter.name)
@@ -71,7 +74,7 @@ def metropolis_posterior(
         key,
         sampler_class(sampler).from_gaussian(mode, covariance),  # pyright: ignore
         trials.log_density,
-        starts,
+        jnp.asarray(starts),
         trials.names,
         settings=settings,
         monitor=monitor,
