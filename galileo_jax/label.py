@@ -10,6 +10,7 @@ from typing import Any
 from galileo_jax import command
 from galileo_jax.clip.load import YAML_SUFFIXES, check_belongs, check_clip, find_yaml
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.track_files.read import is_track
 from galileo_jax.clip.yaml_edit import Key, dump, edited
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.errors import InputError
@@ -141,7 +142,7 @@ def _yaml_path(clip_path: Path) -> Path:
 
 def _defaults(clip_path: Path, arguments: Namespace) -> dict[Key, Any]:
     """What a new yaml takes from the file beside it."""
-    if clip_path.suffix.lower() == ".csv":
+    if is_track(clip_path):
         return {("track",): clip_path.name}
     defaults: dict[Key, Any] = {("video",): clip_path.name}
     if arguments.fps is None:

@@ -1,24 +1,34 @@
 """From the clips of a call to what was measured: what every command that fits begins with."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from galileo_jax import command
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
-from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.errors import InputError
 from galileo_jax.observation import Observation, observe
 from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.slope import Slope, needs_slope, slope_of_path
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A clip and where its objects were seen."""
+    """A clip and where its objects were seen.
+
+    Attributes:
+      clip: with what was inferred filled in.
+      observation: in metres.
+      inferred: key of the clip that was left null to value and sd.
+    """
 
     clip: Clip
     observation: Observation
+    inferred: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -48,7 +58,13 @@ def load_clips(paths: Sequence[str], pixels_per_metre: float | None = None) -> l
     for clip in clips:
         for warning in clip.warnings:
             command.console().print(f"warning: {warning}")
-        if clip.scenario == "ramp" and clip.pixels_per_metre is None and clip.video is not None:
+        has_table, in_pixels = SCENARIOS[clip.scenario].has_table, clip.track_units in (None, "px")
+        if has_table and in_pixels and clip.origin_px is None:
+            raise InputError(
+                f"{clip.path}: origin_px: null; a {clip.scenario} is seen from its ramp's foot; "
+                "set it with `galileo label --origin X Y`"
+            )
+        if has_table and not clip.is_scale_known:
             raise InputError(
                 f"{clip.path}: pixels_per_metre: null; the scale of a ramp clip cannot be told "
                 "from its motion; set it with `galileo label --scale X1 Y1 X2 Y2 METRES` or "
@@ -73,12 +89,51 @@ def load_clips(paths: Sequence[str], pixels_per_metre: float | None = None) -> l
     return clips
 
 
+def inferred(measured: Sequence[Measured]) -> dict[str, Any]:
+    """For a result's document: `{"inferred": {clip: {key: {mean, sd}}}}`, or nothing."""
+    found = {
+        one.name: {key: dict(value) for key, value in one.inferred.items()}
+        for one in measured
+        if one.inferred
+    }
+    return {"inferred": found} if found else {}
+
+
 def measure(clip: Clip) -> Measured:
-    """Tracks a clip's video, or reads its csv track."""
+    """Tracks a clip's video, or reads its track, and infers a ramp's angle that is null.
+
+    Raises:
+      InputError: an object cannot be followed, or the path does not tell the angle.
+    """
+    if not needs_slope(clip):
+        return Measured(clip, _observed(clip))
+    if clip.video is not None:
+        # The object's outline stands along the ramp: a first look, without it, tells how steep.
+        unknown = [item.model_copy(update={"size_m": None}) for item in clip.objects]
+        look = clip.model_copy(update={"objects": tuple(unknown)})
+        clip = _inclined(clip, slope_of_path(clip, _observed(look)))
+    observation = _observed(clip)
+    slope = slope_of_path(clip, observation)
+    clip = _inclined(clip, slope)
+    command.console().print(
+        f"warning: {clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "
+        f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is taken",
+        soft_wrap=True,
+    )
+    inferred = {"ramp_angle_deg": {"mean": slope.angle_deg, "sd": slope.sd_deg}}
+    return Measured(clip, observation, inferred)
+
+
+def _inclined(clip: Clip, slope: Slope) -> Clip:
+    found = {"ramp_angle_deg": slope.angle_deg, "ramp_angle_sd_deg": slope.sd_deg}
+    return clip.model_copy(update=found)
+
+
+def _observed(clip: Clip) -> Observation:
     if clip.video is None:
         assert clip.track is not None  # load_clip requires one of the two
-        return Measured(clip, read_observation_csv(clip.track))
+        return read_track(clip.path, clip.track, clip, clip.fps).observation
     from galileo_jax.tracking import track_clip
 
     with command.progress() as bar:
-        return Measured(clip, observe(clip, track_clip(clip, progress=bar)))
+        return observe(clip, track_clip(clip, progress=bar))
