@@ -17,6 +17,7 @@ VERBS = (
     ("predict", "continue a fitted scene beyond its clip"),
     ("export", "write tracks and fits as csv, parquet or netCDF"),
     ("train", "train and test the neural estimators"),
+    ("sweep", "many clips, many ways, from one config"),
 )
 
 USAGE = "usage: galileo VERB ..., galileo VERB --help, galileo --version"
