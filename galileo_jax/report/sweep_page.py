@@ -86,7 +86,7 @@ def _errors(
     """Box plots of the errors of each quantity; of the velocity error where none is known."""
     figures = {}
     for name, symbol in QUANTITIES.items():
-        known = [r for r in rows if r[f"{name}_error"] is not None and r[f"{name}_identified"]]
+        known = [row for row in rows if _has_error(row, name)]
         if known:
             values = [abs(row[f"{name}_error"]) for row in known]
             title = f"error of {symbol}"
@@ -100,6 +100,11 @@ def _errors(
     names = sorted({label(row) for row in rows})
     key = legend(("dot", COLOURS[i % len(COLOURS)], name) for i, name in enumerate(names))
     return [figure_section(heading, caption, figures, legend=key)]
+
+
+def _has_error(row: Row, quantity: str) -> bool:
+    """Whether the truth is known and the clip determines the quantity, as far as that is said."""
+    return row[f"{quantity}_error"] is not None and row[f"{quantity}_identified"] is not False
 
 
 def _boxes(
@@ -189,11 +194,7 @@ def _methods(rows: Sequence[Row], label: Callable[[Row], str]) -> str:
         own = [row for row in rows if label(row) == name]
         line = [escape(name), str(len(own)), _share(row["converged"] for row in own)]
         for quantity in QUANTITIES:
-            errors = [
-                abs(row[f"{quantity}_error"])
-                for row in own
-                if row[f"{quantity}_error"] is not None and row[f"{quantity}_identified"]
-            ]
+            errors = [abs(row[f"{quantity}_error"]) for row in own if _has_error(row, quantity)]
             line.append(f"{np.median(errors):.3g}" if errors else "")
             line.append(_share(row[f"{quantity}_covered"] for row in own))
         lines.append(line)

@@ -101,9 +101,9 @@ def _of_fit(result: dict[str, Any], truth: dict[str, Any]) -> Row:
 
 def _of_quantity(name: str, entry: dict[str, Any], best: float | None, true: float | None) -> Row:
     value = entry["mean"] if best is None else best
-    row: Row = {name: value, f"{name}_identified": entry["identified"]}
+    row: Row = {name: value}
     if best is None:
-        row |= {f"{name}_{key}": entry[key] for key in ("sd", "q025", "q975")}
+        row |= {f"{name}_{key}": entry[key] for key in ("sd", "q025", "q975", "identified")}
     if true is not None:
         row |= {f"{name}_true": true, f"{name}_error": value - true}
         if best is None:

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from galileo_jax import __version__, jax_cache
 from galileo_jax.errors import InputError
 from galileo_jax.measured import Measured, inferred, load_clips, measure
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
     from galileo_jax.inference.fits.gradient import GradientFit
     from galileo_jax.inference.posterior import Posterior
     from galileo_jax.inference.trials import Trials
+
+Found = tuple["Posterior", np.ndarray, dict[str, Any]]  # draws, the best z, notes for result.json
 
 
 def measure_files(packed: Packed) -> Measured:
@@ -51,34 +55,13 @@ def run_cell(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]
 
 
 def _fit(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]:
-    import jax
-
     from galileo_jax.effects.registry import make_effects
-    from galileo_jax.inference.fits.gradient import Code, GradientFitter
-    from galileo_jax.inference.laplace import laplace_posterior
     from galileo_jax.inference.result import make_result
 
     effects = make_effects(getattr(settings, "effects", ()))
     trials = _trials(settings, measured, effects)
     notes: dict[str, Any] = {"engine": trials.problems[0].engine.name}
-    if isinstance(settings, Cnn):
-        from galileo_jax.neural.estimate import cnn_posterior
-
-        posterior, z_best, extra = cnn_posterior(trials, settings.seed)
-        notes |= extra
-    else:
-        fit = GradientFitter(trials).fit(settings.seed)
-        if fit.code is Code.FAILED:
-            raise InputError(f"{measured[0].clip.path}: {fit.code}")
-        z_best = fit.z
-        if isinstance(settings, Mh | Thesis):
-            posterior, extra = _chains(settings, trials, fit)
-            notes |= {"status": posterior.status.value} | extra
-            # Chains compile their own density: kept, it would never be used again.
-            jax.clear_caches()
-        else:
-            posterior = laplace_posterior(trials, fit, settings.seed)
-            notes["status"] = fit.code.value
+    posterior, z_best, extra = _found(settings, trials)
     return make_result(
         trials,
         posterior,
@@ -87,27 +70,58 @@ def _fit(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]:
         method=settings.method,
         seed=settings.seed,
         timings_s={},
-        notes=notes,
+        notes=notes | extra,
     )
 
 
-def _chains(
-    settings: Mh | Thesis, trials: "Trials", fit: "GradientFit"
-) -> tuple["Posterior", dict[str, Any]]:
-    if isinstance(settings, Thesis):
-        from galileo_jax.inference.thesis_preset import thesis_posterior
+def _found(settings: Settings, trials: "Trials") -> Found:
+    """What the settings' method says."""
+    if isinstance(settings, Cnn):
+        from galileo_jax.neural.estimate import cnn_posterior
 
-        if len(trials.problems) > 1:
-            raise InputError("method thesis: one clip expected")
-        posterior, best = thesis_posterior(
-            trials,
-            settings.seed,
-            settings.similarity,
-            settings.acceptance,
-            settings.selection,
-            settings.chains,
-        )
-        return posterior, {"best": best}
+        return cnn_posterior(trials, settings.seed)
+    if isinstance(settings, Thesis):
+        return _by_thesis(settings, trials)
+    from galileo_jax.inference.fits.gradient import Code, GradientFitter
+    from galileo_jax.inference.laplace import laplace_posterior
+
+    fit = GradientFitter(trials).fit(settings.seed)
+    if fit.code is Code.FAILED:
+        raise InputError(f"{trials.problems[0].name}: {fit.code}")
+    if isinstance(settings, Mh):
+        return _by_chains(settings, trials, fit)
+    posterior = laplace_posterior(trials, fit, settings.seed)
+    return posterior, fit.z, {"status": fit.code.value}
+
+
+def _by_thesis(settings: Thesis, trials: "Trials") -> Found:
+    """The thesis's sampler: errors are told at its answer."""
+    import jax
+    import jax.numpy as jnp
+
+    from galileo_jax.inference.thesis_preset import thesis_posterior
+    from galileo_jax.parameters import inverse
+
+    if len(trials.problems) > 1:
+        raise InputError("method thesis: one clip expected")
+    posterior, best = thesis_posterior(
+        trials,
+        settings.seed,
+        settings.similarity,
+        settings.acceptance,
+        settings.selection,
+        settings.chains,
+    )
+    theta = trials.theta(np.zeros(len(trials.names)))
+    theta = np.array([best.get(name, rest) for name, rest in zip(trials.names, theta, strict=True)])
+    z_best = np.asarray(inverse(trials.parameters, jnp.asarray(theta)))
+    jax.clear_caches()  # chains compile their own density: kept, it would never be used again
+    return posterior, z_best, {"status": posterior.status.value, "best": best}
+
+
+def _by_chains(settings: Mh, trials: "Trials", fit: "GradientFit") -> Found:
+    import jax
+
     from galileo_jax.inference.metropolis import metropolis_posterior
     from galileo_jax.inference.samplers.driver import Settings as Steps
 
@@ -119,7 +133,9 @@ def _chains(
         settings=Steps(max_steps=settings.max_steps),
         num_chains=settings.chains,
     )
-    return posterior, {"sampler": settings.sampler, "sampling": dict(posterior.stats)}
+    jax.clear_caches()  # as above
+    sampling = {"sampler": settings.sampler, "sampling": dict(posterior.stats)}
+    return posterior, fit.z, {"status": posterior.status.value} | sampling
 
 
 def _diagnosis(settings: Diagnose, measured: Sequence[Measured]) -> dict[str, Any]:

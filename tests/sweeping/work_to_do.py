@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from pathlib import Path
 
 from galileo_jax.errors import InputError
@@ -29,3 +30,10 @@ def die(marks: Path, times: int) -> str:
 
 def environment(name: str) -> str | None:
     return os.environ.get(name)
+
+
+def slow_double(number: int, folder: str) -> int:
+    """Leaves a mark with the number and its process."""
+    Path(folder, f"{number}_{os.getpid()}").touch()
+    time.sleep(0.5)
+    return 2 * number
