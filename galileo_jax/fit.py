@@ -17,7 +17,8 @@ from galileo_jax import command, jax_cache
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
-from galileo_jax.measured import Measured, add_clip_options, load_clips, measure
+from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
+from galileo_jax.registry import entry_names
 
 if TYPE_CHECKING:
     from galileo_jax.effects.effect import Effect
@@ -29,6 +30,8 @@ BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
 METHODS = ("grad", "mh", "cnn")
 PRESETS = ("galileo", "thesis")
+SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
+SIMILARITIES = entry_names("galileo_jax.similarity.library")
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -165,7 +168,7 @@ def write_fit(
             method=method,
             seed=seed,
             timings_s={key: round(value, 3) for key, value in timings.items()},
-            notes=notes,
+            notes=notes | inferred(measured),
         )
 
     result = told(trials, posterior, z_best, list(files))
@@ -265,10 +268,14 @@ def _thesis(trials: "Trials", call):
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
     from galileo_jax.inference.thesis_preset import thesis_posterior
 
-    posterior, best = thesis_posterior(
-        trials, call.seed, call.similarity, call.acceptance, call.selection
-    )
-    return posterior, {"status": posterior.status.value, "preset": "thesis", "best": best}
+    chosen = {name: getattr(call, name) for name in ("similarity", "acceptance", "selection")}
+    posterior, best = thesis_posterior(trials, call.seed, **chosen)
+    return posterior, {
+        "status": posterior.status.value,
+        "preset": call.preset,
+        **chosen,
+        "best": best,
+    }
 
 
 def _identity(measured: Sequence[Measured], call: argparse.Namespace) -> str:
@@ -285,7 +292,7 @@ def _identity(measured: Sequence[Measured], call: argparse.Namespace) -> str:
 
 
 def read_truth(clip: Clip) -> dict[str, float]:
-    """What NAME.truth.json beside a synthetic clip says of masses and frictions; {} without.
+    """What NAME.truth.json beside a synthetic clip says of its parameters; {} without.
 
     It is shown beside the estimate, and nothing else is done with it.
 
@@ -297,6 +304,8 @@ def read_truth(clip: Clip) -> dict[str, float]:
         return {}
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
+        if "parameters" in content:
+            return {key: float(value) for key, value in content["parameters"].items()}
         known = {key: float(content[key]) for key in ("m1", "k1", "m2", "k2")}
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not a truth with m1, k1, m2 and k2 ({error})") from error
@@ -330,7 +339,7 @@ def _parser() -> command.Parser:
     parser.add_argument("--effects", default="", help="a,b: effects in the model")
     add_clip_options(parser, out="folder of the run (default runs/CLIP)")
     group = parser.add_argument_group("--method mh")
-    group.add_argument("--sampler", choices=("mixture", "random_walk"), default="mixture")
+    group.add_argument("--sampler", choices=SAMPLERS, default="mixture")
     group.add_argument(
         "--max-steps",
         type=command.whole_number(BLOCK_STEPS, BLOCK_STEPS),
@@ -339,7 +348,7 @@ def _parser() -> command.Parser:
     group.add_argument("--preset", choices=PRESETS, default="galileo")
     group.add_argument(
         "--similarity",
-        choices=("thesis_gaussian", "earth_mover", "root_mean"),
+        choices=SIMILARITIES,
         default="thesis_gaussian",
         help="of --preset thesis",
     )

@@ -62,6 +62,12 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
     if scene.has_surface:
         found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
         found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
+    elif scene.moves_in_plane:
+        # Anywhere in the picture: about the middle of what is seen of the flight.
+        seen = observation.mask[:, None].repeat(2, axis=1)
+        middle = np.ma.masked_array(position, ~seen).mean(axis=-1, keepdims=True).filled(0.0)
+        aside = position - middle
+        found.extend(KEYSTONE_SD * aside * aside[:, axis : axis + 1] for axis in range(2))
     else:
         found.append(_bent_scale(y, observation))
     found.append(ROLL_SD_RAD * np.stack([-y, x], axis=1))
@@ -79,7 +85,7 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
                 found.append(step)
     if scene.has_surface:
         found.extend(_wobble(position, observation, scene))
-    else:
+    elif not scene.moves_in_plane:
         found.extend(_aside(position))
     found.extend(_after_hit(position, observation))
     return np.stack(found)
