@@ -169,7 +169,7 @@ def _parser() -> command.Parser:
         action="append",
         default=[],
         metavar=("NAME", "FRAME"),
-        help="first frame in which it moves by itself, from 0",
+        help="first frame in which it moves by itself, from 0; null: to be found",
     )
     scale = parser.add_mutually_exclusive_group()
     scale.add_argument("--pixels-per-metre", type=float)
@@ -253,9 +253,11 @@ def _object_changes(arguments: Namespace, yaml_path: Path, old: dict[str, Any]) 
     for name, *point in arguments.point:
         given.setdefault(name, {})["point_px"] = _numbers("--point", name, point)
     for name, frame in arguments.first_frame:
-        if not frame.isdecimal():
-            raise InputError(f"--first-frame {name}: {frame!r} is not a frame number from 0")
-        given.setdefault(name, {})["first_frame"] = int(frame)
+        if not (frame.isdecimal() or frame == "null"):
+            raise InputError(
+                f"--first-frame {name}: {frame!r} is not a frame number from 0, or null"
+            )
+        given.setdefault(name, {})["first_frame"] = None if frame == "null" else int(frame)
 
     listed = old.get("objects") or []
     if given and not isinstance(listed, list):
