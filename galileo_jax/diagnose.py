@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -53,8 +54,8 @@ def main(argv: Sequence[str]) -> int | None:
     go_on = findings.how_to_go_on(diagnosis, call.clips, call.effects_from)
     print("\n".join(_told(diagnosis, record, go_on, hidden)))
     with command.console().status("drawing"):
-        shapes = tuple(tuple(one.shape for one in clip.objects) for clip in clips)
-        told = Told(diagnosis, document, go_on, hidden, shapes, call.seed)
+        again = shlex.join(["galileo", "diagnose", *argv])
+        told = Told(diagnosis, document, go_on, hidden, tuple(clips), again, call.seed)
         title = ", ".join(one.name for one in measured)
         write_diagnosis_page(out / "report.html", title, trials, told)
         _write_model(diagnosis, trials, measured, call, out / "model", timings)

@@ -72,14 +72,21 @@ def fit_quality(result: dict[str, Any]) -> str:
     chi2 = result["error"]["chi2_per_dof"]
     if chi2 is None or not math.isfinite(chi2):
         return "chi2 per degree of freedom cannot be told."
-    said = f"chi2 per degree of freedom is {chi2:.2f}: "
     if chi2 < CHI2_GOOD:
-        return said + "the model fits, and the tracker did better than it claims."
-    if chi2 <= CHI2_HIGH:
-        return said + "what the model leaves over is of the size of the tracking noise."
-    if chi2 <= CHI2_BAD:
-        return said + "the model leaves more over than tracking noise explains; see the residuals."
-    return said + "the model does not describe this clip; do not trust its parameters."
+        said = "The model fits, and the tracker did better than it claims"
+    elif chi2 <= CHI2_HIGH:
+        said = "What the model leaves over is of the size of the tracking noise"
+    elif chi2 <= CHI2_BAD:
+        said = "The model leaves more over than tracking noise explains; see the residuals"
+    else:
+        said = "The model does not describe this clip; do not trust its parameters"
+    return f"{said} (chi2 per degree of freedom {chi2:.2f})."
+
+
+def fits(result: dict[str, Any]) -> bool:
+    """Whether chi2 per degree of freedom is one that noise gives."""
+    chi2 = result["error"]["chi2_per_dof"]
+    return chi2 is not None and chi2 <= CHI2_HIGH  # False for NaN
 
 
 def convergence(run: Run) -> str:
