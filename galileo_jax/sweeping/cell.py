@@ -33,8 +33,8 @@ class Cell:
             "version": __version__,
         }
         digest = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
-        stems = "+".join(clip.path.stem for clip in self.clips)
-        return f"{stems[:NAME_LENGTH]}-{self.settings.method}-{digest[:16]}"
+        names = "+".join(clip.name for clip in self.clips)
+        return f"{names[:NAME_LENGTH]}-{self.settings.method}-{digest[:16]}"
 
 
 def make_cells(

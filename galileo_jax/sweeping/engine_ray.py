@@ -31,7 +31,7 @@ class EngineRay:
           InputError: Ray is not installed, or no cluster answers.
         """
         try:
-            import ray
+            import ray  # pyright: ignore[reportMissingImports]
         except ImportError:
             raise InputError(
                 "--engine ray: Ray is not installed; pip install 'galileo-jax[distributed]'"

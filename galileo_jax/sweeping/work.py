@@ -49,8 +49,11 @@ def run_cell(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]
     jax.config.update("jax_enable_x64", True)
     jax_cache.enable()
     began = time.perf_counter()
-    find = _diagnosis if isinstance(settings, Diagnose) else _fit
-    result = find(settings, measured) | inferred(measured)
+    if isinstance(settings, Diagnose):
+        result = _diagnosis(settings, measured)
+    else:
+        result = _fit(settings, measured)
+    result |= inferred(measured)
     return result | {"timings_s": {settings.method: round(time.perf_counter() - began, 3)}}
 
 

@@ -51,9 +51,9 @@ def test_multirun_is_a_config_for_every_combination(tmp_path):
     path = write(tmp_path, "clips: [a.csv]")
     found = load_config(path, (), ["common.seed=1,2", "common.effects=[],[air_drag]"])
     settings = [each for config in found for each in config.all_settings()]
-    assert [(s.seed, s.effects) for s in settings] == [
-        (1, ()), (1, ("air_drag",)), (2, ()), (2, ("air_drag",)),
-    ]  # fmt: skip
+    assert settings == [
+        Grad(seed=seed, effects=effects) for seed in (1, 2) for effects in ((), ("air_drag",))
+    ]
 
 
 WRONG = {

@@ -81,7 +81,7 @@ def test_killed_ten_times_the_summary_is_the_same(plan, tmp_path):
 def cluster():
     """A real Ray cluster of two nodes on this machine, each with one core."""
     pytest.importorskip("ray")
-    from ray.cluster_utils import Cluster
+    from ray.cluster_utils import Cluster  # pyright: ignore[reportMissingImports]
 
     found = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
     yield found

@@ -99,3 +99,21 @@ def test_what_a_kill_left_is_cleared_away(tmp_path):
     with Store(tmp_path).locked():
         assert not any(path.exists() for path in left)
         assert kept.exists()
+
+
+def test_a_clip_of_physics_101_travels_with_its_folders(tmp_path):
+    """Its folders and a table of labels declare it; only its own labels count."""
+    video = tmp_path / "scenarios" / "ramp" / "20_01" / "c_block_01" / "03" / "Camera_1.mp4"
+    video.parent.mkdir(parents=True)
+    video.write_bytes(b"no video")
+    labels = tmp_path / "scenarios" / "labels.yaml"
+    labels.write_text("clips:\n  ramp/20_01/c_block_01/03: {fps: 30.0}\n")
+    files = ClipFiles.of(video)
+    assert files.name == "20_01-c_block_01-03"
+    assert set(files.packed().content) == {"ramp/20_01/c_block_01/03/Camera_1.mp4", "labels.yaml"}
+    with pytest.raises(InputError, match=str(tmp_path)):
+        measure_files(files.packed())
+    labels.write_text(labels.read_text() + "  ramp/10_01: {fps: 60.0}\n")
+    assert ClipFiles.of(video).digest == files.digest
+    labels.write_text("clips:\n  ramp/20_01/c_block_01/03: {fps: 60.0}\n")
+    assert ClipFiles.of(video).digest != files.digest
