@@ -2,14 +2,39 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+)
 
+from galileo_jax.clip.schema import wrong
 from galileo_jax.errors import InputError
+from galileo_jax.registry import entry_names
 
 Whole = Annotated[int, Field(strict=True, ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1)]
 Name = Annotated[str, Field(strict=True)]
 NoiseModel = Literal["camera", "tracker"]
+
+
+def _entry_of(package: str) -> AfterValidator:
+    """Refuses what is no entry of a package's registry."""
+    known = entry_names(package)
+
+    def check(value: str) -> str:
+        if value not in known:
+            raise wrong(f"unknown value; known: {', '.join(known)}")
+        return value
+
+    return AfterValidator(check)
+
+
+Sampler = Annotated[Name, _entry_of("galileo_jax.inference.samplers.library")]
+Similarity = Annotated[Name, _entry_of("galileo_jax.similarity.library")]
 
 
 class _Settings(BaseModel):
@@ -53,7 +78,7 @@ class Mh(_Settings):
     method: Literal["mh"]
     effects: tuple[Name, ...] = ()
     noise: NoiseModel = "camera"
-    sampler: Literal["mixture", "random_walk"] = "mixture"
+    sampler: Sampler = "mixture"
     chains: Annotated[int, Field(strict=True, ge=2)] = 8
     max_steps: Annotated[int, Field(strict=True, ge=25, multiple_of=25)] = 4000
 
@@ -75,7 +100,7 @@ class Thesis(_Settings):
     """
 
     method: Literal["thesis"]
-    similarity: Literal["thesis_gaussian", "earth_mover", "root_mean"] = "thesis_gaussian"
+    similarity: Similarity = "thesis_gaussian"
     acceptance: Literal["coin", "metropolis"] = "coin"
     selection: Literal["best", "least_variance"] = "best"
     chains: Count = 16

@@ -68,6 +68,9 @@ WRONG = {
     "clips: [a]\ngrid: {seed: 3}": "grid.seed: Input should be a valid list; got 3",
     "clips: [a]\nlist: [{seed: 1}]\ngrid: {seed: [2]}": "list.0.seed: stands in grid, too",
     "clips: [a]\nlist: [{}, {method: mh, max_steps: 30}]": "list.1.max_steps: ",
+    "clips: [a]\ncommon: {method: mh, sampler: nuts}": (
+        "common.sampler: unknown value; known: mixture, random_walk; got 'nuts'"
+    ),
     "simulate: [{count: 0}]": "simulate.0.count: ",
     "- a": "a list, not a mapping",
 }
