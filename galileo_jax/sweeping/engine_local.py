@@ -41,7 +41,6 @@ class EngineLocal:
     def __init__(self, num_workers: int, each: Resources = Resources()):  # noqa: B008
         self.num_workers, self.each = num_workers, each
         self._workers: dict[int, _Worker] = {}
-        self._is_warm = False
 
     def outcomes(self, tasks: Iterable[Task]) -> Iterator[Outcome]:
         """See `Engine`.
@@ -51,8 +50,9 @@ class EngineLocal:
         """
         waiting = iter(tasks)
         again: list[tuple[Task, int]] = []  # tasks whose worker died, and how often
+        is_warm = False
         while True:
-            limit = self.num_workers if self._is_warm else 1
+            limit = self.num_workers if is_warm else 1
             for number in range(limit):
                 if self._is_busy(number):
                     continue
@@ -73,7 +73,7 @@ class EngineLocal:
                         again.append((lost, tries))
                         continue
                     outcome = died(lost, f"its worker died ({worker.ending()})")
-                self._is_warm = True
+                is_warm = True
                 yield outcome
 
     def close(self) -> None:

@@ -25,7 +25,7 @@ def simulated_clips(folder: Path, wanted: Iterable[Simulated]) -> list[Path]:
             suffix = ".mp4" if one.video else ".csv"
             path = folder / f"{one.effect or 'none'}{strength}_{seed}{suffix}"
             paths.append(path)
-            if path.is_file():
+            if all(path.with_suffix(end).is_file() for end in (suffix, ".yaml", ".truth.json")):
                 continue
             words = ["--seed", str(seed), "--out", str(path)]
             words += [] if one.video else ["--track-only"]

@@ -11,6 +11,7 @@ kill what was in flight is missing, and nothing is there in part.
 
 import fcntl
 import json
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -60,6 +61,8 @@ class Store:
             for pattern in ("cells/*/.*.json", "clips/.*.npz", ".summary.*"):
                 for left in self.folder.glob(pattern):
                     left.unlink()
+            for folder in self.folder.glob("simulated/.simulate.*"):
+                shutil.rmtree(folder)
             yield
 
     def has_result(self, name: str) -> bool:
