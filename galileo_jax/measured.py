@@ -1,7 +1,7 @@
 """From the clips of a call to what was measured: what every command that fits begins with."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.errors import InputError
 from galileo_jax.observation import Observation, observe
 from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.sizes import SIZE_SD_M, needs_sizes, sizes_of_track
 from galileo_jax.slope import Slope, needs_slope, slope_of_path
 
 
@@ -28,7 +29,7 @@ class Measured:
 
     clip: Clip
     observation: Observation
-    inferred: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    inferred: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -100,13 +101,17 @@ def inferred(measured: Sequence[Measured]) -> dict[str, Any]:
 
 
 def measure(clip: Clip) -> Measured:
-    """Tracks a clip's video, or reads its track, and infers a ramp's angle that is null.
+    """Tracks a clip's video, or reads its track, and infers what the model needs and is null.
 
     Raises:
-      InputError: an object cannot be followed, or the path does not tell the angle.
+      InputError: an object cannot be followed, or the path does not tell the ramp's angle.
     """
-    if not needs_slope(clip):
-        return Measured(clip, _observed(clip))
+    measured = _with_slope(clip) if needs_slope(clip) else Measured(clip, _observed(clip))
+    return _with_sizes(measured) if needs_sizes(measured.clip) else measured
+
+
+def _with_slope(clip: Clip) -> Measured:
+    """A measurement with the ramp's angle from the path."""
     if clip.video is not None:
         # The object's outline stands along the ramp: a first look, without it, tells how steep.
         unknown = [item.model_copy(update={"size_m": None}) for item in clip.objects]
@@ -115,13 +120,32 @@ def measure(clip: Clip) -> Measured:
     observation = _observed(clip)
     slope = slope_of_path(clip, observation)
     clip = _inclined(clip, slope)
-    command.console().print(
-        f"warning: {clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "
-        f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is taken",
-        soft_wrap=True,
+    _warn(
+        f"{clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "
+        f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is taken"
     )
     inferred = {"ramp_angle_deg": {"mean": slope.angle_deg, "sd": slope.sd_deg}}
     return Measured(clip, observation, inferred)
+
+
+def _with_sizes(measured: Measured) -> Measured:
+    """The measurement with sizes from the heights of the paths and the distance at the hit."""
+    clip = measured.clip
+    found = sizes_of_track(clip, measured.observation)
+    objects = tuple(
+        item.model_copy(update={"size_m": found.get(item.name, item.size_m)})
+        for item in clip.objects
+    )
+    inferred = dict(measured.inferred)
+    for name, size in found.items():
+        _warn(f"{clip.path}: {name}: size_m: null; {list(size)} is taken, from its path")
+        inferred[f"{name}.size_m"] = {"mean": list(size), "sd": SIZE_SD_M}
+    clip = clip.model_copy(update={"objects": objects})
+    return replace(measured, clip=clip, inferred=inferred)
+
+
+def _warn(line: str) -> None:
+    command.console().print(f"warning: {line}", soft_wrap=True, markup=False)
 
 
 def _inclined(clip: Clip, slope: Slope) -> Clip:
