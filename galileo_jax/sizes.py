@@ -80,10 +80,11 @@ def _distance_at_hit(observation: Observation, k: int) -> float | None:
     if both.sum() < 2 * NUM_BESIDE + 1:
         return None
     noise = math.sqrt(float(np.median(observation.covariance_m2[k + 1, 0, 0, both])))
-    if np.ptp(second) < CLEARLY * noise:
+    gone = second - np.median(second[:NUM_BESIDE])
+    if np.median(gone[-NUM_BESIDE:]) < CLEARLY * noise:
         return None
     apart, times = second - first, observation.times_s[both]
-    at = int(np.argmax(second - second[0] > CLEARLY * noise))
+    at = int(np.argmax(gone > CLEARLY * noise))
     before, after = slice(max(at - 1 - NUM_BESIDE, 0), at - 1), slice(at, at + NUM_BESIDE)
     if before.stop - before.start < 2 or len(apart[after]) < 2:
         return float(apart.min())
