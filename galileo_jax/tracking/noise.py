@@ -61,36 +61,36 @@ def motion_variance(paths: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarra
     """
     excess = np.zeros(2)
     for axis in range(2):
-        squares, stated = [], []
-        for place, covariance in paths:
-            if len(place) < 4:
-                continue
-            x, variance = place[:, axis], covariance[:, axis, axis]
-            steps = np.diff(x) ** 2 > MOVED_SDS**2 * (variance[1:] + variance[:-1])
-            # A NaN step compares False: windows with gaps do not count.
-            moves = np.lib.stride_tricks.sliding_window_view(steps, 3).all(axis=1)
-            squares.append(np.diff(x, n=3)[moves] ** 2)
-            windows = np.lib.stride_tricks.sliding_window_view(variance, 4)
-            stated.append((windows @ THIRD_DIFFERENCE)[moves])
-        square = np.concatenate(squares) if squares else np.empty(0)
-        if len(square) < MIN_WINDOWS:
-            continue
-        total, kept = _variance_without_blows(square)
-        expected = np.concatenate(stated)[kept].mean()
-        excess[axis] = max(0.0, (total - expected) / THIRD_DIFFERENCE.sum())
+        differences = [_third_differences(p[:, axis], c[:, axis, axis]) for p, c in paths]
+        square, stated = np.concatenate(differences, axis=1)
+        if len(square) >= MIN_WINDOWS:
+            excess[axis] = _excess(square, stated) / THIRD_DIFFERENCE.sum()
     return excess
 
 
-def _variance_without_blows(square: np.ndarray) -> tuple[float, np.ndarray]:
-    """The variance of normal values with these squares, and which `[value]` are no outliers."""
-    variance = float(np.median(square)) / CHI2_MEDIAN
-    kept = np.ones(len(square), dtype=bool)
-    for _ in range(20):
-        before, kept = kept, square <= CUT_SDS**2 * variance
-        if np.array_equal(before, kept):
-            break
-        variance = float(square[kept].mean()) / CUT_VARIANCE
-    return variance, kept
+def _third_differences(place: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    """`[2, window]`: squared third differences of `[frame]` while moving; their stated variance."""
+    if len(place) < len(THIRD_DIFFERENCE):
+        return np.empty((2, 0))
+    steps = np.diff(place) ** 2 > MOVED_SDS**2 * (variance[1:] + variance[:-1])
+    # A NaN step compares False: windows with gaps do not count.
+    moves = np.lib.stride_tricks.sliding_window_view(steps, 3).all(axis=1)
+    stated = np.lib.stride_tricks.sliding_window_view(variance, 4) @ THIRD_DIFFERENCE
+    return np.stack([np.diff(place, n=3) ** 2, stated])[:, moves]
+
+
+def _excess(square: np.ndarray, stated: np.ndarray) -> float:
+    """The variance that normal values with these squares have beyond the `stated`, >= 0.
+
+    Maximum likelihood, by scoring, without the values beyond `CUT_SDS`.
+    """
+    excess = float(np.median(square)) / CHI2_MEDIAN
+    for _ in range(30):
+        variance = stated + excess
+        weight = (square <= CUT_SDS**2 * variance) / variance**2
+        surplus = square / CUT_VARIANCE - stated
+        excess = max(0.0, float((weight * surplus).sum() / max(weight.sum(), 1e-300)))
+    return excess
 
 
 def blow_shift(jumps: np.ndarray, exposure_share: float) -> np.ndarray:
