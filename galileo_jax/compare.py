@@ -91,6 +91,7 @@ def _of_clips(call: argparse.Namespace) -> Compared:
     effects = chosen_effects(call)
     import_ahead()
     measured = [measure(clip) for clip in clips]
+    clips = [one.clip for one in measured]
     _prepare_jax()
     from galileo_jax.run import make_trials
 
