@@ -1,7 +1,6 @@
 """`galileo compare`: is the model adequate for a clip, and where does it fail?"""
 
 import argparse
-import json
 import shlex
 import time
 from collections.abc import Sequence
@@ -110,8 +109,7 @@ def _of_run(folder: Path, call: argparse.Namespace) -> Compared:
 
     folders = [folder]
     if (folder / RESULT).is_file() and not (folder / CLIP).is_file():
-        named = json.loads((folder / RESULT).read_text(encoding="utf-8"))["clips"]
-        folders = [folder / Path(clip).stem for clip in named]
+        folders = sorted(path.parent for path in folder.glob(f"*/{CLIP}")) or [folder]
     runs = [load_run(each, call.engine) for each in folders]
     out = Path(call.out) if call.out else folder / "compare"
     clips = [clip for run in runs for clip in run.result["clips"]]

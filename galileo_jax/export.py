@@ -19,6 +19,8 @@ from galileo_jax.table_files import TABLE_WRITERS, Table
 FORMATS = (*TABLE_WRITERS, "netcdf")
 TRACK, PARAMETERS, DRAWS = "track", "parameters", "draws"
 AXES = ("x", "y")
+MEASURED = ("x_m", "y_m", "sd_x_m", "sd_y_m", "correlation")
+OBSERVATION = "observation.csv"
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -29,7 +31,7 @@ def main(argv: Sequence[str]) -> int | None:
         raise InputError(f"{source}: no such file or folder")
     if source.is_dir():
         out = call.out or source / "export"
-        written = _export_run(source, out, call.to)
+        written = _export_run(source, out, call.to, call.fitted)
     else:
         from galileo_jax.measured import load_clips, measure
 
@@ -40,10 +42,12 @@ def main(argv: Sequence[str]) -> int | None:
     return None
 
 
-def _export_run(folder: Path, out: Path, to: str) -> list[Path]:
+def _export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path]:
     """The tracks, the parameters' summaries and the draws of a run, of one clip or several."""
     result = _result(folder)
-    tracks = {name: read_observation_csv(path) for name, path in _track_paths(folder, result)}
+    folders = _clip_folders(folder, result)
+    tracks = {name: read_observation_csv(one / OBSERVATION) for name, one in folders.items()}
+    fitted = {name: _fitted_m(one) for name, one in folders.items()} if with_fitted else {}
     posterior = folder / "posterior.nc"
     if not posterior.is_file():
         raise InputError(f"{posterior}: no such file; a folder written by `galileo fit` expected")
@@ -53,10 +57,12 @@ def _export_run(folder: Path, out: Path, to: str) -> list[Path]:
             shutil.copyfile(posterior, temporary)
             for name, observation in tracks.items():
                 group = "observed_data" if len(tracks) == 1 else f"observed_data/{name}"
-                _dataset(observation).to_netcdf(temporary, mode="a", group=group, engine="h5netcdf")
+                _dataset(observation, fitted.get(name)).to_netcdf(
+                    temporary, mode="a", group=group, engine="h5netcdf"
+                )
         return [path]
     tables = {
-        TRACK: _track_table(tracks),
+        TRACK: _track_table(tracks, fitted),
         PARAMETERS: _parameter_table(result),
         DRAWS: _draw_table(posterior),
     }
@@ -65,12 +71,12 @@ def _export_run(folder: Path, out: Path, to: str) -> list[Path]:
 
 def _export_tracks(tracks: Mapping[str, Observation], out: Path, to: str) -> list[Path]:
     if to != "netcdf":
-        return _write({TRACK: _track_table(tracks)}, out, to)
+        return _write({TRACK: _track_table(tracks, {})}, out, to)
     written = []
     for name, observation in tracks.items():
         path = out / f"{name}.nc"
         with _outputs(out), replacing(path) as temporary:
-            _dataset(observation).to_netcdf(
+            _dataset(observation, None).to_netcdf(
                 temporary, mode="w", group="observed_data", engine="h5netcdf"
             )
         written.append(path)
@@ -105,20 +111,29 @@ def _result(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path}: not JSON ({error})") from None
 
 
-def _track_paths(folder: Path, result: dict[str, Any]) -> list[tuple[str, Path]]:
-    """Name and track of every clip; of several clips each has a folder of its own."""
-    names = [Path(clip).stem for clip in result["clips"]]
-    if (folder / "observation.csv").is_file():
-        return [(names[0], folder / "observation.csv")]
-    return [(name, folder / name / "observation.csv") for name in names]
+def _clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
+    """Name and folder of every clip; of several clips each has a folder of its own."""
+    if (folder / OBSERVATION).is_file():
+        return {Path(result["clips"][0]).stem: folder}
+    return {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{OBSERVATION}"))}
 
 
-def _track_table(tracks: Mapping[str, Observation]) -> Table:
+def _fitted_m(folder: Path) -> np.ndarray:
+    """Where a run's model, at the posterior's mean, has the objects: `[object, 2, frame]`, m."""
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    from galileo_jax.run import load_run
+
+    run = load_run(folder)
+    mean = run.posterior.flat().mean(axis=0)
+    columns = [run.posterior.names.index(name) for name in run.problem.model.names]
+    return np.asarray(run.problem.simulate(mean[columns]))
+
+
+def _track_table(tracks: Mapping[str, Observation], fitted_m: Mapping[str, np.ndarray]) -> Table:
     """One row per clip, object and time; empty where the object was not seen."""
-    table: dict[str, list[Any]] = {
-        title: []
-        for title in ("clip", "object", "time_s", "x_m", "y_m", "sd_x_m", "sd_y_m", "correlation")
-    }
+    table: dict[str, list[Any]] = {}
     for clip, seen in tracks.items():
         count = len(seen.times_s)
         for k, name in enumerate(seen.names):
@@ -134,9 +149,11 @@ def _track_table(tracks: Mapping[str, Observation]) -> Table:
                 "sd_y_m": sd_y,
                 "correlation": covariance[0, 1] / (sd_x * sd_y),
             }
+            if clip in fitted_m:
+                columns["fitted_x_m"], columns["fitted_y_m"] = fitted_m[clip][k]
             for title, values in columns.items():
-                is_measured = title not in ("clip", "object", "time_s")
-                table[title].extend(
+                is_measured = title in MEASURED
+                table.setdefault(title, []).extend(
                     np.where(seen.mask[k], values, np.nan) if is_measured else values
                 )
     return table
@@ -167,19 +184,20 @@ def _draw_table(posterior: Path) -> Table:
     }
 
 
-def _dataset(seen: Observation) -> Any:
+def _dataset(seen: Observation, fitted_m: np.ndarray | None) -> Any:
     """ArviZ's `observed_data`: `position_m [object, axis, time]` and its covariance."""
     import xarray as xr
 
-    return xr.Dataset(
-        {
-            "position_m": (("object", "axis", "time_s"), seen.position_m),
-            "covariance_m2": (("object", "axis", "other_axis", "time_s"), seen.covariance_m2),
-            "is_seen": (("object", "time_s"), seen.mask.astype("i1")),
-        },
-        {"object": list(seen.names), "axis": list(AXES), "other_axis": list(AXES),
-         "time_s": seen.times_s},
-    )  # fmt: skip
+    place = ("object", "axis", "time_s")
+    data: dict[str, Any] = {
+        "position_m": (place, seen.position_m),
+        "covariance_m2": (("object", "axis", "other_axis", "time_s"), seen.covariance_m2),
+        "is_seen": (("object", "time_s"), seen.mask.astype("i1")),
+    }
+    if fitted_m is not None:
+        data["fitted_position_m"] = (place, fitted_m)
+    axes = {"axis": list(AXES), "other_axis": list(AXES)}
+    return xr.Dataset(data, {"object": list(seen.names), "time_s": seen.times_s, **axes})
 
 
 def _parser() -> command.Parser:
@@ -191,6 +209,11 @@ def _parser() -> command.Parser:
     add = parser.add_argument
     add("source", type=Path, metavar="RUN|CLIP", help="the folder that fit wrote, or a clip")
     add("--to", choices=FORMATS, required=True)
+    add(
+        "--fitted",
+        action="store_true",
+        help="of a run: also where the fitted model has the objects, at the posterior's mean",
+    )
     add("--out", type=Path, metavar="DIR", help="default: RUN/export, or CLIP_export")
     return parser
 

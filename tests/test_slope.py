@@ -5,9 +5,10 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from galileo_jax import command, fit
+from galileo_jax import command, export, fit
 from galileo_jax.clip.load import load_clip
 from galileo_jax.errors import InputError
 from galileo_jax.measured import inferred, measure
@@ -111,6 +112,9 @@ def test_inferred_angle_enters_the_fit(tmp_path: Path) -> None:
     friction = math.tan(math.radians(20)) - 1.6 / (9.81 * math.cos(math.radians(20)))
     found = result["parameters"]["k1"]
     assert found["q025"] < friction < found["q975"]
+    assert command.run(export.main, [str(out), "--to", "csv", "--fitted"]) == 0
+    track = pd.read_csv(out / "export" / "track.csv")
+    assert np.std(track["fitted_x_m"] - track["x_m"]) == pytest.approx(5e-4, rel=0.3)
     # d k / d angle = 1 + k tan(angle) per radian
     from_angle = math.radians(LEVEL_SD_DEG) * (1 + friction * math.tan(math.radians(20)))
     assert found["sd"] == pytest.approx(from_angle, rel=0.3)
