@@ -23,6 +23,8 @@ shares differs from the template by more than noise, or lies beyond the picture'
 
 LONG_RUN = 10
 """A run of so many frames is believed after any gap."""
+SAME_PLACE_PX = 1.0
+"""What comes back this close to where it was last seen had only been covered."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ def _seen(fits: list[Refined | None]) -> tuple[np.ndarray, np.ndarray]:
     for index, fit in enumerate(fits):
         if fit is not None and _is_visible(fit):
             poses[index], noise[index] = fit.pose, fit.covariance
-    is_doubtful = ~_without_glimpses(np.isfinite(poses[:, 0]))
+    is_doubtful = ~_without_glimpses(poses)
     poses[is_doubtful], noise[is_doubtful] = np.nan, np.nan
     return poses, noise
 
@@ -122,16 +124,21 @@ def _anchored(
     return Finished(position, covariance, angle)
 
 
-def _without_glimpses(is_seen: np.ndarray) -> np.ndarray:
-    """`is_seen` `[frame]` without the runs that are shorter than the gap before them.
+def _without_glimpses(poses: np.ndarray) -> np.ndarray:
+    """`[frame]`: where `poses` `[frame, 3]` are to be believed.
 
-    What comes back for a few frames after a long absence is more likely something like it.
+    What comes back for a few frames after a longer absence is more likely something like it,
+    unless it is where it was.
     """
+    is_seen = np.isfinite(poses[:, 0])
     result = np.zeros_like(is_seen)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_seen, [False]]).astype(int)))
     last_end: int | None = None
     for begin, end in edges.reshape(-1, 2):
-        if last_end is None or end - begin >= min(begin - last_end, LONG_RUN):
+        is_same = last_end is not None and (
+            np.hypot(*(poses[begin] - poses[last_end - 1])[:2]) < SAME_PLACE_PX
+        )
+        if last_end is None or is_same or end - begin >= min(begin - last_end, LONG_RUN):
             result[begin:end] = True
             last_end = end
     return result
