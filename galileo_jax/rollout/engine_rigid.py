@@ -18,6 +18,7 @@ import numpy as np
 
 from galileo_jax.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.chunks import MOTIONS, in_chunks
+from galileo_jax.rollout.devices import over_devices
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
 
@@ -88,7 +89,7 @@ def _roll_out_batch(
     scene: Surroundings,
 ) -> tuple[jax.Array, jax.Array]:
     one = functools.partial(roll_out, effects, names, num_records, dt_s)
-    return jax.vmap(one, (0, None))(theta, scene)
+    return over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, scene)
 
 
 def roll_out(
