@@ -17,6 +17,7 @@ from galileo_jax.clip.yaml_edit import dump
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
 from galileo_jax.observation import Observation
+from galileo_jax.simulate_free import FREE_SCENARIOS, write_free_clip
 from galileo_jax.truth import (
     LONGEST_S,
     SOLVERS,
@@ -49,6 +50,20 @@ def main(argv: Sequence[str]) -> int | None:
     if call.track_only and call.camera_fault:
         raise InputError("--camera-fault: a track (--track-only) has no camera")
     hidden = _hidden(call)
+    if call.scenario != "ramp":
+        _refuse_ramp_options(call)
+        path = out.parent / out.name
+        try:
+            with _all_or_nothing(out.parent) as folder:
+                write_free_clip(folder / out.name, call, hidden)
+        except OSError as error:
+            raise InputError(f"--out: {out}: {error.strerror or error}") from error
+        for end in (suffix, ".yaml", ".truth.json"):
+            print(path.with_suffix(end))
+        return None
+    for option, value in (("--set", call.set), ("--floor", call.floor)):
+        if value:
+            raise InputError(f"{option}: not of a ramp")
     looks, things, faults, secrets = np.random.default_rng(call.seed).spawn(4)
     given = {key: getattr(call, key) for key in ("m1", "k1", "m2", "k2")}
     trials = draw_series(
@@ -73,6 +88,14 @@ def main(argv: Sequence[str]) -> int | None:
         for end in (suffix, ".yaml", ".truth.json"):
             print(out.with_name(name + end))
     return None
+
+
+def _refuse_ramp_options(call: argparse.Namespace) -> None:
+    """What only a ramp has."""
+    given = {f"--{key}": getattr(call, key) is not None for key in ("m1", "k1", "m2", "k2")}
+    given |= {"--series": bool(call.series), "--hand": call.hand, "--faults": call.faults}
+    for option in (option for option, is_given in given.items() if is_given):
+        raise InputError(f"{option}: of a ramp only, not of scenario {call.scenario}")
 
 
 def _hidden(call: argparse.Namespace) -> list[Hidden]:
@@ -309,7 +332,7 @@ def _parser() -> command.Parser:
     )
     add = parser.add_argument
     add("--out", type=Path, required=True, metavar="DIR/NAME.mp4", help="NAME.csv for a track")
-    add("--scenario", choices=["ramp"], default="ramp")
+    add("--scenario", choices=["ramp", *FREE_SCENARIOS], default="ramp")
     add("--seed", type=_number(int, 0), default=0)
     add("--angle", type=_number(float, 1, 60), default=20.0, metavar="DEG", help="of the ramp")
     add("--seconds", type=_number(float, 0.1, LONGEST_S), help="default: until all is at rest")
@@ -318,6 +341,15 @@ def _parser() -> command.Parser:
         add(f"--m{index}", type=_number(float, 0.01, 100), metavar="KG")
         add(f"--k{index}", type=_number(float, 0, 2), metavar="FRICTION")
     add("--solver", choices=SOLVERS, default="rigid", help="fine: not the engine that fits")
+    add(
+        "--set",
+        type=_value,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a parameter of a scenario without a ramp, such as floor_restitution=0.7",
+    )
+    add("--floor", action="store_true", help="of a fall or a flight: it bounces")
     add("--series", type=_number(int, 1, 99), metavar="N", help="N trials: NAME_1, NAME_2, ...")
     add("--track-only", action="store_true", help="a csv track in place of the video")
     add(
@@ -398,6 +430,14 @@ def _effect(text: str) -> tuple[str, dict[str, float]]:
         if not math.isfinite(values[key.strip()]):
             raise argparse.ArgumentTypeError(f"{part!r} is not PARAMETER=NUMBER")
     return name.strip(), values
+
+
+def _value(text: str) -> tuple[str, float]:
+    """`NAME=VALUE`."""
+    name, values = _effect(f":{text}")
+    if name or len(values) != 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=NUMBER")
+    return next(iter(values.items()))
 
 
 def _size(text: str) -> tuple[int, int]:

@@ -187,10 +187,6 @@ def test_release_of_an_incline_is_where_motion_begins(tmp_path):
 
 def test_what_cannot_be_simulated_is_said(tmp_path):
     centres = solve(HIT, np.array([0.0])).position_m
-    with pytest.raises(
-        InputError, match=r"scenario: 'flight' cannot be simulated yet; known: ramp"
-    ):
-        build_scene(clip(tmp_path, scenario="flight"), observed(centres))
     unseen = observed(centres)
     unseen.mask[1] = False
     with pytest.raises(InputError, match="object2 is not seen in any frame"):
