@@ -5,7 +5,7 @@ import hashlib
 import json
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -22,7 +22,7 @@ from galileo_jax.registry import entry_names
 
 if TYPE_CHECKING:
     from galileo_jax.effects.effect import Effect
-    from galileo_jax.inference.fits.gradient import GradientFit
+    from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
     from galileo_jax.inference.posterior import Posterior
     from galileo_jax.inference.trials import Trials
 
@@ -30,6 +30,7 @@ BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
 METHODS = ("grad", "mh", "cnn")
 PRESETS = ("galileo", "thesis")
+INITS = ("grad", "cnn")
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
 SIMILARITIES = entry_names("galileo_jax.similarity.library")
 
@@ -37,6 +38,8 @@ SIMILARITIES = entry_names("galileo_jax.similarity.library")
 def main(argv: Sequence[str]) -> int | None:
     """Fits a clip, or several trials together, and writes a run."""
     call = _parser().parse_args(argv)
+    if call.init == "cnn" and (call.method, call.preset) != ("mh", "galileo"):
+        raise InputError("--init cnn: it starts the chains of --method mh --preset galileo")
     clips = load_clips(call.clips, call.pixels_per_metre)
     out = out_folder(call, clips)
     if call.preset == "thesis" and len(clips) > 1:
@@ -211,19 +214,32 @@ def _search(
     timings["compile"] = time.perf_counter() - began
     began = time.perf_counter()
     with command.console().status("fitting") as status:
-        fit = fitter.fit(call.seed, on_stage=status.update)
+        fit, starts, begun = _begin(trials, fitter, call, status.update)
     if fit.code is Code.FAILED:
         raise InputError(f"{measured[0].clip.path}: {fit.code}")
     posterior = laplace_posterior(trials, fit, call.seed)
     notes: dict[str, Any] = {"engine": trials.problems[0].engine.name, "status": fit.code.value}
+    notes |= begun
     if call.method == "mh":
         if call.preset == "thesis":
             posterior, extra = _thesis(trials, call)
         else:
-            posterior, extra = _metropolis(trials, fit, call, out, _identity(measured, call))
+            identity = _identity(measured, call)
+            posterior, extra = _metropolis(trials, fit, starts, call, out, identity)
         notes |= extra
     timings["fit"] = time.perf_counter() - began
     return posterior, fit.z, notes
+
+
+def _begin(trials: "Trials", fitter: "GradientFitter", call, on_stage: Callable[[str], None]):
+    """The mode, where chains start in z (None: dispersed round it), and notes."""
+    if call.init == "cnn":
+        from galileo_jax.inference.metropolis import NUM_CHAINS
+        from galileo_jax.neural.start import start_from_network
+
+        start = start_from_network(trials, call.seed, NUM_CHAINS)
+        return start.fit, start.z, start.notes
+    return fitter.fit(call.seed, on_stage=on_stage), None, {}
 
 
 def _network(trials: "Trials", call: argparse.Namespace, timings: dict[str, float]) -> Found:
@@ -236,7 +252,14 @@ def _network(trials: "Trials", call: argparse.Namespace, timings: dict[str, floa
     return posterior, z_best, {"engine": trials.problems[0].engine.name} | notes
 
 
-def _metropolis(trials: "Trials", fit: "GradientFit", call, out: Path, identity: str):
+def _metropolis(
+    trials: "Trials",
+    fit: "GradientFit",
+    starts: np.ndarray | None,
+    call: argparse.Namespace,
+    out: Path,
+    identity: str,
+) -> tuple["Posterior", dict[str, Any]]:
     """Samples with a progress bar; resumes what a Ctrl-C left in the run's folder."""
     from galileo_jax.inference.metropolis import metropolis_posterior
     from galileo_jax.inference.samplers.driver import Settings
@@ -253,6 +276,7 @@ def _metropolis(trials: "Trials", fit: "GradientFit", call, out: Path, identity:
             call.seed,
             sampler=call.sampler,
             settings=settings,
+            starts=starts,
             checkpoint=out / CHECKPOINT,
             identity=identity,
             on_block=lambda state: bar.update(task, completed=state.num_steps),
@@ -344,6 +368,12 @@ def _parser() -> command.Parser:
         "--max-steps",
         type=command.whole_number(BLOCK_STEPS, BLOCK_STEPS),
         help="per chain, after the warm-up",
+    )
+    group.add_argument(
+        "--init",
+        choices=INITS,
+        default="grad",
+        help="what chains start from: a fit, or the network",
     )
     group.add_argument("--preset", choices=PRESETS, default="galileo")
     group.add_argument(

@@ -44,7 +44,7 @@ def main(argv: Sequence[str]) -> int | None:
         axes[0, 0].set(title="L1 distance, m/frame")
         axes[0, 0].invert_yaxis()
         for name, entry in found.items():
-            axes[0, 1].plot(setting.QUANTITIES, entry["error"], "o-", linewidth=0.8, label=name)
+            axes[0, 1].plot(setting.QUANTITIES, entry["error"], "o", label=name)
         axes[0, 1].set(title="mean absolute error", yscale="log")
         axes[0, 1].legend(fontsize=6)
     setting.finish(call, "chain_selection", found)

@@ -49,7 +49,7 @@ def main(argv: Sequence[str]) -> int | None:
         axes[0, 0].set(title="L1 distance, m/frame", yscale="log")
         axes[0, 0].tick_params(axis="x", labelsize=7)
         for name, entry in table.items():
-            axes[0, 1].plot(setting.QUANTITIES, entry["error"], "o-", label=name)
+            axes[0, 1].plot(setting.QUANTITIES, entry["error"], "o", label=name)
         axes[0, 1].set(title="mean absolute error", yscale="log")
         axes[0, 1].legend()
     setting.finish(call, "coin_toss", table)

@@ -33,7 +33,7 @@ def main(argv: Sequence[str]) -> int | None:
         off = off.reshape(-1, *off.shape[-2:]).mean(0)
         found[name] = off[:, [0, -1]].T
         setting.row(name, list(found[name].ravel()))
-    with setting.figure(call, "first_last_frame", columns=2, rows=2) as axes:
+    with setting.figure(call, "first_last_frame", columns=2, rows=2, row_in=1.25) as axes:
         for i, (name, positions) in enumerate((("seen", seen[0]), ("simulated", simulated[0]))):
             for j, frame in enumerate((0, -1)):
                 draw_scene(axes[i, j], positions[..., frame])

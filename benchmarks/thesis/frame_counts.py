@@ -42,7 +42,7 @@ def main(argv: Sequence[str]) -> int | None:
     with setting.figure(call, "frame_counts", columns=2) as axes:
         for i, name in enumerate(("sampler", "network")):
             for frames in FRAMES:
-                axes[0, i].plot(setting.QUANTITIES, found[str(frames)][name], "o-", label=frames)
+                axes[0, i].plot(setting.QUANTITIES, found[str(frames)][name], "o", label=frames)
             axes[0, i].set(title=f"{name}: mean absolute error", yscale="log")
             axes[0, i].legend()
     setting.finish(call, "frame_counts", found)

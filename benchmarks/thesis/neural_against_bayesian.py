@@ -72,7 +72,7 @@ def main(argv: Sequence[str]) -> int | None:
             found[label] = {"mae": error.mean(0), "median": np.median(error, 0), "s": seconds}
     with setting.figure(call, "neural_against_bayesian") as axes:
         for label, entry in found.items():
-            axes[0, 0].plot(setting.QUANTITIES, entry["mae"], "o-", label=label)
+            axes[0, 0].plot(setting.QUANTITIES, entry["mae"], "o", label=label)
         axes[0, 0].set(title="mean absolute error", yscale="log")
         axes[0, 0].legend(fontsize=6)
     setting.finish(call, "neural_against_bayesian", found)

@@ -172,12 +172,14 @@ def start(argv: Sequence[str], doc: str | None, num: int, frames: int = 60) -> a
 
 
 @contextmanager
-def figure(call: argparse.Namespace, name: str, columns: int = 1, rows: int = 1):
+def figure(
+    call: argparse.Namespace, name: str, columns: int = 1, rows: int = 1, row_in: float = 2.7
+):
     """Yields matplotlib axes `[row, column]`; the figure is then OUT/NAME.png."""
     from matplotlib.figure import Figure
 
     with style(name):
-        drawn = Figure(figsize=(3.6 * columns, 2.7 * rows), dpi=110, layout="constrained")
+        drawn = Figure(figsize=(3.6 * columns, row_in * rows), dpi=110, layout="constrained")
         yield drawn.subplots(rows, columns, squeeze=False)
         with replacing(call.out / f"{name}.png") as temporary:
             drawn.savefig(temporary)
