@@ -129,6 +129,7 @@
       if (!canvas || !picture) return;
       if (!picture.complete) { picture.onload = () => +slider.value === frame && paint(frame); return; }
       canvas.getContext("2d").drawImage(picture, 0, 0, canvas.width, canvas.height);
+      canvas.dataset.frame = frame;
     }
 
     function show() {

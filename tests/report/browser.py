@@ -31,9 +31,9 @@ def started() -> Iterator:
 
 
 @contextmanager
-def opened(browser, path: Path, width_px: int = 1280) -> Iterator[tuple]:
+def opened(browser, path: Path) -> Iterator[tuple]:
     """The page with all its charts drawn, and a list of what it complains of or asks for."""
-    context = browser.new_context(viewport={"width": width_px, "height": 900})
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
     page = context.new_page()
     complaints: list[str] = []
     page.on("console", lambda message: complaints.append(message.text))
