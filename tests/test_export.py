@@ -3,6 +3,7 @@
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -49,9 +50,10 @@ def test_tables_of_a_run(to: str, tmp_path: Path, capsys) -> None:
     assert run(folder, "--to", to) == 0
     files = [folder / "export" / f"{name}.{to}" for name in ("track", "parameters", "draws")]
     assert capsys.readouterr().out.split() == [str(path) for path in files]
-    track, parameters, draws = (
+    tables: list[Any] = [
         pd.read_csv(path) if to == "csv" else pd.read_parquet(path) for path in files
-    )
+    ]
+    track, parameters, draws = tables
 
     seen = make_observation(0, False)
     assert list(track["object"].unique()) == list(seen.names)

@@ -62,7 +62,7 @@ def load_clip(path: str | Path, **overrides: Any) -> Clip:
 
 
 def check_place(
-    place: physics101.Place, labels: physics101.Labels, given: Mapping[str, Any] | None = None
+    place: physics101.Place, labels: physics101.Labels, given: dict[str, Any] | None = None
 ) -> Clip:
     """Checks a clip of Physics 101, which its folders and its labels declare.
 

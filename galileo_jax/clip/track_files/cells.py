@@ -44,7 +44,7 @@ def read_cells(path: Path) -> list[tuple[int, list[str]]]:
     """The rows that are not blank, each with its line number.
 
     Raises:
-      InputError: the file cannot be read, or is no table.
+      InputError: the file cannot be read, is no table, or has no rows.
     """
     try:
         text = decoded(path.read_bytes())
@@ -55,7 +55,10 @@ def read_cells(path: Path) -> list[tuple[int, list[str]]]:
         rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
     except csv.Error as error:
         raise InputError(f"{path}: not a table: line {reader.line_num}: {error}") from None
-    return [(line, row) for line, row in rows if any(row)]
+    rows = [(line, row) for line, row in rows if any(row)]
+    if not rows:
+        raise InputError(f"{path}: empty; a row of titles and numbers expected")
+    return rows
 
 
 def number(text: str) -> float:

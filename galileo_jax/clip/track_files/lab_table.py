@@ -37,7 +37,10 @@ class LabTable(TrackReader):
         (line, header), *rest = read_cells(path)
         titles = [title_of(cell) for cell in header]
         clock = next((t for t in titles if t.symbol == "t"), None) or Title("frame", "", None)
-        columns = {clock.symbol: [t.symbol for t in titles].index(clock.symbol)}
+        symbols = [t.symbol for t in titles]
+        if clock.symbol not in symbols:
+            raise InputError(f"{path}: line {line}: no column t or frame")
+        columns = {clock.symbol: symbols.index(clock.symbol)}
         names = list(dict.fromkeys(t.name for t in titles if t.symbol in ("x", "y")))
         for name in names:
             for symbol in ("x", "y"):
