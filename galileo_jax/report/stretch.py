@@ -12,7 +12,7 @@ def strongest(values: np.ndarray) -> tuple[int, int, float] | None:
       values: `[n]`, unit normal if there is nothing; no NaN.
 
     Returns:
-      None with fewer than three values. White noise gives about 3.7 for 120 values.
+      None with fewer than three values. White noise gives about 3.0 for 120 values.
     """
     if len(values) < LEAST_STRETCH:
         return None
