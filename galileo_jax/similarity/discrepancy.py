@@ -19,6 +19,7 @@ OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of 
 KEYSTONE_SD = 0.006  # 1/m; half a degree of yaw or tilt, 1.5 m away
 CAMERA_M = 1.5  # a longer fall is seen from further away, at least its own length
 ROLL_SD_RAD = 0.002
+READ_OFF = 10.0  # times an angle's sd: so wide that the direction tells nothing more
 SCALE_SD = 0.001
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
 HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none
@@ -47,31 +48,20 @@ def offsets(observation: Observation) -> list[np.ndarray]:
     return found
 
 
-def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
+def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True) -> np.ndarray:
     """The patterns times their standard deviations, `[mode, object, 2, frame]`, m.
 
     Offsets of each object and axis; keystone about either axis, roll and scale of the
     camera, common to all objects; and, for what comes down a ramp, the step that an
     off-centre point and a box's length make when the object turns at the foot.
-    After a hit the way each object goes is known to a tenth of a per cent.
+    After a hit the way each object goes is known to a tenth of a per cent. Without a camera
+    (`is_filmed`) keystone, roll and scale are not among them.
     """
     position = np.nan_to_num(observation.position_m)
     count, _, frames = position.shape
     found = offsets(observation)
-    x, y = position[:, 0], position[:, 1]
-    if scene.has_surface:
-        found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
-        found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
-    elif scene.moves_in_plane:
-        # Anywhere in the picture: about the middle of what is seen of the flight.
-        seen = observation.mask[:, None].repeat(2, axis=1)
-        middle = np.ma.masked_array(position, ~seen).mean(axis=-1, keepdims=True).filled(0.0)
-        aside = position - middle
-        found.extend(KEYSTONE_SD * aside * aside[:, axis : axis + 1] for axis in range(2))
-    else:
-        found.append(_bent_scale(y, observation))
-    found.append(ROLL_SD_RAD * np.stack([-y, x], axis=1))
-    found.append(SCALE_SD * position)
+    if is_filmed:
+        found.extend(_camera(position, observation, scene))
     for i, comes_down in enumerate(scene.comes_down):
         if comes_down:
             share = _share_past_foot(position[i, 0], scene, i)
@@ -89,6 +79,31 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
         found.extend(_aside(position))
     found.extend(_after_hit(position, observation))
     return np.stack(found)
+
+
+def _camera(
+    position: np.ndarray, observation: Observation, scene: Surroundings
+) -> list[np.ndarray]:
+    """Keystone about either axis, roll and scale, common to all objects."""
+    found = []
+    x, y = position[:, 0], position[:, 1]
+    if scene.has_surface:
+        found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
+        found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
+    elif scene.moves_in_plane:
+        # Anywhere in the picture: about the middle of what is seen of the flight.
+        seen = observation.mask[:, None].repeat(2, axis=1)
+        middle = np.ma.masked_array(position, ~seen).mean(axis=-1, keepdims=True).filled(0.0)
+        aside = position - middle
+        found.extend(KEYSTONE_SD * aside * aside[:, axis : axis + 1] for axis in range(2))
+    else:
+        found.append(_bent_scale(y, observation))
+    # A ramp's angle known within so much was read off the picture: its direction there, used
+    # already, must not count again.
+    lean = READ_OFF * scene.angle_sd_rad if scene.has_surface else 0.0
+    found.append(math.hypot(ROLL_SD_RAD, lean) * np.stack([-y, x], axis=1))
+    found.append(SCALE_SD * position)
+    return found
 
 
 def _wobble(
