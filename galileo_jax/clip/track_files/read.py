@@ -36,6 +36,9 @@ TRACK_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".trk", ".trz", ".h5", ".hdf5"
 """Files taken for a track when given as CLIP; what is in them decides the rest."""
 
 
+LENGTH_CHOICES = " | ".join((*METRES_PER_UNIT, "px"))
+
+
 @dataclass(frozen=True)
 class FileTrack:
     """What was read.
@@ -88,15 +91,16 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
     check_times(path, times)
     unit = "px" if table.unit == "px" else file.track_units or table.unit
     y_axis = file.track_y or table.y_axis
-    if unit is None:
+    if unit is None or y_axis is None:
+        asked = [
+            *([("track_units", "its unit of length", LENGTH_CHOICES)] if unit is None else []),
+            *([("track_y", "which way its y axis points", "up | down")] if y_axis is None else []),
+        ]
+        keys, what, choices = zip(*asked, strict=True)
+        wanted = ", ".join(f"{key}: {words}" for key, words in zip(keys, choices, strict=True))
         raise InputError(
-            f"{yaml_path}: track_units: missing; {path.name} does not name its unit of length; "
-            f"write track_units: {' | '.join(METRES_PER_UNIT)} | px"
-        )
-    if y_axis is None:
-        raise InputError(
-            f"{yaml_path}: track_y: missing; {path.name} does not say whether y points up or down; "
-            "write track_y: up | down"
+            f"{yaml_path}: {', '.join(keys)}: missing; {path.name} does not tell "
+            f"{' and '.join(what)}; write {wanted}"
         )
     if unit == "px":
         scale, origin = _scale(yaml_path, path, file, table.calibration), _origin(file, table)
