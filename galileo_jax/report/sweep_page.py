@@ -16,6 +16,7 @@ from galileo_jax.report.shell import document, figure_section, header, legend, t
 COLOURS = ("object2", "object1", "good", "fails", "ink", "soft")
 QUANTITIES = {"k1": "k1", "k2": "k2", "mass_ratio": "m1/m2"}
 CHART_PX, CELL_PX = 300, 34
+EACH = {"type": "category", "tickmode": "linear", "dtick": 1}  # an axis that names each category
 MAX_FAILURES = 50  # listed; the table on disk has all
 Row = Mapping[str, Any]
 
@@ -135,9 +136,9 @@ def _boxes(
             }
         )
     layout = {
-        "boxmode": "group" if len(names) > 1 else "overlay",
+        "boxmode": "overlay" if category is label or len(names) == 1 else "group",
         "margin": {"l": 62, "r": 12, "t": 12, "b": 96},
-        "xaxis": {"tickangle": -35, "type": "category"},
+        "xaxis": {"tickangle": -35, **EACH},
         "yaxis": {"title": {"text": title}, "rangemode": "tozero"},
     }
     return figure_element({"data": data, "layout": layout}, f"{title}, box plots", CHART_PX)
@@ -170,8 +171,8 @@ def _confusion(rows: Sequence[Row]) -> list[str]:
         ],
         "layout": {
             "margin": {"l": 130, "r": 12, "t": 12, "b": 110},
-            "xaxis": {"title": {"text": "said"}, "tickangle": -35, "type": "category"},
-            "yaxis": {"title": {"text": ""}, "autorange": "reversed", "type": "category"},
+            "xaxis": {"title": {"text": "said"}, "tickangle": -35, **EACH},
+            "yaxis": {"title": {"text": ""}, "autorange": "reversed", **EACH},
         },
     }
     right = sum(n for (h, v), n in count.items() if h == v)
