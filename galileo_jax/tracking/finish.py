@@ -7,8 +7,8 @@ import numpy as np
 
 from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
-    ELSEWHERE_SD_PX,
     MEMORY_FRAMES,
+    SAMPLING_SD_PX,
     blow_shift,
     is_in_motion,
     motion_variance,
@@ -105,7 +105,6 @@ def _anchored(
     covariance[frames] += np.einsum("fi,ij->fij", moves * excess, np.eye(2))
 
     anchor = np.array([*point_px, 0.0])
-    began = np.empty(0, dtype=int)
     if first_fit is not None:
         anchor, anchor_noise = first_fit.pose, first_fit.covariance
         at_rest = frames[np.cumprod(~moves.any(axis=1)).astype(bool)] if len(frames) else frames
@@ -115,8 +114,7 @@ def _anchored(
             anchor = poses[began].mean(axis=0)
             anchor_noise = noise[began].mean(axis=0) / max(1.0, len(began) / MEMORY_FRAMES)
         covariance += anchor_noise
-    is_elsewhere = ~np.isin(np.arange(len(poses)), began)
-    covariance[is_elsewhere] += ELSEWHERE_SD_PX**2 * np.eye(2)
+    covariance += SAMPLING_SD_PX**2 * np.eye(2)
 
     angle = poses[:, 2] - anchor[2]
     arm = point_px - anchor[:2]

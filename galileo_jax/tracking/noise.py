@@ -14,9 +14,10 @@ CHI2_MEDIAN = 0.4549
 """Median of chi^2 with one degree of freedom."""
 CUT_SDS, CUT_VARIANCE = 3.0, 0.9733
 """Differences beyond are blows; the variance that a normal keeps when it is cut there."""
-ELSEWHERE_SD_PX = 0.0035
-"""How much the alignment's own error (sampling a texture with pixels) differs between two
-places or turns, per axis: 0.0034 px measured on drawn boxes without noise."""
+SAMPLING_SD_PX = 0.0035
+"""The alignment's own error, per axis, that sampling a texture with pixels makes: 0.0034 px from
+place to place measured on drawn boxes without noise. It is counted at rest, too, where it does
+not change: what noise has in common from frame to frame is not stated otherwise."""
 MEMORY_FRAMES = 3
 """Coded video repeats the noise of what stands still: at lags of 1, 2 and 3 frames it was seen
 to correlate by 0.45, 0.2 and 0.1 (MPEG-4), so that so many frames count as one."""
