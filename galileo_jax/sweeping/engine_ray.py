@@ -6,6 +6,7 @@ Ray; its outcome comes once, because the driver waits for it by name.
 """
 
 import os
+import socket
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -14,6 +15,7 @@ from galileo_jax.sweeping.resources import Resources
 from galileo_jax.sweeping.task import MAX_TRIES, Outcome, Task, attempt, died
 
 AHEAD = 2  # tasks given to the cluster for each of its slots, so that none waits for the driver
+ANSWER_S = 10.0  # for a cluster to answer
 LOOK_S = 5.0  # between looks at how large the cluster is
 
 
@@ -38,8 +40,9 @@ class EngineRay:
             ) from None
         self._ray, self.each = ray, each
         try:
+            _knock(address)
             ray.init(address=address or "local", log_to_driver=False, logging_level="ERROR")
-        except (ConnectionError, ValueError, RuntimeError) as error:
+        except (OSError, ValueError, RuntimeError) as error:
             raise InputError(f"--address: no Ray cluster at {address} ({error})") from error
         self._attempt = ray.remote(attempt_as_worker).options(
             num_cpus=each.cpus, num_gpus=each.gpus, max_retries=MAX_TRIES - 1
@@ -75,6 +78,13 @@ class EngineRay:
         if self.each.gpus:
             slots = min(slots, there.get("GPU", 0) // self.each.gpus)
         return max(int(slots), 1)
+
+
+def _knock(address: str | None) -> None:
+    """Raises `OSError` if nothing listens at HOST:PORT: Ray would try for minutes."""
+    host, _, port = (address or "").removeprefix("ray://").rpartition(":")
+    if port.isdecimal():
+        socket.create_connection((host, int(port)), timeout=ANSWER_S).close()
 
 
 def attempt_as_worker(task: Task, each: Resources) -> Outcome:

@@ -1,7 +1,6 @@
 """Sweeps of real fits: ready configs, kills, Ray with a node that is lost."""
 
 import csv
-import os
 import time
 
 import pytest
@@ -135,5 +134,4 @@ def test_ray_without_an_answer_is_one_line(plan, tmp_path, capsys):
     began = time.monotonic()
     assert command.run(sweep.main, words) == 2
     assert "--address: no Ray cluster at 127.0.0.1:1" in capsys.readouterr().err
-    assert time.monotonic() - began < 120
-    assert os.environ.get("RAY_ADDRESS") is None
+    assert time.monotonic() - began < 20
