@@ -21,7 +21,7 @@ from galileo_jax.rollout.motion import pitch
 MM = 1000.0  # per metre: the SVG's units
 SLOWER = 3  # the clip's seconds take so many
 MOST_STEPS = 480  # of the slider, without pictures
-CROSS_PX, PAGE_PX = 9, 1000  # half a cross, on a page so wide
+CROSS_PX, DOT_PX, PAGE_PX = 9.0, 1.6, 1000.0  # half a cross, half a dot, on a page so wide
 
 
 def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray]) -> str:
@@ -131,7 +131,7 @@ def _stage(
     turn = ' transform="scale(-1 1)"' if view.is_mirrored else ""
     scene = problem.model.scene
     ground = "".join(_slab(*one, is_outline=filmed is not None) for one in surfaces(scene, view))
-    drawn = [ground, _trails(motions["measured"])]
+    drawn = [ground, _trails(motions["measured"], DOT_PX * width / PAGE_PX)]
     for k, model in enumerate(models):
         for i, declared in enumerate(clip.objects):
             colour = f"var(--{object_colour(i)})"
@@ -166,18 +166,16 @@ def _shape(of: str, index: int, look: str, body: str) -> str:
     return f'<g data-of="{escape(of, quote=True)}" data-object="{index}" {look}>{body}</g>'
 
 
-def _trails(measured_m: np.ndarray) -> str:
-    """Every measured place as a dot."""
+def _trails(measured_m: np.ndarray, radius: float) -> str:
+    """Every measured place as a dot of so many mm."""
+    r = f"{radius:.1f}"
+    dot = f"m-{r} 0a{r} {r} 0 1 0 {2 * radius:.1f} 0a{r} {r} 0 1 0 {-2 * radius:.1f} 0"
     found = []
     for x, y in measured_m:
         seen = np.isfinite(x) & np.isfinite(y)
-        dots = "".join(
-            f"M{MM * a:.1f} {-MM * b:.1f}h.01" for a, b in zip(x[seen], y[seen], strict=True)
-        )
-        found.append(
-            f'<path class="trail" d="{dots}" fill="none" stroke="currentColor" stroke-width="2.5" '
-            'stroke-linecap="round"/>'
-        )
+        places = zip(MM * x[seen], -MM * y[seen], strict=True)
+        dots = "".join(f"M{a:.1f} {b:.1f}{dot}" for a, b in places)
+        found.append(f'<path class="trail" d="{dots}" fill="currentColor"/>')
     return "".join(found)
 
 
