@@ -11,6 +11,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.errors import InputError
+from galileo_jax.foot import foot_of_path, needs_foot
 from galileo_jax.observation import Observation, observe
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.sizes import SIZE_SD_M, needs_sizes, sizes_of_track
@@ -59,13 +60,7 @@ def load_clips(paths: Sequence[str], pixels_per_metre: float | None = None) -> l
     for clip in clips:
         for warning in clip.warnings:
             command.console().print(f"warning: {warning}")
-        has_table, in_pixels = SCENARIOS[clip.scenario].has_table, clip.track_units in (None, "px")
-        if has_table and in_pixels and clip.origin_px is None:
-            raise InputError(
-                f"{clip.path}: origin_px: null; a {clip.scenario} is seen from its ramp's foot; "
-                "set it with `galileo label --origin X Y`"
-            )
-        if has_table and not clip.is_scale_known:
+        if SCENARIOS[clip.scenario].has_table and not clip.is_scale_known:
             raise InputError(
                 f"{clip.path}: pixels_per_metre: null; the scale of a ramp clip cannot be told "
                 "from its motion; set it with `galileo label --scale X1 Y1 X2 Y2 METRES` or "
@@ -104,19 +99,49 @@ def measure(clip: Clip) -> Measured:
     """Tracks a clip's video, or reads its track, and infers what the model needs and is null.
 
     Raises:
-      InputError: an object cannot be followed, or the path does not tell the ramp's angle.
+      InputError: an object cannot be followed, or its path does not tell the ramp's angle or foot.
     """
+    found: dict[str, Any] = {}
+    if needs_foot(clip):
+        clip = _with_foot(clip)
+        found["origin_px"] = {"mean": list(clip.origin_px or ()), "sd": _foot_sd_px(clip)}
     measured = _with_slope(clip) if needs_slope(clip) else Measured(clip, _observed(clip))
-    return _with_sizes(measured) if needs_sizes(measured.clip) else measured
+    measured = _with_sizes(measured) if needs_sizes(measured.clip) else measured
+    return replace(measured, inferred={**found, **measured.inferred})
+
+
+def _with_foot(clip: Clip) -> Clip:
+    """The clip with the foot of its ramp, from a first look at the path."""
+    assert clip.pixels_per_metre is not None  # load_clips requires it of a ramp
+    point = foot_of_path(clip, _observed(_without_sizes(clip, origin_px=(0.0, 0.0))))
+    sign = 1.0 if clip.direction == "right" else -1.0
+    x, y = (float(value) * clip.pixels_per_metre for value in point)
+    origin = (round(sign * x, 1), round(-y, 1))
+    clip = clip.model_copy(update={"origin_px": origin})
+    _warn(
+        f"{clip.path}: origin_px: null; {list(origin)} +- {_foot_sd_px(clip):.1f} is taken, from "
+        f"the bend of {clip.objects[0].name}'s path"
+    )
+    return clip
+
+
+def _foot_sd_px(clip: Clip) -> float:
+    """As good as the point that was followed is the object's centre."""
+    assert clip.pixels_per_metre is not None
+    return round(SIZE_SD_M * clip.pixels_per_metre, 1)
+
+
+def _without_sizes(clip: Clip, **update: Any) -> Clip:
+    """For a first look: outlines are placed by what is not known yet."""
+    unknown = tuple(item.model_copy(update={"size_m": None}) for item in clip.objects)
+    return clip.model_copy(update={"objects": unknown, **update})
 
 
 def _with_slope(clip: Clip) -> Measured:
     """A measurement with the ramp's angle from the path."""
     if clip.video is not None:
         # The object's outline stands along the ramp: a first look, without it, tells how steep.
-        unknown = [item.model_copy(update={"size_m": None}) for item in clip.objects]
-        look = clip.model_copy(update={"objects": tuple(unknown)})
-        clip = _inclined(clip, slope_of_path(clip, _observed(look)))
+        clip = _inclined(clip, slope_of_path(clip, _observed(_without_sizes(clip))))
     observation = _observed(clip)
     slope = slope_of_path(clip, observation)
     clip = _inclined(clip, slope)

@@ -142,12 +142,6 @@ def test_label_refuses_what_the_folders_say(tmp_path: Path, capsys) -> None:
     assert not (path.parents[4] / "labels.yaml").exists()
 
 
-def test_ramp_without_a_foot_asks_for_it(tmp_path: Path) -> None:
-    path = add_clip(tmp_path, "ramp", "20_01", "c_block_01", "03")
-    with pytest.raises(InputError, match=r"origin_px: null; a ramp is seen from .* label --origin"):
-        load_clips([str(path)])
-
-
 @pytest.mark.slow
 @pytest.mark.video
 def test_simulated_clip_in_the_tree_is_fitted(tmp_path: Path) -> None:
