@@ -149,8 +149,8 @@ def _with_slope(clip: Clip) -> Measured:
         f"{clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "
         f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is taken"
     )
-    inferred = {"ramp_angle_deg": {"mean": slope.angle_deg, "sd": slope.sd_deg}}
-    return Measured(clip, observation, inferred)
+    found = {"mean": slope.angle_deg, "sd": slope.sd_deg}
+    return Measured(clip, observation, {"ramp_angle_deg": found})
 
 
 def _with_sizes(measured: Measured) -> Measured:
@@ -161,12 +161,12 @@ def _with_sizes(measured: Measured) -> Measured:
         item.model_copy(update={"size_m": found.get(item.name, item.size_m)})
         for item in clip.objects
     )
-    inferred = dict(measured.inferred)
+    told = dict(measured.inferred)
     for name, size in found.items():
         _warn(f"{clip.path}: {name}: size_m: null; {list(size)} is taken, from its path")
-        inferred[f"{name}.size_m"] = {"mean": list(size), "sd": SIZE_SD_M}
+        told[f"{name}.size_m"] = {"mean": list(size), "sd": SIZE_SD_M}
     clip = clip.model_copy(update={"objects": objects})
-    return replace(measured, clip=clip, inferred=inferred)
+    return replace(measured, clip=clip, inferred=told)
 
 
 def _warn(line: str) -> None:
