@@ -29,7 +29,9 @@ def chart_svg(chart: Chart) -> str:
             STACKED_IN + EDGE_IN + (EDGE_IN if panel.xlabel else 0) for panel in chart.panels
         )
     with style(chart.name):
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = Figure(figsize=(width, height), layout="constrained" if count > 1 else None)
+        if count == 1:  # laid out by hand: a fit has ten of them
+            figure.subplots_adjust(0.165, 0.165, 0.98, 0.9)
         grid = figure.subplots(count, 1, squeeze=False, sharex=chart.shares_x)[:, 0]
         for axes, panel in zip(grid, chart.panels, strict=True):
             _draw(axes, panel)
