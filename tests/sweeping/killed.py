@@ -112,9 +112,7 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=10)
     call, more = parser.parse_known_args()
     found = kill_and_resume(call.folder, [*call.words, *more], call.kills)
-    print(
-        f"undisturbed {found.seconds:.1f} s; {found.num_killed} kills, cells after each: {found.done}"
-    )
+    print(f"undisturbed {found.seconds:.1f} s; {found.num_killed} kills, then {found.done} cells")
     print(f"half-written {len(found.partial)}, workers left {found.left_alive}")
     print(f"same summary: {found.is_same}")
     sys.exit(not found.is_same)
