@@ -171,9 +171,8 @@ def _correlation_width_px(fit: Fit, target: Target) -> float:
 
     From neighbouring pixels along both axes: they correlate by exp(-1 / 4 s^2).
     """
-    residual, count = np.zeros((2, *target.region.shape))
+    residual, count = np.zeros(target.region.shape), target.region.astype(float)
     residual[target.region] = np.sqrt(fit.weight) * fit.residual
-    count[target.region] = 1
     product = sum((a[1:] * a[:-1]).sum() for a in (residual, residual.T))
     pairs = sum((a[1:] * a[:-1]).sum() for a in (count, count.T))
     own = (residual**2).sum() / count.sum() + 1e-12
