@@ -24,7 +24,7 @@ from galileo_jax.neural.thesis_task import ThesisTask
 from galileo_jax.neural.training import train
 from galileo_jax.train import TEST_SHARD
 
-EPOCHS = 160
+EPOCHS = 80
 SCALES = (2.0, RANGES[1], 2.0, RANGES[3])
 
 
