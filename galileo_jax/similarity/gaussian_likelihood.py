@@ -18,7 +18,7 @@ from galileo_jax.effects.effect import Surroundings
 from galileo_jax.observation import Observation
 from galileo_jax.similarity.discrepancy import crossing_sd_m, modes, offsets
 
-NoiseModel = Literal["camera", "tracker"]
+NoiseModel = Literal["camera", "bodies", "tracker"]
 
 
 class Whitening(NamedTuple):
@@ -57,15 +57,16 @@ class GaussianLikelihood:
         Args:
           observation: the data, with the tracker's own errors.
           scene: what it shows.
-          noise: "camera": the tracker's errors and all of `discrepancy`; "tracker": the
-            tracker's errors alone, to see what the rest is good for.
+          noise: "camera": the tracker's errors and all of `discrepancy`; "bodies": without
+            the camera's part of it; "tracker": the tracker's errors alone, to see what the
+            rest is good for.
         """
         mask = observation.mask
         covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
-        if noise == "camera":
+        if noise != "tracker":
             extra = crossing_sd_m(observation, scene) ** 2
             covariance += extra[:, :, None, None] * np.eye(2)
-            patterns = modes(observation, scene)
+            patterns = modes(observation, scene, is_filmed=noise == "camera")
         else:
             patterns = np.stack(offsets(observation))
         covariance[~mask] = np.eye(2)
