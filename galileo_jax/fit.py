@@ -17,6 +17,7 @@ from galileo_jax import command, jax_cache
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
+from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
 from galileo_jax.registry import entry_names
 
@@ -330,11 +331,12 @@ def read_truth(clip: Clip) -> dict[str, float]:
         content = json.loads(path.read_text(encoding="utf-8"))
         if "parameters" in content:
             return {key: float(value) for key, value in content["parameters"].items()}
-        known = {key: float(content[key]) for key in ("m1", "k1", "m2", "k2")}
+        count = content.get("objects", 2)
+        names = [f"{key}{i + 1}" for i in range(count) for key in "mk"]
+        known = {name: float(content[name]) for name in names}
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not a truth with m1, k1, m2 and k2 ({error})") from error
-    m1, m2 = known["m1"], known["m2"]
-    return known | {"mass_ratio": m1 / m2, "phi": (m1 - m2) / (m1 + m2)}
+    return known | mass_ratios([known[f"m{i + 1}"] for i in range(count)])
 
 
 def _table(result: dict[str, Any], truth: Mapping[str, float]) -> str:

@@ -48,9 +48,9 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
         if not scene.has_surface:
             label[i] = PHASES.index(free_phase(scene))
         label[i][speed < RESTS_M_S] = PHASES.index("at rest")
-        if hit_s is not None:
-            label[i][times > hit_s] = PHASES.index("after")
-            label[i][np.abs(times - hit_s) <= COLLISION_S] = PHASES.index("collision")
+        if (hit := hit_s[i]) is not None:
+            label[i][times > hit] = PHASES.index("after")
+            label[i][np.abs(times - hit) <= COLLISION_S] = PHASES.index("collision")
         label[i][times < 0 if scene.starts_moving else times <= 0] = PHASES.index("held")
     return label
 
@@ -64,10 +64,14 @@ def free_phase(scene: Surroundings) -> str:
 
 def _hit_s(
     position: np.ndarray, times_s: np.ndarray, half_length_m: tuple[float, ...]
-) -> float | None:
-    """When objects 1 and 2 first touch; None where they do not."""
-    if len(position) < 2:
-        return None
-    gap = position[1, 0] - position[0, 0] - half_length_m[0] - half_length_m[1]
-    touching = np.flatnonzero(gap < 1e-4)
-    return float(times_s[touching[0]]) if touching.size else None
+) -> list[float | None]:
+    """When each object first touches a neighbour; None where it does not."""
+    found: list[float | None] = [None] * len(position)
+    for i in range(len(position) - 1):
+        gap = position[i + 1, 0] - position[i, 0] - half_length_m[i] - half_length_m[i + 1]
+        touching = np.flatnonzero(gap < 1e-4)
+        if touching.size:
+            hit_s = float(times_s[touching[0]])
+            for j in (i, i + 1):
+                found[j] = min(hit_s, found[j] or hit_s)
+    return found

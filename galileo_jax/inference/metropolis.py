@@ -1,6 +1,8 @@
 """Metropolis-Hastings for a problem: start, target and what must converge."""
 
+import re
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import jax
@@ -64,10 +66,9 @@ def metropolis_posterior(
 
     def monitor(draws: np.ndarray) -> dict[str, np.ndarray]:
         found = {name: draws[..., i] for i, name in watched}
-        if "m2" in trials.names:
-            found["mass_ratio"] = (
-                draws[..., trials.names.index("m1")] - draws[..., trials.names.index("m2")]
-            )
+        masses = [i for i, name in enumerate(trials.names) if re.fullmatch(r"m\d+", name)]
+        for i, (one, other) in enumerate(pairwise(masses), 1):
+            found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]
         return found or {"log_noise": draws[..., -1]}
 
     posterior = sample(

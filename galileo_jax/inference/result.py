@@ -1,5 +1,6 @@
 """result.json: the numbers of a fit by contract (DESIGN.md 2.3)."""
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -7,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax import __version__
+from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.trials import Trials
@@ -169,14 +171,14 @@ def make_result(
         room = "nuisances" if parameter.role == "nuisance" else "parameters"
         table[room][parameter.name] = entry
     derived = {}
-    if "m2" in posterior.names:
-        m1, m2 = posterior["m1"].reshape(-1), posterior["m2"].reshape(-1)
+    masses = [name for name in posterior.names if re.fullmatch(r"m\d+", name)]
+    ratios = mass_ratios([posterior[name].reshape(-1) for name in masses])
+    for name, values in ratios.items():
+        # Of two masses that nothing told of.
         prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
-        is_identified = bool(np.log(m1 / m2).std() < IDENTIFIED_SD_Z * prior_sd)
-        derived = {
-            "mass_ratio": {**summarise(m1 / m2), "unit": "1", "identified": is_identified},
-            "phi": {**summarise((m1 - m2) / (m1 + m2)), "unit": "1", "identified": is_identified},
-        }
+        logs = np.log(ratios["mass_ratio"] if name == "phi" else values)
+        is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
+        derived[name] = {**summarise(values), "unit": "1", "identified": is_identified}
     derived |= _derived_by_laws(trials, draws)
     has_surface = trials.problems[0].model.scene.surroundings.has_surface
     if not table["parameters"].get("pixels_per_metre", {}).get("identified", True):
