@@ -280,7 +280,7 @@ def _parser() -> command.Parser:
     parser = command.Parser(prog="samplers.py", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("--num", type=int, default=100, help="tracks")
-    parser.add_argument("--num-shared", type=int, default=25, help="of these, for all methods")
+    parser.add_argument("--num-shared", type=int, default=10, help="of these, for all methods")
     parser.add_argument("--seed", type=int, default=0, help="the first track's seed")
     parser.add_argument("--source", choices=synthetic_tracks.SOURCES, default="exact")
     parser.add_argument("--methods", default="grad,sysid", help=",".join(METHODS))
