@@ -217,9 +217,10 @@ def memory_of_cells(folder: Path, method: str, cells: Sequence[int]) -> dict[str
     """Peak resident memory of a sweep's processes, MB: one short track from many seeds."""
     path = make_short_track(folder)
     found: dict[str, Any] = {"method": method}
+    config: dict[str, Any] = {"clips": [str(path)], "common": {"method": method}}
+    run_sweep(folder / "cells_first", config, 1)  # compiles, which takes memory of its own
     tables.row("cells", ("parent MB", "worker MB", "s per cell"))
     for count in cells:
-        config = {"clips": [str(path)], "common": {"method": method}}
         began = time.perf_counter()
         parent, worker = run_sweep(
             folder / f"cells_{count}", config | {"grid": {"seed": list(range(count))}}, 1
