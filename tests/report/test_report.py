@@ -90,7 +90,7 @@ def filmed(clip: Clip, path: Path) -> Clip:
     """The clip as if it had been filmed: frames that grow brighter, by 4 each."""
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (160, 120))
     for index in range(clip.frame_count):
-        writer.write(np.full((120, 160, 3), 4 * index, np.uint8))
+        writer.write(np.full((120, 160, 3), min(4 * index, 255), np.uint8))
     writer.release()
     seen = {"video": path, "track": None, "frame_size_px": (160, 120), "origin_px": (80.0, 90.0)}
     return clip.model_copy(update=seen | {"pixels_per_metre": 100.0})
