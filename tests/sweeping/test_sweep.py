@@ -158,7 +158,7 @@ def test_the_page_shows_errors_and_what_was_taken_for_what(tmp_path, clips, call
     ):
         for width_px in (1280, 390):
             page.set_viewport_size({"width": width_px, "height": 900})
-            assert page.evaluate("document.documentElement.scrollWidth") <= width_px
+            page.wait_for_function(f"document.documentElement.scrollWidth <= {width_px}")
         seen = page.inner_text("main")
         for words in ("Error by effect", "Error by method", "an unlucky seed"):
             assert words in seen
