@@ -1,11 +1,11 @@
-# make demo | test | test-all | lint | setup | clean. Each does the set-up it needs, once.
+# make demo | test | test-all | lint | docs | setup | clean. Each does the set-up it needs, once.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-all lint setup clean
+.PHONY: demo test test-all lint docs setup clean
 
 demo: $(READY)
 	$(BIN)/galileo simulate --seed 7 --out demo/clip.mp4
@@ -23,6 +23,11 @@ lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/pyright
+
+docs: $(READY)
+	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(BIN)/mkdocs build --strict
+	@echo "docs: build/site/index.html"
 
 setup: $(READY)
 

@@ -1,10 +1,11 @@
 """The ramp experiment in PyBullet, as the thesis has it: 240 Hz, the engine's defaults.
 
-Optional: `pip install pybullet`.
+Optional: `pip install -e '.[bullet]'`.
 """
 
 import math
 
+import numpy as np
 import pybullet  # pyright: ignore
 
 from galileo_jax.truth import Truth
@@ -13,13 +14,13 @@ STEP_S = 1 / 240
 DEPTH_M = 0.06
 
 
-def roll_out(truth: Truth, num_steps: int, client: int) -> list[tuple[float, float]]:
+def roll_out(truth: Truth, num_steps: int, client: int) -> np.ndarray:
     """Builds the world anew, as the thesis does for every rollout, and steps it.
 
     Friction is multiplied in Bullet: with 1 on ramp and table the boxes' own counts.
 
     Returns:
-      x of both objects at the end of each step, m.
+      the centres `[step + 1, object, 2]`, m, at the start and at the end of each step.
     """
     where, angle = truth.surroundings, truth.angle_rad
     pybullet.resetSimulation(physicsClientId=client)
@@ -56,12 +57,11 @@ def roll_out(truth: Truth, num_steps: int, client: int) -> list[tuple[float, flo
         pybullet.changeDynamics(
             objects[i], -1, lateralFriction=truth.friction[i], physicsClientId=client
         )
-    path = []
-    for _ in range(num_steps):
-        pybullet.stepSimulation(physicsClientId=client)
-        places = [
-            pybullet.getBasePositionAndOrientation(body, physicsClientId=client)[0][0]
-            for body in objects
-        ]
-        path.append((places[0], places[1]))
+    path = np.empty((num_steps + 1, 2, 2))
+    for step in range(num_steps + 1):
+        if step:
+            pybullet.stepSimulation(physicsClientId=client)
+        for i, body in enumerate(objects):
+            place, _ = pybullet.getBasePositionAndOrientation(body, physicsClientId=client)
+            path[step, i] = place[0], place[2]
     return path

@@ -1,49 +1,52 @@
 """Inference alone, on synthetic tracks with random truths: `python benchmarks/samplers.py`.
 
-Methods on the same tracks, one after the other:
+Methods on the same tracks, one after the other; the first named on all `--num` tracks, the others
+on the first `--num-shared`, because they take longer:
 
     grad      the multi-start gradient fit with its Laplace posterior
     mh        Metropolis-Hastings, started from the gradient fit (its time included)
     thesis    the thesis's 16 chains x 75 steps on our rollouts; the best sample wins
-    sysid     as mujoco.sysid does: 256 random rollouts, the best 3 refined by its optimiser,
-              mujoco.minimize.least_squares, on the same engine with m1, k1, m2, k2 free and no
-              nuisances; intervals by its formula, s^2 (J^T J)^-1
+    sysid     as mujoco.sysid does: 256 random rollouts of MuJoCo's C engine, the best 3 refined
+              by its optimiser, m1, k1, m2, k2 free, no nuisances (peers.py)
+    bullet    the thesis's sampler on PyBullet's rollouts, if PyBullet is there (peers.py)
 
 Noise: 0.01 m/s on the velocities, that is 0.01 / (fps sqrt 2) m on positions. `--source exact`
-makes the tracks in closed form (a model error for every method here), `--source engine` with
-our own rollouts (none). Seconds of grad are warm, those of mh and thesis contain tracing and
-compiling, which each call does anew. Stuck: velocity residuals
-at the best parameters above 1.5 per degree of freedom. The last line is JSON.
+makes the tracks in closed form (a model error for all but the rigid engine), `--source engine`
+with our own rollouts. Seconds of grad are warm, those of mh and thesis contain tracing and
+compiling, which each call does anew. Stuck: velocity residuals of the method's own rollout at
+its best parameters above 1.5 per degree of freedom. With `--keep FILE` a run that was cut off
+goes on, and methods measured apart stand in one table. The last line is JSON.
 """
 
 import argparse
-import io
+import json
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
+import peers
 import scoring
 import synthetic_tracks
 import tables
 
 from galileo_jax import command, jax_cache
 from galileo_jax.errors import InputError
-from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.trials import Trials
 from galileo_jax.rollout.engine_names import ENGINES
 
 NOISE_M_S = 0.01
 STUCK = 1.5
 BARS = {"stuck": 0.02, "coverage": (0.90, 0.99)}
-MAIN = ("m1", "k1", "m2", "k2")
 COLUMNS = (
     *("k1 err", "in 95%", "k2 err", "in 95%", "ratio err", "in 95%"),
     *("chi2/dof", "rollouts", "seconds", "ess", "converged"),
 )
+SUMMARY = ("tracks", "stuck", "s median", "s worst", "rollouts", "ess/s", "unconverged")
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,8 @@ class Answer:
     """What one method says about one track.
 
     Attributes:
-      estimates: as `scoring.score` takes them.
-      best: the best parameters, model parameters in their units; for the residuals.
-      num_free: how many parameters were fitted.
+      estimates: k1, k2 and mass_ratio as `scoring.score` takes them.
+      chi2_per_dof: of the velocities, at the best parameters.
       seconds: of inference alone.
       num_rollouts: it took.
       ess: smallest effective sample size of k1, k2 and the mass ratio; NaN: no draws.
@@ -61,8 +63,7 @@ class Answer:
     """
 
     estimates: dict[str, Any]
-    best: np.ndarray
-    num_free: int
+    chi2_per_dof: float
     seconds: float
     num_rollouts: float
     ess: float
@@ -76,166 +77,119 @@ def main(argv: Sequence[str]) -> int | None:
     methods = call.methods.split(",")
     if unknown := set(methods) - set(METHODS):
         raise InputError(f"--methods: unknown {sorted(unknown)}; known: {', '.join(METHODS)}")
+    kept = _read(call.keep)
     noise_m = NOISE_M_S / (synthetic_tracks.FPS * math.sqrt(2))
     tables.row("track, method", COLUMNS)
     answers: dict[str, list[Answer]] = {name: [] for name in methods}
     scores: dict[str, list[dict[str, scoring.Score]]] = {name: [] for name in methods}
-    chi2: dict[str, list[float]] = {name: [] for name in methods}
     for seed in range(call.seed, call.seed + call.num):
+        is_shared = seed < call.seed + call.num_shared
         case = synthetic_tracks.make_case(seed, call.source, noise_m, call.engine)
-        for name in methods:
-            answer = METHODS[name](case.trials, seed)
-            found = scoring.score(answer.estimates, case.values, True, True)
+        for name in methods if is_shared else methods[:1]:
+            key = f"{call.source} {call.engine} {seed} {name}"
+            if key not in kept:
+                kept[key] = METHODS[name](case, seed)
+                _append(call.keep, key, kept[key])
+            answer = kept[key]
             answers[name].append(answer)
-            scores[name].append(found)
-            chi2[name].append(_velocity_chi2(case.trials, answer))
+            scores[name].append(scoring.score(answer.estimates, case.values, True, True))
             cells: list[Any] = []
-            for entry in found.values():
+            for entry in scores[name][-1].values():
                 cells += [entry.error, entry.is_covered]
-            told = [chi2[name][-1], int(answer.num_rollouts), answer.seconds, answer.ess]
+            told = [answer.chi2_per_dof, int(answer.num_rollouts), answer.seconds, answer.ess]
             tables.row(f"{seed} {name}", [*cells, *told, answer.is_converged])
     figures: dict[str, Any] = {}
     missed: list[str] = []
-    columns = ("stuck", "seconds", "rollouts", "ess/s", "unconverged")
     print()
-    tables.row("method", columns)
+    tables.row("method", SUMMARY)
     for name in methods:
-        table = scoring.summary(scores[name])
-        seconds = np.array([answer.seconds for answer in answers[name]])
-        ess = np.array([answer.ess for answer in answers[name]])
-        figures[name] = {
-            "stuck": float(np.mean(np.array(chi2[name]) > STUCK)),
-            "seconds_median": float(np.median(seconds)),
-            "rollouts_median": float(np.median([a.num_rollouts for a in answers[name]])),
-            "ess_per_s_median": float(np.median(ess / seconds)),
-            "unconverged": sum(not answer.is_converged for answer in answers[name]),
-            **table,
-        }
-        tables.row(name, list(figures[name].values())[: len(columns)])
+        figures[name] = _figures(answers[name], scores[name])
+        tables.row(name, list(figures[name].values())[: len(SUMMARY)])
         if name in ("grad", "mh"):
             missed += [f"{name}: {what}" for what in _missed_bars(figures[name])]
+    if {"grad", "sysid"} <= set(methods):
+        count = len(answers["sysid"])
+        ours, theirs = (
+            float(np.median([answer.seconds for answer in answers[name][:count]]))
+            for name in ("grad", "sysid")
+        )
+        if ours > theirs:
+            missed.append(f"grad takes {ours:.2g} s, sysid {theirs:.2g} s")
     print()
     tables.row("method, quantity", list(figures[methods[0]]["k1"]))
     for name in methods:
         for quantity in scoring.QUANTITIES:
             tables.row(f"{name} {quantity}", list(figures[name][quantity].values()))
     print("bars missed: " + ("; ".join(missed) or "none"))
-    figures |= {"num": call.num, "source": call.source, "bars_missed": missed}
+    figures |= {"source": call.source, "engine": call.engine, "bars_missed": missed}
     tables.finish("samplers", figures)
     return None
 
 
-def fit_grad(trials: Trials, seed: int) -> Answer:
-    fit, seconds = _warm_fit(trials, seed)
-    return _of_draws(trials, fit, _laplace(trials, fit, seed), seconds, fit.stats["num_rollouts"])
+def fit_grad(case: synthetic_tracks.Case, seed: int) -> Answer:
+    from galileo_jax.inference.laplace import laplace_posterior
+
+    fit, began = _warm_fit(case.trials, seed)
+    posterior = laplace_posterior(case.trials, fit, seed)
+    seconds = time.perf_counter() - began
+    return _of_draws(case.trials, fit, posterior, seconds, fit.stats["num_rollouts"])
 
 
-def fit_mh(trials: Trials, seed: int) -> Answer:
-    from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
-    from galileo_jax.inference.samplers.driver import Settings
+def fit_mh(case: synthetic_tracks.Case, seed: int) -> Answer:
+    from galileo_jax.inference.metropolis import metropolis_posterior
 
-    fit, seconds = _warm_fit(trials, seed)
-    began = time.perf_counter()
-    posterior = metropolis_posterior(trials, fit, seed)
-    seconds += time.perf_counter() - began
-    steps = Settings().warmup_steps + posterior.draws.shape[1]
-    rollouts = fit.stats["num_rollouts"] + NUM_CHAINS * (1 + steps)
-    return _of_draws(trials, fit, posterior, seconds, rollouts)
+    fit, began = _warm_fit(case.trials, seed)
+    posterior = metropolis_posterior(case.trials, fit, seed)
+    seconds = time.perf_counter() - began
+    rollouts = fit.stats["num_rollouts"] + posterior.stats["num_evaluations"]
+    return _of_draws(case.trials, fit, posterior, seconds, rollouts)
 
 
-def fit_thesis(trials: Trials, seed: int) -> Answer:
+def fit_thesis(case: synthetic_tracks.Case, seed: int) -> Answer:
     from galileo_jax.inference.thesis_preset import thesis_posterior
 
+    trials = case.trials
     began = time.perf_counter()
     posterior, best = thesis_posterior(trials, seed, "thesis_gaussian", "coin", "best")
     seconds = time.perf_counter() - began
-    theta = _middle(trials)
-    theta[[trials.names.index(name) for name in MAIN]] = [best[name] for name in MAIN]
-    values = {"k1": best["k1"], "k2": best["k2"], "mass_ratio": best["m1"] / best["m2"]}
-    estimates = {name: {"mean": value, "identified": True} for name, value in values.items()}
-    count = int(np.prod(posterior.draws.shape[:2]) + posterior.draws.shape[0])
-    return Answer(estimates, theta, len(MAIN), seconds, count, math.nan, posterior.is_converged)
+    theta = trials.of_clip(trials.theta(np.zeros(len(trials.names))), 0)
+    for name, value in best.items():
+        theta[trials.names.index(name)] = value
+    chi2 = _velocity_chi2(trials, case.problem.simulate(theta), len(best))
+    estimates = peers.point(np.array([best[name] for name in peers.MAIN]))
+    count = posterior.stats["num_evaluations"]
+    return Answer(estimates, chi2, seconds, count, math.nan, posterior.is_converged)
 
 
-def fit_sysid(trials: Trials, seed: int) -> Answer:
-    from mujoco import minimize
-
-    low, high = np.array([0.05, 0.005, 0.05, 0.005]), np.array([1.5, 0.6, 1.5, 0.6])
-    (problem,) = trials.problems
-    where = [trials.names.index(name) for name in MAIN]
-    rest = _middle(trials)
-    observed = problem.observation.velocity_m_s
-    rng = np.random.default_rng(seed)
-    count = 0
-
-    def residuals(x: np.ndarray) -> np.ndarray:
-        """`[4, batch]` to `[value, batch]`, as mujoco.minimize has it."""
-        nonlocal count
-        x = x.reshape(len(MAIN), -1)
-        count += x.shape[1]
-        theta = np.tile(rest, (x.shape[1], 1))
-        theta[:, where] = x.T
-        velocity = np.diff(_centres(problem, theta), axis=-1) * synthetic_tracks.FPS
-        return ((velocity - observed) / NOISE_M_S).reshape(x.shape[1], -1).T.copy()
-
+def fit_sysid(case: synthetic_tracks.Case, seed: int) -> Answer:
     began = time.perf_counter()
-    starts = rng.uniform([0.1, 0.02, 0.1, 0.02], [1.0, 0.35, 1.0, 0.35], (256, 4))
-    cost = (residuals(starts.T) ** 2).mean(axis=0)
-    refined = []
-    for i in np.argsort(cost)[:3]:
-        x, log = minimize.least_squares(
-            starts[i],
-            residuals,
-            [low, high],
-            eps=1e-3,
-            verbose=minimize.Verbosity.FULLITER,
-            output=io.StringIO(),
-        )
-        refined.append((float(np.mean(np.asarray(log[-1].residual) ** 2)), np.ravel(x), log[-1]))
-    chi2, x, last = min(refined, key=lambda entry: entry[0])
-    m1, k1, m2, k2 = x
-    # By log(m1 / m2), k1 and k2 at a given m1 m2: the column of the masses' size is null.
-    turn = np.zeros((4, 3))
-    turn[0, 0], turn[2, 0], turn[1, 1], turn[3, 2] = m1 / 2, -m2 / 2, 1.0, 1.0
-    jacobian, white = last.jacobian @ turn, np.ravel(last.residual)
-    variance = white @ white / (white.size - turn.shape[1])
-    sd = np.sqrt(variance * np.diag(np.linalg.inv(jacobian.T @ jacobian)))
-    half = 1.96 * sd
-    seconds = time.perf_counter() - began
-    estimates = {
-        "k1": _interval(k1, k1 - half[1], k1 + half[1], sd[1]),
-        "k2": _interval(k2, k2 - half[2], k2 + half[2], sd[2]),
-        "mass_ratio": _interval(
-            m1 / m2, m1 / m2 * np.exp(-half[0]), m1 / m2 * np.exp(half[0]), m1 / m2 * sd[0]
-        ),
-    }
-    theta = rest.copy()
-    theta[where] = x
-    return Answer(estimates, theta, len(MAIN), seconds, count, math.nan, chi2 <= STUCK)
+    found = peers.sysid(case.problem, NOISE_M_S, seed)
+    return _of_peer(case.trials, found, time.perf_counter() - began)
 
 
-METHODS: dict[str, Callable[[Trials, int], Answer]] = {
+def fit_bullet(case: synthetic_tracks.Case, seed: int) -> Answer:
+    began = time.perf_counter()
+    found = peers.thesis_on_bullet(case.problem, case.truth, seed)
+    return _of_peer(case.trials, found, time.perf_counter() - began)
+
+
+METHODS: dict[str, Callable[[synthetic_tracks.Case, int], Answer]] = {
     "grad": fit_grad,
     "mh": fit_mh,
     "thesis": fit_thesis,
     "sysid": fit_sysid,
+    "bullet": fit_bullet,
 }
 
 
 def _warm_fit(trials: Trials, seed: int):
+    """The gradient fit, and when it began, compiled."""
     from galileo_jax.inference.fits.gradient import GradientFitter
 
     fitter = GradientFitter(trials)
     fitter.compile()
     began = time.perf_counter()
-    fit = fitter.fit(seed)
-    return fit, time.perf_counter() - began
-
-
-def _laplace(trials: Trials, fit, seed: int):
-    from galileo_jax.inference.laplace import laplace_posterior
-
-    return laplace_posterior(trials, fit, seed)
+    return fitter.fit(seed), began
 
 
 def _of_draws(trials: Trials, fit, posterior, seconds: float, rollouts: float) -> Answer:
@@ -245,15 +199,16 @@ def _of_draws(trials: Trials, fit, posterior, seconds: float, rollouts: float) -
     result = make_result(
         trials, posterior, fit.z, clips=[], method="", seed=0, timings_s={}, notes={}
     )
+    estimates = scoring.of_result(result)
     ratio = posterior["m1"] / posterior["m2"]
     ess = math.nan
     if ratio.shape[0] > 1:
         draws = (posterior["k1"], posterior["k2"], ratio)
         ess = min(convergence(values).ess_bulk for values in draws)
+    predicted = trials.problems[0].simulate(trials.of_clip(trials.theta(fit.z), 0))
     return Answer(
-        scoring.of_result(result),
-        trials.of_clip(trials.theta(fit.z), 0),
-        len(trials.model_parameters),
+        {name: dict(estimates[name]) for name in scoring.QUANTITIES},
+        _velocity_chi2(trials, predicted, len(trials.model_parameters)),
         seconds,
         rollouts,
         ess,
@@ -261,31 +216,34 @@ def _of_draws(trials: Trials, fit, posterior, seconds: float, rollouts: float) -
     )
 
 
-def _middle(trials: Trials) -> np.ndarray:
-    """The model's parameters at their priors' middle."""
-    return trials.of_clip(trials.theta(np.zeros(len(trials.names))), 0)
+def _of_peer(trials: Trials, found: peers.Estimate, seconds: float) -> Answer:
+    chi2 = _velocity_chi2(trials, found.centres_m, len(found.values))
+    count = found.num_rollouts
+    return Answer(found.entries, chi2, seconds, count, math.nan, found.is_converged)
 
 
-def _centres(problem: Problem, theta: np.ndarray) -> np.ndarray:
-    """Centres `[batch, object, 2, frame]` of plain rollouts at the frames, no nuisances."""
-    position, _ = problem.engine.simulate(theta)
-    step = problem.model.record_dt_s
-    at = problem.observation.times_s / step
-    i = np.minimum(np.floor(at).astype(int), position.shape[-1] - 2)
-    share = at - i
-    return position[..., i] * (1 - share) + position[..., i + 1] * share
+def _velocity_chi2(trials: Trials, predicted_m: np.ndarray, num_free: int) -> float:
+    """Squared velocity residuals of predicted centres per degree of freedom."""
+    velocity = np.diff(predicted_m, axis=-1) * synthetic_tracks.FPS
+    white = (velocity - trials.problems[0].observation.velocity_m_s) / NOISE_M_S
+    return float(np.sum(white**2) / (white.size - num_free))
 
 
-def _velocity_chi2(trials: Trials, answer: Answer) -> float:
-    """Squared velocity residuals at the best parameters per degree of freedom."""
-    (problem,) = trials.problems
-    velocity = np.diff(problem.simulate(answer.best), axis=-1) * synthetic_tracks.FPS
-    white = velocity - problem.observation.velocity_m_s
-    return float(np.sum((white / NOISE_M_S) ** 2) / (white.size - answer.num_free))
-
-
-def _interval(mean: float, low: float, high: float, sd: float) -> dict[str, Any]:
-    return {"mean": mean, "q025": low, "q975": high, "sd": sd, "identified": True}
+def _figures(
+    answers: Sequence[Answer], scores: Sequence[dict[str, scoring.Score]]
+) -> dict[str, Any]:
+    seconds = np.array([answer.seconds for answer in answers])
+    ess = np.array([answer.ess for answer in answers])
+    return {
+        "tracks": len(answers),
+        "stuck": float(np.mean([answer.chi2_per_dof > STUCK for answer in answers])),
+        "seconds_median": float(np.median(seconds)),
+        "seconds_worst": float(seconds.max()),
+        "rollouts_median": float(np.median([answer.num_rollouts for answer in answers])),
+        "ess_per_s_median": float(np.median(ess / seconds)),
+        "unconverged": sum(not answer.is_converged for answer in answers),
+        **scoring.summary(scores),
+    }
 
 
 def _missed_bars(figures: dict[str, Any]) -> list[str]:
@@ -302,14 +260,32 @@ def _missed_bars(figures: dict[str, Any]) -> list[str]:
     return missed
 
 
+def _read(path: Path | None) -> dict[str, Answer]:
+    """The answers that an earlier run kept, by source, engine, track and method."""
+    if path is None or not path.is_file():
+        return {}
+    lines = (json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
+    return {line.pop("key"): Answer(**line) for line in lines}
+
+
+def _append(path: Path | None, key: str, answer: Answer) -> None:
+    if path is None:
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps({"key": key, **asdict(answer)}) + "\n")
+
+
 def _parser() -> command.Parser:
     parser = command.Parser(prog="samplers.py", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--num", type=int, default=20, help="tracks")
+    parser.add_argument("--num", type=int, default=100, help="tracks")
+    parser.add_argument("--num-shared", type=int, default=10, help="of these, for all methods")
     parser.add_argument("--seed", type=int, default=0, help="the first track's seed")
     parser.add_argument("--source", choices=synthetic_tracks.SOURCES, default="exact")
     parser.add_argument("--methods", default="grad,sysid", help=",".join(METHODS))
     parser.add_argument("--engine", default="auto", choices=ENGINES)
+    parser.add_argument("--keep", type=Path, metavar="FILE", help="answers, to go on from")
     return parser
 
 

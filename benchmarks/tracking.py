@@ -2,9 +2,10 @@
 
 For every clip and object of FOLDER (NAME.yaml with NAME.truth.json): RMS distance from the
 truth in pixels, absolute and after taking out a constant offset; the normalised squared error
-(1 is honest, above is too narrow); the correlation of neighbouring frames' errors while the
-object moves; the share of frames in which it is visible, and lost (invisible though no hand is
-near). The followed point is the declared one, or the centre without it (`--find`).
+(1 is honest, above is too narrow) over all its frames, and over those in which it rests and
+moves; the correlation of neighbouring frames' errors while it moves; the share of frames in which
+it is visible, and lost (invisible though no hand is near). The followed point is the declared
+one, or the centre without it (`--find`).
 The last line is JSON.
 """
 
@@ -25,10 +26,13 @@ from galileo_jax.errors import InputError
 from galileo_jax.tracking import track_clip
 from galileo_jax.tracking.track import Track
 
+MOVES_PX = 0.02
+"""What goes farther than this from frame to frame moves."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Row:
-    """One object of one clip; px, except `nse`, the shares, and `seconds` (of the clip)."""
+    """One object of one clip; px, except `nse...`, the shares, and `seconds` (of the clip)."""
 
     clip: str
     object: str
@@ -36,6 +40,8 @@ class Row:
     rms_shifted: float
     worst: float
     nse: float
+    nse_resting: float
+    nse_moving: float
     correlation: float
     visible: float
     lost: int
@@ -74,7 +80,8 @@ def rows_of(clip: Clip, truth: dict, track: Track, seconds: float) -> list[Row]:
         step = np.linalg.norm(np.gradient(expected, axis=0), axis=1)[seen]
         shifted = error - error.mean(axis=0)
         squares = np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error) / 2
-        moving = (error - np.median(error, axis=0))[step > 0.5]
+        moves = step > MOVES_PX
+        moving = (error - np.median(error, axis=0))[moves]
         pairs = (moving[1:] * moving[:-1]).sum() / max((moving**2).sum(), 1e-12)
         rows.append(
             Row(
@@ -84,6 +91,8 @@ def rows_of(clip: Clip, truth: dict, track: Track, seconds: float) -> list[Row]:
                 float(np.sqrt((shifted**2).sum(axis=1).mean())),
                 float(np.abs(error).max()),
                 float(squares.mean()),
+                _mean(squares[~moves]),
+                _mean(squares[moves]),
                 float(pairs) if len(moving) > 4 else float("nan"),
                 float(seen.mean()),
                 int((~seen & ~hidden).sum()),
@@ -91,6 +100,10 @@ def rows_of(clip: Clip, truth: dict, track: Track, seconds: float) -> list[Row]:
             )
         )
     return rows
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if len(values) else float("nan")
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -135,9 +148,12 @@ def main(argv: Sequence[str]) -> int | None:
         "rms_shifted_px_median": float(np.median([r.rms_shifted for r in rows])),
         "nse_median": float(np.median(nse)),
         "nse_mean": float(nse.mean()),
+        "nse_resting_mean": float(np.nanmean([r.nse_resting for r in rows])),
+        "nse_moving_mean": float(np.nanmean([r.nse_moving for r in rows])),
         "nse_within_half_to_two": float(np.mean((nse >= 0.5) & (nse <= 2))),
         "correlation_median": float(np.nanmedian([r.correlation for r in rows])),
         "lost_frames": sum(r.lost for r in rows),
+        "cpu_seconds_median": float(np.median([r.seconds for r in rows])),
         "cpu_seconds_worst": max(r.seconds for r in rows),
     }
     print(json.dumps(summary))

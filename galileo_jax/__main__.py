@@ -15,7 +15,9 @@ VERBS = (
     ("label", "write points and scale into a clip's yaml"),
     ("simulate", "make a clip with known truth"),
     ("predict", "continue a fitted scene beyond its clip"),
+    ("export", "write tracks and fits as csv, parquet or netCDF"),
     ("train", "train and test the neural estimators"),
+    ("sweep", "many clips, many ways, from one config"),
 )
 
 USAGE = "usage: galileo VERB ..., galileo VERB --help, galileo --version"

@@ -1,7 +1,7 @@
 """`galileo compare`: is the model adequate for a clip, and where does it fail?"""
 
 import argparse
-import json
+import shlex
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +15,7 @@ from galileo_jax.fit import chosen_effects, import_ahead, out_folder
 from galileo_jax.measured import add_clip_options, load_clips, measure
 
 if TYPE_CHECKING:
+    from galileo_jax.clip.schema import Clip
     from galileo_jax.comparison.compare import Comparison
     from galileo_jax.inference.trials import Trials
 
@@ -26,6 +27,7 @@ class Compared:
     """What is compared: the clips with a model, how they were named, and where results go."""
 
     trials: "Trials"
+    declared: tuple["Clip", ...]
     clips: list[str]
     out: Path
 
@@ -42,8 +44,8 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.comparison.compare import compare
     from galileo_jax.comparison.document import comparison_document
     from galileo_jax.inference.fits.gradient import Code, GradientFitter
+    from galileo_jax.report import comparison_page
     from galileo_jax.report.along import along_paths
-    from galileo_jax.report.comparison_page import write_comparison_page
 
     with command.console().status("fitting") as status:
         fit = GradientFitter(trials).fit(call.seed, on_stage=status.update)
@@ -54,7 +56,17 @@ def main(argv: Sequence[str]) -> int | None:
         status.update("drawing")
         shown = along_paths(trials, fit, comparison, call.seed)
         page, title = compared.out / "report.html", ", ".join(p.name for p in trials.problems)
-        write_comparison_page(page, title, trials.all_effects, comparison, shown)
+        told = comparison_page.Compared(
+            comparison,
+            trials,
+            trials.theta(fit.z, fit.free),
+            compared.declared,
+            trials.all_effects,
+            shown,
+            shlex.join(["galileo", "compare", *argv]),
+            call.seed,
+        )
+        comparison_page.write_comparison_page(page, title, told)
     document: dict[str, Any] = {
         "clips": compared.clips,
         "effects": list(trials.all_effects),
@@ -78,11 +90,13 @@ def _of_clips(call: argparse.Namespace) -> Compared:
     effects = chosen_effects(call)
     import_ahead()
     measured = [measure(clip) for clip in clips]
+    clips = [one.clip for one in measured]
     _prepare_jax()
     from galileo_jax.run import make_trials
 
     trials = make_trials(clips, [one.observation for one in measured], call.engine, effects)
-    return Compared(trials, list(call.clips), out if call.out else out / "compare")
+    out = out if call.out else out / "compare"
+    return Compared(trials, tuple(clips), list(call.clips), out)
 
 
 def _of_run(folder: Path, call: argparse.Namespace) -> Compared:
@@ -95,12 +109,12 @@ def _of_run(folder: Path, call: argparse.Namespace) -> Compared:
 
     folders = [folder]
     if (folder / RESULT).is_file() and not (folder / CLIP).is_file():
-        named = json.loads((folder / RESULT).read_text(encoding="utf-8"))["clips"]
-        folders = [folder / Path(clip).stem for clip in named]
+        folders = sorted(path.parent for path in folder.glob(f"*/{CLIP}")) or [folder]
     runs = [load_run(each, call.engine) for each in folders]
     out = Path(call.out) if call.out else folder / "compare"
     clips = [clip for run in runs for clip in run.result["clips"]]
-    return Compared(Trials(tuple(run.problem for run in runs)), clips, out)
+    trials = Trials(tuple(run.problem for run in runs))
+    return Compared(trials, tuple(run.clip for run in runs), clips, out)
 
 
 def _prepare_jax() -> None:

@@ -2,17 +2,19 @@
 
 import argparse
 import json
+import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax import __version__, command, jax_cache
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.fit import import_ahead, out_folder, write_fit
-from galileo_jax.measured import Measured, add_clip_options, load_clips, measure
+from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
 
 if TYPE_CHECKING:
     from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
@@ -33,6 +35,7 @@ def main(argv: Sequence[str]) -> int | None:
     import_ahead()
     timings, began = {}, time.perf_counter()
     measured = [measure(clip) for clip in clips]
+    clips = [one.clip for one in measured]
     timings["track"] = time.perf_counter() - began
     began = time.perf_counter()
     diagnosis, trials, record = _diagnose(measured, call)
@@ -40,6 +43,7 @@ def main(argv: Sequence[str]) -> int | None:
     document = {
         "clips": call.clips,
         **record,
+        **inferred(measured),
         "left_out": _absent(trials),
         "engine": trials.problems[0].engine.name,
         "timings_s": {key: round(value, 3) for key, value in timings.items()},
@@ -53,8 +57,8 @@ def main(argv: Sequence[str]) -> int | None:
     go_on = findings.how_to_go_on(diagnosis, call.clips, call.effects_from)
     print("\n".join(_told(diagnosis, record, go_on, hidden)))
     with command.console().status("drawing"):
-        shapes = tuple(tuple(one.shape for one in clip.objects) for clip in clips)
-        told = Told(diagnosis, document, go_on, hidden, shapes, call.seed)
+        again = shlex.join(["galileo", "diagnose", *argv])
+        told = Told(diagnosis, document, go_on, hidden, tuple(clips), again, call.seed)
         title = ", ".join(one.name for one in measured)
         write_diagnosis_page(out / "report.html", title, trials, told)
         _write_model(diagnosis, trials, measured, call, out / "model", timings)
@@ -116,10 +120,12 @@ def _diagnose(
         return make_trials(clips, observations, call.engine, (*effects, *forms))
 
     names = (*effect_names(), *FORM_NAMES)
-    trials = trials_with(names)
-    if absent := _without_place(trials):
-        if call.add in absent:
-            raise InputError(f"--add: {call.add} has no place in {clips[0].path}")
+    without = SCENARIOS[clips[0].scenario].without
+    trials = trials_with([name for name in names if name not in without])
+    absent = [*without, *_without_place(trials)]
+    if call.add in absent:
+        raise InputError(f"--add: {call.add} has no place in {clips[0].path}")
+    if len(absent) > len(without):
         trials = trials_with([name for name in names if name not in absent])
     rows: list[dict[str, Any]] = []
     with command.console().status("starting") as status:

@@ -5,7 +5,7 @@ import hashlib
 import json
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -17,11 +17,13 @@ from galileo_jax import command, jax_cache
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
-from galileo_jax.measured import Measured, add_clip_options, load_clips, measure
+from galileo_jax.inference.mass_ratios import mass_ratios
+from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
+from galileo_jax.registry import entry_names
 
 if TYPE_CHECKING:
     from galileo_jax.effects.effect import Effect
-    from galileo_jax.inference.fits.gradient import GradientFit
+    from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
     from galileo_jax.inference.posterior import Posterior
     from galileo_jax.inference.trials import Trials
 
@@ -29,11 +31,16 @@ BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
 METHODS = ("grad", "mh", "cnn")
 PRESETS = ("galileo", "thesis")
+INITS = ("grad", "cnn")
+SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
+SIMILARITIES = entry_names("galileo_jax.similarity.library")
 
 
 def main(argv: Sequence[str]) -> int | None:
     """Fits a clip, or several trials together, and writes a run."""
     call = _parser().parse_args(argv)
+    if call.init == "cnn" and (call.method, call.preset) != ("mh", "galileo"):
+        raise InputError("--init cnn: it starts the chains of --method mh --preset galileo")
     clips = load_clips(call.clips, call.pixels_per_metre)
     out = out_folder(call, clips)
     if call.preset == "thesis" and len(clips) > 1:
@@ -165,7 +172,7 @@ def write_fit(
             method=method,
             seed=seed,
             timings_s={key: round(value, 3) for key, value in timings.items()},
-            notes=notes,
+            notes=notes | inferred(measured),
         )
 
     result = told(trials, posterior, z_best, list(files))
@@ -208,19 +215,32 @@ def _search(
     timings["compile"] = time.perf_counter() - began
     began = time.perf_counter()
     with command.console().status("fitting") as status:
-        fit = fitter.fit(call.seed, on_stage=status.update)
+        fit, starts, begun = _begin(trials, fitter, call, status.update)
     if fit.code is Code.FAILED:
         raise InputError(f"{measured[0].clip.path}: {fit.code}")
     posterior = laplace_posterior(trials, fit, call.seed)
     notes: dict[str, Any] = {"engine": trials.problems[0].engine.name, "status": fit.code.value}
+    notes |= begun
     if call.method == "mh":
         if call.preset == "thesis":
             posterior, extra = _thesis(trials, call)
         else:
-            posterior, extra = _metropolis(trials, fit, call, out, _identity(measured, call))
+            identity = _identity(measured, call)
+            posterior, extra = _metropolis(trials, fit, starts, call, out, identity)
         notes |= extra
     timings["fit"] = time.perf_counter() - began
     return posterior, fit.z, notes
+
+
+def _begin(trials: "Trials", fitter: "GradientFitter", call, on_stage: Callable[[str], None]):
+    """The mode, where chains start in z (None: dispersed round it), and notes."""
+    if call.init == "cnn":
+        from galileo_jax.inference.metropolis import NUM_CHAINS
+        from galileo_jax.neural.start import start_from_network
+
+        start = start_from_network(trials, call.seed, NUM_CHAINS)
+        return start.fit, start.z, start.notes
+    return fitter.fit(call.seed, on_stage=on_stage), None, {}
 
 
 def _network(trials: "Trials", call: argparse.Namespace, timings: dict[str, float]) -> Found:
@@ -233,7 +253,14 @@ def _network(trials: "Trials", call: argparse.Namespace, timings: dict[str, floa
     return posterior, z_best, {"engine": trials.problems[0].engine.name} | notes
 
 
-def _metropolis(trials: "Trials", fit: "GradientFit", call, out: Path, identity: str):
+def _metropolis(
+    trials: "Trials",
+    fit: "GradientFit",
+    starts: np.ndarray | None,
+    call: argparse.Namespace,
+    out: Path,
+    identity: str,
+) -> tuple["Posterior", dict[str, Any]]:
     """Samples with a progress bar; resumes what a Ctrl-C left in the run's folder."""
     from galileo_jax.inference.metropolis import metropolis_posterior
     from galileo_jax.inference.samplers.driver import Settings
@@ -250,6 +277,7 @@ def _metropolis(trials: "Trials", fit: "GradientFit", call, out: Path, identity:
             call.seed,
             sampler=call.sampler,
             settings=settings,
+            starts=starts,
             checkpoint=out / CHECKPOINT,
             identity=identity,
             on_block=lambda state: bar.update(task, completed=state.num_steps),
@@ -265,10 +293,14 @@ def _thesis(trials: "Trials", call):
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
     from galileo_jax.inference.thesis_preset import thesis_posterior
 
-    posterior, best = thesis_posterior(
-        trials, call.seed, call.similarity, call.acceptance, call.selection
-    )
-    return posterior, {"status": posterior.status.value, "preset": "thesis", "best": best}
+    chosen = {name: getattr(call, name) for name in ("similarity", "acceptance", "selection")}
+    posterior, best = thesis_posterior(trials, call.seed, **chosen)
+    return posterior, {
+        "status": posterior.status.value,
+        "preset": call.preset,
+        **chosen,
+        "best": best,
+    }
 
 
 def _identity(measured: Sequence[Measured], call: argparse.Namespace) -> str:
@@ -285,7 +317,7 @@ def _identity(measured: Sequence[Measured], call: argparse.Namespace) -> str:
 
 
 def read_truth(clip: Clip) -> dict[str, float]:
-    """What NAME.truth.json beside a synthetic clip says of masses and frictions; {} without.
+    """What NAME.truth.json beside a synthetic clip says of its parameters; {} without.
 
     It is shown beside the estimate, and nothing else is done with it.
 
@@ -297,11 +329,14 @@ def read_truth(clip: Clip) -> dict[str, float]:
         return {}
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        known = {key: float(content[key]) for key in ("m1", "k1", "m2", "k2")}
+        if "parameters" in content:
+            return {key: float(value) for key, value in content["parameters"].items()}
+        count = content.get("objects", 2)
+        names = [f"{key}{i + 1}" for i in range(count) for key in "mk"]
+        known = {name: float(content[name]) for name in names}
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not a truth with m1, k1, m2 and k2 ({error})") from error
-    m1, m2 = known["m1"], known["m2"]
-    return known | {"mass_ratio": m1 / m2, "phi": (m1 - m2) / (m1 + m2)}
+    return known | mass_ratios([known[f"m{i + 1}"] for i in range(count)])
 
 
 def _table(result: dict[str, Any], truth: Mapping[str, float]) -> str:
@@ -330,16 +365,22 @@ def _parser() -> command.Parser:
     parser.add_argument("--effects", default="", help="a,b: effects in the model")
     add_clip_options(parser, out="folder of the run (default runs/CLIP)")
     group = parser.add_argument_group("--method mh")
-    group.add_argument("--sampler", choices=("mixture", "random_walk"), default="mixture")
+    group.add_argument("--sampler", choices=SAMPLERS, default="mixture")
     group.add_argument(
         "--max-steps",
         type=command.whole_number(BLOCK_STEPS, BLOCK_STEPS),
         help="per chain, after the warm-up",
     )
+    group.add_argument(
+        "--init",
+        choices=INITS,
+        default="grad",
+        help="what chains start from: a fit, or the network",
+    )
     group.add_argument("--preset", choices=PRESETS, default="galileo")
     group.add_argument(
         "--similarity",
-        choices=("thesis_gaussian", "earth_mover", "root_mean"),
+        choices=SIMILARITIES,
         default="thesis_gaussian",
         help="of --preset thesis",
     )

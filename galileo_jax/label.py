@@ -8,17 +8,42 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax import command
-from galileo_jax.clip.load import YAML_SUFFIXES, check_belongs, check_clip, find_yaml
+from galileo_jax.clip import physics101
+from galileo_jax.clip.load import (
+    YAML_SUFFIXES,
+    check_belongs,
+    check_clip,
+    check_place,
+    find_yaml,
+    has_yaml,
+)
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.track_files.read import is_track
 from galileo_jax.clip.yaml_edit import Key, dump, edited
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_text
 from galileo_jax.video.decode import probe
 
+SCALARS = (
+    "scenario",
+    "fps",
+    "ramp_angle_deg",
+    "direction",
+    "pixels_per_metre",
+    "gravity",
+    "track_units",
+    "track_y",
+)
+
+LEVELS = ("scenario", "setup", "object", "trial")
+"""Folders of Physics 101, of which something can be told."""
+
 KEY_ORDER = (
     "video",
     "track",
+    "track_units",
+    "track_y",
     "scenario",
     "fps",
     "ramp_angle_deg",
@@ -34,6 +59,8 @@ def main(argv: Sequence[str]) -> int | None:
     """Creates or updates the yaml beside a clip; writes nothing unless the result is valid."""
     arguments = _parser().parse_args(argv)
     clip_path: Path = arguments.clip
+    if (place := physics101.place_of(clip_path)) and not has_yaml(clip_path):
+        return _label_place(place, arguments)
     yaml_path = _yaml_path(clip_path)
     is_new = not yaml_path.exists()
     old = {} if is_new else read_mapping(yaml_path)
@@ -60,6 +87,44 @@ def main(argv: Sequence[str]) -> int | None:
     return None
 
 
+def _label_place(place: physics101.Place, arguments: Namespace) -> int | None:
+    """Writes into the labels of Physics 101: sizes by object, all else for one of the folders."""
+    if arguments.scenario is not None:
+        raise InputError(f"--scenario: the folders of {place.video} say {place.scenario}")
+    old = physics101.read_labels(place.labels)
+    things, clips = copy.deepcopy(old.things), copy.deepcopy(old.clips)
+    level = place.level(arguments.level)
+    changes = _changes(arguments, place.labels, {})
+    here = {key[0]: value for key, value in changes.items() if key[0] != "objects"}
+    by_trial: dict[str, dict[str, Any]] = {}
+    for thing in (value for key, value in changes.items() if key[0] == "objects"):
+        name = thing.pop("name")
+        if name != place.object:
+            here["target"] = name
+        for key in physics101.BY_OBJECT:
+            if key in thing:
+                by_trial.setdefault(key, {})[name] = thing.pop(key)
+        if name not in things or any(name == shape[0] for shape in arguments.shape):
+            things.setdefault(name, {})["shape"] = thing["shape"]
+        things[name] |= {key: value for key, value in thing.items() if key != "shape"}
+    if not changes:
+        raise InputError(f"{place.video}: nothing to write; see galileo label --help")
+    if here:
+        clips[level] = (clips.get(level) or {}) | here
+    trial = clips.setdefault(place.levels[-1], {}) if by_trial else {}
+    for key, values in by_trial.items():
+        trial[key] = (trial.get(key) or {}) | values
+    clip = check_place(place, physics101.Labels(things, clips))
+    if place.labels.is_file() and "#" in place.labels.read_text(encoding="utf-8-sig"):
+        _say(f"note: {place.labels} was written afresh; its comments are lost")
+    tables = {"objects": things, "clips": clips}
+    write_text(place.labels, dump({key: table for key, table in tables.items() if table}))
+    for warning in clip.warnings:
+        _say(f"warning: {warning}")
+    print(place.labels)
+    return None
+
+
 def _say(line: str) -> None:
     command.console().print(line, soft_wrap=True, markup=False)
 
@@ -70,7 +135,7 @@ def _parser() -> command.Parser:
         description="Write what is known about a clip into the yaml beside it. Pixels: x right, "
         "y down, as any image viewer shows them.",
     )
-    parser.add_argument("clip", type=Path, metavar="CLIP", help="video, csv track or yaml")
+    parser.add_argument("clip", type=Path, metavar="CLIP", help="video, track file or yaml")
     parser.add_argument("--scenario", help=f"one of {', '.join(SCENARIOS)}")
     parser.add_argument("--fps", type=float, help="true frames per second; default: the video's")
     objects = parser.add_argument_group("objects (repeat for each; a new NAME adds an object)")
@@ -104,7 +169,7 @@ def _parser() -> command.Parser:
         action="append",
         default=[],
         metavar=("NAME", "FRAME"),
-        help="first frame in which it moves by itself, from 0",
+        help="first frame in which it moves by itself, from 0; null: to be found",
     )
     scale = parser.add_mutually_exclusive_group()
     scale.add_argument("--pixels-per-metre", type=float)
@@ -124,24 +189,33 @@ def _parser() -> command.Parser:
         metavar=("X1", "Y1", "X2", "Y2"),
         help="two pixels on the ramp: its angle and direction",
     )
+    parser.add_argument("--track-units", help="of a track file: m, cm, mm, in, ft or px")
+    parser.add_argument("--track-y", help="of a track file: y points up or down")
     parser.add_argument("--direction", help="which way the objects travel: right or left")
     parser.add_argument(
         "--origin", nargs=2, type=float, metavar=("X", "Y"), help="foot of the ramp, pixels"
     )
     parser.add_argument("--gravity", type=float, help="m/s^2")
+    parser.add_argument(
+        "--level",
+        choices=LEVELS,
+        default=LEVELS[-1],
+        help="Physics 101: of what in the folder tree it is told (default trial); points are "
+        "always of the trial, sizes of the object",
+    )
     return parser
 
 
 def _yaml_path(clip_path: Path) -> Path:
     """The clip's yaml: the one that is there, or the one to create."""
     is_source = clip_path.is_file() and clip_path.suffix.lower() not in YAML_SUFFIXES
-    has_yaml = any(clip_path.with_suffix(suffix).exists() for suffix in YAML_SUFFIXES)
-    return clip_path.with_suffix(".yaml") if is_source and not has_yaml else find_yaml(clip_path)
+    is_new = is_source and not has_yaml(clip_path)
+    return clip_path.with_suffix(".yaml") if is_new else find_yaml(clip_path)
 
 
 def _defaults(clip_path: Path, arguments: Namespace) -> dict[Key, Any]:
     """What a new yaml takes from the file beside it."""
-    if clip_path.suffix.lower() == ".csv":
+    if is_track(clip_path):
         return {("track",): clip_path.name}
     defaults: dict[Key, Any] = {("video",): clip_path.name}
     if arguments.fps is None:
@@ -163,7 +237,7 @@ def _changes(arguments: Namespace, yaml_path: Path, old: dict[str, Any]) -> dict
         changes["pixels_per_metre",] = _pixels_per_metre(*arguments.scale)
     if arguments.origin is not None:
         changes["origin_px",] = arguments.origin
-    for key in ("scenario", "fps", "ramp_angle_deg", "direction", "pixels_per_metre", "gravity"):
+    for key in SCALARS:
         value = getattr(arguments, key)
         if value is not None:
             changes[key,] = value
@@ -179,9 +253,11 @@ def _object_changes(arguments: Namespace, yaml_path: Path, old: dict[str, Any]) 
     for name, *point in arguments.point:
         given.setdefault(name, {})["point_px"] = _numbers("--point", name, point)
     for name, frame in arguments.first_frame:
-        if not frame.isdecimal():
-            raise InputError(f"--first-frame {name}: {frame!r} is not a frame number from 0")
-        given.setdefault(name, {})["first_frame"] = int(frame)
+        if not (frame.isdecimal() or frame == "null"):
+            raise InputError(
+                f"--first-frame {name}: {frame!r} is not a frame number from 0, or null"
+            )
+        given.setdefault(name, {})["first_frame"] = None if frame == "null" else int(frame)
 
     listed = old.get("objects") or []
     if given and not isinstance(listed, list):

@@ -53,7 +53,7 @@ def observe(clip: Clip, track: Track) -> Observation:
     sign = 1.0 if clip.direction == "right" else -1.0
     mask = track.is_visible.copy()
     for i, declared in enumerate(clip.objects):
-        mask[i, : declared.first_frame] = False
+        mask[i, : declared.first_frame or 0] = False
     if clip.origin_px is not None:
         origin = np.asarray(clip.origin_px)
     else:

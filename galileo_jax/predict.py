@@ -15,7 +15,7 @@ LONGEST_S = 60.0
 
 
 def main(argv: Sequence[str]) -> int | None:
-    """Writes prediction.json and its pictures into --out (default: the run's folder)."""
+    """Writes prediction.json, its pictures and its part of the report into --out (default: RUN)."""
     call = _parser().parse_args(argv)
     out: Path = call.out or call.run
     if out.exists() and not out.is_dir():
@@ -29,6 +29,7 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.report.continuation import continuation_figure
     from galileo_jax.report.figure import to_svg
     from galileo_jax.report.first_and_last import write_first_and_last
+    from galileo_jax.report.prediction import told, write_prediction
     from galileo_jax.run import load_run
 
     with command.console().status("rolling out") as status:
@@ -40,52 +41,13 @@ def main(argv: Sequence[str]) -> int | None:
         try:
             found["picture"] = write_first_and_last(run, motions, out / "first_and_last.png")
             write_text(out / "prediction.svg", svg)
+            page = write_prediction(out, run, found, svg)
             write_json(out / "prediction.json", found)
         except OSError as error:
             raise InputError(f"--out: {out}: {error.strerror or error}") from error
-    print("\n".join(_told(found)))
-    print(f"{out}/prediction.json, prediction.svg, first_and_last.png")
+    print("\n".join(told(found)))
+    print(f"{out}/prediction.json, prediction.svg, first_and_last.png, {page.name}")
     return None
-
-
-def _told(found: dict[str, Any]) -> list[str]:
-    """The answers as lines for the reader."""
-    until = found["predicted_until_s"]
-    lines = [f"until {until:.2f} s, {found['seconds_beyond_clip_s']:g} s after the clip's end:"]
-    for name, entry in found["objects"].items():
-        slides, stops = entry["slides_probability"], entry["stops_probability"]
-        lines.append(f"{name}: will it slide? {_chance(slides)}")
-        if slides == 0:
-            continue
-        lines.append(f"  how far: {_interval(entry['travelled_m'], 'm')}")
-        beyond = entry["travelled_beyond_clip_m"]
-        if beyond["q975"] > 5e-4:
-            lines.append(f"  of that after the clip: {_interval(beyond, 'm')}")
-        lines.append(f"  does it stop? {_chance(stops)}")
-        if entry["rest_x_m"] and entry["rest_time_s"]:
-            lines.append(
-                f"  at x = {_interval(entry['rest_x_m'], 'm')}, "
-                f"after {_interval(entry['rest_time_s'], 's')}"
-            )
-        if stops < 1:
-            lines.append(f"  at the end at x = {_interval(entry['end_x_m'], 'm')}")
-    if found["hit"] is not None:
-        first, second = list(found["objects"])[:2]
-        told = f"does {first} hit {second}? {_chance(found['hit']['probability'])}"
-        if found["hit"]["time_s"]:
-            told += f", after {_interval(found['hit']['time_s'], 's')}"
-        lines.append(told)
-    return lines
-
-
-def _chance(probability: float) -> str:
-    words = {0.0: "no", 1.0: "yes"}.get(probability, "perhaps")
-    return f"{words} (probability {probability:.2f})"
-
-
-def _interval(entry: dict[str, float], unit: str) -> str:
-    mean, low, high = (f"{entry[key]:.3f}" for key in ("mean", "q025", "q975"))
-    return f"{mean} {unit} ({low} to {high})"
 
 
 def _parser() -> command.Parser:

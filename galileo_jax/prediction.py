@@ -147,6 +147,7 @@ def answers(run: Run, motions: Motions, seconds: float, seed: int) -> dict[str, 
             "travelled_m": _summary(steps[:, i].sum(axis=1)),
             "travelled_beyond_clip_m": _summary(steps[:, i, beyond:].sum(axis=1)),
             "end_x_m": _summary(end_x),
+            "end_y_m": _summary(motions.position_m[:, i, 1, -1]),
             "end_speed_m_s": _summary(motions.speed_m_s[:, i, -1]),
         }
     hit = None

@@ -1,5 +1,8 @@
 """Entries by name: a file that adds one registers it and touches no other file."""
 
+import importlib
+import pkgutil
+from pathlib import Path
 from typing import ClassVar, Generic, Protocol, TypeVar
 
 
@@ -46,3 +49,18 @@ class Registry(Generic[Base]):
         if name not in self._entries:
             raise ValueError(f"unknown {self.singular} {name!r}; known: {', '.join(self.names())}")
         return self._entries[name]
+
+
+def load_entries(package: str) -> None:
+    """Imports a package's modules, so that each registers its entry."""
+    for module in pkgutil.iter_modules(importlib.import_module(package).__path__):
+        importlib.import_module(f"{package}.{module.name}")
+
+
+def entry_names(package: str) -> tuple[str, ...]:
+    """The names of a package's entries, sorted, where files are named as their entries.
+
+    Nothing is imported, so that the command line can tell them without JAX.
+    """
+    folder = Path(__file__).parents[1].joinpath(*package.split("."))
+    return tuple(sorted(module.name for module in pkgutil.iter_modules([str(folder)])))

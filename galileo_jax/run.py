@@ -17,7 +17,7 @@ import yaml
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
-from galileo_jax.effects.effect import Effect
+from galileo_jax.effects.effect import Effect, Surroundings
 from galileo_jax.effects.registry import load_file, load_library, make_effects
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
@@ -28,6 +28,7 @@ from galileo_jax.observation import Observation
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.model import Model
 from galileo_jax.scene.scene import build_scene
+from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
 RESULT, OBSERVATION = "result.json", "observation.csv"
 LONGER = 1.15
@@ -58,18 +59,31 @@ class Run:
         return Trials((self.problem,))
 
 
+def noise_of(clip: Clip, scene: Surroundings) -> NoiseModel:
+    """Which imperfections a clip's observation has.
+
+    Positions on a ramp in metres, without any scale in pixels, were measured by no camera that
+    anybody knows of. Those of a fall were read off a picture, whoever told them.
+    """
+    has_pixels = clip.video is not None or clip.pixels_per_metre is not None
+    is_measured = scene.has_surface and scene.is_scale_known and not has_pixels
+    return "bodies" if is_measured else "camera"
+
+
 def make_problem(
     clip: Clip,
     observation: Observation,
     engine: str = "auto",
     effects: tuple[Effect, ...] = (),
+    noise: NoiseModel | None = None,
 ) -> Problem:
-    """A clip with a model of it: the base model, or one with effects."""
+    """A clip with a model of it: the base model, or one with effects; `noise`: its own."""
     scene = build_scene(clip, observation)
     # An effect may run the clock faster: the frame rate's does.
     margin = LONGER if effects else 1.0
     model = Model(scene, margin * float(observation.times_s[-1]), effects)
-    return Problem(observation, model, make_engine(engine, model), clip.path.stem)
+    noise = noise or noise_of(clip, scene.surroundings)
+    return Problem(observation, model, make_engine(engine, model), clip.path.stem, noise)
 
 
 def make_trials(
@@ -77,11 +91,12 @@ def make_trials(
     observations: Sequence[Observation],
     engine: str = "auto",
     effects: tuple[Effect, ...] = (),
+    noise: NoiseModel | None = None,
 ) -> Trials:
     """Clips of the same objects with the same model."""
     return Trials(
         tuple(
-            make_problem(clip, observation, engine, effects)
+            make_problem(clip, observation, engine, effects, noise)
             for clip, observation in zip(clips, observations, strict=True)
         )
     )

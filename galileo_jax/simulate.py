@@ -6,17 +6,20 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from galileo_jax import command
 from galileo_jax.clip.load import check_clip
+from galileo_jax.clip.schema import ClipObject, Shape
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.clip.yaml_edit import dump
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
 from galileo_jax.observation import Observation
+from galileo_jax.scene.scene import extents
+from galileo_jax.simulate_free import FREE_SCENARIOS, write_free_clip
 from galileo_jax.truth import (
     LONGEST_S,
     SOLVERS,
@@ -31,11 +34,17 @@ from galileo_jax.video import synthetic
 
 MARGIN_M = 0.10  # round the motion, to the picture's edge
 WIDEST_M = 2.5
+BEYOND_TABLE_M = 2.5  # x, where a clip ends; a board alone ends at 0
 TABLE_AT = 0.80  # of the picture's height
 KEYSTONE_PER_M = 0.01
 ROLL_RAD = math.radians(0.5)
 OFF_PX = (1.0, 4.0)  # how far a point set by hand is off, where the fault is asked for
 CAMERA_FAULTS = ("keystone", "roll", "origin", "points")
+SHAPES: dict[str, tuple[Shape, ...]] = {
+    "ramp": ("box", "box"),
+    "multi": ("box", "box", "box"),
+    "incline": ("box",),
+}
 TRACK_SUFFIX, VIDEO_SUFFIX = ".csv", ".mp4"
 
 
@@ -49,8 +58,23 @@ def main(argv: Sequence[str]) -> int | None:
     if call.track_only and call.camera_fault:
         raise InputError("--camera-fault: a track (--track-only) has no camera")
     hidden = _hidden(call)
+    if call.scenario not in SHAPES:
+        _refuse_ramp_options(call)
+        path = out.parent / out.name
+        try:
+            with _all_or_nothing(out.parent) as folder:
+                write_free_clip(folder / out.name, call, hidden)
+        except OSError as error:
+            raise InputError(f"--out: {out}: {error.strerror or error}") from error
+        for end in (suffix, ".yaml", ".truth.json"):
+            print(path.with_suffix(end))
+        return None
+    if call.floor:
+        raise InputError("--floor: not of a ramp")
+    shapes = _shapes(call)
     looks, things, faults, secrets = np.random.default_rng(call.seed).spawn(4)
     given = {key: getattr(call, key) for key in ("m1", "k1", "m2", "k2")}
+    given |= _masses_and_frictions(call.set, len(shapes))
     trials = draw_series(
         call.angle,
         {key: value for key, value in given.items() if value is not None},
@@ -60,6 +84,8 @@ def main(argv: Sequence[str]) -> int | None:
         things=things,
         secrets=secrets,
         frame_s=1 / call.fps if call.faults else None,
+        scenario=call.scenario,
+        shapes=shapes,
     )
     names = [f"{out.stem}_{i + 1}" if call.series else out.stem for i in range(len(trials))]
     try:
@@ -73,6 +99,39 @@ def main(argv: Sequence[str]) -> int | None:
         for end in (suffix, ".yaml", ".truth.json"):
             print(out.with_name(name + end))
     return None
+
+
+def _shapes(call: argparse.Namespace) -> list[Shape]:
+    """The objects' shapes, as many as the scenario has."""
+    shapes = call.shapes.split(",") if call.shapes else list(SHAPES[call.scenario])
+    for shape in shapes:
+        if shape not in get_args(Shape):
+            raise InputError(f"--shapes: unknown shape {shape!r}; known: box, cylinder, ...")
+    most = 9 if call.scenario == "multi" else len(SHAPES[call.scenario])
+    if not (2 if call.scenario == "multi" else most) <= len(shapes) <= most:
+        raise InputError(
+            f"--shapes: {len(shapes)} given; {call.scenario} has {most} (multi: 2 to 9)"
+        )
+    return shapes
+
+
+def _masses_and_frictions(given: Sequence[tuple[str, float]], count: int) -> dict[str, float]:
+    """`--set` of a ramp: m1, k1 and so on."""
+    names = [f"{key}{i + 1}" for i in range(count) for key in "mk"]
+    for name, _ in given:
+        if name not in names:
+            raise InputError(f"--set: no parameter {name!r}; known: {', '.join(names)}")
+    return dict(given)
+
+
+def _refuse_ramp_options(call: argparse.Namespace) -> None:
+    """What only a ramp has."""
+    if call.shapes:
+        raise InputError(f"--shapes: of a ramp only, not of scenario {call.scenario}")
+    given = {f"--{key}": getattr(call, key) is not None for key in ("m1", "k1", "m2", "k2")}
+    given |= {"--series": bool(call.series), "--hand": call.hand, "--faults": call.faults}
+    for option in (option for option, is_given in given.items() if is_given):
+        raise InputError(f"{option}: of a ramp only, not of scenario {call.scenario}")
 
 
 def _hidden(call: argparse.Namespace) -> list[Hidden]:
@@ -99,7 +158,9 @@ def _write_clip(
 ) -> None:
     """Writes one clip, its yaml and its truth into the folder of `out`."""
     declared = Declared.of(truth, call.fps)
-    seconds = call.seconds or min(LONGEST_S, max(1.5, motion.rest_s + declared.release_s + 0.4))
+    ends = motion.leaves_s(BEYOND_TABLE_M if truth.surroundings.has_table else 0.0)
+    longest = min(LONGEST_S, ends + declared.release_s)
+    seconds = call.seconds or min(longest, max(1.5, motion.rest_s + declared.release_s + 0.4))
     num_frames = max(2, round(seconds * declared.true_fps))
     frames = motion.at(declared.taken_s(num_frames))
     camera = _camera(call, truth, frames, faults)
@@ -146,7 +207,7 @@ def _film(
     seed: int,
 ) -> dict[str, Any]:
     """Renders the video; returns what of the filming belongs into the truth."""
-    bodies = tuple(synthetic.Body(each.shape, each.size_m or ()) for each in truth.objects)
+    bodies = tuple(_body(each) for each in truth.objects)
     ramp = synthetic.Ramp(truth.angle_rad, truth.release_m + 0.12)
     path = synthetic.Motion(
         motion.times_s + declared.release_s, motion.position_m, motion.pitch_rad
@@ -184,6 +245,13 @@ def _film(
             for each, row in zip(truth.objects, covered, strict=True)
         },
     }
+
+
+def _body(declared: ClipObject) -> synthetic.Body:
+    """What rolls is a disc from the side."""
+    if declared.roll_inertia is not None:
+        return synthetic.Body("sphere", extents(declared)[:1])
+    return synthetic.Body(declared.shape, declared.size_m or ())
 
 
 def _write_track(
@@ -267,6 +335,7 @@ def _clip_content(
     """What is declared about the clip (DESIGN.md 2.1)."""
     objects: list[dict[str, Any]] = [
         {"name": each.name, "shape": each.shape, "size_m": list(each.size_m or ())}
+        | ({} if each.rolls is None else {"rolls": each.rolls})
         for each in truth.objects
     ]
     seen: dict[str, Any] = {}
@@ -309,7 +378,13 @@ def _parser() -> command.Parser:
     )
     add = parser.add_argument
     add("--out", type=Path, required=True, metavar="DIR/NAME.mp4", help="NAME.csv for a track")
-    add("--scenario", choices=["ramp"], default="ramp")
+    add("--scenario", choices=[*SHAPES, *FREE_SCENARIOS], default="ramp")
+    add(
+        "--shapes",
+        metavar="SHAPE,...",
+        help="of the objects on a ramp, in the order of the travel; round ones roll; so many has a "
+        "multi (default 3 boxes)",
+    )
     add("--seed", type=_number(int, 0), default=0)
     add("--angle", type=_number(float, 1, 60), default=20.0, metavar="DEG", help="of the ramp")
     add("--seconds", type=_number(float, 0.1, LONGEST_S), help="default: until all is at rest")
@@ -318,6 +393,15 @@ def _parser() -> command.Parser:
         add(f"--m{index}", type=_number(float, 0.01, 100), metavar="KG")
         add(f"--k{index}", type=_number(float, 0, 2), metavar="FRICTION")
     add("--solver", choices=SOLVERS, default="rigid", help="fine: not the engine that fits")
+    add(
+        "--set",
+        type=_value,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="a parameter of the scenario, such as k3=0.2 or floor_restitution=0.7",
+    )
+    add("--floor", action="store_true", help="of a fall or a flight: it bounces")
     add("--series", type=_number(int, 1, 99), metavar="N", help="N trials: NAME_1, NAME_2, ...")
     add("--track-only", action="store_true", help="a csv track in place of the video")
     add(
@@ -398,6 +482,14 @@ def _effect(text: str) -> tuple[str, dict[str, float]]:
         if not math.isfinite(values[key.strip()]):
             raise argparse.ArgumentTypeError(f"{part!r} is not PARAMETER=NUMBER")
     return name.strip(), values
+
+
+def _value(text: str) -> tuple[str, float]:
+    """`NAME=VALUE`."""
+    name, values = _effect(f":{text}")
+    if name or len(values) != 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=NUMBER")
+    return next(iter(values.items()))
 
 
 def _size(text: str) -> tuple[int, int]:

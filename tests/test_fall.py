@@ -132,7 +132,7 @@ def test_where_the_ball_is_across_its_fall_says_nothing(tmp_path):
 
 @pytest.mark.parametrize("engine", ["c", "mjx"])
 def test_mujoco_has_no_fall(engine, tmp_path):
-    with pytest.raises(InputError, match=f"engine: '{engine}' has no scene of a fall; rigid or"):
+    with pytest.raises(InputError, match=f"engine: '{engine}' has no scene without a ramp; rigid"):
         make_engine(engine, problem_of(write_fall(tmp_path)).model)
 
 

@@ -273,6 +273,17 @@ class TestSampling:
         assert not list(out.glob("*.checkpoint.npz"))
 
 
+@pytest.mark.slow
+def test_the_thesis_preset_says_what_it_chose(simulated, tmp_path):
+    chosen = {"similarity": "root_mean", "acceptance": "metropolis", "selection": "least_variance"}
+    words = [word for name, value in chosen.items() for word in (f"--{name}", value)]
+    result = run_fit(simulated[0], tmp_path / "run", "--method", "mh", "--preset", "thesis", *words)
+    assert {name: result[name] for name in chosen} == chosen
+    assert result["preset"] == "thesis"
+    assert set(result["best"]) == {"m1", "k1", "m2", "k2"}
+    assert not result["converged"], "a point, and no posterior"
+
+
 @pytest.mark.parametrize("broken", BROKEN_CLIPS, ids=lambda broken: broken.id)
 def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
     """Exit code 2, one line that names the file and the fault, nothing written."""

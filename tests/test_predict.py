@@ -9,6 +9,7 @@ import pytest
 from galileo_jax import command, predict
 from galileo_jax.prediction import extrapolate
 from galileo_jax.report import gl_view
+from galileo_jax.report.shell import document, header
 from tests.oracle_run import HIT, MISS, STILL, make_run
 from tests.reference_ramp import solve
 
@@ -74,8 +75,22 @@ def test_rest_and_hit_agree_with_the_closed_form(runs, tmp_path, drawn_only, cap
     assert {path.name for path in tmp_path.iterdir()} == {
         "prediction.json",
         "prediction.svg",
+        "prediction.html",
         "first_and_last.png",
     }
+
+
+def test_the_report_gets_one_section(runs, tmp_path, drawn_only):
+    report = tmp_path / "report.html"
+    report.write_text(document("a fit", [header("fit", "a fit", "It fits."), "<h2>Motion</h2>"]))
+    for _ in range(2):
+        call(runs["hit"], tmp_path)
+        page = report.read_text()
+        assert page.count('<section id="prediction">') == 1
+        assert page.count('href="#prediction"') == 1
+        assert "will it slide?" in page and "data:image/png;base64," in page
+        assert page.index("Motion") < page.index("will it slide?") < page.index("</main>")
+    assert not (tmp_path / "prediction.html").exists()
 
 
 def test_object_2_stays_where_nothing_reaches_it(runs, tmp_path, drawn_only):

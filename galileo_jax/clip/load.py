@@ -9,10 +9,10 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from galileo_jax.clip import placement
+from galileo_jax.clip import physics101, placement
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import SIZE_MEANING, Clip, ClipFile, ClipObject, short
-from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.clip.track_files.read import FileTrack, is_track, read_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.errors import InputError
 from galileo_jax.observation import Observation
@@ -48,15 +48,43 @@ def load_clip(path: str | Path, **overrides: Any) -> Clip:
     header's frame count and rate cannot be trusted.
     """
     path = Path(path)
+    given = {key: value for key, value in overrides.items() if value is not None}
+    if (place := physics101.place_of(path)) and not has_yaml(path):
+        return check_place(place, physics101.read_labels(place.labels), given)
     yaml_path = find_yaml(path)
     content = read_mapping(yaml_path)
-    if path.suffix.lower() == ".csv":
+    if is_track(path):
         content = {key: value for key, value in content.items() if key != "video"}
         content.setdefault("track", path.name)
-    given = {key: value for key, value in overrides.items() if value is not None}
     clip = check_clip(yaml_path, content | given, overridden=frozenset(given))
     check_belongs(clip, path)
     return clip
+
+
+def check_place(
+    place: physics101.Place, labels: physics101.Labels, given: dict[str, Any] | None = None
+) -> Clip:
+    """Checks a clip of Physics 101, which its folders and its labels declare.
+
+    Args:
+      place: where it is.
+      labels: of the data set.
+      given: values that win over both.
+    """
+    content, warnings = physics101.content_of(place, labels)
+    given = given or {}
+    try:
+        clip = check_clip(place.yaml, content | given, overridden=frozenset(given))
+    except InputError as error:
+        named = f"{place.labels}: clips: {place.levels[-1]}"
+        raise InputError(str(error).replace(str(place.yaml), named)) from None
+    noted = () if "pixels_per_metre" in given else warnings
+    return clip.model_copy(update={"warnings": clip.warnings + noted})
+
+
+def has_yaml(path: Path) -> bool:
+    """Whether a video or track has a yaml beside it."""
+    return any(path.with_suffix(suffix).is_file() for suffix in YAML_SUFFIXES)
 
 
 def check_belongs(clip: Clip, path: Path) -> None:
@@ -117,18 +145,15 @@ def check_clip(
         file = ClipFile.model_validate(content)
     except ValidationError as error:
         fail(*_first_problem(error))
-    observation = None
-    if file.track is not None:
-        if file.track.suffix.lower() != ".csv":
-            fail("track", f"{file.track} is not a .csv file")
-        observation = read_observation_csv(path.parent / file.track)
-        if is_timed:
-            file = file.model_copy(update={"fps": _frame_rate(observation)})
-
     _check_objects(file, fail)
-    found = _observed(path, file, observation) if observation else _filmed(path, file)
+    read = None
+    if file.track is not None:
+        read = read_track(path, path.parent / file.track, file, None if is_timed else file.fps)
+        if is_timed:
+            file = file.model_copy(update={"fps": read.fps})
+    found = _observed(path, file, read) if read else _filmed(path, file)
     clip = Clip.model_validate({**dict(file), "path": path, **found})
-    _check_against_source(clip, observation, fail)
+    _check_against_source(clip, read.observation if read else None, fail)
     return clip
 
 
@@ -223,8 +248,12 @@ def _unknown_key(key: Any, model: type[BaseModel]) -> str:
 def _check_objects(file: ClipFile, fail: Any) -> None:
     """What takes several values of the yaml to judge."""
     scenario = SCENARIOS[file.scenario]
-    if scenario.has_ramp and file.ramp_angle_deg is None:
-        fail("ramp_angle_deg", f"missing; scenario {file.scenario} needs it, in degrees")
+    if scenario.has_ramp and "ramp_angle_deg" not in file.model_fields_set:
+        fail(
+            "ramp_angle_deg",
+            f"missing; scenario {file.scenario} needs it, in degrees, or null where it is to be "
+            "found from the path",
+        )
     is_alone = scenario.num_objects[1] == 1  # several objects may slide beside a ramp
     if is_alone and not scenario.has_ramp and file.ramp_angle_deg is not None:
         fail(
@@ -232,6 +261,11 @@ def _check_objects(file: ClipFile, fail: Any) -> None:
             f"{file.ramp_angle_deg:g} given; scenario {file.scenario} ({scenario.meaning}) has no "
             "ramp; leave it out",
         )
+    for key in (key for other in SCENARIOS.values() for key in other.keys):
+        is_given = getattr(file, key) != ClipFile.model_fields[key].default
+        if is_given and key not in scenario.keys:
+            where = ", ".join(name for name, other in SCENARIOS.items() if key in other.keys)
+            fail(key, f"means nothing in scenario {file.scenario}, only in {where}; leave it out")
     fewest, most = scenario.num_objects
     count = len(file.objects)
     if count < fewest:
@@ -250,6 +284,8 @@ def _check_objects(file: ClipFile, fail: Any) -> None:
                 f"{item.name!r} is also the name of objects[{names[item.name]}]; names must differ",
             )
         names[item.name] = index
+        if item.rolls is not None:
+            _check_rolls(f"objects[{index}].rolls", item, file.scenario, fail)
         if item.size_m is None:
             continue
         meaning = SIZE_MEANING[item.shape]
@@ -266,6 +302,16 @@ def _check_objects(file: ClipFile, fail: Any) -> None:
             )
 
 
+def _check_rolls(key: str, item: ClipObject, scenario: str, fail: Any) -> None:
+    given = short(item.rolls)
+    if not SCENARIOS[scenario].has_ramp:
+        fail(key, f"{given} means nothing in scenario {scenario}, where nothing is touched")
+    if item.shape == "box" and item.rolls:
+        fail(key, f"{given}, but a box slides; leave it out, or mend shape")
+    if item.shape == "sphere" and item.rolls is False:
+        fail(key, "false, but a sphere rolls as far as friction lets it; leave it out")
+
+
 def _filmed(path: Path, file: ClipFile) -> dict[str, Any]:
     assert file.video is not None
     video = path.parent / file.video
@@ -280,30 +326,30 @@ def _filmed(path: Path, file: ClipFile) -> dict[str, Any]:
     }
 
 
-def _observed(path: Path, file: ClipFile, observation: Observation) -> dict[str, Any]:
+def _observed(path: Path, file: ClipFile, read: FileTrack) -> dict[str, Any]:
     assert file.track is not None
     track = path.parent / file.track
-    declared = [item.name for item in file.objects]
-    if tuple(declared) != observation.names:
-        raise InputError(
-            f"{path}: objects: {', '.join(declared)} declared, but {track.name} has "
-            f"{', '.join(observation.names)}; the same names in the same order expected"
-        )
-    fps = _frame_rate(observation)
-    warnings = ()
-    if abs(file.fps / fps - 1) > 0.01:
-        warnings = (
-            f"{path}: fps: {file.fps:g} declared, the times in {track.name} say {fps:.4g}; "
+    warnings = read.warnings
+    if abs(file.fps / read.fps - 1) > 0.01:
+        warnings += (
+            f"{path}: fps: {file.fps:g} declared, the times in {track.name} say {read.fps:.4g}; "
             "the times are used",
         )
-    return {"track": track, "frame_count": len(observation.times_s), "warnings": warnings}
+    in_pixels = {"pixels_per_metre": read.pixels_per_metre, "origin_px": read.origin_px}
+    return {
+        "track": track,
+        "track_units": read.unit,
+        **(in_pixels if read.unit == "px" else {}),
+        "frame_count": len(read.observation.times_s),
+        "warnings": warnings,
+    }
 
 
 def _check_against_source(clip: Clip, observation: Observation | None, fail: Any) -> None:
     """What takes the video or the csv track to judge."""
     for index, item in enumerate(clip.objects):
         key = f"objects[{index}]"
-        if item.first_frame >= clip.frame_count:
+        if (item.first_frame or 0) >= clip.frame_count:
             fail(
                 f"{key}.first_frame",
                 f"{item.first_frame} is beyond the end; the clip has "
@@ -334,10 +380,6 @@ def _check_in_frame(
     if not is_inside:
         far = "far " if margin else ""
         fail(key, f"{list(point)} is {far}outside the frame of {width} x {height} pixels")
-
-
-def _frame_rate(observation: Observation) -> float:
-    return float(1 / np.median(np.diff(observation.times_s)))
 
 
 def _first_positions(observation: Observation) -> dict[str, np.ndarray]:

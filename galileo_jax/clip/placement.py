@@ -26,6 +26,9 @@ TOLERANCE_PER_SIZE = 0.125
 TOLERANCE_PER_DISTANCE = 0.06
 """Error of height per metre from the foot: a declared angle that is off by 3.4 degrees."""
 
+MEND_PIXELS = "mend point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre"
+MEND_LENGTHS = "mend track_origin, ramp_angle_deg, direction, size_m or track_units"
+
 MIN_SIZE_PX = 2.0
 """An object that would appear smaller cannot be followed: its size or the scale is wrong."""
 
@@ -90,9 +93,15 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
       clip: the clip.
       centres_m: name to `[2]`, m; x along the travel, y up, origin at the foot of the ramp.
     """
-    pixel_m = 1 / clip.pixels_per_metre if clip.pixels_per_metre and clip.video else 0.0
-    has_origin = clip.track is not None or clip.origin_px is not None
-    is_on_ramp = SCENARIOS[clip.scenario].has_ramp and has_origin
+    if not clip.is_scale_known:
+        return None
+    in_pixels = clip.track is None or clip.track_units == "px"
+    pixel_m = 1 / clip.pixels_per_metre if clip.pixels_per_metre and in_pixels else 0.0
+    has_origin = not in_pixels or clip.origin_px is not None
+    is_on_ramp = (
+        SCENARIOS[clip.scenario].has_ramp and has_origin and clip.ramp_angle_deg is not None
+    )
+    mend = MEND_PIXELS if in_pixels else MEND_LENGTHS
     angle = math.radians(clip.ramp_angle_deg or 0.0)
     placed = [
         (index, item, _outline(item, centres_m[item.name], angle if is_on_ramp else 0.0))
@@ -104,7 +113,7 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
         for index, _, outline in placed:
             problem = _against_surfaces(outline, angle, has_table, pixel_m)
             if problem:
-                return f"objects[{index}] ({outline.name})", problem
+                return f"objects[{index}] ({outline.name})", f"{problem}; {mend}"
     for (_, first, a), (index, second, b) in itertools.combinations(placed, 2):
         if first.first_frame != second.first_frame:
             continue
@@ -177,13 +186,12 @@ def _against_surfaces(
     clearance = min(above_ramp, y) if has_table else above_ramp
     tolerance = _tolerance_m(outline, pixel_m) + TOLERANCE_PER_DISTANCE * math.hypot(x, y)
     smallest, largest = outline.height_m
-    mend = "mend point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre"
     if clearance < smallest / 2 - tolerance:
         depth_mm = 1000 * (smallest / 2 - clearance)
-        return f"stands {depth_mm:.0f} mm inside the {surface} at the start; {mend}"
+        return f"stands {depth_mm:.0f} mm inside the {surface} at the start"
     if clearance > largest + tolerance:
         gap_mm = 1000 * (clearance - largest / 2)
-        return f"hangs {gap_mm:.0f} mm above the {surface} at the start; {mend}"
+        return f"hangs {gap_mm:.0f} mm above the {surface} at the start"
     return None
 
 

@@ -15,6 +15,8 @@ from pydantic_core import PydanticCustomError
 
 from galileo_jax.clip.scenarios import SCENARIOS
 
+LengthUnit = Literal["m", "cm", "mm", "km", "in", "ft", "px"]
+YAxis = Literal["up", "down"]
 Shape = Literal["box", "cylinder", "torus", "sphere"]
 Direction = Literal["right", "left"]
 
@@ -29,6 +31,7 @@ MIN_SIZE_M, MAX_SIZE_M = 0.001, 2.0
 MIN_SCALE_PX_PER_M, MAX_SCALE_PX_PER_M = 5.0, 100_000.0
 MIN_MASS_KG, MAX_MASS_KG = 1e-5, 100.0
 MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
+MIN_DENSITY, MAX_DENSITY = 100.0, 20_000.0  # kg/m^3, of a liquid
 MIN_FPS, MAX_FPS = 1.0, 1_000_000.0
 MAX_ANGLE_SD_DEG = 10.0
 MIN_RAMP_ANGLE_DEG = 1.0  # below it nothing slides; it is an angle in radians
@@ -120,9 +123,41 @@ def _ramp_angle_deg(value: float) -> float:
     return value
 
 
-def _ramp_angle_sd_deg(value: float) -> float:
+def _angle_sd_deg(value: float) -> float:
     if not 0 <= value <= MAX_ANGLE_SD_DEG:
         raise wrong(f"{value:g} is outside [0, {MAX_ANGLE_SD_DEG:g}] degrees")
+    return value
+
+
+def _floor(value: Any) -> Any:
+    if isinstance(value, bool) or value is None:
+        return value
+    if isinstance(value, int | float) and math.isfinite(value):
+        return float(value)
+    raise wrong(f"{short(value)} is no height; metres above the origin, or true, expected")
+
+
+def _rolls(value: Any) -> Any:
+    if isinstance(value, bool) or value is None:
+        return value
+    if isinstance(value, int | float) and 0 < value <= 1:
+        return float(value)
+    raise wrong(
+        f"{short(value)} is no share J / (m r^2) in (0, 1]; a share such as 0.667 (hollow ball), "
+        "or true (solid), expected"
+    )
+
+
+def _liquid_density(value: float) -> float:
+    if value <= 0:
+        raise wrong(f"{value:g} is not a density; kg/m^3 above 0 expected")
+    if value < MIN_DENSITY:
+        raise wrong(
+            f"{value:g} is too small for a liquid; kg/m^3 expected; "
+            + _suggestion(value, (1000, "g/cm^3"))
+        )
+    if value > MAX_DENSITY:
+        raise wrong(f"{value:g} is too large; kg/m^3 expected (water: 998)")
     return value
 
 
@@ -177,6 +212,7 @@ Metres = Annotated[Number, AfterValidator(_metres)]
 Kilograms = Annotated[Number, AfterValidator(_kilograms)]
 Point = tuple[Number, Number]
 File = Annotated[Path | None, BeforeValidator(_path)]
+OneLine = Annotated[str, Field(strict=True, min_length=1, max_length=80)]
 
 
 class ClipObject(BaseModel):
@@ -192,7 +228,10 @@ class ClipObject(BaseModel):
       point_px: its centre as marked by eye, pixels (x right, y down), in `first_frame`;
         None = to be found.
       first_frame: the first frame in which the object moves by itself; frames before are
-        not used for it.
+        not used for it. None = not known: the release is found from the motion.
+      rolls: whether it may roll: a cylinder on its side, a torus on edge; a sphere always may.
+        A number is its moment of inertia over m r^2, where it is not that of a solid.
+      track_name: what another tool's track file calls it; None = the same, or the only one.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -202,7 +241,26 @@ class ClipObject(BaseModel):
     size_m: tuple[Metres, ...] | None = None
     mass_kg: Kilograms | None = None
     point_px: Annotated[Point, AfterValidator(_point_px)] | None = None
-    first_frame: Annotated[int, Field(strict=True, ge=0)] = 0
+    first_frame: Annotated[int, Field(strict=True, ge=0)] | None = 0
+    rolls: Annotated[bool | float | None, BeforeValidator(_rolls)] = None
+    track_name: OneLine | None = None
+
+    @property
+    def roll_inertia(self) -> float | None:
+        """J / (m r^2) about the axis it rolls about; None: it slides whatever the friction."""
+        if self.shape == "box" or self.rolls is False or (self.rolls is None and not self.is_ball):
+            return None
+        if isinstance(self.rolls, float):
+            return self.rolls
+        if self.shape == "torus":
+            ring, tube = self.size_m or (1.0, 0.5)
+            return (ring**2 + 0.75 * tube**2) / (ring + tube) ** 2
+        return 0.4 if self.is_ball else 0.5
+
+    @property
+    def is_ball(self) -> bool:
+        """Whether it is a sphere."""
+        return self.shape == "sphere"
 
 
 class ClipFile(BaseModel):
@@ -212,14 +270,20 @@ class ClipFile(BaseModel):
 
     video: File = None
     track: File = None
+    track_units: Annotated[LengthUnit, _one_of(get_args(LengthUnit))] | None = None
+    track_y: Annotated[YAxis, _one_of(get_args(YAxis))] | None = None
+    track_origin: Point | None = None
     scenario: Annotated[str, _one_of(tuple(SCENARIOS))]
     fps: Annotated[Number, AfterValidator(_fps)]
     ramp_angle_deg: Annotated[Number, AfterValidator(_ramp_angle_deg)] | None = None
-    ramp_angle_sd_deg: Annotated[Number, AfterValidator(_ramp_angle_sd_deg)] = 0.0
+    ramp_angle_sd_deg: Annotated[Number, AfterValidator(_angle_sd_deg)] = 0.0
     direction: Annotated[Direction, _one_of(get_args(Direction))] = "right"
     pixels_per_metre: Annotated[Number, AfterValidator(_pixels_per_metre)] | None = None
     origin_px: Point | None = None
     gravity: Annotated[Number, AfterValidator(_gravity)] = 9.81
+    vertical_sd_deg: Annotated[Number, AfterValidator(_angle_sd_deg)] = 0.0
+    floor: Annotated[bool | float | None, BeforeValidator(_floor)] = None
+    liquid_density: Annotated[Number, AfterValidator(_liquid_density)] | None = None
     objects: tuple[ClipObject, ...]
 
 
@@ -229,7 +293,11 @@ class Clip(ClipFile):
     Attributes:
       path: the yaml.
       video: the video file; None for a csv track.
-      track: the csv track in metres; None for a video.
+      track: the track file, ours or another tool's; None for a video.
+      track_units: of a track file of another tool, or of its calibration; "px" = pixels.
+      track_y: which way its y axis points.
+      track_origin: where the foot of the ramp is in a track file in units of length, in these
+        units and along its axes.
       scenario: a name in `SCENARIOS`.
       fps: true frames per second; declared, or for a csv track without it 1 / median step.
       ramp_angle_deg: in [1, 90) degrees; None where the scenario has no ramp.
@@ -238,6 +306,11 @@ class Clip(ClipFile):
       pixels_per_metre: None = unknown.
       origin_px: foot of the ramp at table level, pixels, x right, y down; None = unknown.
       gravity: m/s^2.
+      vertical_sd_deg: flight: how well the picture's vertical is gravity's direction (one
+        standard deviation); 0 = taken at its word.
+      floor: fall, flight: its height over the origin, m; true = there is one, at a height to be
+        inferred; None or false = none is reached.
+      liquid_density: liquid: kg/m^3; None = not known.
       objects: at least one, names unique.
       frame_count: frames that decode, or rows of the csv track.
       frame_size_px: (width, height); None for a csv track.
@@ -248,3 +321,14 @@ class Clip(ClipFile):
     frame_count: int
     frame_size_px: tuple[int, int] | None = None
     warnings: tuple[str, ...] = ()
+
+    @property
+    def is_scale_known(self) -> bool:
+        """Whether lengths are in metres, not in pixels of unknown size."""
+        is_in_metres = self.track is not None and self.track_units != "px"
+        return self.pixels_per_metre is not None or is_in_metres
+
+    @property
+    def has_floor(self) -> bool:
+        """Whether the object may reach a floor."""
+        return self.floor is not None and self.floor is not False

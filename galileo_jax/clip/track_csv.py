@@ -10,6 +10,7 @@ import csv
 import difflib
 import io
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,7 @@ def read_observation_csv(path: Path) -> Observation:
         raise InputError(f"{path}: {len(rows)} rows; at least {MIN_ROWS} expected")
     table = _parse(path, header, rows)
     times = table[:, header.index(TIME)]
-    _check_times(path, times, [line for line, _ in rows])
+    check_times(path, times, [f"line {line}" for line, _ in rows])
 
     position = np.empty((len(names), 2, len(times)))
     covariance = np.empty((len(names), 2, 2, len(times)))
@@ -123,6 +124,23 @@ def position_noise_m(times_s: np.ndarray, position_m: np.ndarray) -> float:
     weights = 1 / gaps.prod(axis=2)
     draws = (weights * x).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
     return max(1.4826 * float(np.median(np.abs(draws))), MIN_SD_M)
+
+
+def roughness_covariance_m2(
+    path: Path, name: str, times_s: np.ndarray, position_m: np.ndarray
+) -> np.ndarray:
+    """`[2, 2, row]`, m^2: errors of the same size in every row, by `position_noise_m`.
+
+    Raises:
+      InputError: too few consecutive rows to tell.
+    """
+    sd = [position_noise_m(times_s, coordinate) for coordinate in position_m]
+    if any(map(math.isnan, sd)):
+        raise InputError(
+            f"{path}: column '{name}_sd_m': missing, and too few consecutive rows "
+            f"({MIN_NOISE_WINDOWS + 3} expected) to estimate it; give the error in metres"
+        )
+    return np.repeat(np.diag(np.square(sd))[:, :, None], len(times_s), axis=2)
 
 
 def _read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
@@ -205,15 +223,21 @@ def _parse(path: Path, header: list[str], rows: list[tuple[int, list[str]]]) -> 
     return table
 
 
-def _check_times(path: Path, times: np.ndarray, lines: list[int]) -> None:
+def check_times(path: Path, times: np.ndarray, rows: Sequence[str] | None = None) -> None:
+    """Raises `InputError` unless `times` `[row]`, s, increase and are seconds.
+
+    `rows` are what the rows are called in the message; default: row 1, row 2, ...
+    """
+    rows = rows or [f"row {n + 1}" for n in range(len(times))]
     if np.isnan(times).any():
-        line = lines[int(np.isnan(times).argmax())]
-        raise InputError(f"{path}: line {line}: {TIME}: empty; seconds expected")
+        raise InputError(
+            f"{path}: {rows[int(np.isnan(times).argmax())]}: {TIME}: empty; seconds expected"
+        )
     steps = np.diff(times)
     if (steps <= 0).any():
         at = int((steps <= 0).argmax()) + 1
         raise InputError(
-            f"{path}: line {lines[at]}: {TIME}: {times[at]:g} is not after {times[at - 1]:g}; "
+            f"{path}: {rows[at]}: {TIME}: {times[at]:g} is not after {times[at - 1]:g}; "
             "times must increase"
         )
     if np.median(steps) > MAX_STEP_S:
@@ -252,13 +276,7 @@ def _covariance(
         sd = np.stack([column["sd_x_m"], column["sd_y_m"]])
         correlation = column["correlation"]
     else:
-        estimates = [position_noise_m(times, coordinate) for coordinate in position]
-        if any(map(math.isnan, estimates)):
-            raise InputError(
-                f"{path}: column '{name}_sd_m': missing, and too few consecutive rows "
-                f"({MIN_NOISE_WINDOWS + 3} expected) to estimate it; give the error in metres"
-            )
-        sd = np.outer(estimates, np.ones(len(times)))
+        return roughness_covariance_m2(path, name, times, position)
     is_visible = np.isfinite(position[0])
     is_right = (sd > 0).all(axis=0) & (sd <= MAX_SD_M).all(axis=0) & (np.abs(correlation) < 1)
     if not is_right[is_visible].all():

@@ -2,9 +2,12 @@
 
 import numpy as np
 
+from galileo_jax.effects.effect import Surroundings
 from galileo_jax.inference.problem import Problem
 
 PHASES = ("held", "ramp", "foot", "table", "collision", "after", "at rest", "fall")
+FREE = {"spring": "swing", "liquid": "liquid"}  # by the law that makes it
+PHASES += ("flight", *FREE.values())
 COLLISION_S = 0.05  # either side of the hit
 RESTS_M_S = 2e-3
 
@@ -13,8 +16,8 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     """The phase of every object in every frame, from the fitted motion.
 
     held: before the release; ramp, foot (its length spans the foot), table; collision: near
-    the first hit; after it; at rest: where nothing moves any more, or not yet; fall: without
-    anything to slide on.
+    the first hit; after it; at rest: where nothing moves any more, or not yet; fall, flight,
+    swing, liquid: without anything to slide on.
 
     Args:
       problem: the clip and its model.
@@ -43,21 +46,32 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
             label[i][beyond < half] = PHASES.index("foot")
             label[i][beyond < -half] = PHASES.index("ramp")
         if not scene.has_surface:
-            label[i] = PHASES.index("fall")
+            label[i] = PHASES.index(free_phase(scene))
         label[i][speed < RESTS_M_S] = PHASES.index("at rest")
-        if hit_s is not None:
-            label[i][times > hit_s] = PHASES.index("after")
-            label[i][np.abs(times - hit_s) <= COLLISION_S] = PHASES.index("collision")
-        label[i][times <= 0] = PHASES.index("held")
+        if (hit := hit_s[i]) is not None:
+            label[i][times > hit] = PHASES.index("after")
+            label[i][np.abs(times - hit) <= COLLISION_S] = PHASES.index("collision")
+        label[i][times < 0 if scene.starts_moving else times <= 0] = PHASES.index("held")
     return label
+
+
+def free_phase(scene: Surroundings) -> str:
+    """What the motion of an object that slides on nothing is called."""
+    if scene.moves_in_plane:
+        return "flight"
+    return next((phase for law, phase in FREE.items() if law in scene.laws), "fall")
 
 
 def _hit_s(
     position: np.ndarray, times_s: np.ndarray, half_length_m: tuple[float, ...]
-) -> float | None:
-    """When objects 1 and 2 first touch; None where they do not."""
-    if len(position) < 2:
-        return None
-    gap = position[1, 0] - position[0, 0] - half_length_m[0] - half_length_m[1]
-    touching = np.flatnonzero(gap < 1e-4)
-    return float(times_s[touching[0]]) if touching.size else None
+) -> list[float | None]:
+    """When each object first touches a neighbour; None where it does not."""
+    found: list[float | None] = [None] * len(position)
+    for i in range(len(position) - 1):
+        gap = position[i + 1, 0] - position[i, 0] - half_length_m[i] - half_length_m[i + 1]
+        touching = np.flatnonzero(gap < 1e-4)
+        if touching.size:
+            hit_s = float(times_s[touching[0]])
+            for j in (i, i + 1):
+                found[j] = min(hit_s, found[j] or hit_s)
+    return found

@@ -212,6 +212,10 @@ def _motion(
     tangent = np.stack([np.cos(slope), -np.sin(slope)], axis=1)
     path = np.sum((position - origin[..., None]) * tangent, axis=1)
     speed = np.sum(velocity * tangent, axis=1)
+    if scene.moves_in_plane:
+        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+        steps = np.hypot(*np.diff(position, axis=-1).transpose(1, 0, 2))
+        path = np.pad(np.cumsum(steps, axis=-1), [(0, 0), (1, 0)])
     recorded = np.arange(path.shape[-1]) * model.record_dt_s
     chosen = np.unique(np.linspace(0, np.searchsorted(recorded, end_s), NUM_TIMES).astype(int))
     chosen = chosen[chosen < len(recorded)]

@@ -5,12 +5,13 @@ runs in every engine, NumPy or JAX. Every hook's default does nothing; an effect
 those it needs. At its parameters' `absent` values each hook must return exactly what the
 default returns, and have a finite derivative.
 
-Objects move along a path: down the ramp and along the table. Hooks see and return numbers
-along it, positive downhill and away from the ramp.
+Objects move along a path: down the ramp and along the table, straight down, or freely through
+the plane of the picture. Hooks see and return numbers along it, positive downhill and away from
+the ramp; in the plane, along the velocity.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
 import jax
@@ -27,8 +28,8 @@ class State(NamedTuple):
 
     Attributes:
       path_m: `[..., object]`, how far each centre is past the foot; negative on the ramp.
-        On an incline without a table: how far it has gone.
-      speed_m_s: `[..., object]`.
+        Without a table: how far it has gone; in the plane, along its curve.
+      speed_m_s: `[..., object]`; to a friction law, that at which the surfaces slip.
       time_s: scalar, since the release.
       is_on_ramp: `[..., object]`.
     """
@@ -37,6 +38,20 @@ class State(NamedTuple):
     speed_m_s: Array
     time_s: Array
     is_on_ramp: Array
+
+
+class Bounce(NamedTuple):
+    """A level floor; each `[...]`.
+
+    Attributes:
+      height_m: of an object's centre when it touches the floor, y as measured.
+      restitution: share of the speed against the floor with which it leaves.
+      grip: share of the speed along the floor that is lost.
+    """
+
+    height_m: Array
+    restitution: Array
+    grip: Array
 
 
 Force = Callable[[State], Array]
@@ -51,15 +66,20 @@ _ARRAYS = (
     "start_m",
     "start_path_m",
     "mass_kg",
+    "roll_inertia",
+    "release_s",
+    "expected",
 )
 _STATIC = (
     "names",
     "has_table",
     "comes_down",
     "is_scale_known",
-    "release_s",
     "has_surface",
     "angle_sd_rad",
+    "rolls",
+    "moves_in_plane",
+    "laws",
 )
 
 
@@ -73,7 +93,7 @@ class Surroundings:
 
     Attributes:
       names: of the objects.
-      angle_rad: the ramp's; in a fall, which is a path straight down, pi / 2.
+      angle_rad: the ramp's; of a path straight down pi / 2, in the plane 0.
       gravity: m/s^2.
       half_length_m, half_height_m: `[object]`, along the travel and across it.
       corner_m: `[object]`, x at which each centre's path bends from ramp to table; inf
@@ -85,9 +105,16 @@ class Surroundings:
       release_s: when the release was, after the first frame: expected, and its standard
         deviation.
       is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
-      has_surface: whether objects slide on something; not in a fall.
-      angle_sd_rad: how well the ramp's angle is known; 0: taken at its word.
+      has_surface: whether objects slide on something; not in a fall, in the air, in a liquid.
+      angle_sd_rad: how well the ramp's angle (in the plane: gravity's direction) is known; 0:
+        taken at its word.
       mass_kg: `[object]`, as weighed, None where not; empty: none is.
+      rolls: `[object]`, whether it is round and may turn; empty: none does.
+      roll_inertia: `[object]`, beta = J / (m r^2) of what rolls; empty: none does.
+      moves_in_plane: whether the path is not given, but bends with the motion.
+      laws: names of the laws that are always there (`effects/laws/`).
+      expected: what a look at the clip suggests of the laws' parameters, by name: the two
+        numbers of a prior that is wide against what the fit will tell.
     """
 
     names: tuple[str, ...]
@@ -105,6 +132,16 @@ class Surroundings:
     has_surface: bool = True
     angle_sd_rad: float = 0.0
     mass_kg: tuple[float | None, ...] = ()
+    rolls: tuple[bool, ...] = ()
+    roll_inertia: tuple[float, ...] = ()
+    moves_in_plane: bool = False
+    laws: tuple[str, ...] = ()
+    expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def starts_moving(self) -> bool:
+        """Whether nothing is let go: the object moves when it is first seen."""
+        return "start_velocity" in self.laws
 
     def tree_flatten_with_keys(self):
         """Splits into traced numbers and static facts."""
@@ -156,6 +193,10 @@ class Effect:
         """Returns the speed at the release `[..., object]`, m/s, or None."""
         return None
 
+    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the velocity in the plane at the start `[..., object, 2]`, m/s, or None."""
+        return None
+
     def force(self, theta: Theta, scene: Surroundings) -> Force | None:
         """Returns the force along the path as a function of the state, or None.
 
@@ -176,7 +217,10 @@ class Effect:
         return None
 
     def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
-        """Returns how much steeper ramp and table are than declared, rad, each `[...]`, or None."""
+        """Returns how much steeper ramp and table are than declared, rad, each `[...]`, or None.
+
+        In the plane: how far gravity points forward of the picture's vertical, and 0.
+        """
         return None
 
     def foot(self, theta: Theta, scene: Surroundings) -> Array | None:
@@ -186,6 +230,14 @@ class Effect:
     def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns the coefficient of restitution between objects `[...]`, or None."""
         return None
+
+    def bounce(self, theta: Theta, scene: Surroundings) -> Bounce | None:
+        """Returns the floor, or None where there is none to bounce on."""
+        return None
+
+    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
+        """Returns what follows from the parameters and is worth telling: name to value and unit."""
+        return {}
 
     def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
         """Maps the clip's time to the time since the release, s: `[frame]` to `[frame]`."""

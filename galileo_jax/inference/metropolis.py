@@ -1,6 +1,8 @@
 """Metropolis-Hastings for a problem: start, target and what must converge."""
 
+import re
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 
 import jax
@@ -27,6 +29,8 @@ def metropolis_posterior(
     *,
     sampler: str = "mixture",
     settings: Settings = Settings(),  # noqa: B008
+    num_chains: int = NUM_CHAINS,
+    starts: np.ndarray | None = None,
     checkpoint: Path | None = None,
     identity: str = "",
     on_block: Callable[[Progress], None] | None = None,
@@ -39,6 +43,8 @@ def metropolis_posterior(
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
       settings: how long.
+      num_chains: how many.
+      starts: `[chain, parameter]`, where they begin, in z; default: dispersed round the fit.
       checkpoint: file that interrupted chains go on from; see `samplers.sample`.
       identity: of what is sampled; a checkpoint of anything else is refused.
       on_block: called with the progress.
@@ -49,7 +55,8 @@ def metropolis_posterior(
     """
     start_key, key = jax.random.split(jax.random.key(seed))
     mode, covariance = jnp.asarray(fit.z), jnp.asarray(fit.covariance)
-    starts = dispersed_starts(start_key, mode, covariance, NUM_CHAINS)
+    if starts is None:
+        starts = np.asarray(dispersed_starts(start_key, mode, covariance, num_chains))
     sd = np.sqrt(np.diag(fit.covariance))
     watched = [
         (i, parameter.name)
@@ -59,17 +66,16 @@ def metropolis_posterior(
 
     def monitor(draws: np.ndarray) -> dict[str, np.ndarray]:
         found = {name: draws[..., i] for i, name in watched}
-        if "m2" in trials.names:
-            found["mass_ratio"] = (
-                draws[..., trials.names.index("m1")] - draws[..., trials.names.index("m2")]
-            )
+        masses = [i for i, name in enumerate(trials.names) if re.fullmatch(r"m\d+", name)]
+        for i, (one, other) in enumerate(pairwise(masses), 1):
+            found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]
         return found or {"log_noise": draws[..., -1]}
 
     posterior = sample(
         key,
         sampler_class(sampler).from_gaussian(mode, covariance),  # pyright: ignore
         trials.log_density,
-        starts,
+        jnp.asarray(starts),
         trials.names,
         settings=settings,
         monitor=monitor,

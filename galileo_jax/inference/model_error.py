@@ -6,6 +6,9 @@ taken to be known within a few tenths of a per cent, friction within half a per 
 hundredths of a pixel; an interval from the likelihood alone would there be too narrow.
 """
 
+import re
+from itertools import pairwise
+
 import numpy as np
 
 IMPULSE_SD = 0.003
@@ -17,7 +20,8 @@ def add_model_error(draws: np.ndarray, names: tuple[str, ...], seed: int) -> np.
     """Widens draws `[..., parameter]` (in the parameters' units) by the simulator's own errors.
 
     A plastic hit gives v' = v R / (1 + R), R = m1 / m2, so that a relative error d of the
-    impulse is one of (1 + R) d of the mass ratio; it is shared out evenly between the masses.
+    impulse is one of (1 + R) d of the mass ratio; it is shared out evenly between the masses
+    before and behind it.
     """
     generator = np.random.default_rng([seed, 20])
     widened = draws.copy()
@@ -25,14 +29,15 @@ def add_model_error(draws: np.ndarray, names: tuple[str, ...], seed: int) -> np.
         k1 = names.index("k1")
         allowed = FRICTION_SD * generator.standard_normal(draws.shape[:-1])
         widened[..., k1] = np.clip(draws[..., k1] + allowed, 1e-9, 1 - 1e-9)
-    if "m2" not in names:
-        return widened
-    m1, m2, k2 = names.index("m1"), names.index("m2"), names.index("k2")
-    ratio = draws[..., m1] / draws[..., m2]
-    normal = generator.standard_normal((2, *draws.shape[:-1]))
-    factor = np.exp(0.5 * IMPULSE_SD * (1 + ratio) * normal[0])
-    widened[..., m1] *= factor
-    widened[..., m2] /= factor
-    spread = np.exp(FRICTION_AFTER_HIT_SD * normal[1])
-    widened[..., k2] = np.minimum(draws[..., k2] * spread, 1.0 - 1e-9)
+    masses = [i for i, name in enumerate(names) if re.fullmatch(r"m\d+", name)]
+    for number, (one, other) in enumerate(pairwise(masses), 2):
+        ratio = draws[..., one] / draws[..., other]
+        normal = generator.standard_normal((2, *draws.shape[:-1]))
+        factor = np.exp(0.5 * IMPULSE_SD * (1 + ratio) * normal[0])
+        # Only this ratio changes: those on either side of it keep theirs.
+        for mass in masses:
+            widened[..., mass] *= factor if mass <= one else 1 / factor
+        k = names.index(f"k{number}")
+        spread = np.exp(FRICTION_AFTER_HIT_SD * normal[1])
+        widened[..., k] = np.minimum(draws[..., k] * spread, 1.0 - 1e-9)
     return widened

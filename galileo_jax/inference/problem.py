@@ -17,7 +17,11 @@ from galileo_jax.rollout.chunks import FRAMES, MOTIONS, in_chunks, padded_motion
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
+from galileo_jax.similarity.gaussian_likelihood import (
+    GaussianLikelihood,
+    NoiseModel,
+    Whitening,
+)
 
 
 @dataclass(frozen=True)
@@ -29,12 +33,14 @@ class Problem:
       model: scene and effects.
       engine: rolls the model out.
       name: of the clip.
+      noise: see `GaussianLikelihood.prepare`.
     """
 
     observation: Observation
     model: Model
     engine: Engine
     name: str = "clip"
+    noise: NoiseModel = "camera"
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -44,7 +50,8 @@ class Problem:
     @cached_property
     def data(self) -> Whitening:
         """The data and their covariance, decomposed."""
-        return GaussianLikelihood.prepare(self.observation, self.model.scene.surroundings)
+        scene = self.model.scene.surroundings
+        return GaussianLikelihood.prepare(self.observation, scene, self.noise)
 
     def predict(self, theta: jax.Array) -> jax.Array:
         """What the camera would see, in JAX: `[parameter]` to `[object, 2, frame]`, m."""

@@ -1,5 +1,6 @@
 """result.json: the numbers of a fit by contract (DESIGN.md 2.3)."""
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -7,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax import __version__
+from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.trials import Trials
@@ -19,6 +21,10 @@ IDENTIFIED_SD_Z = 0.5
 SCALE_WARNING = (
     "friction and scale cannot both be told from one clip: give --pixels-per-metre, or fit "
     "clips of several angles together"
+)
+
+FREE_SCALE_WARNING = (
+    "nothing in this motion tells the scale: give --pixels-per-metre to have lengths in metres"
 )
 
 # chi2 is told at the fitted noise scale, but not at one that no camera explains.
@@ -101,6 +107,37 @@ def error_of(
     return error
 
 
+NUM_PRIOR_DRAWS = 2000
+
+
+def _derived_by_laws(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, Any]]:
+    """What the models' laws derive from draws `[draw, parameter]` of one clip's parameters."""
+    if len(trials.problems) > 1:
+        return {}
+    model = trials.problems[0].model
+    scene = model.scene.surroundings
+
+    def told(rows: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+        found: dict[str, tuple[np.ndarray, str]] = {}
+        for effect in model.effects + model.nuisances:
+            found |= effect.derived(model.by_name(rows), scene)
+        return found
+
+    def width(values: np.ndarray) -> float:
+        return float(np.diff(np.quantile(values, [0.16, 0.84]))[0])
+
+    z = np.random.default_rng(0).standard_normal((NUM_PRIOR_DRAWS, len(trials.parameters)))
+    before = told(trials.theta(z))
+    return {
+        name: {
+            **summarise(values),
+            "unit": unit,
+            "identified": width(values) < IDENTIFIED_SD_Z * width(before[name][0]),
+        }
+        for name, (values, unit) in told(draws).items()
+    }
+
+
 def make_result(
     trials: Trials,
     posterior: Posterior,
@@ -134,19 +171,21 @@ def make_result(
         room = "nuisances" if parameter.role == "nuisance" else "parameters"
         table[room][parameter.name] = entry
     derived = {}
-    if "m2" in posterior.names:
-        m1, m2 = posterior["m1"].reshape(-1), posterior["m2"].reshape(-1)
+    masses = [name for name in posterior.names if re.fullmatch(r"m\d+", name)]
+    ratios = mass_ratios([posterior[name].reshape(-1) for name in masses])
+    for name, values in ratios.items():
+        # Of two masses that nothing told of.
         prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
-        is_identified = bool(np.log(m1 / m2).std() < IDENTIFIED_SD_Z * prior_sd)
-        derived = {
-            "mass_ratio": {**summarise(m1 / m2), "unit": "1", "identified": is_identified},
-            "phi": {**summarise((m1 - m2) / (m1 + m2)), "unit": "1", "identified": is_identified},
-        }
+        logs = np.log(ratios["mass_ratio"] if name == "phi" else values)
+        is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
+        derived[name] = {**summarise(values), "unit": "1", "identified": is_identified}
+    derived |= _derived_by_laws(trials, draws)
+    has_surface = trials.problems[0].model.scene.surroundings.has_surface
     if not table["parameters"].get("pixels_per_metre", {}).get("identified", True):
         # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.
         for name, entry in table["parameters"].items():
             entry["identified"] = entry["identified"] and not name.startswith("k")
-        notes = notes | {"warnings": [SCALE_WARNING]}
+        notes = notes | {"warnings": [SCALE_WARNING if has_surface else FREE_SCALE_WARNING]}
     # Every parameter takes from the residuals what the data told of it.
     effective = float(np.sum(1 - np.clip(spread[: len(trials.model_parameters)] ** 2, 0, 1)))
     nuisance = [p.role == "nuisance" for p in trials.model_parameters]

@@ -7,6 +7,7 @@ import numpy as np
 from galileo_jax.errors import InputError
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers import thesis
+from galileo_jax.inference.samplers.thesis import NUM_CHAINS
 from galileo_jax.inference.trials import Trials
 from galileo_jax.similarity.similarity import similarity_class
 
@@ -14,9 +15,14 @@ SEARCHED = ("m1", "k1", "m2", "k2")
 
 
 def thesis_posterior(
-    trials: Trials, seed: int, similarity: str, acceptance: str, selection: str
+    trials: Trials,
+    seed: int,
+    similarity: str,
+    acceptance: str,
+    selection: str,
+    num_chains: int = NUM_CHAINS,
 ) -> tuple[Posterior, dict[str, float]]:
-    """Runs the thesis's 16 x 75 steps.
+    """Runs the thesis's 16 x 75 steps, or 75 of another number of chains.
 
     Everything but the masses and frictions stays at its prior's middle, as in the thesis.
 
@@ -49,6 +55,7 @@ def thesis_posterior(
         SEARCHED,
         acceptance=thesis.Acceptance(acceptance),
         selection=thesis.Selection(selection),
+        num_chains=num_chains,
     )
     draws = answer.posterior.draws
     whole = np.tile(rest_theta, (*draws.shape[:2], 1))

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from flax import nnx
 
+from galileo_jax.effects.effect import Surroundings
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.posterior_network import (
     PosteriorNetwork,
@@ -98,10 +99,23 @@ def thesis_clips(
     of_theta, of_noise = jax.random.split(key)
     theta = setting.draw(of_theta, count)
     clean = setting.positions(theta)
-    frames = clean.shape[-1]
     seen = clean + noise_m * np.asarray(jax.random.normal(of_noise, clean.shape))
+    made = to_clips(theta, seen, setting.surroundings, told_noise_m or noise_m)
+    collides = np.ptp(clean[:, 1, 0], axis=-1) > 1e-4
+    return made | {"collides": collides}
+
+
+def to_clips(theta: np.ndarray, seen_m: np.ndarray, scene: Surroundings, noise_m: float) -> Arrays:
+    """Samples of an ideal world, in the form `GalileoTask.make` gives.
+
+    Args:
+      theta: `[sample, 4]`, m1, k1, m2, k2.
+      seen_m: `[sample, object, 2, frame]`, centres at the thesis's frame rate.
+      scene: of all of them.
+      noise_m: what the network is told of the noise of every coordinate.
+    """
+    frames = seen_m.shape[-1]
     missing = ((0, 0), (0, 0), (0, 0), (0, NUM_FRAMES - frames))
-    scene = setting.surroundings
     times = np.arange(NUM_FRAMES) / FPS
 
     def one(position: jax.Array, theta: jax.Array):
@@ -109,7 +123,7 @@ def thesis_clips(
             times_s=jnp.asarray(times),
             position_m=position,
             mask=jnp.tile(jnp.arange(NUM_FRAMES) < frames, (2, 1)),
-            noise_m=jnp.full(2, told_noise_m or noise_m),
+            noise_m=jnp.full(2, noise_m),
             angle_rad=jnp.asarray(scene.angle_rad),
             gravity=jnp.asarray(scene.gravity),
             half_length_m=jnp.asarray(scene.half_length_m),
@@ -118,10 +132,8 @@ def thesis_clips(
         )
         return to_sample(clip, Truth(theta[1], theta[3], theta[0] / theta[2]))
 
-    made = jax.jit(jax.vmap(one))(jnp.asarray(np.pad(seen, missing)), jnp.asarray(theta))
-    made = {name: np.asarray(values) for name, values in made.items()}
-    collides = np.ptp(clean[:, 1, 0], axis=-1) > 1e-4
-    return made | {"collides": collides}
+    made = jax.jit(jax.vmap(one))(jnp.asarray(np.pad(seen_m, missing)), jnp.asarray(theta))
+    return {name: np.asarray(values) for name, values in made.items()}
 
 
 _THESIS = {

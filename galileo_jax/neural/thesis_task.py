@@ -1,6 +1,7 @@
 """The thesis's setting: one fixed scene at 20 degrees, no noise, masses and frictions uniform."""
 
 import functools
+from typing import Any
 
 import jax
 import numpy as np
@@ -46,8 +47,11 @@ class ThesisTask:
 
     def positions(self, theta: np.ndarray) -> np.ndarray:
         """Centres in every frame, `[count, object, 2, frames + 1]`, m."""
-        position, _ = self._engine.simulate(theta)
-        stride = round(1 / (FPS * self._engine.model.record_dt_s))
+        return self.at_frames(self.engine.simulate(theta)[0])
+
+    def at_frames(self, position: Any) -> Any:
+        """Of a rollout's records `[..., record]` those that fall on frames `[..., frames + 1]`."""
+        stride = round(1 / (FPS * self.engine.model.record_dt_s))
         return position[..., ::stride][..., : self.config.frames + 1]
 
     def make(self, key: jax.Array, count: int) -> Arrays:
@@ -59,10 +63,11 @@ class ThesisTask:
     @property
     def surroundings(self) -> Surroundings:
         """The scene's geometry."""
-        return self._engine.model.scene.surroundings
+        return self.engine.model.scene.surroundings
 
     @functools.cached_property
-    def _engine(self) -> Engine:
+    def engine(self) -> Engine:
+        """Rolls the scene out; its parameters are `NAMES`."""
         return make_engine(self.config.engine, _model(self.config.frames))
 
     def test(self, network: ThesisNetwork, data: Arrays, seed: int) -> dict[str, float]:

@@ -12,11 +12,11 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.trials import Trials
-from galileo_jax.report.fitted import Phase
+from galileo_jax.report.phase import Phase
+from galileo_jax.report.stretch import strongest
 
 NUM_DRAWS = 60
 MARKED_Z = 3.0  # below it a cell is no place where the model fails
-LEAST_STRETCH = 3  # frames
 
 
 @dataclass(frozen=True)
@@ -140,15 +140,10 @@ def worst_stretch(
     if worst.phase != WHOLE:
         chosen &= labels == PHASES.index(worst.phase)
     frames = np.flatnonzero(chosen)
-    if len(frames) < LEAST_STRETCH:
+    if (window := strongest(values[frames])) is None:
         return None
-    sums = np.concatenate([[0.0], np.cumsum(values[frames])])
-    first, last = np.triu_indices(len(frames) + 1, LEAST_STRETCH)
-    strongest = np.argmax(np.abs(sums[last] - sums[first]) / np.sqrt(last - first))
-    return (
-        float(times_s[frames[first[strongest]]]),
-        float(times_s[frames[last[strongest] - 1]]),
-    )
+    first, last, _ = window
+    return float(times_s[frames[first]]), float(times_s[frames[last]])
 
 
 def _tangent(problem: Problem, index: int, centre_m: np.ndarray) -> np.ndarray:

@@ -1,4 +1,7 @@
-"""Measured against simulated motion from the side: inline SVG, a slider and a few lines of JS."""
+"""The clip with the measured and the simulated motion over it, and a slider.
+
+Of a video its own pictures, of a csv track the scene drawn from the side; page.js moves it.
+"""
 
 import json
 import math
@@ -7,96 +10,69 @@ from html import escape
 
 import numpy as np
 
+from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.problem import Problem
-from galileo_jax.report.figure import COLOURS
-from galileo_jax.report.side_view import MARGIN_M, SURFACE, View, surfaces
+from galileo_jax.report.chart import object_colour
+from galileo_jax.report.film import Film, film
+from galileo_jax.report.shell import legend
+from galileo_jax.report.side_view import SLAB_M, View, surfaces, view_of
 from galileo_jax.rollout.motion import pitch
 
 MM = 1000.0  # per metre: the SVG's units
-SLAB_MM = 12.0
-
-SCRIPT = """
-for (const box of document.querySelectorAll(".motion")) {
-  const data = JSON.parse(box.querySelector("script").textContent);
-  const slider = box.querySelector("input"), play = box.querySelector("button");
-  const clock = box.querySelector("output");
-  const shapes = [...box.querySelectorAll("[data-of]")];
-  function show() {
-    const frame = +slider.value;
-    clock.value = data.times[frame].toFixed(2) + " s";
-    for (const shape of shapes) {
-      const place = data.motions[shape.dataset.of][shape.dataset.object][frame];
-      shape.style.display = place ? "" : "none";
-      if (place) shape.setAttribute("transform",
-        `translate(${place[0]} ${place[1]}) rotate(${place[2]})`);
-    }
-  }
-  let running = null, start = 0;
-  function stop() { cancelAnimationFrame(running); running = null; play.textContent = "play"; }
-  function tick(now) {
-    const times = data.times, at = times[0] + (now - start) / 1000 / data.slower;
-    let frame = times.findIndex((time) => time >= at);
-    if (frame < 0) frame = times.length - 1;
-    slider.value = frame; show();
-    if (frame < times.length - 1) running = requestAnimationFrame(tick); else stop();
-  }
-  play.onclick = () => {
-    if (running !== null) return stop();
-    const from = +slider.value < data.times.length - 1 ? +slider.value : 0;
-    start = performance.now() - 1000 * data.slower * (data.times[from] - data.times[0]);
-    play.textContent = "stop"; running = requestAnimationFrame(tick);
-  };
-  slider.oninput = () => { if (running !== null) stop(); show(); };
-  show();
-}
-"""
 SLOWER = 3  # the clip's seconds take so many
+MOST_STEPS = 480  # of the slider, without pictures
+CROSS_PX, DOT_PX, PAGE_PX = 9.0, 1.6, 1000.0  # half a cross, half a dot, on a page so wide
 
 
-def animation(
-    problem: Problem, shapes: tuple[str, ...], predicted_m: Mapping[str, np.ndarray]
-) -> str:
-    """One clip's motion: measured in outline, each model's under it.
+def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray]) -> str:
+    """One clip's motion.
 
     Args:
-      problem: the clip.
-      shapes: of the objects, as the clip declares them.
-      predicted_m: by what it is called `[object, 2, frame]`; the last is drawn full, those
-        before it faint.
+      clip: with a video that is still there, its pictures are shown.
+      problem: its observation and its scene.
+      predicted_m: centres by what the model is called `[object, 2, frame]`; the last is drawn
+        full, those before it faint.
     """
-    observation, scene = problem.observation, problem.model.scene
-    measured = observation.position_m - _offset(problem, list(predicted_m.values())[-1])
-    motions = {**predicted_m, "measured": measured}
-    view = _view(problem, list(motions.values()))
-    ground = "".join(_slab(*one) for one in surfaces(scene, view))
-    drawn = []
-    for k, name in enumerate(motions):
-        for i, shape in enumerate(shapes):
-            look = _look(name == "measured", k == len(motions) - 2, COLOURS[i])
-            body = _body(problem, i, shape)
-            drawn.append(
-                f'<g data-of="{escape(name, quote=True)}" data-object="{i}" {look}>{body}</g>'
-            )
+    observation = problem.observation
+    models = list(predicted_m)
+    offset = _offset(problem, predicted_m[models[-1]])
+    filmed = _film(clip, len(observation.times_s))
+    # In a picture shapes stand round the point that was followed, in a drawing round the centre.
+    motions = {name: motion + offset * (filmed is not None) for name, motion in predicted_m.items()}
+    motions["measured"] = observation.position_m - offset * (filmed is None)
+    view = view_of(clip, problem.model.scene, np.stack(list(motions.values())))
+    steps = filmed.frames if filmed else range(0, len(observation.times_s), _stride(problem))
+    chosen = {name: motion[..., list(steps)] for name, motion in motions.items()}
     data = {
-        "times": observation.times_s.round(4).tolist(),
-        "motions": {name: _places(problem, motion) for name, motion in motions.items()},
+        "times": observation.times_s[list(steps)].round(4).tolist(),
+        "motions": {name: _places(problem, motion) for name, motion in chosen.items()},
+        "pictures": list(filmed.pictures) if filmed else [],
         "slower": SLOWER,
     }
-    left, top = MM * view.left_m, -MM * view.top_m
-    size = (MM * (view.right_m - view.left_m), MM * (view.top_m - view.bottom_m))
     encoded = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
-    last = len(observation.times_s) - 1
-    models = list(predicted_m)
-    faint = f"; faint: {', '.join(models[:-1])}" if len(models) > 1 else ""
+    name = escape(problem.name, quote=True)
     return (
-        f'<figure class="motion"><figcaption>{escape(problem.name)}: outline measured, '
-        f"full {escape(models[-1])}{escape(faint)}.</figcaption>"
-        f'<svg role="img" aria-label="motion" style="max-width:none" '
-        f'viewBox="{left:.1f} {top:.1f} {size[0]:.1f} {size[1]:.1f}">{ground}{"".join(drawn)}</svg>'
-        f'<div><button type="button">play</button> <input type="range" min="0" max="{last}" '
-        f'value="0" aria-label="frame" style="width:60%"> <output></output></div>'
+        f'<figure class="motion" data-clip="{name}">'
+        f"<figcaption>{escape(_caption(filmed))}</figcaption>"
+        f"{_stage(clip, problem, motions, models, view, filmed)}"
+        f'<div class="controls"><button type="button">Play</button>'
+        f'<input type="range" min="0" max="{len(data["times"]) - 1}" value="0" '
+        f'aria-label="time in {name}"><output></output></div>{_legend(problem, models, filmed)}'
         f'<script type="application/json">{encoded}</script></figure>'
     )
+
+
+def _film(clip: Clip, num_frames: int) -> Film | None:
+    """The pictures; None for a csv track, a clip without a place for its origin, a lost video."""
+    if clip.video is None or not clip.video.is_file():
+        return None
+    if clip.origin_px is None and clip.objects[0].point_px is None:
+        return None
+    return film(clip.video, num_frames)
+
+
+def _stride(problem: Problem) -> int:
+    return -(-len(problem.observation.times_s) // MOST_STEPS)
 
 
 def _offset(problem: Problem, predicted_m: np.ndarray) -> np.ndarray:
@@ -110,15 +86,97 @@ def _offset(problem: Problem, predicted_m: np.ndarray) -> np.ndarray:
     return found
 
 
-def _view(problem: Problem, motions: list[np.ndarray]) -> View:
-    """All places with room round them."""
-    places = np.concatenate([motion.transpose(0, 2, 1).reshape(-1, 2) for motion in motions])
-    reach = MARGIN_M + max(problem.model.scene.surroundings.half_length_m)
-    (left, bottom), (right, top) = (
-        np.nanmin(places, axis=0) - reach,
-        np.nanmax(places, axis=0) + reach,
+def _caption(filmed: Film | None) -> str:
+    if filmed is None:
+        return "The scene from the side. Arrow keys move the slider frame by frame."
+    step = filmed.frames[1] - filmed.frames[0] if len(filmed.frames) > 1 else 1
+    every = "" if step == 1 else f" Every {_ordinal(step)} frame is shown."
+    return (
+        "The clip, with what was followed and what the model does drawn over it."
+        f"{every} Arrow keys move the slider frame by frame."
     )
-    return View(float(left), float(right), float(bottom), float(top), 0, 0, False)
+
+
+def _ordinal(number: int) -> str:
+    return {2: "second", 3: "third"}.get(number, f"{number}th")
+
+
+def _legend(problem: Problem, models: list[str], filmed: Film | None) -> str:
+    entries = [
+        ("fill", object_colour(i), f"{name}, {models[-1]}")
+        for i, name in enumerate(problem.observation.names)
+    ]
+    if len(models) > 1:
+        entries.append(("dashed", "soft", ", ".join(models[:-1])))
+    if filmed:
+        entries.append(("cross", "ink", "measured"))
+        if problem.model.scene.surroundings.has_surface:
+            entries.append(("line", "soft", "ramp and table as declared"))
+    else:
+        entries.append(("line", "ink", "measured (outline; its way dotted)"))
+    return legend(entries)
+
+
+def _stage(
+    clip: Clip,
+    problem: Problem,
+    motions: Mapping[str, np.ndarray],
+    models: list[str],
+    view: View,
+    filmed: Film | None,
+) -> str:
+    """The picture: a canvas for the video's frames, shapes over it."""
+    width, height = MM * (view.right_m - view.left_m), MM * (view.top_m - view.bottom_m)
+    left = -MM * view.right_m if view.is_mirrored else MM * view.left_m
+    turn = ' transform="scale(-1 1)"' if view.is_mirrored else ""
+    scene = problem.model.scene
+    ground = "".join(_slab(*one, is_outline=filmed is not None) for one in surfaces(scene, view))
+    drawn = [ground, _trails(motions["measured"], DOT_PX * width / PAGE_PX)]
+    for k, model in enumerate(models):
+        for i, declared in enumerate(clip.objects):
+            colour = f"var(--{object_colour(i)})"
+            if k == len(models) - 1:
+                look = f'fill="{colour}" fill-opacity="{0.45 if filmed else 0.8}" stroke="{colour}"'
+            else:
+                look = f'fill="none" stroke="{colour}" stroke-dasharray="4 3"'
+            drawn.append(_shape(model, i, look, _body(problem, i, declared.shape)))
+    for i, declared in enumerate(clip.objects):
+        look = 'fill="none" stroke="currentColor" stroke-width="1.5"'
+        arm = CROSS_PX * width / PAGE_PX
+        body = (
+            f'<path d="M{-arm:.1f} 0H{arm:.1f}M0 {-arm:.1f}V{arm:.1f}"/>'
+            if filmed
+            else _body(problem, i, declared.shape)
+        )
+        drawn.append(_shape("measured", i, look, body))
+    size = filmed.size_px if filmed else (0, 0)
+    canvas = f'<canvas width="{size[0]}" height="{size[1]}"></canvas>' if filmed else ""
+    names = " and ".join(problem.observation.names)
+    return (
+        f'<div class="stage{" filmed" if filmed else ""}" '
+        f'style="aspect-ratio:{width:.1f}/{height:.1f}">{canvas}'
+        f'<svg role="img" aria-label="{escape(names, quote=True)}, measured and simulated, at the '
+        f"slider's time\" "
+        f'viewBox="{left:.1f} {-MM * view.top_m:.1f} {width:.1f} {height:.1f}">'
+        f"<g{turn}>{''.join(drawn)}</g></svg></div>"
+    )
+
+
+def _shape(of: str, index: int, look: str, body: str) -> str:
+    return f'<g data-of="{escape(of, quote=True)}" data-object="{index}" {look}>{body}</g>'
+
+
+def _trails(measured_m: np.ndarray, radius: float) -> str:
+    """Every measured place as a dot of so many mm."""
+    r = f"{radius:.1f}"
+    dot = f"m-{r} 0a{r} {r} 0 1 0 {2 * radius:.1f} 0a{r} {r} 0 1 0 {-2 * radius:.1f} 0"
+    found = []
+    for x, y in measured_m:
+        seen = np.isfinite(x) & np.isfinite(y)
+        places = zip(MM * x[seen], -MM * y[seen], strict=True)
+        dots = "".join(f"M{a:.1f} {b:.1f}{dot}" for a, b in places)
+        found.append(f'<path class="trail" d="{dots}" fill="currentColor"/>')
+    return "".join(found)
 
 
 def _places(problem: Problem, motion_m: np.ndarray) -> list[list[list[float] | None]]:
@@ -145,17 +203,16 @@ def _body(problem: Problem, index: int, shape: str) -> str:
     )
 
 
-def _look(is_measured: bool, is_last: bool, colour: str) -> str:
-    if is_measured:
-        return 'fill="none" stroke="currentColor" stroke-width="2"'
-    return f'fill="{colour}" fill-opacity="{0.8 if is_last else 0.25}"'
-
-
-def _slab(corner: tuple[float, float], length_m: float, angle_rad: float) -> str:
-    (x, y), far = corner, MM * length_m
+def _slab(corner: tuple[float, float], length_m: float, angle_rad: float, is_outline: bool) -> str:
+    (x, y), far, thick = corner, MM * length_m, MM * SLAB_M
     dx, dy = far * math.cos(angle_rad), -far * math.sin(angle_rad)
     x, y = MM * x, -MM * y
+    if is_outline:
+        return (
+            f'<path d="M{x:.1f} {y:.1f}l{dx:.1f} {dy:.1f}" fill="none" stroke="currentColor" '
+            'opacity="0.5"/>'
+        )
     return (
-        f'<polygon fill="{SURFACE}" points="{x:.1f},{y:.1f} {x + dx:.1f},{y + dy:.1f} '
-        f'{x + dx:.1f},{y + dy + SLAB_MM:.1f} {x:.1f},{y + SLAB_MM:.1f}"/>'
+        f'<polygon fill="var(--surface)" points="{x:.1f},{y:.1f} {x + dx:.1f},{y + dy:.1f} '
+        f'{x + dx:.1f},{y + dy + thick:.1f} {x:.1f},{y + thick:.1f}"/>'
     )

@@ -7,27 +7,23 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
 from galileo_jax.files import write_text
 from galileo_jax.inference.trials import Trials
 from galileo_jax.report import findings
 from galileo_jax.report.along import Along, along_paths
-from galileo_jax.report.animation import SCRIPT, animation
-from galileo_jax.report.comparison_page import cells, failures
-from galileo_jax.report.failure import before_after_figure
-from galileo_jax.report.figure import to_inline, to_svg
-from galileo_jax.report.missing_force import is_told, missing_force_figure
-from galileo_jax.report.shell import document, figure_section, items, table
+from galileo_jax.report.comparison_page import cells, failures, motion
+from galileo_jax.report.failure import before_after_chart
+from galileo_jax.report.missing_force import is_told, missing_force_chart
+from galileo_jax.report.plotly_chart import chart_element, figure_element
+from galileo_jax.report.provenance import provenance
+from galileo_jax.report.rounds import HEIGHT_PX, rounds_figure
+from galileo_jax.report.shell import document, figure_section, header, items, legend, table
 from galileo_jax.report.statements import number
 
 NUM_CANDIDATES = 8
-BAR = (
-    '<div style="background:var(--line);width:9rem;border-radius:.2rem">'
-    '<div style="background:var(--accent);height:.7rem;border-radius:.2rem;width:{:.1f}%"></div>'
-    "</div>"
-)
+BAR = '<div class="bar"><div style="width:{:.1f}%"></div></div>'
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,8 @@ class Told:
       record: diagnosis.json.
       go_on: the command that comes next.
       hidden: what was hidden in a synthetic clip, None where that is not known.
-      shapes: of each clip, its objects' shapes.
+      clips: what was diagnosed.
+      command: that makes the page again.
       seed: of the draws in pictures.
     """
 
@@ -47,7 +44,8 @@ class Told:
     record: Mapping[str, Any]
     go_on: str
     hidden: str | None
-    shapes: tuple[tuple[str, ...], ...]
+    clips: tuple[Clip, ...]
+    command: str
     seed: int
 
 
@@ -59,39 +57,50 @@ def write_diagnosis_page(path: Path, title: str, trials: Trials, told: Told) -> 
         for one in diagnosis.rounds
     ]
     sections = [
-        f"<h1>{escape(title)}</h1>",
-        _verdict(told),
+        _verdict(title, told),
         _rounds(told.record["history"]),
+        _candidates(diagnosis, told.record["candidates"]),
+        motion(told.clips, trials, _fitted(trials, diagnosis)),
+        failures(f"Where it fails: {_title(diagnosis.rounds[0])}", shown[0]),
         *(
             _before_after(before, after, _title(one), _title(two))
             for (before, after), (one, two) in zip(
                 pairwise(shown), pairwise(diagnosis.rounds), strict=True
             )
         ),
-        _motion(trials, told),
-        _candidates(diagnosis, told.record["candidates"]),
         _missing(told, trials.problems[0].observation.names),
-        failures(f"Where the model fails: {_title(diagnosis.rounds[0])}", shown[0]),
         cells(diagnosis.base, several=len(trials.problems) > 1),
         _left_one_out(told.record.get("left_one_out", [])),
+        provenance(
+            told.command,
+            told.clips,
+            {"engine": trials.problems[0].engine.name, "seed": str(told.seed)},
+        ),
     ]
-    page = document(f"{title}: diagnosis", [part for part in sections if part], SCRIPT)
-    write_text(path, page)
+    write_text(path, document(f"{title}: diagnosis", [part for part in sections if part]))
+
+
+def _fitted(trials: Trials, diagnosis: Diagnosis) -> dict[str, Any]:
+    """The parameters of every round, `[parameter]`, by its effects."""
+    return {
+        _title(one): trials.theta(one.hypothesis.fit.z, one.hypothesis.fit.free)
+        for one in diagnosis.rounds
+    }
 
 
 def _title(one: Round) -> str:
     return findings.effects_text(one.hypothesis.effects)
 
 
-def _verdict(told: Told) -> str:
+def _verdict(title: str, told: Told) -> str:
     diagnosis = told.diagnosis
-    warn = ' class="warn"' if diagnosis.verdict.status == "unknown" else ""
     hidden = "" if told.hidden is None else f"<p>Truth: {escape(told.hidden)}.</p>\n"
-    return (
-        f"<p{warn}><strong>{escape(findings.verdict(diagnosis))}</strong></p>\n{hidden}"
-        f"{items(diagnosis.verdict.advice)}\n"
+    more = (
+        f"{hidden}{items(diagnosis.verdict.advice)}\n"
         f'<p class="soft">Next: <code>{escape(told.go_on)}</code></p>'
     )
+    is_known = diagnosis.verdict.status != "unknown"
+    return header("diagnosis", title, findings.verdict(diagnosis), more, is_known)
 
 
 def _rounds(history: Sequence[Mapping[str, Any]]) -> str:
@@ -108,36 +117,31 @@ def _rounds(history: Sequence[Mapping[str, Any]]) -> str:
             ]
         )
     head = ["model with", "rmse, m/s", "chi2 per dof", "p", *frictions]
-    return f"<h2>Rounds</h2>\n{table(head, rows)}"
+    errors = [float(row["rmse"]) for row in history]
+    label = "velocity error round by round: " + ", ".join(f"{error:.4f} m/s" for error in errors)
+    chart = figure_element(rounds_figure(history), label, HEIGHT_PX)
+    key = legend([("fill", "accent", "velocity error"), ("dashed", "ink", "tracking noise alone")])
+    return (
+        "<h2>Rounds</h2>\n<figure><figcaption>The error of the velocity, round by round, and what "
+        "tracking noise alone would leave of it.</figcaption>"
+        f'{key}<div class="stack">{chart}</div></figure>\n{table(head, rows)}'
+    )
 
 
 def _before_after(
     before: Sequence[Along], after: Sequence[Along], title_before: str, title_after: str
 ) -> str:
-    pictures = {}
-    for one, two in zip(before, after, strict=True):
-        name = f"{two.clip}_{two.name}"
-        figure = before_after_figure(one, two, (title_before, title_after))
-        label = f"{name}, before and after"
-        pictures[name] = to_inline(to_svg(figure, f"{name}_{title_after}"), escape(label, True))
+    charts = [
+        before_after_chart(one, two, (title_before, title_after))
+        for one, two in zip(before, after, strict=True)
+    ]
+    pictures = {chart.name: chart_element(chart) for chart in charts}
     return figure_section(
         f"Added: {title_after}",
         "What is left, in units of the noise, on the same axes: filled along the path, hollow "
         "across it. Yellow: where the model fails worst.",
         pictures,
     )
-
-
-def _motion(trials: Trials, told: Told) -> str:
-    found = []
-    for clip, problem in enumerate(trials.problems):
-        predicted: dict[str, np.ndarray] = {}
-        for one in told.diagnosis.rounds:
-            fit = one.hypothesis.fit
-            theta = trials.of_clip(trials.theta(fit.z, fit.free), clip)
-            predicted[_title(one)] = problem.simulate(theta)
-        found.append(animation(problem, told.shapes[clip], predicted))
-    return "<h2>Motion</h2>\n" + "\n".join(found)
 
 
 def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -> str:
@@ -174,8 +178,7 @@ def _missing(told: Told, names: Sequence[str]) -> str:
     for i, name in enumerate(names):
         if not is_told(missing, i):
             continue
-        svg = to_svg(missing_force_figure(missing, i, name), f"missing_{name}")
-        pictures[name] = to_inline(svg, escape(name, quote=True))
+        pictures[name] = chart_element(missing_force_chart(missing, i, name))
         share = missing.share_explained[i]
         explains = f" (explains {100 * share:.0f} % of what is missing)" if share > 0 else ""
         said.append(f"{name}: {missing.formula[i]}{explains}")

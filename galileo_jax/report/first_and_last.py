@@ -32,7 +32,7 @@ def write_first_and_last(run: Run, motions: Motions, path: Path) -> str:
         Still(median[..., last], f"simulated, last frame ({clip_end_s:.2f} s)"),
         Still(median[..., -1], f"predicted, {motions.times_s[-1]:.2f} s"),
     ]
-    view = view_of(run, np.moveaxis(median, 1, -1))
+    view = view_of(run.clip, run.problem.model.scene, median)
     filmed = _first_and_last_frame(run.clip.video) if run.clip.video else []
     pictures = gl_view.render(run.problem.model.scene, stills, view)
     columns = 2 if filmed else 1

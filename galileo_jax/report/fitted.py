@@ -8,24 +8,11 @@ import numpy as np
 
 from galileo_jax.observation import Observation
 from galileo_jax.prediction import GRID_S, as_measured, draw_theta, hit_s, roll_out
+from galileo_jax.report.phase import Phase
 from galileo_jax.run import Run
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NUM_DRAWS = 100
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A stretch of one object's motion.
-
-    Attributes:
-      name: "ramp", "foot", "table", "fall", "at rest" or "after the hit".
-      start_s, end_s: on the clip's clock.
-    """
-
-    name: str
-    start_s: float
-    end_s: float
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.report import statements
+from galileo_jax.report.chart import object_colour
 from galileo_jax.report.fitted import Fitted
-from galileo_jax.report.shell import document, figure_section
+from galileo_jax.report.provenance import provenance
+from galileo_jax.report.residuals import worst_stretch_of
+from galileo_jax.report.shell import details, document, figure_section, header, legend
 from galileo_jax.report.statements import MEANINGS, number
 from galileo_jax.run import Run
 
@@ -22,19 +25,20 @@ def render(run: Run, fitted: Fitted, figures: Mapping[str, Mapping[str, str]]) -
     Args:
       run: the fit.
       fitted: it in the clip's frames.
-      figures: inline SVG by section ("velocity", "position", "residuals", "draws") and name.
+      figures: HTML by section ("motion", "velocity", "position", "residuals", "draws") and name.
     """
     title = ", ".join(Path(clip).name for clip in run.result["clips"])
+    key = _key(run)
     sections = [
-        _header(title, run),
-        _headlines(run),
+        _header(title, run) + _headlines(run),
         _untold(run, fitted),
-        figure_section("Velocity", _velocity_caption(), figures["velocity"]),
-        figure_section("Position", _position_caption(fitted), figures["position"]),
-        figure_section("Residuals", _residual_caption(), figures["residuals"]),
-        figure_section("Posterior", _draws_caption(run), figures["draws"], "narrow"),
+        "<h2>Motion</h2>\n" + "\n".join(figures["motion"].values()),
+        figure_section("Velocity", _velocity_caption(), figures["velocity"], legend=key),
+        figure_section("Where it fails", _failure_caption(run, fitted), figures["residuals"]),
         _table("Parameters", {**run.result["parameters"], **run.result.get("derived", {})}),
-        _table("Nuisances", run.result.get("nuisances", {}), _NUISANCES),
+        details("Nuisances", _table("", run.result.get("nuisances", {}), _NUISANCES)),
+        figure_section("Posterior", _draws_caption(run), figures["draws"], "narrow"),
+        figure_section("Position", _position_caption(fitted), figures["position"], legend=key),
         _provenance(run),
     ]
     return document(f"{title}: fit", sections)
@@ -49,14 +53,25 @@ _NUISANCES = (
 def _header(title: str, run: Run) -> str:
     result = run.result
     effects = ", ".join(result["effects"]) or "none beyond friction and impact"
-    converged = escape(statements.convergence(run))
     mark = "" if result["converged"] else ' class="warn"'
     caution = statements.caution(result)
-    warning = f'\n<p class="warn">{escape(caution)}</p>' if caution else ""
-    return (
-        f"<h1>{escape(title)}</h1>\n"
-        f'<p class="soft">method {escape(result["method"])}, effects: {escape(effects)}</p>\n'
-        f"<p{mark}>{converged}</p>\n<p>{escape(statements.fit_quality(result))}</p>{warning}"
+    warning = f'<p class="warn">{escape(caution)}</p>\n' if caution else ""
+    more = (
+        f"<p{mark}>{escape(statements.convergence(run))}</p>\n{warning}"
+        f'<p class="soft">Method {escape(result["method"])}; effects: {escape(effects)}.</p>\n'
+    )
+    return header("fit", title, statements.fit_quality(result), more, statements.fits(result))
+
+
+def _key(run: Run) -> str:
+    """What the marks of velocities and positions mean."""
+    names = run.problem.observation.names
+    return legend(
+        [
+            ("dot", "ink", "measured"),
+            *(("line", object_colour(i), f"{name}, fitted") for i, name in enumerate(names)),
+            ("fill", "soft", "dark: 95 % of the model, light: 95 % of measurements"),
+        ]
     )
 
 
@@ -96,8 +111,24 @@ def _untold(run: Run, fitted: Fitted) -> str:
 
 def _velocity_caption() -> str:
     return (
-        "Measured velocities (dots) against the fit. Dark band: the model with the posterior's "
-        "uncertainty. Light band: where 95 of 100 measurements are expected."
+        "Measured velocities against the fit. Dark band: the model with the posterior's "
+        "uncertainty. Light band: where 95 of 100 measurements are expected. The line that the "
+        "slider moves is the clip's time."
+    )
+
+
+def _failure_caption(run: Run, fitted: Fitted) -> str:
+    told = (
+        "Measured minus fitted, in units of the noise: without a pattern and, but for 5 in 100, "
+        "inside the grey band if the model is right. "
+    )
+    worst = worst_stretch_of(fitted)
+    if worst is None:
+        return told + "It fails nowhere: no stretch is stronger than noise makes it."
+    return (
+        f"{told}Yellow: the worst stretch, {worst.name} along {worst.axis} from "
+        f"{worst.start_s:.2f} to {worst.end_s:.2f} s ({worst.z:.0f} times the noise of its mean). "
+        "`galileo compare` tests it; `galileo diagnose` looks for what is missing."
     )
 
 
@@ -110,13 +141,6 @@ def _position_caption(fitted: Fitted) -> str:
     return (
         "The point followed is not quite the centre; this constant offset is in the fitted "
         f"curves: {moved}."
-    )
-
-
-def _residual_caption() -> str:
-    return (
-        "Measured minus fitted, whitened with the noise's covariance: without a pattern and, but "
-        "for 5 in 100, between the dashed lines if the model is right."
     )
 
 
@@ -143,30 +167,26 @@ def _table(heading: str, entries: Mapping[str, Mapping[str, Any]], note: str = "
             f"<td>{told}</td></tr>"
         )
     head = (
-        '<tr><th></th><th class="meaning"></th><th>mean</th><th>sd</th><th>95 % interval</th>'
-        "<th>identified</th></tr>"
+        '<tr><th scope="col">name</th><th scope="col" class="meaning">meaning</th>'
+        '<th scope="col">mean</th><th scope="col">sd</th><th scope="col">95 % interval</th>'
+        '<th scope="col">identified</th></tr>'
     )
     text = f"<p>{escape(note)}</p>" if note else ""
-    return (
-        f"<h2>{escape(heading)}</h2>\n{text}"
-        f'<div class="table"><table>{head}{"".join(rows)}</table></div>'
-    )
+    top = f"<h2>{escape(heading)}</h2>\n" if heading else ""
+    return f'{top}{text}<div class="table"><table>{head}{"".join(rows)}</table></div>'
 
 
 def _provenance(run: Run) -> str:
     result = run.result
     timings = ", ".join(f"{stage} {spent:.1f} s" for stage, spent in result["timings_s"].items())
     error = result["error"]
-    items = {
-        "made again by": f"<code>{escape(statements.command_again(run))}</code>",
-        "engine": escape(str(result.get("engine", run.problem.engine.name))),
+    facts = {
+        "engine": str(result.get("engine", run.problem.engine.name)),
         "seed": str(result["seed"]),
-        "version": f"galileo_jax {escape(str(result['version']))}",
         "velocity error": (
             f"rmse {number(error['rmse'], None)} m/s; tracking noise alone would give "
             f"{number(error['noise'], None)} m/s"
         ),
-        "timings": escape(timings),
+        "timings": timings,
     }
-    listed = "".join(f"<dt>{key}</dt><dd>{value}</dd>" for key, value in items.items())
-    return f"<h2>Provenance</h2>\n<dl>{listed}</dl>"
+    return provenance(statements.command_again(run), (run.clip,), facts)

@@ -1,23 +1,15 @@
 """Velocity profiles and positions, measured against fitted, with 95 % bands."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from galileo_jax.report.figure import COLOURS, INK, panel, style
-from galileo_jax.report.fitted import Fitted, Phase
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from galileo_jax.report.chart import Band, Chart, Dots, Line, Panel, object_colour, time_limits
+from galileo_jax.report.fitted import Fitted
 
 AXES = ("x", "y")
-SHADED = ("held", "foot", "collision", "after the hit")
-LETTER = 0.021  # of the panel's width, what a phase's name takes
+NAMES_ROOM = 0.14  # of a panel's height, for the phases' names
 
 
-def velocity_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
+def velocity_chart(fitted: Fitted, index: int, axis: int, clip: str) -> Chart:
     """The velocity profile of one object along one axis.
 
     Dark band: the model's velocity with the posterior's uncertainty. Light band: where 95 % of
@@ -26,88 +18,68 @@ def velocity_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
     observation = fitted.observation
     times = observation.times_s
     step = np.diff(times)
-    middle = times[:-1] + step / 2
     drawn = np.diff(fitted.position_m[:, index, axis], axis=-1) / step
     variance = observation.covariance_m2[index, axis, axis] * fitted.noise_scale**2
     noise = np.sqrt(variance[1:] + variance[:-1]) / step
-    name = observation.names[index]
-    with style(f"velocity_{name}_{AXES[axis]}"):
-        figure, axes = panel(f"{name}, {AXES[axis]}", "time, s", "velocity, m/s")
-        _fill(axes, middle, drawn, noise, index)
-        measured = observation.velocity_m_s[index, axis]
-        _measured(axes, middle, measured, noise)
-        shade_phases(axes, fitted.phases[index], times)
-        _legend(axes, index, axis)
-    return figure
+    measured = observation.velocity_m_s[index, axis]
+    middle = times[:-1] + step / 2
+    return _chart(fitted, index, axis, clip, "velocity", "m/s", middle, drawn, noise, measured)
 
 
-def position_figure(fitted: Fitted, index: int, axis: int) -> "Figure":
+def position_chart(fitted: Fitted, index: int, axis: int, clip: str) -> Chart:
     """The position of one object along one axis."""
     observation = fitted.observation
-    variance = observation.covariance_m2[index, axis, axis] * fitted.noise_scale**2
-    name = observation.names[index]
-    with style(f"position_{name}_{AXES[axis]}"):
-        figure, axes = panel(f"{name}, {AXES[axis]}", "time, s", f"{AXES[axis]}, m")
-        drawn = fitted.position_m[:, index, axis]
-        noise, measured = np.sqrt(variance), observation.position_m[index, axis]
-        _fill(axes, observation.times_s, drawn, noise, index)
-        _measured(axes, observation.times_s, measured, noise)
-        shade_phases(axes, fitted.phases[index], observation.times_s)
-        _legend(axes, index, axis)
-    return figure
+    drawn = fitted.position_m[:, index, axis]
+    noise = fitted.noise_scale * np.sqrt(observation.covariance_m2[index, axis, axis])
+    measured = observation.position_m[index, axis]
+    times = observation.times_s
+    return _chart(fitted, index, axis, clip, "position", "m", times, drawn, noise, measured)
 
 
-def shade_phases(axes: "Axes", phases: Sequence[Phase], times_s: np.ndarray) -> None:
-    """Shades the passages between phases, and what follows the hit; names those wide enough."""
-    whole = float(times_s[-1] - times_s[0])
-    axes.set_xlim(times_s[0] - 0.02 * whole, times_s[-1] + 0.02 * whole)
-    low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.14 * (high - low))  # room for the names
-    for phase in phases:
-        if phase.name in SHADED:
-            axes.axvspan(phase.start_s, phase.end_s, color=INK, alpha=0.06, linewidth=0)
-        if phase.end_s - phase.start_s > LETTER * len(phase.name) * whole:
-            axes.text(
-                (phase.start_s + phase.end_s) / 2,
-                0.985,
-                phase.name,
-                transform=axes.get_xaxis_transform(),
-                ha="center",
-                va="top",
-                fontsize=8,
-                alpha=0.65,
-            )
-
-
-def _fill(
-    axes: "Axes", times_s: np.ndarray, drawn: np.ndarray, noise: np.ndarray, index: int
-) -> None:
-    """Median and bands of `drawn` `[draw, time]`; `noise` `[time]` is a standard deviation."""
-    colour = COLOURS[index]
+def _chart(
+    fitted: Fitted,
+    index: int,
+    axis: int,
+    clip: str,
+    quantity: str,
+    unit: str,
+    times_s: np.ndarray,
+    drawn: np.ndarray,
+    noise: np.ndarray,
+    measured: np.ndarray,
+) -> Chart:
+    """Bands of `drawn` `[draw, time]` with the measured values on top; `noise` is their sd."""
+    name, colour = fitted.observation.names[index], object_colour(index)
     low, median, high = np.quantile(drawn, [0.025, 0.5, 0.975], axis=0)
     spread = 1.96 * np.sqrt(drawn.var(axis=0) + np.where(np.isfinite(noise), noise, 0.0) ** 2)
     mean = drawn.mean(axis=0)
-    axes.fill_between(
-        times_s, mean - spread, mean + spread, color=colour, alpha=0.18, linewidth=0,
-        label="95 % of measurements",
-    )  # fmt: skip
-    axes.fill_between(
-        times_s, low, high, color=colour, alpha=0.45, linewidth=0, label="95 % of the model"
+    marks = (
+        Band(times_s, mean - spread, mean + spread, colour, "95 % of measurements", 0.16),
+        Band(times_s, low, high, colour, "95 % of the model", 0.4),
+        Line(times_s, median, colour, "fitted"),
+        Dots(times_s, measured, "ink", "measured"),
     )
-    axes.plot(times_s, median, color=colour, label="fitted")
+    panel = Panel(
+        ylabel=f"{quantity}, {unit}",
+        marks=marks,
+        title=f"{name}, {AXES[axis]}",
+        xlabel="time, s",
+        xlim=time_limits(fitted.observation.times_s),
+        ylim=with_room(*_limits(measured, noise)) if np.isfinite(measured).any() else None,
+        phases=fitted.phases[index],
+    )
+    label = f"{quantity} of {name} along {AXES[axis]} against time, measured and fitted"
+    return Chart(f"{quantity}_{name}_{AXES[axis]}", label, (panel,), clip)
 
 
-def _measured(axes: "Axes", times_s: np.ndarray, values: np.ndarray, noise: np.ndarray) -> None:
-    """The dots; the panel shows all of them, but not all of a band that is far wider."""
-    axes.plot(times_s, values, "o", color=INK, markersize=2.6, markeredgewidth=0, label="measured")
+def with_room(low: float, high: float) -> tuple[float, float]:
+    """The ends of an axis with room for the phases' names."""
+    return low, high + NAMES_ROOM * (high - low)
+
+
+def _limits(values: np.ndarray, noise: np.ndarray) -> tuple[float, float]:
+    """Of an axis that shows all measured values, but not all of a band that is far wider."""
     seen = np.isfinite(values)
-    if seen.any():
-        span = np.ptp(values[seen])
-        spare = max(0.1 * span, min(3 * float(np.median(noise[seen])), max(0.5 * span, 1e-3)))
-        axes.set_ylim(values[seen].min() - spare, values[seen].max() + spare)
-
-
-def _legend(axes: "Axes", index: int, axis: int) -> None:
-    """A legend in the first panel of a group only."""
-    if index == 0 and axis == 0:
-        axes.legend(loc="best", bbox_to_anchor=(0, 0, 1, 0.9), handlelength=1.4, labelspacing=0.25)
+    span = np.ptp(values[seen])
+    spare = max(0.1 * span, min(3 * float(np.median(noise[seen])), max(0.5 * span, 1e-3)))
+    return float(values[seen].min() - spare), float(values[seen].max() + spare)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from galileo_jax.clip.schema import Clip
 from galileo_jax.observation import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.report.figure import COLOURS, INK
 from galileo_jax.rollout.motion import pitch
@@ -48,9 +49,8 @@ class Still:
     title: str
 
 
-def view_of(run: Run, positions_m: np.ndarray) -> View:
-    """What the video shows; without one all of `positions_m` `[..., 2]`."""
-    clip = run.clip
+def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
+    """What the video shows; without one all of `positions_m` `[..., 2, frame]`, NaN left out."""
     # As in `observe`: without a declared foot the first object's first place is the origin.
     origin = clip.origin_px or clip.objects[0].point_px
     if clip.frame_size_px and origin:
@@ -60,9 +60,12 @@ def view_of(run: Run, positions_m: np.ndarray) -> View:
         bottom, top = (y - height) / scale, y / scale
         enlarge = min(1.0, LARGEST_PX / max(width, height))
     else:
-        places = positions_m.reshape(-1, 2)
-        reach = MARGIN_M + max(run.problem.model.scene.surroundings.half_length_m)
-        (left, bottom), (right, top) = places.min(axis=0) - reach, places.max(axis=0) + reach
+        places = np.moveaxis(positions_m, -2, -1).reshape(-1, 2)
+        reach = MARGIN_M + max(scene.surroundings.half_length_m)
+        (left, bottom), (right, top) = (
+            np.nanmin(places, axis=0) - reach,
+            np.nanmax(places, axis=0) + reach,
+        )
         width, height = right - left, top - bottom
         enlarge = LARGEST_PX / max(width, height)
     is_mirrored = clip.direction == "left"
@@ -109,13 +112,13 @@ def draw(axes: "Axes", run: Run, still: Still, view: View) -> None:
         length = scene.surroundings.half_length_m[i]
         height = scene.surroundings.half_height_m[i]
         if declared.shape == "sphere":
-            axes.add_patch(Circle((x, y), length, color=COLOURS[i], linewidth=0))
+            axes.add_patch(Circle((x, y), length, color=COLOURS[i % len(COLOURS)], linewidth=0))
             continue
         cos, sin = math.cos(float(turned[i])), math.sin(float(turned[i]))
         corners = [
             (x + a * length * cos - b * height * sin, y + a * length * sin + b * height * cos)
             for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
         ]
-        axes.add_patch(Polygon(corners, color=COLOURS[i], linewidth=0))
+        axes.add_patch(Polygon(corners, color=COLOURS[i % len(COLOURS)], linewidth=0))
     for side in axes.spines.values():
         side.set(visible=True, color=INK, alpha=0.3)

@@ -15,6 +15,21 @@ MEANINGS = {
     "mass_ratio": "m1 / m2",
     "phi": "(m1 - m2) / (m1 + m2)",
     "pixels_per_metre": "scale of the picture",
+    "start_velocity_x": "velocity in the first frame, along the travel",
+    "start_velocity_y": "velocity in the first frame, upward",
+    "start_speed": "speed in the first frame",
+    "start_angle": "direction of the throw, over the horizontal",
+    "floor_restitution": "share of the speed left after a bounce",
+    "floor_height": "height of the centre at a bounce",
+    "floor_grip": "share of the speed along the floor that a bounce takes",
+    "period": "period of the swing without damping",
+    "damping": "rate at which the swing dies away",
+    "rest": "place of rest, below the first",
+    "stiffness": "of the spring",
+    "stretch": "how far the weight alone stretches the spring",
+    "density_ratio": "density of the liquid over the object's",
+    "liquid_drag": "drag constant c of c v|v|",
+    "terminal_speed": "speed at which drag and weight balance",
     "declared_angle": "ramp's angle, over what was declared",
     "foot_transition": "factor on the speed kept at the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
@@ -23,6 +38,7 @@ MEANINGS = {
     "start_offset_object2": "start of object 2, from where it was marked",
     "noise_scale": "tracking noise over what the tracker stated",
 }
+WEIGHED = ("liquid_drag", "stiffness")  # forces: known as far as the mass is
 CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
 
 
@@ -53,6 +69,10 @@ def _reason(name: str, run: Run, fitted: Fitted) -> str:
                 "only the ratio of the masses shows in such a clip; doubling both changes nothing"
             )
         return "masses show in a collision only, and there only their ratio"
+    if name in WEIGHED and run.clip.objects[0].mass_kg is None:
+        return "only its ratio to the mass shows; weigh the object (mass_kg)"
+    if name == "pixels_per_metre" and not surroundings.has_surface:
+        return "nothing in this motion tells how long a metre is"
     if name == "pixels_per_metre":
         return (
             "on one slope only scale * (sin a - k1 cos a) shows; "
@@ -72,14 +92,21 @@ def fit_quality(result: dict[str, Any]) -> str:
     chi2 = result["error"]["chi2_per_dof"]
     if chi2 is None or not math.isfinite(chi2):
         return "chi2 per degree of freedom cannot be told."
-    said = f"chi2 per degree of freedom is {chi2:.2f}: "
     if chi2 < CHI2_GOOD:
-        return said + "the model fits, and the tracker did better than it claims."
-    if chi2 <= CHI2_HIGH:
-        return said + "what the model leaves over is of the size of the tracking noise."
-    if chi2 <= CHI2_BAD:
-        return said + "the model leaves more over than tracking noise explains; see the residuals."
-    return said + "the model does not describe this clip; do not trust its parameters."
+        said = "The model fits, and the tracker did better than it claims"
+    elif chi2 <= CHI2_HIGH:
+        said = "What the model leaves over is of the size of the tracking noise"
+    elif chi2 <= CHI2_BAD:
+        said = "The model leaves more over than tracking noise explains; see the residuals"
+    else:
+        said = "The model does not describe this clip; do not trust its parameters"
+    return f"{said} (chi2 per degree of freedom {chi2:.2f})."
+
+
+def fits(result: dict[str, Any]) -> bool:
+    """Whether chi2 per degree of freedom is one that noise gives."""
+    chi2 = result["error"]["chi2_per_dof"]
+    return chi2 is not None and chi2 <= CHI2_HIGH  # False for NaN
 
 
 def convergence(run: Run) -> str:

@@ -2,19 +2,21 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from galileo_jax.files import write_text
+from galileo_jax.report.animation import animation
+from galileo_jax.report.chart import Chart
 from galileo_jax.report.draws import pair_figure, trace_figure
 from galileo_jax.report.figure import to_inline, to_svg
 from galileo_jax.report.fitted import Fitted, evaluate
 from galileo_jax.report.page import render
-from galileo_jax.report.profiles import AXES, position_figure, velocity_figure
-from galileo_jax.report.residuals import residual_figure
+from galileo_jax.report.plotly_chart import chart_element
+from galileo_jax.report.profiles import AXES, position_chart, velocity_chart
+from galileo_jax.report.residuals import residual_chart
+from galileo_jax.report.svg_chart import chart_svg
 from galileo_jax.run import Run
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PAGE, PLOTS = "report.html", "plots"
 
@@ -22,32 +24,43 @@ PAGE, PLOTS = "report.html", "plots"
 def write_report(run: Run) -> Path:
     """Writes a finished fit's plots (SVG) and its page; returns the page's path."""
     fitted = evaluate(run, seed=int(run.result["seed"]))
-    inline: dict[str, dict[str, str]] = {}
-    for section, name, figure in _figures(run, fitted):
-        svg = to_svg(figure, name)
+    shown: dict[str, dict[str, str]] = {}
+    files: dict[str, str] = {}
+    for section, chart in _charts(run, fitted):
+        files[chart.name] = chart_svg(chart)
+        shown.setdefault(section, {})[chart.name] = chart_element(chart)
+    for name, svg in _draws(run):
+        files[name] = svg
+        shown.setdefault("draws", {})[name] = to_inline(svg, f"{name} of the posterior's draws")
+    for name, svg in files.items():
         write_text(run.folder / PLOTS / f"{name}.svg", svg)
-        inline.setdefault(section, {})[name] = to_inline(svg, name.replace("_", " "))
-    names = {name for section in inline.values() for name in section}
     for path in (run.folder / PLOTS).glob("*.svg"):
-        if path.stem not in names:  # of an earlier fit into the same folder
+        if path.stem not in files:  # of an earlier fit into the same folder
             path.unlink()
+    model = ", ".join(run.result["effects"]) or "fitted"
+    centres = np.median(fitted.position_m, axis=0) - fitted.offset_m[..., None]
+    shown["motion"] = {run.problem.name: animation(run.clip, run.problem, {model: centres})}
     page = run.folder / PAGE
-    write_text(page, render(run, fitted, inline))
+    write_text(page, render(run, fitted, shown))
     return page
 
 
-def _figures(run: Run, fitted: Fitted) -> Iterator[tuple[str, str, "Figure"]]:
-    """Section, name and figure, one by one."""
-    objects = list(enumerate(fitted.observation.names))
-    for i, name in objects:
-        for axis, letter in enumerate(AXES):
-            yield "velocity", f"velocity_{name}_{letter}", velocity_figure(fitted, i, axis)
-    for i, name in objects:
-        for axis, letter in enumerate(AXES):
-            yield "position", f"position_{name}_{letter}", position_figure(fitted, i, axis)
-    for i, name in objects:
-        yield "residuals", f"residuals_{name}", residual_figure(fitted, i)
+def _charts(run: Run, fitted: Fitted) -> Iterator[tuple[str, Chart]]:
+    """Section and chart, one by one."""
+    objects, clip = range(len(fitted.observation.names)), run.problem.name
+    for i in objects:
+        for axis in range(len(AXES)):
+            yield "velocity", velocity_chart(fitted, i, axis, clip)
+    for i in objects:
+        yield "residuals", residual_chart(fitted, i, clip)
+    for i in objects:
+        for axis in range(len(AXES)):
+            yield "position", position_chart(fitted, i, axis, clip)
+
+
+def _draws(run: Run) -> Iterator[tuple[str, str]]:
+    """Name and SVG: pairs of parameters and, of chains, their way."""
     names = [p.name for p in run.problem.parameters if p.role != "nuisance"]
-    yield "draws", "pairs", pair_figure(run.posterior, names)
+    yield "pairs", to_svg(pair_figure(run.posterior, names), "pairs")
     if run.result["method"] == "mh":
-        yield "draws", "trace", trace_figure(run.posterior, names)
+        yield "trace", to_svg(trace_figure(run.posterior, names), "trace")

@@ -32,9 +32,10 @@ class EngineC:
 
     def __init__(self, model: Model):
         self.model = model
-        self._batch = lru_cache(maxsize=4)(self._new_batch)
+        self._batch = lru_cache(maxsize=4)(self.new_batch)
 
-    def _new_batch(self, size: int) -> Batch:
+    def new_batch(self, size: int) -> Batch:
+        """Simulations of the scene, to be written and stepped."""
         return Batch(self.model.scene.model, nsim=size)
 
     def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -56,7 +57,7 @@ class EngineC:
         law = dynamics(model.effects + model.nuisances, scene, named, np)
         loads = make_loads(model.effects + model.nuisances, scene, named, law)
         batch = self._batch(len(theta))
-        self._write(batch, make_fields(law, scene, np))
+        self.write(batch, make_fields(law, scene, np))
         qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
         applied = batch.bind("qfrc_applied")
         home = model.scene.model.body_pos[1:][:, [0, 2]]
@@ -90,7 +91,7 @@ class EngineC:
         speed[:, ~is_good] = np.nan
         return np.moveaxis(path, 0, -1), np.moveaxis(speed, 0, -1)
 
-    def _write(self, batch: Batch, fields: Fields) -> None:
+    def write(self, batch: Batch, fields: Fields) -> None:
         """Writes masses, frictions and the start into the batch."""
         compiled = self.model.scene.model
         batch.state[:] = 0.0

@@ -1,9 +1,14 @@
 """The rigid engine: rigid bodies on their path, from event to event, in pure JAX.
 
-What this scene shows is bodies that slide along a line, rub, and knock together. Written in
-that coordinate, with exact contact, the motion has no stiffness at all: between events a
+What this scene shows is bodies that slide or roll along a line, rub, and knock together. Written
+in that coordinate, with exact contact, the motion has no stiffness at all: between events a
 midpoint step of 1/240 s is exact for constant friction and second order for every other law,
-and the events (the foot, a stop, a hit) are met at their time, not at the next step. So the
+and the events (the foot, a hit, an end of slipping) are met at their time, not at the next step.
+
+A round body has a second speed, its rim's. Coulomb's friction acts against the slip between
+the two until they are equal; then the body rolls, and what holds it there is as much friction as
+that takes, or all there is: too little, and it slips. Boxes are bodies whose rim never moves: to
+stop is to end slipping. So the
 motion is a continuous function of the parameters and JAX's derivatives of it are right, which
 those through compliant contacts are not (docs/contact.md). MuJoCo's engines are the check:
 tests/rollout/test_engines.py.
@@ -18,6 +23,7 @@ import numpy as np
 
 from galileo_jax.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.chunks import MOTIONS, in_chunks
+from galileo_jax.rollout.devices import over_devices
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
 
@@ -32,11 +38,19 @@ class Bodies(NamedTuple):
     """All bodies of one rollout.
 
     Attributes:
-      path_m, speed_m_s: `[object]`.
+      path_m, speed_m_s: `[object]`, of the centres.
+      rim_m_s: `[object]`, angular velocity times radius; 0 of what does not roll. None where
+        nothing does.
     """
 
     path_m: jax.Array
     speed_m_s: jax.Array
+    rim_m_s: jax.Array | None = None
+
+    @property
+    def slip_m_s(self) -> jax.Array:
+        """How fast each slides over its surface, `[object]`."""
+        return self.speed_m_s if self.rim_m_s is None else self.speed_m_s - self.rim_m_s
 
     def gap_m(self, scene: Surroundings) -> jax.Array:
         """Between the faces of neighbours, `[object - 1]`."""
@@ -88,7 +102,7 @@ def _roll_out_batch(
     scene: Surroundings,
 ) -> tuple[jax.Array, jax.Array]:
     one = functools.partial(roll_out, effects, names, num_records, dt_s)
-    return jax.vmap(one, (0, None))(theta, scene)
+    return over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, scene)
 
 
 def roll_out(
@@ -105,8 +119,10 @@ def roll_out(
     def record(bodies: Bodies, index: jax.Array):
         return _step(bodies, index * dt_s, dt_s, law, scene), bodies
 
-    start = Bodies(law.start_m, law.start_speed_m_s)
-    _, (path, speed) = jax.lax.scan(record, start, jnp.arange(num_records))
+    # What is pushed rolls from the hand.
+    rim = law.start_speed_m_s * jnp.asarray(scene.rolls) if any(scene.rolls) else None
+    start = Bodies(law.start_m, law.start_speed_m_s, rim)
+    _, (path, speed, _) = jax.lax.scan(record, start, jnp.arange(num_records))
     position, velocity = to_plane(path, speed, law.ramp_rad, law.table_rad, scene)
     return jnp.moveaxis(position, 0, -1), jnp.moveaxis(velocity, 0, -1)
 
@@ -143,82 +159,114 @@ def _to_next_event(
     which both sides lead up) what is slow waits, and the others go on.
     """
     touches = bodies.touches(scene)
-    at_start = _acceleration(bodies, bodies, touches, time_s, law, scene)
+    at_start = _accelerations(bodies, bodies, touches, time_s, law, scene)
     half = 0.5 * _event_times(bodies, touches, at_start, left_s, scene).soonest
     middle = _after(bodies, at_start, half)
-    a = _acceleration(bodies, middle, touches, time_s + half, law, scene)
+    a = _accelerations(bodies, middle, touches, time_s + half, law, scene)
     events = _event_times(bodies, touches, a, left_s, scene)
     t = jnp.where(is_last, left_s, events.soonest)
-    q, v = _after(bodies, a, t)
-    v = jnp.where(events.stop <= t, 0.0, v)
+    q, v, u = _after(bodies, a, t)
+    holds = events.grip <= t
+    if u is not None:
+        u = jnp.where(holds & jnp.asarray(scene.rolls), v, u)
+    v = jnp.where(holds, 0.0 if u is None else u, v)
     if scene.has_table:
-        at_foot = state_at(jnp.zeros_like(q), v, time_s + t, scene)
-        turn = law.ramp_rad - law.table_rad
-        kept = jnp.cos(turn) - law.coefficient(at_foot) * jnp.abs(jnp.sin(turn))
         arrives = events.foot <= t
-        v = jnp.where(arrives, v * jnp.maximum(kept, 0.0) * law.foot, v)
+        v, u = _past_foot(v, u, arrives, time_s + t, law, scene)
         q = jnp.where(arrives, jnp.where(v < 0, -PAST_FOOT_M, 0.0), q)
-    for i in range(len(scene.names) - 1):
-        v = jnp.where(events.hit[i] <= t, _after_hit(v, i, law), v)
+    if len(scene.names) > 1:
+        v = _after_hits(Bodies(q, v, u), events.hit <= t, law, scene)
     waits = is_last & (t > events.soonest) & (jnp.abs(bodies.speed_m_s) < PLASTIC_M_S)
-    return Bodies(jnp.where(waits, bodies.path_m, q), jnp.where(waits, 0.0, v)), t
+    rests = Bodies(bodies.path_m, jnp.zeros_like(v), None if u is None else jnp.zeros_like(u))
+    return jax.tree.map(functools.partial(jnp.where, waits), rests, Bodies(q, v, u)), t
 
 
-def _after(bodies: Bodies, a: jax.Array, t: jax.Array) -> Bodies:
-    q, v = bodies
-    return Bodies(q + v * t + 0.5 * a * t**2, v + a * t)
+class _Accelerations(NamedTuple):
+    centre: jax.Array
+    rim: jax.Array | None
 
 
-def _acceleration(
+def _after(bodies: Bodies, a: _Accelerations, t: jax.Array) -> Bodies:
+    q, v, u = bodies
+    rim = None if u is None or a.rim is None else u + a.rim * t
+    return Bodies(q + v * t + 0.5 * a.centre * t**2, v + a.centre * t, rim)
+
+
+def _accelerations(
     bodies: Bodies,
     at: Bodies,
     touches: jax.Array,
     time_s: jax.Array,
     law: Dynamics,
     scene: Surroundings,
-) -> jax.Array:
-    """Accelerations `[object]` with the forces that act `at` a place and speed.
+) -> _Accelerations:
+    """Accelerations, each `[object]`, with the forces that act `at` a place and speed.
 
     Bodies that touch move as one where the rear one would otherwise be faster: groups are
-    merged, each with the sum of its members' forces and masses.
+    merged, each with the sum of its members' forces and masses. Of a group's members those
+    that slip are braked by all their friction; those at rest hold it with up to theirs; and
+    those that roll turn with it, each as long as its friction can turn it so fast.
     """
-    state = state_at(at.path_m, at.speed_m_s, time_s, scene)
-    drive, brake = law.drive(state), law.brake(state)
-    direction = jnp.sign(bodies.speed_m_s)
+    drive = law.drive(state_at(at.path_m, at.speed_m_s, time_s, scene))
+    brake = law.brake(state_at(at.path_m, at.slip_m_s, time_s, scene))
     count = len(scene.names)
+    direction = jnp.sign(bodies.slip_m_s)
+    sticks = direction == 0
+    rolls = sticks & jnp.asarray(scene.rolls or (False,) * count)
+    pull = drive - direction * brake
+    rest = jnp.where(sticks & ~rolls, brake, 0.0)
+    turning = 1 / jnp.where(law.rim > 0, law.rim, 1.0)  # the inertia that rolling adds
 
-    def each(together: jax.Array) -> jax.Array:
+    def each(together: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """Accelerations, and the way those that should roll slip all the same."""
         weight = together.astype(drive.dtype)
-        force, rub = weight @ drive, weight @ brake
-        moving = force - direction * rub
-        resting = force - jnp.clip(force, -rub, rub)
-        return jnp.where(direction == 0, resting, moving) / (weight @ law.inertia)
+        force, held = weight @ pull, weight @ rest
+        left = force - jnp.clip(force, -held, held)
+        inertia, slips = weight @ law.inertia, jnp.zeros_like(direction)
+        if not any(scene.rolls):
+            return left / inertia, slips
+        a = left / (inertia + weight @ (rolls * turning))
+        for _ in range(sum(scene.rolls)):
+            fails = rolls & (jnp.abs(a) * turning > brake)
+            slips = jnp.where(fails, jnp.sign(left), slips)
+            grips = rolls & (slips == 0)
+            a = (left - weight @ (slips * brake)) / (inertia + weight @ (grips * turning))
+        return a, slips
 
     together = jnp.eye(count, dtype=bool)
-    a = each(together)
+    a, slips = each(together)
     for _ in range(count - 1):
         for i in range(count - 1):
             presses = touches[i] & (a[i] > a[i + 1])
-            union = together[i] | together[i + 1]
-            together = jnp.where(presses & union[:, None], union, together)
-            a = each(together)
-    return a
+            together = _merged(together, i, presses)
+            a, slips = each(together)
+    if not any(scene.rolls):
+        return _Accelerations(a, None)
+    turned = (direction + slips) * brake * law.rim
+    return _Accelerations(a, jnp.where(rolls & (slips == 0), a, turned))
+
+
+def _merged(together: jax.Array, i: int, when: jax.Array) -> jax.Array:
+    """The groups `[object, object]` with those of neighbours i and i + 1 made one."""
+    union = together[i] | together[i + 1]
+    return jnp.where(when & union[:, None], union, together)
 
 
 class _Events(NamedTuple):
-    stop: jax.Array
+    grip: jax.Array
     foot: jax.Array
     hit: jax.Array
     soonest: jax.Array
 
 
 def _event_times(
-    bodies: Bodies, touches: jax.Array, a: jax.Array, left_s: jax.Array, scene: Surroundings
+    bodies: Bodies, touches: jax.Array, by: _Accelerations, left_s: jax.Array, scene: Surroundings
 ) -> _Events:
     """When each event comes at constant accelerations, s; inf where it does not."""
-    q, v = bodies
-    stops = v * a < 0
-    stop = jnp.where(stops, -v / jnp.where(stops, a, 1.0), jnp.inf)
+    q, v, a = bodies.path_m, bodies.speed_m_s, by.centre
+    slip, change = bodies.slip_m_s, a if by.rim is None else a - by.rim
+    ends = slip * change < 0
+    grip = jnp.where(ends, -slip / jnp.where(ends, change, 1.0), jnp.inf)
     foot = jnp.full_like(q, jnp.inf)
     if scene.has_table:
         toward = jnp.where(q < 0, 1.0, -1.0)
@@ -228,8 +276,8 @@ def _event_times(
     if len(scene.names) > 1:
         hit = _reaches(bodies.gap_m(scene), v[:-1] - v[1:], a[:-1] - a[1:])
         hit = jnp.where(touches, jnp.inf, hit)
-    soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([stop, foot, hit])))
-    return _Events(stop, foot, hit, soonest)
+    soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([grip, foot, hit])))
+    return _Events(grip, foot, hit, soonest)
 
 
 def _reaches(distance: jax.Array, v: jax.Array, a: jax.Array) -> jax.Array:
@@ -244,11 +292,49 @@ def _reaches(distance: jax.Array, v: jax.Array, a: jax.Array) -> jax.Array:
     return jnp.where(forward, at_once, jnp.where(turning, later, jnp.inf))
 
 
-def _after_hit(v: jax.Array, i: int, law: Dynamics) -> jax.Array:
-    """Speeds after object i knocked against object i + 1."""
-    m1, m2 = law.inertia[i], law.inertia[i + 1]
-    approach = v[i] - v[i + 1]
+def _past_foot(
+    v: jax.Array,
+    u: jax.Array | None,
+    arrives: jax.Array,
+    time_s: jax.Array,
+    law: Dynamics,
+    scene: Surroundings,
+) -> tuple[jax.Array, jax.Array | None]:
+    """Speeds of centres and rims after the impulse that turns those that arrive at the foot.
+
+    Its friction is k times as large, or what ends the slip.
+    """
+    cos, sin = law.turn
+    rim = jnp.zeros_like(v) if u is None else u
+    along, lever = v * cos, law.inertia * law.rim
+    at_foot = state_at(jnp.zeros_like(v), v - rim, time_s, scene)
+    most = law.coefficient(at_foot) * jnp.abs(v * sin)
+    slip = along - rim
+    ends = most * (1 + lever) >= jnp.abs(slip)
+    rubbed = jnp.where(ends, slip / (1 + lever), jnp.sign(slip) * most)
+    turned = rim + lever * rubbed
+    v = jnp.where(arrives, jnp.where(ends, turned, along - rubbed) * law.foot, v)
+    return v, None if u is None else jnp.where(arrives, turned * law.foot, u)
+
+
+def _after_hits(bodies: Bodies, hits: jax.Array, law: Dynamics, scene: Surroundings) -> jax.Array:
+    """Speeds `[object]` after the neighbours that `hits` `[object - 1]` names knock together.
+
+    Impulses only push, and neighbours part at least e times as fast as they met: of all such
+    speeds the nearest in kinetic energy, found by merging as in `_accelerations`. So what stands
+    against a body that is hit is pushed on at once. Faces are smooth: rims keep their speeds.
+    """
+    v = bodies.speed_m_s
+    meets = hits | (bodies.gap_m(scene) < TOUCH_M)
+    approach = v[:-1] - v[1:]
     e = jnp.where(approach > PLASTIC_M_S, law.restitution, 0.0)
-    common = (m1 * v[i] + m2 * v[i + 1]) / (m1 + m2)
-    rebound = e * approach / (m1 + m2)
-    return v.at[i].set(common - rebound * m2).at[i + 1].set(common + rebound * m1)
+    parting = jnp.cumsum(jnp.where(meets, e * approach, 0.0))
+    ahead = jnp.concatenate([jnp.zeros(1), parting])
+    count = len(scene.names)
+    together, common = jnp.eye(count, dtype=bool), v - ahead
+    for _ in range(count - 1):
+        for i in range(count - 1):
+            together = _merged(together, i, meets[i] & (common[i] > common[i + 1]))
+            weight = together.astype(v.dtype)
+            common = weight @ (law.inertia * (v - ahead)) / (weight @ law.inertia)
+    return jnp.where(jnp.any(hits), common + ahead, v)

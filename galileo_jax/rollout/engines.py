@@ -19,12 +19,19 @@ def make_engine(name: str, model: Model) -> Engine:
         raise InputError(f"engine: unknown value {name!r}; known: {', '.join(ENGINES)}")
     if name == "auto":
         name = "rigid"
+    is_free = not model.scene.surroundings.has_surface
+    if name == "rigid" and is_free:
+        from galileo_jax.rollout.engine_free import EngineFree
+
+        return EngineFree(model)
     if name == "rigid":
         from galileo_jax.rollout.engine_rigid import EngineRigid
 
         return EngineRigid(model)
-    if not model.scene.surroundings.has_surface:
-        raise InputError(f"engine: {name!r} has no scene of a fall; rigid or auto expected")
+    if is_free:
+        raise InputError(f"engine: {name!r} has no scene without a ramp; rigid or auto expected")
+    if any(model.scene.surroundings.rolls):
+        raise InputError(f"engine: {name!r} has nothing that rolls; rigid or auto expected")
     if name == "mjx":
         from galileo_jax.rollout.engine_mjx import EngineMJX
 

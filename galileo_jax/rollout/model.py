@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any
 
 from galileo_jax.effects.effect import Effect
+from galileo_jax.effects.laws import LAWS
 from galileo_jax.effects.nuisances import NUISANCES
 from galileo_jax.parameters import LogNormal, Parameter, Uniform
 from galileo_jax.scene.scene import Scene
@@ -26,13 +27,13 @@ class Model:
       scene: the compiled scene.
       duration_s: how long rollouts last.
       effects: physical effects that are part of the hypothesis (none is the base model).
-      nuisances: always there.
+      nuisances: always there, after the scenario's own laws.
     """
 
     scene: Scene
     duration_s: float
     effects: tuple[Effect, ...] = ()
-    nuisances: tuple[Effect, ...] = field(default=NUISANCES)
+    nuisances: tuple[Effect, ...] = field(default=LAWS + NUISANCES)
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

@@ -3,6 +3,7 @@
 Written in the array standard, so that the same lines run in NumPy (C engine) and in JAX.
 """
 
+import dataclasses
 import functools
 import operator
 from collections.abc import Callable, Mapping, Sequence
@@ -19,43 +20,43 @@ LEAST_FRICTION = 1e-5
 class Dynamics(NamedTuple):
     """The equations of motion along the path, for given parameters; leading axes `[...]`.
 
-        inertia * acceleration = drive - sign(speed) * brake;    at rest while |drive| <= brake
+        inertia * acceleration = drive - sign(slip) * brake
+        rim's acceleration     = rim * sign(slip) * brake,           slip = speed - rim's speed
+
+    or, while less than the brake keeps the slip at 0, with so much of it. What does not roll has
+    rim = 0: its slip is its speed, and without slip it rests.
 
     Attributes:
       mass: `[..., object]`, kg.
       inertia: `[..., object]`, kg; the mass, and what turns with it.
+      rim: `[..., object]`, 1 / (beta m), 1/kg, of what rolls: how friction turns it; 0 of others.
       friction: `[..., object]`, the constant coefficients that effects start from.
       start_m, start_speed_m_s: `[..., object]`, at the release.
       ramp_rad, table_rad: `[...]`, true slopes.
+      turn: cos and sin, each `[...]`, of the angle by which the path turns at the foot.
       foot: `[...]`, factor on the speed kept at the foot.
       restitution: `[...]`, between objects.
       coefficient: `State` to friction coefficients `[..., object]`.
       drive: `State` to forces along the path but friction, `[..., object]`, N.
+      brake: `State` to friction's size `[..., object]`, N.
+      gravity: m/s^2.
     """
 
     mass: Array
     inertia: Array
+    rim: Array
     friction: Array
     start_m: Array
     start_speed_m_s: Array
     ramp_rad: Array
     table_rad: Array
+    turn: tuple[Array, Array]
     foot: Array
     restitution: Array
     coefficient: Callable[[State], Array]
     drive: Callable[[State], Array]
+    brake: Callable[[State], Array]
     gravity: Array
-
-    def slope_rad(self, state: State) -> Array:
-        """The slope under each object, `[..., object]`."""
-        xp = self.mass.__array_namespace__()
-        return xp.where(state.is_on_ramp, self.ramp_rad[..., None], self.table_rad[..., None])
-
-    def brake(self, state: State) -> Array:
-        """Friction's size `[..., object]`, N."""
-        xp = self.mass.__array_namespace__()
-        normal = self.mass * self.gravity * xp.cos(self.slope_rad(state))
-        return self.coefficient(state) * normal
 
 
 def dynamics(
@@ -91,25 +92,45 @@ def dynamics(
     def coefficient(state: State) -> Array:
         return functools.reduce(lambda k, law: law(state, k), laws, friction)
 
+    # Once for each rollout: its loop has no need of sines.
+    weight = mass * scene.gravity
+    slopes = ramp[..., None], table[..., None]
+    # In the plane gravity has a direction of its own and is no force along the path.
+    pulls = [weight * (0.0 if scene.moves_in_plane else xp.sin(slope)) for slope in slopes]
+    normals = [weight * xp.cos(slope) for slope in slopes]
+
     def drive(state: State) -> Array:
-        slope = xp.where(state.is_on_ramp, ramp[..., None], table[..., None])
-        pull = mass * scene.gravity * xp.sin(slope)
+        pull = xp.where(state.is_on_ramp, *pulls)
         return functools.reduce(operator.add, (force(state) for force in forces), pull)
+
+    def brake(state: State) -> Array:
+        return coefficient(state) * xp.where(state.is_on_ramp, *normals)
 
     return Dynamics(
         mass=mass,
         inertia=mass if share is None else mass * (1.0 + share),
+        rim=_rim(mass, scene),
         friction=friction,
         start_m=start,
         start_speed_m_s=xp.zeros(mass.shape) if speed is None else speed,
         ramp_rad=ramp,
         table_rad=table,
+        turn=(xp.cos(ramp - table), xp.sin(ramp - table)),
         foot=foot,
         restitution=xp.zeros(lead) if restitution is None else restitution,
         coefficient=coefficient,
         drive=drive,
+        brake=brake,
         gravity=scene.gravity,
     )
+
+
+def _rim(mass: Array, scene: Surroundings) -> Array:
+    xp = mass.__array_namespace__()
+    if not any(scene.rolls):
+        return xp.zeros(mass.shape)
+    rolls = xp.asarray(scene.rolls)
+    return rolls / (xp.where(rolls, xp.asarray(scene.roll_inertia), 1.0) * mass)
 
 
 def state_at(path_m: Array, speed_m_s: Array, time_s: Array, scene: Surroundings) -> State:
@@ -147,10 +168,15 @@ def to_plane(
 def pitch(position: Array, scene: Surroundings) -> Array:
     """How far each drawn object is turned, rad: -angle on the ramp, 0 on the table, in a fall.
 
-    While an object's length spans the foot it turns evenly per metre. `position`:
-    `[..., object, 2]`; returns `[..., object]`.
+    While an object's length spans the foot it turns evenly per metre; what rolls is drawn as if
+    it never slipped. `position`: `[..., object, 2]`; returns `[..., object]`.
     """
     xp = position.__array_namespace__()
+    if any(scene.rolls):
+        far = xp.sqrt(xp.sum((position - xp.asarray(scene.start_m)) ** 2, axis=-1))
+        sliding = pitch(position, dataclasses.replace(scene, rolls=()))
+        turned = far / xp.asarray(scene.half_height_m)
+        return sliding - xp.where(xp.asarray(scene.rolls), turned, 0.0)
     if not scene.has_surface:
         return xp.zeros(position.shape[:-1])
     if not scene.has_table:

@@ -206,18 +206,21 @@ def rigid_motion(
 
 
 def _without_overlap(path: Array, mass: Array, scene: Surroundings) -> Array:
-    """Undoes the overlap of object 1's front and object 2's back face.
+    """Undoes the overlap of each object's front with the next one's back face.
 
     Each centre is put back by its share (the other's mass over the sum) of the deepest overlap
     so far, as if the hit had taken no time.
     """
     xp = path.__array_namespace__()
-    front, back = scene.half_length_m[0], scene.half_length_m[1]
+    half = xp.asarray(scene.half_length_m)
     x = path + xp.asarray(scene.corner_m)
-    overlap = xp.maximum(x[..., 0] + front - (x[..., 1] - back), 0.0)
+    overlap = xp.maximum(x[..., :-1] + half[:-1] - (x[..., 1:] - half[1:]), 0.0)
     if isinstance(overlap, np.ndarray):
         deepest = np.maximum.accumulate(overlap, axis=0)
     else:
         deepest = jax.lax.cummax(overlap, axis=0)
-    share = xp.stack([-mass[..., 1], mass[..., 0]], axis=-1) / mass.sum(axis=-1, keepdims=True)
-    return path + deepest[..., None] * share
+    back = deepest * mass[..., 1:] / (mass[..., :-1] + mass[..., 1:])
+    none = xp.zeros_like(path[..., :1])
+    pushed_back = xp.concat([back, none], axis=-1)
+    pushed_on = xp.concat([none, deepest - back], axis=-1)
+    return path - pushed_back + pushed_on

@@ -1,17 +1,16 @@
 """How alike a predicted and a measured motion are."""
 
-from galileo_jax.similarity import earth_mover, gaussian_similarity, root_mean
+from galileo_jax.registry import load_entries
 from galileo_jax.similarity.similarity import (
     AbstractSimilarity,
     similarity_class,
     similarity_names,
 )
 
+load_entries("galileo_jax.similarity.library")
+
 __all__ = [
     "AbstractSimilarity",
-    "earth_mover",
-    "gaussian_similarity",
-    "root_mean",
     "similarity_class",
     "similarity_names",
 ]

@@ -19,6 +19,8 @@ OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of 
 KEYSTONE_SD = 0.006  # 1/m; half a degree of yaw or tilt, 1.5 m away
 CAMERA_M = 1.5  # a longer fall is seen from further away, at least its own length
 ROLL_SD_RAD = 0.002
+THROW_SD_RAD = 0.05  # nobody throws square to the camera: what comes nearer grows
+READ_OFF = 10.0  # times an angle's sd: so wide that the direction tells nothing more
 SCALE_SD = 0.001
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
 HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none
@@ -32,16 +34,9 @@ SMALLEST_MODE = 1e-3  # of a family's largest variance; what is smaller is left 
 MOVED_M = 0.002  # an object that has gone so far has been hit
 
 
-def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
-    """The patterns times their standard deviations, `[mode, object, 2, frame]`, m.
-
-    Offsets of each object and axis; keystone about either axis, roll and scale of the
-    camera, common to all objects; and, for what comes down a ramp, the step that an
-    off-centre point and a box's length make when the object turns at the foot.
-    After a hit the way each object goes is known to a tenth of a per cent.
-    """
-    position = np.nan_to_num(observation.position_m)
-    count, _, frames = position.shape
+def offsets(observation: Observation) -> list[np.ndarray]:
+    """The modes of a track as a whole: with these alone, displacements are what counts."""
+    count, _, frames = observation.position_m.shape
     found = []
     for i in range(count):
         for axis in range(2):
@@ -51,14 +46,30 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
             error = observation.covariance_m2[i, axis, axis, seen]
             offset[i, axis] = math.sqrt(OFFSET_SD_M**2 + error)
             found.append(offset)
-    x, y = position[:, 0], position[:, 1]
-    if scene.has_surface:
-        found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
-        found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
-    else:
-        found.append(_bent_scale(y, observation))
-    found.append(ROLL_SD_RAD * np.stack([-y, x], axis=1))
-    found.append(SCALE_SD * position)
+    return found
+
+
+def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True) -> np.ndarray:
+    """The patterns times their standard deviations, `[mode, object, 2, frame]`, m.
+
+    Offsets of each object and axis; keystone about either axis, roll and scale of the
+    camera, common to all objects; and, for what comes down a ramp, the step that an
+    off-centre point and a box's length make when the object turns at the foot.
+    After a hit the way each object goes is known to a tenth of a per cent. What only cameras
+    and trackers do (keystone, roll, scale, a drift past a hit) is among them if `is_filmed`.
+    """
+    position = np.nan_to_num(observation.position_m)
+    count, _, frames = position.shape
+    found = offsets(observation)
+    if is_filmed:
+        found.extend(_camera(position, observation, scene))
+    # A ramp's angle known within so much was read off the picture or the path: the direction
+    # there, used already, must not count again.
+    lean = READ_OFF * scene.angle_sd_rad if scene.has_surface else 0.0
+    roll = math.hypot(ROLL_SD_RAD if is_filmed else 0.0, lean)
+    if roll:
+        x, y = position[:, 0], position[:, 1]
+        found.append(roll * np.stack([-y, x], axis=1))
     for i, comes_down in enumerate(scene.comes_down):
         if comes_down:
             share = _share_past_foot(position[i, 0], scene, i)
@@ -72,10 +83,34 @@ def modes(observation: Observation, scene: Surroundings) -> np.ndarray:
                 found.append(step)
     if scene.has_surface:
         found.extend(_wobble(position, observation, scene))
-    else:
+    elif not scene.moves_in_plane:
         found.extend(_aside(position))
-    found.extend(_after_hit(position, observation))
+    found.extend(_after_hit(position, observation, is_filmed))
     return np.stack(found)
+
+
+def _camera(
+    position: np.ndarray, observation: Observation, scene: Surroundings
+) -> list[np.ndarray]:
+    """Keystone about either axis and scale, common to all objects."""
+    found = []
+    x, y = position[:, 0], position[:, 1]
+    if scene.has_surface:
+        found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
+        found.append(KEYSTONE_SD * np.stack([x * y, y * y], axis=1))
+    elif scene.moves_in_plane:
+        # Anywhere in the picture: about the middle of what is seen of the flight.
+        seen = observation.mask[:, None].repeat(2, axis=1)
+        middle = np.ma.masked_array(position, ~seen).mean(axis=-1, keepdims=True).filled(0.0)
+        aside = position - middle
+        away_m = max(CAMERA_M, float(np.ptp(np.where(seen, position, middle), axis=-1).max()))
+        yaw_sd = math.hypot(KEYSTONE_SD, THROW_SD_RAD / away_m)
+        for axis, sd in enumerate((yaw_sd, KEYSTONE_SD)):
+            found.append(sd * aside * aside[:, axis : axis + 1])
+    else:
+        found.append(_bent_scale(y, observation))
+    found.append(SCALE_SD * position)
+    return found
 
 
 def _wobble(
@@ -118,31 +153,50 @@ def _aside(position: np.ndarray) -> list[np.ndarray]:
     return found
 
 
-def _after_hit(position: np.ndarray, observation: Observation) -> list[np.ndarray]:
-    """For each object a step at the first hit, the way it goes from there, and a slow drift."""
-    x, times_s = position[:, 0], observation.times_s
-    if len(x) < 2 or not observation.mask[1].any():
-        return []
-    seen = np.flatnonzero(observation.mask[1])
-    moved = observation.mask[1] & (np.abs(x[1] - np.median(x[1, seen[:3]])) > MOVED_M)
-    if not moved.any():
-        return []
-    hit = max(int(np.argmax(moved)) - 1, 0)
-    after = times_s[hit + 1 :]
+def _after_hit(position: np.ndarray, observation: Observation, is_filmed: bool) -> list[np.ndarray]:
+    """For each hit and who is in it a step, the way it goes from there; filmed, a slow drift."""
+    found = []
+    for i in range(1, len(position)):
+        seen = np.flatnonzero(observation.mask[i])
+        if not seen.size:
+            continue
+        gone = np.abs(position[i, 0] - np.median(position[i, 0, seen[:3]]))
+        moved = observation.mask[i] & (gone > MOVED_M)
+        if moved.any():
+            hit = max(int(np.argmax(moved)) - 1, 0)
+            found.extend(_after(hit, (i - 1, i), position))
+            if is_filmed:
+                found.extend(_drift(hit, (i - 1, i), position, observation))
+    return found
+
+
+def _after(hit: int, objects: tuple[int, int], position: np.ndarray) -> list[np.ndarray]:
+    """What a hit in frame `hit` leaves behind in either object's motion."""
+    x = position[:, 0]
+    found = []
+    for i in objects:
+        way, step = np.zeros_like(position), np.zeros_like(position)
+        way[i, 0, hit:] = IMPULSE_SD * (x[i, hit:] - x[i, hit])
+        step[i, 0, hit + 1 :] = HIT_STEP_SD_M
+        found.extend([way, step])
+    return found
+
+
+def _drift(
+    hit: int, objects: tuple[int, int], position: np.ndarray, observation: Observation
+) -> list[np.ndarray]:
+    """What a hit in frame `hit` leaves behind in either object's track."""
+    after = observation.times_s[hit + 1 :]
     values, vectors = np.linalg.eigh(
         HIT_DRIFT_SD_M**2 * np.exp(-0.5 * ((after[:, None] - after) / HIT_DRIFT_S) ** 2)
     )
     kept = values > SMALLEST_MODE * values[-1]
     found = []
-    for i in range(len(x)):
+    for i in objects:
         for pattern in (np.sqrt(values[kept]) * vectors[:, kept]).T:
             drift = np.zeros_like(position)
             drift[i, 0, hit + 1 :] = pattern
             found.append(drift)
-        way, step = np.zeros_like(position), np.zeros_like(position)
-        way[i, 0, hit:] = IMPULSE_SD * (x[i, hit:] - x[i, hit])
-        step[i, 0, hit + 1 :] = HIT_STEP_SD_M
-        found.extend([way, step])
     return found
 
 

@@ -8,7 +8,7 @@ displacements count: for independent tracking errors that is the likelihood of t
 profile with its exact (tridiagonal) covariance, without losing the first frame's noise.
 """
 
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,9 @@ import numpy as np
 
 from galileo_jax.effects.effect import Surroundings
 from galileo_jax.observation import Observation
-from galileo_jax.similarity.discrepancy import crossing_sd_m, modes
+from galileo_jax.similarity.discrepancy import crossing_sd_m, modes, offsets
+
+NoiseModel = Literal["camera", "bodies", "tracker"]
 
 
 class Whitening(NamedTuple):
@@ -47,16 +49,30 @@ class GaussianLikelihood:
     is_log_likelihood: ClassVar[bool] = True
 
     @staticmethod
-    def prepare(observation: Observation, scene: Surroundings) -> Whitening:
-        """Decomposes the covariance of an observation in a scene."""
+    def prepare(
+        observation: Observation, scene: Surroundings, noise: NoiseModel = "camera"
+    ) -> Whitening:
+        """Decomposes the covariance of an observation in a scene.
+
+        Args:
+          observation: the data, with the tracker's own errors.
+          scene: what it shows.
+          noise: "camera": the tracker's errors and all of `discrepancy`; "bodies": without
+            the camera's part of it; "tracker": the tracker's errors alone, to see what the
+            rest is good for.
+        """
         mask = observation.mask
         covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
-        extra = crossing_sd_m(observation, scene) ** 2
-        covariance += extra[:, :, None, None] * np.eye(2)
+        if noise != "tracker":
+            extra = crossing_sd_m(observation, scene) ** 2
+            covariance += extra[:, :, None, None] * np.eye(2)
+            patterns = modes(observation, scene, is_filmed=noise == "camera")
+        else:
+            patterns = np.stack(offsets(observation))
         covariance[~mask] = np.eye(2)
         inverse_root = np.linalg.inv(np.linalg.cholesky(covariance)) * mask[..., None, None]
         inverse_root = np.moveaxis(inverse_root, 1, -1)
-        patterns = np.einsum("oijt,mojt->moit", inverse_root, modes(observation, scene))
+        patterns = np.einsum("oijt,mojt->moit", inverse_root, patterns)
         flat = patterns.reshape(len(patterns), -1)
         _, gain, basis = np.linalg.svd(flat, full_matrices=False)
         return Whitening(

@@ -41,7 +41,7 @@ def track_clip(clip: Clip, *, progress: Progress | None = None) -> Track:
     if passes == 3:
         clip = _with_points(clip, open_frames, advance)
     starts = [
-        Start(item.name, item.point_px, outline_of(clip, item), item.first_frame)
+        Start(item.name, item.point_px, outline_of(clip, item), item.first_frame or 0)
         for item in clip.objects
         if item.point_px is not None
     ]

@@ -6,7 +6,7 @@ from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refine import FINE_PX, align
 from galileo_jax.tracking.template import Template
 
-SHARES = np.linspace(0.0, 1.0, 6)
+SHARES = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0])
 MIN_SPEED_PX = 3.0
 """Slower than this per frame, the smear is too short to measure."""
 UNLEARNT = (0.0, 0.25, 0.5)
@@ -45,14 +45,20 @@ class Exposure:
 
     @property
     def share(self) -> float:
-        """The share with the least misfit, interpolated by a parabola; 0.25 unlearnt."""
+        """The share with the least misfit; 0.25 unlearnt.
+
+        What a smear changes grows with its variance: between the shares tried, the misfit is
+        taken as a parabola of the share's square.
+        """
         if not self.frames:
             return UNLEARNT[1]
         i = int(np.clip(np.argmin(self.misfit), 1, len(SHARES) - 2))
-        low, middle, high = self.misfit[i - 1 : i + 2]
-        bend = low - 2 * middle + high
-        offset = 0.5 * (low - high) / bend if bend > 0 else np.sign(low - high)
-        return float(np.clip(SHARES[i] + offset * (SHARES[1] - SHARES[0]), 0, 1))
+        low, middle, high = SHARES[i - 1 : i + 2] ** 2
+        before, after = np.diff(self.misfit[i - 1 : i + 2]) / (middle - low, high - middle)
+        if after <= before:
+            return float(SHARES[np.argmin(self.misfit)])
+        least = (low + middle) / 2 - before * (high - low) / (2 * (after - before))
+        return float(np.sqrt(np.clip(least, 0, 1)))
 
     @property
     def trials(self) -> tuple[float, ...]:

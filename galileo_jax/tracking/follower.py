@@ -29,6 +29,11 @@ MAX_COAST_FRAMES = 8
 """A hidden object is expected to have gone on for so many frames, and then to have stopped."""
 LONG_GONE_FRAMES, LOOK_EVERY = 16, 4
 """An object missed for longer is looked for only in every so many frames."""
+HELD_SPEED_PX, HELD_SHARE = 1.0, 0.1
+"""What moved faster than this per frame and is now shown within this share of a step from where it
+was has stopped at once, or the video repeats a frame; the next frame tells."""
+AS_BEFORE = 0.3
+"""Share of its path since by which what goes on after a repeated frame is off a steady motion."""
 SHARP_PX = 1.0
 """An object that moves less than this during the exposure gives a patch for the template."""
 MAX_PATCHES = 32
@@ -60,6 +65,7 @@ class Follower:
     patches: list[np.ndarray] = field(default_factory=list)
     correlation: float = 1.0
     frames_missed: int = 0
+    frames_held: int = 0
     stride: int = 1
     frames_sharp: int = 0
 
@@ -78,21 +84,46 @@ class Follower:
             self.poses.append(np.full(3, np.nan))
             self.frames_missed += 1
             return
+        if self._is_held(fit):
+            self.frames_held = 1
+            self.poses.append(fit.pose)
+            return
+        if self.frames_held and not self.frames_missed and self._went_on(fit):
+            self.poses[-1] = np.full(3, np.nan)
         if before is not None:
-            self.velocity = self._velocity_at(fit.pose)
-            self.mean_velocity = (fit.pose - self.pose) / (self.frames_missed + 1)
+            self.velocity, self.mean_velocity = (
+                self._velocity_at(fit.pose),
+                (fit.pose - self.pose) / self._frames_since,
+            )
         self.correlation = fit.correlation
-        self.frames_missed = 0
+        self.frames_missed = self.frames_held = 0
         self.pose = fit.pose
         self.poses.append(fit.pose)
         self.exposure.add(image, self.template, self.pose, self.velocity)
         self._keep(image)
 
+    @property
+    def _frames_since(self) -> int:
+        """Frames from the last one that showed where the object is to the next."""
+        return self.frames_missed + self.frames_held + 1
+
+    def _is_held(self, fit: Fit) -> bool:
+        """Whether the object is shown where it was though it moved: first frame of a stop, too."""
+        speed, step = (np.hypot(*v[:2]) for v in (self.velocity, fit.pose - self.pose))
+        is_first = not self.frames_held and not self.frames_missed
+        return bool(is_first and speed > HELD_SPEED_PX and step < HELD_SHARE * speed)
+
+    def _went_on(self, fit: Fit) -> bool:
+        """Whether the object is where a steady motion takes it."""
+        off = fit.pose - self._expected()
+        path = self._frames_since * self.velocity
+        return bool(np.hypot(*off[:2]) < AS_BEFORE * np.hypot(*path[:2]))
+
     def _near(self, before: np.ndarray | None, image: np.ndarray) -> Fit | None:
         """The best fit around where the object was, went, or is led to by its features."""
         guesses = [self._expected(), self.pose]
         if before is not None and not self.frames_missed:
-            reach = int(np.ceil(2 * np.hypot(*self.velocity[:2]))) + 16
+            reach = int(np.ceil(2 * self._frames_since * np.hypot(*self.velocity[:2]))) + 16
             motion = rigid_motion(*follow(before, image, self.pose, self.template.region, reach))
             if motion is not None:
                 angle, shift = motion
@@ -144,14 +175,14 @@ class Follower:
 
     def _expected(self) -> np.ndarray:
         """Where the object should be if it goes on, for a few frames of hiding."""
-        return self.pose + min(self.frames_missed + 1, MAX_COAST_FRAMES) * self.velocity
+        return self.pose + min(self._frames_since, MAX_COAST_FRAMES) * self.velocity
 
     def _leap_px(self) -> float:
         """How far from the expected place the object can be; any distance while it is new."""
         if len(self.poses) - self.frames_missed < SETTLED_FRAMES:
             return np.inf
         speed = float(np.hypot(*self.velocity[:2]))
-        return max(1.5 * speed, self.template.radius) * min(self.frames_missed + 1, MAX_LEAP_FRAMES)
+        return max(1.5 * speed, self.template.radius) * min(self._frames_since, MAX_LEAP_FRAMES)
 
     def _velocity_at(self, pose: np.ndarray) -> np.ndarray:
         """The velocity at `pose`: the mean one since the last frame plus half its change.
@@ -159,7 +190,7 @@ class Follower:
         Without the second term a steadily accelerated object seems slower than it is, and
         the exposure longer. Where the speed changes by more than a half, it was a blow.
         """
-        mean = (pose - self.pose) / (self.frames_missed + 1)
+        mean = (pose - self.pose) / self._frames_since
         change = mean - self.mean_velocity
         is_blow = np.hypot(*change[:2]) > 0.5 * np.hypot(*mean[:2])
         return mean if is_blow else mean + change / 2

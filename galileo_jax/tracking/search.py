@@ -19,21 +19,26 @@ MAX_PEAKS = 4
 def best_fit(
     image: np.ndarray, template: Template, guesses: list[tuple[np.ndarray, np.ndarray]]
 ) -> Fit:
-    """The best alignment over guesses, each a pose and a motion during the exposure.
+    """The best alignment over guesses, at least one, each a pose and a motion during the exposure.
 
-    Coarse, then fine; stops at the first sure one. Fits whose contrast is not the template's
-    count only if there is no other.
+    The first guess is tried finely at once; then each coarsely, then finely. Stops at the first
+    sure one. Fits whose contrast is not the template's count only if there is no other.
     """
-    best: Fit | None = None
+    pose, motion = guesses[0]
+    best = align(image, template.target(motion, FINE_PX), pose)
+    if _is_sure(best):
+        return best
     for pose, motion in guesses:
         coarse = align(image, template.target(motion, COARSE_PX), pose, steps=6, robust=False)
         fit = align(image, template.target(motion, FINE_PX), coarse.pose)
-        if best is None or _rank(fit) > _rank(best):
-            best = fit
-        if is_alike(best) and best.correlation > SURE:
+        best = max(best, fit, key=_rank)
+        if _is_sure(best):
             break
-    assert best is not None, "best_fit needs a guess"
     return best
+
+
+def _is_sure(fit: Fit) -> bool:
+    return is_alike(fit) and fit.correlation > SURE
 
 
 def is_alike(fit: Fit) -> bool:

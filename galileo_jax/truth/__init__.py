@@ -5,6 +5,7 @@ and `Declared` is what a user would write down about it.
 """
 
 from galileo_jax.truth.declared import Declared
+from galileo_jax.truth.free import FreeTruth, draw_free, hide_free, solve_free
 from galileo_jax.truth.hidden import Hidden, hide
 from galileo_jax.truth.motion import LONGEST_S, SOLVERS, Motion, Solver, roll_out
 from galileo_jax.truth.record import truth_record
@@ -16,13 +17,17 @@ __all__ = [
     "SLOWEST_HIT_M_S",
     "SOLVERS",
     "Declared",
+    "FreeTruth",
     "Hidden",
     "Motion",
     "Solver",
     "Truth",
+    "draw_free",
     "draw_series",
     "draw_truth",
     "hide",
+    "hide_free",
     "roll_out",
+    "solve_free",
     "truth_record",
 ]

@@ -125,7 +125,10 @@ def _draw(
         where = truth.surroundings
         low = where.start_path_m[0] + FREE_WAY_M
         length = drawn.get(f"{name.removesuffix(START)}_length", 0.0)
-        high = where.start_path_m[1] - sum(where.half_length_m) - length - FREE_WAY_M
+        way = truth.release_m
+        if len(truth.objects) > 1:
+            way = where.start_path_m[1] - sum(where.half_length_m[:2])
+        high = way - length - FREE_WAY_M
         return float(rng.uniform(low, max(low, high)))
     # One that somebody added: what its prior holds for likely, away from the middle.
     z = (0.3 + 1.2 * share) if name == strength_name else rng.uniform(-1.0, 1.0)

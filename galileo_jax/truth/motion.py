@@ -40,6 +40,11 @@ class Motion:
         last = np.flatnonzero(moving)
         return float(self.times_s[min(last[-1] + 1, len(moving) - 1)]) if last.size else 0.0
 
+    def leaves_s(self, x_m: float) -> float:
+        """When the first object is beyond `x_m`; the end if none ever is."""
+        beyond = np.flatnonzero(self.position_m[:, 0].max(axis=0) > x_m)
+        return float(self.times_s[beyond[0] if beyond.size else -1])
+
     def at(self, times_s: np.ndarray) -> "Motion":
         """The motion at other times, linear in between; at rest after the end."""
 
@@ -56,13 +61,18 @@ class Motion:
         )
 
     def events_s(self, truth: Truth) -> dict[str, float | None]:
-        """When object 1's centre turns at the foot and when it meets object 2; None = never."""
+        """When object 1's centre turns at the foot and when it meets object 2; None = never.
+
+        And for each further object, `hitN`: when object N is first moved.
+        """
         x = self.position_m[:, 0]
         # The bumpers give way by a fraction of a millimetre: moved says hit more surely.
-        return {
-            "foot": self._first_s(x[0] - truth.surroundings.corner_m[0]),
-            "hit": self._first_s(x[1] - x[1, 0] - 1e-5),
-        }
+        moved = [self._first_s(each - each[0] - 1e-5) for each in x[1:]]
+        names = ("hit", *(f"hit{i}" for i in range(3, len(x) + 1)))
+        found: dict[str, float | None] = {"foot": None, "hit": None}
+        if truth.surroundings.has_table:
+            found["foot"] = self._first_s(x[0] - truth.surroundings.corner_m[0])
+        return found | dict(zip(names, moved, strict=False))
 
     def _first_s(self, value: np.ndarray) -> float | None:
         """When `value` `[time]`, negative at first, reaches zero."""

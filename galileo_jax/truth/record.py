@@ -28,24 +28,22 @@ def truth_record(
     hidden = {name: found for name, found in parameters.items() if found}
     names = [parameter.name for found in hidden.values() for parameter in found]
     values = truth.effect_values
-    (m1, m2), (k1, k2) = truth.mass_kg, truth.friction
+    stand_m = (truth.object2_x_m, *truth.beyond_x_m)[: len(truth.objects) - 1]
     events = motion.events_s(truth)
     return {
         "engine": "galileo_jax",
         "effect": "+".join(hidden) or "none",
         "effect_parameters": {name: values[name] for name in names},
         "nuisances": {name: value for name, value in values.items() if name not in names},
-        "m1": m1,
-        "k1": k1,
-        "m2": m2,
-        "k2": k2,
+        "scenario": truth.scenario,
+        "objects": len(truth.objects),
+        **truth.known,
         "gravity": truth.gravity,
         "ramp_angle_deg_true": truth.ramp_angle_deg,
         "ramp_angle_deg_declared": declared.ramp_angle_deg,
         "release_m": truth.release_m,
-        "object2_y_m": truth.object2_x_m,
-        "size1_m": truth.objects[0].size_m,
-        "size2_m": truth.objects[1].size_m,
+        **{f"object{i}_y_m": place for i, place in enumerate(stand_m, 2)},
+        **{f"size{i}_m": each.size_m for i, each in enumerate(truth.objects, 1)},
         "events_s": {
             name: None if time is None else round(time + declared.release_s, 4)
             for name, time in events.items()

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from galileo_jax.clip.schema import Shape
 from galileo_jax.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.effects.nuisances.release_instant import ReleaseInstant
@@ -29,6 +30,8 @@ def draw_series(
     things: np.random.Generator,
     secrets: np.random.Generator,
     frame_s: float | None = None,
+    scenario: str = "ramp",
+    shapes: Sequence[Shape] = ("box", "box"),
 ) -> list[tuple[Truth, Motion]]:
     """Draws `count` trials of the same objects from other heights and distances.
 
@@ -37,7 +40,7 @@ def draw_series(
 
     Args:
       ramp_angle_deg: as declared.
-      given: m1, k1, m2, k2 that are not to be drawn.
+      given: masses and frictions (m1, k1, ...) that are not to be drawn.
       hidden: what is hidden; of the parameters drawn, those of a trial differ between clips.
       count: how many clips.
       solver: see `roll_out`.
@@ -45,9 +48,13 @@ def draw_series(
       secrets: for what is hidden.
       frame_s: time between frames; given, clips have the small faults of real ones (release
         between frames, a foot and an impact that are not ideal).
+      scenario: see `draw_truth`.
+      shapes: see `draw_truth`.
     """
     first, motion = _try(
-        lambda: _with_hidden(draw_truth(things, ramp_angle_deg, given), hidden, secrets, frame_s),
+        lambda: _with_hidden(
+            draw_truth(things, ramp_angle_deg, given, scenario, shapes), hidden, secrets, frame_s
+        ),
         solver,
     )
     trials = [(first, motion)]
@@ -65,12 +72,15 @@ def draw_series(
 
 
 def _try(draw, solver: Solver) -> tuple[Truth, Motion]:
-    """The first of some draws in which object 2 is hit on the table; else the last."""
+    """The first of some draws in which the objects on the table are hit; else the last."""
     for _ in range(NUM_TRIES):
         truth = draw()
         motion = roll_out(truth, solver)
-        is_hit = motion.events_s(truth)["hit"] is not None
-        if not truth.effects or (is_hit and motion.position_m[:, 0].max() < FARTHEST_M):
+        events = motion.events_s(truth)
+        is_hit = all(events[name] is not None for name in events if name.startswith("hit"))
+        if len(truth.objects) < 2 or (len(truth.objects) == 2 and not truth.effects):
+            break
+        if is_hit and motion.position_m[:, 0].max() < FARTHEST_M:
             break
     return truth, motion
 
@@ -108,6 +118,6 @@ def _moved(
     first: Truth, ramp_angle_deg: float, given: Mapping[str, float], rng: np.random.Generator
 ) -> Truth:
     """The objects of the first clip without effects, from another height to another place."""
-    (m1, m2), (k1, k2) = first.mass_kg, first.friction
-    other = draw_truth(rng, ramp_angle_deg, {**given, "m1": m1, "k1": k1, "m2": m2, "k2": k2})
+    shapes = [each.shape for each in first.objects]
+    other = draw_truth(rng, ramp_angle_deg, {**given, **first.known}, first.scenario, shapes)
     return replace(other, objects=first.objects)

@@ -7,6 +7,8 @@ of `rollout/motion.py` (the effects act there and nowhere else),
     M (v+ - v) = h d + p + l,    |p| <= h b, p opposes v+ or stops it,    l >= 0 pushes apart,
     q+ = q + h (v + v+) / 2.
 
+Where a body rolls, p opposes or stops its slip v+ - u+, and turns its rim: u+ - u = -p / (beta m).
+
 Forces are taken in the middle of the step, foretold with the last step's acceleration. An
 impact in mid-step is put at its time by the speeds before and after it; at the foot a step is
 split.
@@ -68,6 +70,10 @@ class _Bodies:
         self.path: list[float] = law.start_m.tolist()
         self.speed: list[float] = law.start_speed_m_s.tolist()
         self.inertia: list[float] = law.inertia.tolist()
+        self.rim: list[float] = law.rim.tolist()
+        self.rim_speed = [v if w else 0.0 for v, w in zip(self.speed, self.rim, strict=True)]
+        pairs = zip(self.inertia, self.rim, strict=True)
+        self.resists = [m / (1 + m * w) for m, w in pairs]  # impulse over change of slip
         self.acceleration = [0.0] * len(self.path)
         x = np.add(scene.half_length_m, scene.corner_m)
         y = np.subtract(scene.half_length_m, scene.corner_m)
@@ -75,52 +81,54 @@ class _Bodies:
 
     def step(self, time_s: float, h: float = STEP_S) -> None:
         """Moves on by `h`; a step in which a body passes the foot is split there."""
-        path, speed = self._moved(time_s, h)
+        path, speed, rim_speed = self._moved(time_s, h)
         if self.scene.has_table:
             for i, (before, after) in enumerate(zip(self.path, path, strict=True)):
                 if (before < 0) == (after < 0) or before == after:
                     continue
                 part = h * before / (before - after)
-                self.path, self.speed = self._moved(time_s, part)
+                self.path, self.speed, self.rim_speed = self._moved(time_s, part)
                 self.path[i] = 0.0 if before < 0 else -TOUCH_M
-                self.speed[i] *= self._kept_at_foot(i, time_s)
+                self._turn_at_foot(i, time_s)
                 return self.step(time_s + part, h - part)
-        self.path, self.speed = path, speed
+        self.path, self.speed, self.rim_speed = path, speed, rim_speed
 
-    def _moved(self, time_s: float, h: float) -> tuple[list[float], list[float]]:
-        """Paths and speeds after `h`."""
+    def _moved(self, time_s: float, h: float) -> tuple[list[float], list[float], list[float]]:
+        """Paths and speeds, of centres and rims, after `h`."""
         ahead = zip(self.path, self.speed, self.acceleration, strict=True)
         middle = [(q + 0.5 * h * v, v + 0.5 * h * a) for q, v, a in ahead]
         halfway, speeds = np.transpose(middle)
         state = state_at(halfway, speeds, time_s + 0.5 * h, self.scene)
-        drive, brake = self.law.drive(state).tolist(), self.law.brake(state).tolist()
+        slipping = state._replace(speed_m_s=speeds - self.rim_speed)
+        drive, brake = self.law.drive(state).tolist(), self.law.brake(slipping).tolist()
         pulls = zip(self.speed, drive, self.inertia, strict=True)
         free = [v + h * d / m for v, d, m in pulls]
-        after, hit_s = self._impulses(free, [h * b for b in brake], h)
+        after, rims, hit_s = self._impulses(free, [h * b for b in brake], h)
         path = list(self.path)
         for i, (v, w, hit) in enumerate(zip(self.speed, after, hit_s, strict=True)):
             self.acceleration[i] = 0.0 if hit is not None or h == 0 else (w - v) / h
             early = 0.5 * h if hit is None else hit
             path[i] += early * v + (h - early) * w
-        return path, after
+        return path, after, rims
 
     def _impulses(
         self, free: list[float], limits: list[float], h: float
-    ) -> tuple[list[float], list[float | None]]:
-        """Speeds after friction and contacts, and when in the step each body was hit.
+    ) -> tuple[list[float], list[float], list[float | None]]:
+        """Speeds of centres and rims after friction and contacts, and when each body was hit.
 
         Gauss-Seidel sweeps over one-body friction and two-body contacts.
         """
-        v, m = list(free), self.inertia
+        v, u, m = list(free), list(self.rim_speed), self.inertia
         rub, push = [0.0] * len(v), [0.0] * (len(v) - 1)
         hit_s: list[float | None] = [None] * len(v)
         rebound = [0.0] * len(push)
         for sweep in range(MAX_SWEEPS):
             change = 0.0
             for i, limit in enumerate(limits):
-                wanted = min(limit, max(-limit, rub[i] - m[i] * v[i]))
+                wanted = min(limit, max(-limit, rub[i] - self.resists[i] * (v[i] - u[i])))
                 change = max(change, abs(wanted - rub[i]) / m[i])
                 v[i] += (wanted - rub[i]) / m[i]
+                u[i] -= (wanted - rub[i]) * self.rim[i]
                 rub[i] = wanted
             for j, already in enumerate(push):
                 gap = self.path[j + 1] - self.path[j] - self.between[j]
@@ -139,12 +147,18 @@ class _Bodies:
                 push[j] = wanted
             if change < TOLERANCE_M_S or not any(push):
                 break
-        return [0.0 if abs(w) < TOLERANCE_M_S else w for w in v], hit_s
+        return [0.0 if abs(w) < TOLERANCE_M_S else w for w in v], u, hit_s
 
-    def _kept_at_foot(self, i: int, time_s: float) -> float:
-        """The share of the speed that is kept where the path bends."""
+    def _turn_at_foot(self, i: int, time_s: float) -> None:
+        """The impulse where the path bends, and its friction: all, or what ends slip."""
         law, at_foot = self.law, np.zeros(len(self.path))
-        state = state_at(at_foot, np.asarray(self.speed), time_s, self.scene)
-        turn = float(law.ramp_rad - law.table_rad)
-        kept = np.cos(turn) - law.coefficient(state)[i] * abs(np.sin(turn))
-        return float(max(kept, 0.0) * law.foot)
+        slips = np.subtract(self.speed, self.rim_speed)
+        cos, sin = (float(part) for part in law.turn)
+        most = law.coefficient(state_at(at_foot, slips, time_s, self.scene))[i]
+        most *= abs(self.speed[i] * sin)
+        slip = self.speed[i] * cos - self.rim_speed[i]
+        ending = slip * self.resists[i] / self.inertia[i]
+        rubbed = float(np.clip(ending, -most, most))
+        self.speed[i] = float(law.foot) * (self.speed[i] * cos - rubbed)
+        turned = self.rim_speed[i] + rubbed * self.inertia[i] * self.rim[i]
+        self.rim_speed[i] = float(law.foot) * turned

@@ -15,6 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from tests.clip import track_file_makers as make
 from tests.video.make_video import SIZE_PX, with_index_first, with_uneven_frames, write_video
 
 GOOD_YAML = """\
@@ -137,6 +138,20 @@ def _track(old: str, new: str, *words: str) -> tuple[Callable[[Path], Path], tup
     return build, ("clip.csv", *words)
 
 
+def _foreign(
+    name: str, content: str, keys: str, *words: str
+) -> tuple[Callable[[Path], Path], tuple[str, ...]]:
+    """A track file of another tool, and its yaml."""
+
+    def build(folder: Path) -> Path:
+        (folder / name).write_text(content)
+        path = folder / "clip.yaml"
+        path.write_text(TRACK_YAML.replace("clip.csv", name).replace("ramp", "incline", 1) + keys)
+        return path
+
+    return build, words
+
+
 def _file(name: str, content: bytes | None) -> Callable[[Path], Path]:
     """Only the file `name`, without a yaml; None for no file at all."""
 
@@ -223,7 +238,9 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "name_with_space": _edit("object1", "object 1", "objects[0].name", "object 1"),
     "video_is_a_number": _edit("clip.mp4", "5", "video", "5", "file name"),
     # values and units
-    "unknown_scenario": _edit("scenario: ramp", "scenario: slope", "slope", "ramp, incline, fall"),
+    "unknown_scenario": _edit(
+        "scenario: ramp", "scenario: slope", "slope", "fall, flight, incline"
+    ),
     "unknown_shape": _edit("shape: box", "shape: cube", "shape", "cube", "box, cylinder"),
     "unknown_direction": _edit("direction: right", "direction: up", "direction", "up", "left"),
     "fps_is_zero": _edit("fps: 30.0", "fps: 0", "fps", "0", "above 0"),
@@ -339,6 +356,25 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "track_is_empty": _track(good_track(), "", "empty"),
     "track_of_two_rows": _track(good_track().split("0.066667")[1], "\n", "rows"),
     "track_with_semicolons": _track(",", ";", "commas"),
+    # tracks of other tools
+    "trk_cut_off": _foreign("a.trk", make.trk()[:3000], "", "a.trk", "not whole XML"),
+    "trk_is_other_xml": _foreign("a.trk", "<?xml version='1.0'?><kml/>", "", "a.trk", "holds kml"),
+    "export_without_unit": _foreign(
+        "a.txt", make.tracker_text(), "", "clip.yaml: track_units: missing", "a.txt", "m | cm"
+    ),
+    "table_without_axis": _foreign(
+        "a.csv", make.plain_table(True), "", "clip.yaml: track_y: missing", "up | down"
+    ),
+    "logger_pro_with_a_word": _foreign(
+        "a.csv", make.logger_pro().replace("0.216667", "later"), "", "a.csv: line 3", "'later'"
+    ),
+    "dlc_without_scorer": _foreign(
+        "a.csv", make.dlc_csv().split("\n", 1)[1], "fps: 60.0\n", "a.csv: no row 'scorer'"
+    ),
+    "dlc_without_likelihood": _foreign(
+        "a.csv", make.dlc_csv().replace("likelihood", "p"), "fps: 60.0\n", "no column likelihood"
+    ),
+    "track_of_an_unknown_tool": _foreign("a.csv", "a,b\n1,2\n", "", "a.csv: not a track file"),
 }
 
 BROKEN_CLIPS: tuple[BrokenClip, ...] = tuple(

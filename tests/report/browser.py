@@ -1,21 +1,53 @@
-"""A page in a real browser without a screen: its document after the scripts ran, its complaints."""
+"""A page in a real browser without a screen: Debian's Chromium, driven by playwright."""
 
 import shutil
-import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+QUIET = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+DRAW_ALL = "dispatchEvent(new Event('beforeprint'))"  # also the charts that are out of sight
+ALL_DRAWN = (
+    "[...document.querySelectorAll('.chart')].every((box) => box.querySelector('.main-svg'))"
+)
 
 
-def opened(page: Path, profile: Path) -> tuple[str, list[str]]:
-    """The DOM, and what the page wrote to the console; the test is skipped without a browser."""
+@contextmanager
+def started() -> Iterator:
+    """The browser; the test is skipped where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api")
     if CHROMIUM is None:
         pytest.skip("no chromium here")
-    options = ["--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}"]
-    options += ["--virtual-time-budget=3000", "--enable-logging=stderr", "--dump-dom"]
-    done = subprocess.run(
-        [CHROMIUM, *options, page.as_uri()], capture_output=True, text=True, timeout=120, check=True
-    )
-    return done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+    with playwright.sync_playwright() as tools:
+        browser = tools.chromium.launch(executable_path=CHROMIUM, args=list(QUIET))
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opened(browser, path: Path) -> Iterator[tuple]:
+    """The page with all its charts drawn, and a list of what it complains of or asks for."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    page = context.new_page()
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text))
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on(
+        "request",
+        lambda request: (
+            None if request.url.startswith(("file:", "data:", "blob:"))
+            else complaints.append(request.url)
+        ),
+    )  # fmt: skip
+    page.goto(path.as_uri())
+    page.wait_for_function("document.querySelector('#plotly') === null")
+    page.evaluate(DRAW_ALL)
+    page.wait_for_function(ALL_DRAWN)
+    yield page, complaints
+    context.close()

@@ -1,19 +1,29 @@
 """The page: self-contained, with the numbers, and plain about what is not known."""
 
 import json
-import re
 from dataclasses import replace
-from html.parser import HTMLParser
+from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
+from galileo_jax.clip.schema import Clip
 from galileo_jax.report import write_report
+from galileo_jax.report.animation import animation
+from galileo_jax.report.film import BUDGET_BYTES, film
 from galileo_jax.report.fitted import evaluate
+from galileo_jax.report.provenance import digest
+from galileo_jax.report.residuals import worst_stretch_of
+from galileo_jax.report.shell import document
 from galileo_jax.report.statements import fit_quality, number, undetermined
 from galileo_jax.run import load_run
 from tests.oracle_run import HIT, MISS, PARTS, STILL, make_run
 from tests.reference_ramp import solve
+from tests.report.browser import opened
+from tests.report.references import check_needs_nothing_from_outside
+
+PHONE_PX = 390
 
 
 @pytest.fixture(scope="module")
@@ -27,25 +37,81 @@ def page(run):
     return write_report(run).read_text(encoding="utf-8")
 
 
-class References(HTMLParser):
-    """Collects whatever a browser would fetch."""
-
-    def __init__(self):
-        super().__init__()
-        self.found, self.tags = [], set()
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.add(tag)
-        self.found += [v for k, v in attrs if k in ("src", "href", "xlink:href", "srcset", "data")]
-
-
 def test_needs_nothing_from_outside(page):
-    references = References()
-    references.feed(page)
-    assert references.found
-    assert all(text.startswith(("#", "data:image/")) for text in references.found)
-    assert not references.tags & {"script", "link", "iframe"}
-    assert not re.search(r"url\((?!#)", page) and "@import" not in page
+    check_needs_nothing_from_outside(page)
+
+
+def test_in_a_browser_the_slider_moves_everything_also_on_a_phone(run, page, browser):
+    with opened(browser, run.folder / "report.html") as (shown, complaints):
+        assert shown.locator(".chart").count() == 10
+        first = places(shown)
+        slider = shown.get_by_role("slider")
+        slider.focus()
+        for _ in range(20):
+            slider.press("ArrowRight")
+        moved = places(shown)
+        assert all(one != two for one, two in zip(first[0::2], moved[0::2], strict=True))
+        assert shown.locator("output").inner_text() == "0.67 s"
+        assert shown.locator(".playhead:not([hidden])").count() == 10, "in every chart of time"
+        shown.set_viewport_size({"width": PHONE_PX, "height": 844})
+        shown.wait_for_function(
+            "[...document.querySelectorAll('.chart .main-svg')]"
+            f".every((one) => one.clientWidth <= {PHONE_PX})"
+        )
+        assert shown.evaluate("document.documentElement.scrollWidth") <= PHONE_PX
+        narrow = shown.eval_on_selector_all(".chart", "all => all.map(one => one.clientWidth)")
+        assert min(narrow) >= 300
+    assert complaints == []
+
+
+def places(shown) -> list[str]:
+    """Where the drawn objects are: object 1 and 2, fitted, then measured."""
+    transforms = "all => all.map(one => one.getAttribute('transform'))"
+    return shown.eval_on_selector_all("[data-of]", transforms)
+
+
+def test_shows_the_pictures_of_a_video(run, tmp_path, browser):
+    clip = filmed(run.clip, tmp_path / "clip.mp4")
+    last = len(run.problem.observation.times_s) - 1
+    still = np.zeros((2, 2, last + 1))
+    path = tmp_path / "page.html"
+    sections = ["<h1>film</h1>", animation(clip, run.problem, {"fit": still})]
+    path.write_text(document("film", sections), encoding="utf-8")
+    brightness = "one => one.getContext('2d').getImageData(10, 10, 1, 1).data[0]"
+    with opened(browser, path) as (shown, complaints):
+        shown.wait_for_selector("canvas[data-frame='0']")
+        shown.get_by_role("slider").press("End")
+        canvas = shown.wait_for_selector(f"canvas[data-frame='{last}']")
+        assert canvas.evaluate(brightness) == pytest.approx(4 * last, abs=12)
+    assert complaints == []
+
+
+def filmed(clip: Clip, path: Path) -> Clip:
+    """The clip as if it had been filmed: frames that grow brighter, by 4 each."""
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (160, 120))
+    for index in range(clip.frame_count):
+        writer.write(np.full((120, 160, 3), min(4 * index, 255), np.uint8))
+    writer.release()
+    seen = {"video": path, "track": None, "frame_size_px": (160, 120), "origin_px": (80.0, 90.0)}
+    return clip.model_copy(update=seen | {"pixels_per_metre": 100.0})
+
+
+def test_a_film_is_small_and_evenly_spaced(tmp_path, run):
+    filmed(run.clip.model_copy(update={"frame_count": 250}), tmp_path / "clip.mp4")
+    found = film(tmp_path / "clip.mp4", 245)
+    assert found.frames == tuple(range(0, 245, 3)), "at most 120 pictures"
+    assert found.size_px == (160, 120), "never larger than it was"
+    assert sum(map(len, found.pictures)) < 4 * BUDGET_BYTES / 3
+
+
+def test_the_worst_stretch_is_told_and_noise_has_none(run):
+    fitted = evaluate(run, seed=0)
+    quiet = np.random.default_rng(0).standard_normal(fitted.residuals.shape)
+    assert worst_stretch_of(replace(fitted, residuals=quiet)) is None
+    quiet[0, 0, 10:16] += 6.0
+    worst = worst_stretch_of(replace(fitted, residuals=quiet))
+    assert worst is not None and (worst.name, worst.axis) == ("object1", "x")
+    assert (worst.start_s, worst.end_s) == pytest.approx((10 / 30, 15 / 30), abs=1 / 30)
 
 
 def test_states_the_numbers(run, page):
@@ -58,6 +124,7 @@ def test_states_the_numbers(run, page):
     assert f"{run.result['error']['chi2_per_dof']:.2f}" in page
     assert "--method mh" in page and "--seed 3" in page and run.result["version"] in page
     assert "only the ratio of the masses shows" in page
+    assert digest(run.clip.track) in page and "mujoco" in page, "inputs and versions"
 
 
 def test_has_every_figure_and_leaves_them_as_files(run, page):
@@ -69,7 +136,7 @@ def test_has_every_figure_and_leaves_them_as_files(run, page):
         "pairs",
         "trace",
     }
-    assert page.count("<svg") == len(names)
+    assert page.count('class="chart"') + page.count("<svg") == len(names) + 1, "and the motion"
 
 
 def test_the_same_run_gives_the_same_page(run, page):

@@ -32,7 +32,7 @@ HALVES = {"box": (0.03, 0.02), "cylinder": (0.03, 0.02), "torus": (0.033, 0.008)
 
 def observed(centres, times=None):
     count, _, frames = np.shape(centres)
-    names = ("object1", "object2")[:count]
+    names = tuple(f"object{i + 1}" for i in range(count))
     times = np.arange(frames) / 30 if times is None else times
     covariance = np.broadcast_to(1e-8 * np.eye(2)[None, ..., None], (count, 2, 2, frames))
     return Observation(
@@ -121,6 +121,31 @@ def test_sizes_and_gravity_reach_the_model(tmp_path):
     assert pairs == {"object1_ramp", "object1_table", "object2_table", "object1_object2"}
 
 
+@pytest.mark.parametrize("count", [1, 3, 4])
+def test_any_number_of_objects(count, tmp_path):
+    """Each meets its surfaces and its neighbours."""
+    x = [0.25 + 0.1 * i for i in range(count - 1)]
+    centres = np.array([[-0.4, 0.2], *([place, 0.02] for place in x)])[..., None]
+    declared = clip(tmp_path, "multi", shapes=("box",) * count)
+    scene = build_scene(declared, observed(centres))
+    assert scene.surroundings.comes_down == (True,) + (False,) * (count - 1)
+    pairs = {scene.model.pair(i).name for i in range(scene.model.npair)}
+    assert pairs == {"object1_ramp"} | {f"object{i + 1}_table" for i in range(count)} | {
+        f"object{i}_object{i + 1}" for i in range(1, count)
+    }
+    data = mujoco.MjData(scene.model)  # pyright: ignore
+    mujoco.mj_forward(scene.model, data)  # pyright: ignore
+    assert data.xpos[1:, [0, 2]] == pytest.approx(np.array(scene.surroundings.start_m))
+    assert all(abs(contact.dist) < 1e-6 for contact in data.contact)
+    assert scene.model.body_mass[1:] == pytest.approx(0.5)
+
+
+def test_objects_stand_in_the_order_of_the_travel(tmp_path):
+    centres = np.array([[-0.4, 0.2], [0.4, 0.02], [0.3, 0.02]])[..., None]
+    with pytest.raises(InputError, match=r"objects\[2\]: object3 stands before object2"):
+        build_scene(clip(tmp_path, "multi", shapes=("box",) * 3), observed(centres))
+
+
 def test_one_object_has_no_pair_with_a_second(tmp_path):
     centres = solve(HIT, np.array([0.0])).position_m[:1]
     scene = build_scene(clip(tmp_path, shapes=("box",)), observed(centres))
@@ -162,10 +187,6 @@ def test_release_of_an_incline_is_where_motion_begins(tmp_path):
 
 def test_what_cannot_be_simulated_is_said(tmp_path):
     centres = solve(HIT, np.array([0.0])).position_m
-    with pytest.raises(
-        InputError, match=r"scenario: 'flight' cannot be simulated yet; known: ramp"
-    ):
-        build_scene(clip(tmp_path, scenario="flight"), observed(centres))
     unseen = observed(centres)
     unseen.mask[1] = False
     with pytest.raises(InputError, match="object2 is not seen in any frame"):

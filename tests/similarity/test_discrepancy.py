@@ -66,3 +66,12 @@ def test_a_hit_loosens_only_what_follows(hit):
     spread = np.diag(x) - 2 * x[0] + x[0, 0]
     assert np.abs(spread[calm]).max() < 1e-4**2
     assert spread[moved].min() > 1e-4**2
+
+
+def test_without_a_camera_only_the_bodies_are_left(hit):
+    """No keystone, roll, scale and drift: of both objects after the hit, else of all."""
+    both, bodies = modes(hit, SCENE), modes(hit, SCENE, is_filmed=False)
+    kept = np.array([any(np.array_equal(mode, other) for other in bodies) for mode in both])
+    assert len(bodies) == kept.sum() < len(both) - 4
+    is_everywhere = (both[~kept][..., 0] != 0).any(axis=(1, 2))
+    assert is_everywhere.sum() == 4, "two keystones, roll, scale; the others begin at the hit"

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from galileo_jax.tracking.noise import blow_covariance, scatter_variance
+from galileo_jax.tracking.noise import (
+    BLOW_KNOWN_TO,
+    blow_shift,
+    is_in_motion,
+    motion_variance,
+)
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refine import FINE_PX, align, covariance_of
 from galileo_jax.tracking.rigid import rigid_motion
@@ -77,31 +82,55 @@ def test_rigid_motion_needs_three_points():
     assert rigid_motion(np.zeros((2, 2)), np.ones((2, 2))) is None
 
 
-def test_scatter_beyond_the_stated_noise_is_found_and_smooth_motion_is_not():
+def noisy(place, sd, rng):
+    return place + rng.normal(0, sd, place.shape), np.tile(1e-10 * np.eye(2), (len(place), 1, 1))
+
+
+def test_scatter_beyond_the_stated_noise_is_found_along_the_motion_only():
     rng = np.random.default_rng(5)
     time = np.arange(200.0)
-    smooth = np.stack([1.0 * time + 0.01 * time**2, 0.5 * time, 0 * time], axis=1)
-    nothing = np.zeros((200, 2, 2))
-    assert scatter_variance(smooth, nothing) == pytest.approx(0, abs=1e-12)
-    shaken = smooth + rng.normal(0, 0.05, smooth.shape)
-    np.testing.assert_allclose(np.sqrt(scatter_variance(shaken, nothing)), 0.05, rtol=0.2)
-    assert scatter_variance(shaken, nothing + 0.05**2 * np.eye(2)).max() < 0.03**2
-    assert not scatter_variance(0 * shaken, nothing).any()
+    smooth = np.stack([1.0 * time + 0.01 * time**2, 0 * time], axis=1)
+    assert motion_variance([noisy(smooth, 0, rng)]) == pytest.approx(0, abs=1e-9)
+    shaken, stated = noisy(smooth, (0.05, 1e-5), rng)
+    x, y = np.sqrt(motion_variance([(shaken, stated)]))
+    assert x == pytest.approx(0.05, rel=0.2)
+    assert y < 1e-4
+    x, _ = motion_variance([(shaken, stated + 0.05**2 * np.eye(2))])
+    assert x < 0.03**2
 
 
-def test_scatter_counts_only_while_the_object_moves():
+def test_blows_are_not_taken_for_scatter():
+    rng = np.random.default_rng(7)
+    time = np.arange(40.0)
+    bent = np.stack([6 * np.abs(time - 9.7) + 4 * np.abs(time - 21.3), 0 * time], axis=1)
+    x, _ = np.sqrt(motion_variance([noisy(bent, (0.02, 1e-5), rng)]))
+    assert x == pytest.approx(0.02, rel=0.5)
+
+
+def test_motion_is_told_from_noise_on_each_axis():
     rng = np.random.default_rng(6)
     time = np.arange(100.0)
-    path = np.stack([np.maximum(time - 50, 0) * 2, 0 * time, 0 * time], axis=1)
-    path[51:] += rng.normal(0, 0.05, (49, 3))
-    variance = scatter_variance(path, np.zeros((100, 2, 2)))
-    assert not variance[:50].any()
-    assert (variance[52:] > 0.03**2).all()
+    path = np.stack([np.maximum(time - 50, 0) * 2, 0 * time], axis=1)
+    path += rng.normal(0, 0.01, path.shape)
+    moves = is_in_motion(path, np.tile(0.01**2 * np.eye(2), (100, 1, 1)))
+    assert not moves[:50].any()
+    assert moves[50:, 0].all()
+    assert not moves[:, 1].any()
 
 
-def test_only_a_blow_widens_the_covariance():
-    jumps = np.tile([0.5, 0.0, 0.0], (20, 1))
-    jumps[10] = [-8.0, 4.0, 0.0]
-    covariance = blow_covariance(jumps, 0.4)
-    assert not covariance[:10].any()
-    np.testing.assert_allclose(covariance[10, 0, 0], (8.5 * 0.4 / 8) ** 2)
+@pytest.mark.parametrize("instant", [0.0, 0.05, 0.12, 0.3])
+def test_a_blow_within_an_exposure_shifts_the_picture_by_about_what_is_told(instant):
+    share, blow_at = 0.4, 10 + instant
+
+    def place(time):
+        return 3.0 * time - 9.0 * np.maximum(time - blow_at, 0)
+
+    frames = np.arange(20.0)
+    exposure = share * (np.arange(400) - 199.5) / 400
+    shown = place(frames[:, None] + exposure).mean(axis=1)
+    jumps = np.zeros((20, 2))
+    jumps[1:-1, 0] = np.diff(shown, n=2)
+    expected = shown - place(frames)
+    shift = blow_shift(jumps, share)[:, 0]
+    np.testing.assert_allclose(shift, expected, rtol=BLOW_KNOWN_TO, atol=0.005)
+    assert (np.abs(expected).max() > 0.01) == (instant < share / 2)

@@ -36,6 +36,7 @@ def write_clip(folder, frames, points):
     content = {
         "video": video.name,
         "scenario": "multi",
+        "ramp_angle_deg": 20.0,
         "fps": 30.0,
         "pixels_per_metre": SCALE,
         "origin_px": [20.0, 93.0],
@@ -90,7 +91,8 @@ def test_without_points_the_objects_are_found(tmp_path, frames, paths):
 def test_one_declared_point_is_not_given_away_again(tmp_path, frames, paths):
     track = track_clip(load_clip(write_clip(tmp_path, frames, [None, [160.0, 80.0]])))
     np.testing.assert_allclose(track.position_px[0, 0], paths[0][0, :2], atol=2)
-    np.testing.assert_allclose(track.position_px[1, 0], (160.0, 80.0), atol=1e-6)
+    # The first frame's noise is its own: where the object stood is the mean of its rest.
+    np.testing.assert_allclose(track.position_px[1, 0], (160.0, 80.0), atol=0.03)
 
 
 def test_nothing_moves_and_no_point_asks_for_label(tmp_path, frames, capsys):
@@ -107,7 +109,8 @@ def test_csv_track_is_refused(tmp_path):
     rows = "\n".join(f"{0.1 * i},{0.01 * i},0.0,0.001" for i in range(8))
     table.write_text(f"time_s,object1_x_m,object1_y_m,object1_sd_m\n{rows}\n")
     (tmp_path / "walk.yaml").write_text(
-        "track: walk.csv\nscenario: multi\nobjects:\n  - {name: object1, shape: box}\n"
+        "track: walk.csv\nscenario: multi\nramp_angle_deg: 20.0\n"
+        "objects:\n  - {name: object1, shape: box}\n"
     )
     with pytest.raises(InputError, match="tracked already"):
         main([str(tmp_path / "walk.yaml")])

@@ -69,6 +69,26 @@ def test_covered_object_is_a_gap_and_found_again():
     assert np.nanmax(np.abs(errors(track, path))) < 0.08
 
 
+def test_object_at_rest_that_was_covered_long_is_seen_again_to_the_last_frame():
+    path = np.tile([60.3, 60.6, 0.0], (26, 1))
+    frames = film([(BOX, path)])
+    for index in range(4, 20):
+        frames[index][10:110, 20:160] = 150
+    track = tracked(frames, path[0])
+    assert not track.is_visible[0, 4:20].any()
+    assert track.is_visible[0, 21:].all()
+    assert np.nanmax(np.abs(errors(track, path))) < 0.08
+
+
+def test_repeated_frame_is_a_gap_and_not_a_stop():
+    path = slide(frames=22, turn_at=30)
+    frames = film([(BOX, path)])
+    frames[15] = frames[14]
+    track = tracked(frames, path[0])
+    assert np.flatnonzero(~track.is_visible[0]).tolist() == [15]
+    assert np.nanmax(np.abs(errors(track, path))) < 0.08
+
+
 def test_object_that_leaves_the_picture_leaves_no_points():
     time = np.arange(40)
     path = np.stack([150 + 0.2 * time**2, np.full(40, 60.0), np.zeros(40)], axis=1)

@@ -10,7 +10,8 @@ class DeclaredAngle(Effect):
     """The ramp is steeper than declared by some `ramp_angle_sd_deg`, in each clip on its own.
 
     Clips at several angles tell friction and scale by the differences of the angles, and no
-    better than these are known.
+    better than these are known. In a flight it is gravity that points so far forward of the
+    picture's vertical (`vertical_sd_deg`).
     """
 
     name: ClassVar[str] = "declared_angle"

@@ -1,6 +1,6 @@
 """Metropolis-Hastings samplers and the driver that runs them."""
 
-from galileo_jax.inference.samplers import mixture, random_walk, thesis
+from galileo_jax.inference.samplers import thesis
 from galileo_jax.inference.samplers.driver import (
     Progress,
     Settings,
@@ -15,6 +15,9 @@ from galileo_jax.inference.samplers.sampler import (
     LogDensity,
     State,
 )
+from galileo_jax.registry import load_entries
+
+load_entries("galileo_jax.inference.samplers.library")
 
 __all__ = [
     "AbstractSampler",
@@ -25,8 +28,6 @@ __all__ = [
     "Settings",
     "State",
     "dispersed_starts",
-    "mixture",
-    "random_walk",
     "sample",
     "sampler_class",
     "sampler_names",

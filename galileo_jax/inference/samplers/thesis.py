@@ -131,6 +131,7 @@ def infer(
     *,
     acceptance: Acceptance = Acceptance.COIN,
     selection: Selection = Selection.BEST,
+    num_chains: int = NUM_CHAINS,
     on_block: Callable[[Progress], None] | None = None,
 ) -> ThesisResult:
     """Runs 16 chains of 75 steps from uniform starts and selects an answer.
@@ -143,6 +144,7 @@ def infer(
       names: of the parameters.
       acceptance: the thesis's coin, or a true Metropolis-Hastings step.
       selection: how the answer is taken from the chains.
+      num_chains: the thesis has 16.
       on_block: called three times.
     """
     start_key, key = jax.random.split(key)
@@ -150,7 +152,7 @@ def infer(
         key,
         Thesis(acceptance=acceptance),
         log_similarity,
-        jax.random.uniform(start_key, (NUM_CHAINS, len(names)), minval=1e-6),
+        jax.random.uniform(start_key, (num_chains, len(names)), minval=1e-6),
         names,
         settings=Settings(warmup_steps=0, block_steps=25, max_steps=NUM_STEPS, stops_early=False),
         on_block=on_block,

@@ -11,7 +11,7 @@ import pytest
 from galileo_jax.errors import InputError
 from galileo_jax.inference.posterior import Status
 from galileo_jax.inference.samplers import Settings, dispersed_starts, sample
-from galileo_jax.inference.samplers.mixture import Mixture
+from galileo_jax.inference.samplers.library.mixture import Mixture
 from tests.inference.samplers.targets import gaussian
 
 TARGET = gaussian(3)

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 
 from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
-from galileo_jax.inference.samplers.random_walk import (
+from galileo_jax.inference.samplers.library.random_walk import (
     TARGET_ACCEPTANCE,
     optimal_log_scale,
 )

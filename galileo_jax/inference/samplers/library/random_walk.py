@@ -1,5 +1,6 @@
 """Random-walk Metropolis: BlackJAX's kernel with a learned Gaussian proposal."""
 
+import math
 from typing import ClassVar, Self
 
 import jax
@@ -21,7 +22,7 @@ TARGET_ACCEPTANCE = 0.234
 
 def optimal_log_scale(dim: int) -> float:
     """log(2.38 / sqrt(dim)), the best step for a Gaussian density of known covariance."""
-    return float(jnp.log(2.38 / jnp.sqrt(dim)))
+    return math.log(2.38 / math.sqrt(dim))
 
 
 @register

@@ -1,0 +1,186 @@
+"""Other people's estimators on the tracks of samplers.py: mujoco.sysid, and the thesis's.
+
+Starting points: mujoco.sysid's optimiser is mujoco.minimize.least_squares; it gets a plain
+mujoco.batch of the scene with m1, k1, m2, k2 free, 256 random starts and the best three refined,
+without which it is stuck in nine of ten cases. The thesis's sampler is ours (it is the same
+algorithm), with PyBullet's rollouts.
+"""
+
+import io
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.samplers import thesis
+from galileo_jax.rollout.engine_c import EngineC
+from galileo_jax.rollout.model import Model
+from galileo_jax.rollout.motion import dynamics
+from galileo_jax.rollout.mujoco_fields import make_fields, rigid_motion
+from galileo_jax.similarity.library.thesis_gaussian import GaussianSimilarity
+from galileo_jax.truth import Truth
+
+MAIN = ("m1", "k1", "m2", "k2")
+STEP_S = 1 / 480  # agrees with g (sin - k cos) to 0.2 %, and is what others take
+NUM_STARTS, NUM_REFINED = 256, 3
+LOW, HIGH = np.array([0.05, 0.005, 0.05, 0.005]), np.array([1.5, 0.6, 1.5, 0.6])
+START_LOW, START_HIGH = np.array([0.1, 0.02, 0.1, 0.02]), np.array([1.0, 0.35, 1.0, 0.35])
+SUFFICIENT = 1.5  # chi2 per value with which a refined start counts as converged
+
+
+class Estimate(NamedTuple):
+    """What a peer says.
+
+    Attributes:
+      values: `[4]`, in the order of `MAIN`.
+      entries: k1, k2 and mass_ratio as in result.json.
+      centres_m: `[object, 2, frame]`, of its own rollout at `values`.
+      num_rollouts: it took.
+      is_converged: by its own account.
+    """
+
+    values: np.ndarray
+    entries: dict[str, dict[str, Any]]
+    centres_m: np.ndarray
+    num_rollouts: int
+    is_converged: bool
+
+
+def sysid(problem: Problem, noise_m_s: float, seed: int) -> Estimate:
+    """mujoco.sysid, multi-start; intervals by its formula, s^2 (J^T J)^-1."""
+    from mujoco import minimize
+
+    roll_out = _mujoco(problem)
+    observed = problem.observation.velocity_m_s
+    dt = np.diff(problem.observation.times_s)
+    count = 0
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        """`[4, batch]` to `[value, batch]`, as mujoco.minimize has it."""
+        nonlocal count
+        x = x.reshape(len(MAIN), -1)
+        count += x.shape[1]
+        velocity = np.diff(roll_out(x.T), axis=-1) / dt
+        return ((velocity - observed) / noise_m_s).reshape(x.shape[1], -1).T.copy()
+
+    rng = np.random.default_rng(seed)
+    starts = rng.uniform(START_LOW, START_HIGH, (NUM_STARTS, len(MAIN)))
+    cost = (residuals(starts.T) ** 2).mean(axis=0)
+    refined = []
+    for i in np.argsort(cost)[:NUM_REFINED]:
+        x, log = minimize.least_squares(
+            starts[i],
+            residuals,
+            [LOW, HIGH],
+            eps=1e-3,
+            verbose=minimize.Verbosity.FULLITER,
+            output=io.StringIO(),
+        )
+        refined.append((float(np.mean(np.asarray(log[-1].residual) ** 2)), np.ravel(x), log[-1]))
+    chi2, x, last = min(refined, key=lambda entry: entry[0])
+    sd = _sysid_sd(x, np.asarray(last.jacobian), np.ravel(last.residual))
+    return Estimate(x, _intervals(x, sd), roll_out(x[None])[0], count, chi2 <= SUFFICIENT)
+
+
+def thesis_on_bullet(problem: Problem, truth: Truth, seed: int) -> Estimate:
+    """The thesis as it was: its sampler, its similarity and PyBullet at 240 Hz.
+
+    Raises:
+      ImportError: no PyBullet; `pip install -e '.[bullet]'`.
+    """
+    import bullet_scene
+    import pybullet  # pyright: ignore
+
+    observation = problem.observation
+    dt = np.diff(observation.times_s)
+    every = round(float(dt[0]) / bullet_scene.STEP_S)
+    shape = (len(observation.names), 2, len(observation.times_s))
+    client = pybullet.connect(pybullet.DIRECT)
+
+    def centres(theta: np.ndarray) -> np.ndarray:
+        m1, k1, m2, k2 = map(float, theta)
+        there = replace(truth, mass_kg=(m1, m2), friction=(k1, k2))
+        path = bullet_scene.roll_out(there, every * (shape[2] - 1), client)
+        return np.moveaxis(path[::every], 0, -1)
+
+    def log_similarity(theta: jax.Array) -> jax.Array:
+        result = jax.ShapeDtypeStruct(shape, theta.dtype)
+        there = jax.pure_callback(centres, result, theta, vmap_method="sequential")
+        velocity = jnp.diff(there, axis=-1) / dt
+        return GaussianSimilarity()(
+            velocity, observation.velocity_m_s, np.ones((shape[0], shape[2] - 1), bool)
+        )
+
+    try:
+        found = thesis.infer(jax.random.key(seed), log_similarity, MAIN)
+        predicted = centres(found.estimate)
+    finally:
+        pybullet.disconnect(client)
+    x = found.estimate
+    count = int(found.posterior.stats["num_evaluations"])
+    return Estimate(x, point(x), predicted, count, False)
+
+
+def point(x: np.ndarray) -> dict[str, dict[str, Any]]:
+    """`[4]` without an interval."""
+    m1, k1, m2, k2 = map(float, x)
+    values = {"k1": k1, "k2": k2, "mass_ratio": m1 / m2}
+    return {name: {"mean": value, "identified": True} for name, value in values.items()}
+
+
+def _mujoco(problem: Problem) -> Callable[[np.ndarray], np.ndarray]:
+    """`[batch, 4]` to centres `[batch, object, 2, frame]`: MuJoCo alone, without nuisances."""
+    scene = problem.model.scene
+    spec = scene.spec.copy()
+    spec.option.timestep = STEP_S
+    plain = replace(scene, spec=spec, model=spec.compile())
+    engine = EngineC(Model(plain, problem.model.duration_s, nuisances=()))
+    surroundings, names = scene.surroundings, engine.model.names
+    steps = round(float(np.diff(problem.observation.times_s)[0]) / STEP_S)
+    home = plain.model.body_pos[1:][:, [0, 2]]
+
+    def roll_out(theta: np.ndarray) -> np.ndarray:
+        law = dynamics((), surroundings, dict(zip(names, theta.T, strict=True)), np)
+        batch = engine.new_batch(len(theta))
+        engine.write(batch, make_fields(law, surroundings, np))
+        shape = (len(problem.observation.times_s), len(theta), *home.shape)
+        position, velocity = np.empty(shape), np.empty(shape)
+        for frame in range(len(position)):
+            if frame:
+                batch.step(nstep=steps)
+            position[frame] = batch.bind("qpos").reshape(shape[1:]) + home
+            velocity[frame] = batch.bind("qvel").reshape(shape[1:])
+        position -= 0.5 * STEP_S * velocity
+        return np.moveaxis(rigid_motion(position, velocity, law, surroundings)[0], 0, -1)
+
+    return roll_out
+
+
+def _sysid_sd(x: np.ndarray, jacobian: np.ndarray, white: np.ndarray) -> np.ndarray:
+    """Of log(m1 / m2), k1 and k2 at a given m1 m2: the column of the masses' size is null."""
+    m1, _, m2, _ = x
+    turn = np.zeros((4, 3))
+    turn[0, 0], turn[2, 0], turn[1, 1], turn[3, 2] = m1 / 2, -m2 / 2, 1.0, 1.0
+    turned = jacobian @ turn
+    variance = white @ white / (white.size - turn.shape[1])
+    return np.sqrt(variance * np.diag(np.linalg.pinv(turned.T @ turned)))
+
+
+def _intervals(x: np.ndarray, sd: np.ndarray) -> dict[str, dict[str, Any]]:
+    m1, k1, m2, k2 = map(float, x)
+    ratio, (log_sd, k1_sd, k2_sd) = m1 / m2, map(float, sd)
+    factor = math.exp(min(1.96 * log_sd, 50.0))
+    spans = {
+        "k1": (k1, k1 - 1.96 * k1_sd, k1 + 1.96 * k1_sd, k1_sd),
+        "k2": (k2, k2 - 1.96 * k2_sd, k2 + 1.96 * k2_sd, k2_sd),
+        "mass_ratio": (ratio, ratio / factor, ratio * factor, ratio * log_sd),
+    }
+    return {
+        name: {"mean": mean, "q025": low, "q975": high, "sd": spread, "identified": True}
+        for name, (mean, low, high, spread) in spans.items()
+    }

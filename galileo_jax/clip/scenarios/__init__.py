@@ -1,0 +1,7 @@
+"""The scenarios a clip can show: one small file each in `library/`, in one registry."""
+
+from galileo_jax.clip.scenarios.scenario import SCENARIOS, Scenario, load_library, register
+
+load_library()
+
+__all__ = ["SCENARIOS", "Scenario", "register"]

@@ -1,0 +1,1 @@
+"""The library: one scenario per file, each registering itself."""

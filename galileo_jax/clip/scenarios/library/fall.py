@@ -1,0 +1,12 @@
+"""Fall: straight down from rest, onto a floor where the clip has one."""
+
+from galileo_jax.clip.scenarios.scenario import Scenario, register
+
+register(
+    Scenario(
+        name="fall",
+        meaning="one object is dropped",
+        has_ramp=False,
+        keys=("floor",),
+    )
+)

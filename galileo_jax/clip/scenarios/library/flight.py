@@ -1,0 +1,24 @@
+"""Flight: thrown, in the plane of the picture, with gravity as a vector.
+
+The first frame in which the object is free is the start; how fast and which way it goes there
+is unknown. Gravity tells the scale where `pixels_per_metre` is null.
+"""
+
+from galileo_jax.clip.scenarios.scenario import Scenario, register
+
+register(
+    Scenario(
+        name="flight",
+        meaning="one object is thrown",
+        has_ramp=False,
+        moves_in_plane=True,
+        laws=("start_velocity",),
+        without=(
+            "constant_force",  # along the velocity: nothing pushes so
+            "initial_push",  # start_velocity
+            "release_delay",  # start_velocity: it flies when the clip begins
+            "spring_tether",  # along the velocity
+        ),
+        keys=("floor", "vertical_sd_deg"),
+    )
+)

@@ -1,0 +1,11 @@
+"""Incline: the board alone."""
+
+from galileo_jax.clip.scenarios.scenario import Scenario, register
+
+register(
+    Scenario(
+        name="incline",
+        meaning="one object slides down a board, no table",
+        has_ramp=True,
+    )
+)

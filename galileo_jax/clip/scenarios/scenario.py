@@ -1,0 +1,56 @@
+"""What a scenario is: what its clip must declare, along what its objects move, by which laws."""
+
+import importlib
+import pkgutil
+from dataclasses import dataclass
+
+LIBRARY = "galileo_jax.clip.scenarios.library"
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What a scenario asks of its clip, and what its model begins with.
+
+    Attributes:
+      name: as written in the clip yaml.
+      meaning: one phrase for the user.
+      has_ramp: it needs `ramp_angle_deg`, and its objects slide on the ramp or the table.
+      has_table: the ramp ends on a table.
+      num_objects: (fewest, most) objects; None means no upper limit.
+      moves_in_plane: the path bends freely; False: it is straight, or a ramp and a table.
+      laws: names of the laws of motion that are always there (`effects/laws/`).
+      without: effects that have no place, because the laws do the same or the picture cannot
+        tell them from these.
+      keys: optional keys of the clip yaml that mean something here alone.
+    """
+
+    name: str
+    meaning: str
+    has_ramp: bool
+    num_objects: tuple[int, int | None] = (1, 1)
+    has_table: bool = False
+    moves_in_plane: bool = False
+    laws: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ()
+
+
+SCENARIOS: dict[str, Scenario] = {}
+
+
+def register(scenario: Scenario) -> Scenario:
+    """Makes a scenario known under its name.
+
+    Raises:
+      ValueError: the name is taken.
+    """
+    if scenario.name in SCENARIOS:
+        raise ValueError(f"two scenarios are named {scenario.name!r}")
+    SCENARIOS[scenario.name] = scenario
+    return scenario
+
+
+def load_library() -> None:
+    """Registers the library."""
+    for module in pkgutil.iter_modules(importlib.import_module(LIBRARY).__path__):
+        importlib.import_module(f"{LIBRARY}.{module.name}")

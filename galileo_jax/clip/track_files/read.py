@@ -1,0 +1,320 @@
+"""From a track file, ours or another tool's, to an observation in metres.
+
+What the file does not tell is asked for in one line that names the key and its choices.
+"""
+
+import importlib
+import math
+import pkgutil
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax.clip import track_files
+from galileo_jax.clip.schema import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, ClipFile
+from galileo_jax.clip.track_csv import (
+    MAX_POSITION_M,
+    MIN_ROWS,
+    check_times,
+    read_observation_csv,
+    roughness_covariance_m2,
+)
+from galileo_jax.clip.track_files.cells import first_cells
+from galileo_jax.clip.track_files.track_table import (
+    METRES_PER_UNIT,
+    Calibration,
+    TrackReader,
+    TrackTable,
+    readers,
+)
+from galileo_jax.errors import InputError
+from galileo_jax.observation import NOMINAL_SCALE_PX_PER_M, Observation
+
+HEAD_BYTES = 65_536
+TRACK_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".trk", ".trz", ".h5", ".hdf5")
+"""Files taken for a track when given as CLIP; what is in them decides the rest."""
+
+
+LENGTH_CHOICES = " | ".join((*METRES_PER_UNIT, "px"))
+
+
+@dataclass(frozen=True)
+class FileTrack:
+    """What was read.
+
+    Attributes:
+      observation: in metres, axes as `Observation` has them.
+      unit: of the file: "m", "cm", ..., or "px".
+      fps: frames per second.
+      pixels_per_metre: of a file in pixels; None = unknown (lengths are in nominal metres).
+      origin_px: of a file in pixels; None = unknown.
+      warnings: doubts, one line each.
+    """
+
+    observation: Observation
+    unit: str
+    fps: float
+    pixels_per_metre: float | None = None
+    origin_px: tuple[float, float] | None = None
+    warnings: tuple[str, ...] = ()
+
+
+def is_track(path: Path) -> bool:
+    """Whether a file given as CLIP is a track (and no video or yaml)."""
+    return path.suffix.lower() in TRACK_SUFFIXES
+
+
+def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> FileTrack:
+    """Reads a track file.
+
+    Args:
+      yaml_path: named where a key is missing.
+      path: the track.
+      file: what is declared.
+      fps: declared frames per second; None = not declared.
+
+    Raises:
+      InputError: one line naming the file and the place that is wrong, or the key that has to
+        be given.
+    """
+    head = _head(path)
+    if _is_ours(head):
+        observation = read_observation_csv(path)
+        _check_names(yaml_path, path, file, observation.names)
+        return FileTrack(observation, "m", _frame_rate(observation.times_s))
+    table = _reader(path, head).read(path)
+    table, warnings = _in_declared_order(yaml_path, path, file, table)
+    times = _times(yaml_path, path, file, table, fps)
+    if len(times) < MIN_ROWS:
+        raise InputError(f"{path}: {len(times)} rows; at least {MIN_ROWS} expected")
+    check_times(path, times)
+    unit = "px" if table.unit == "px" else file.track_units or table.unit
+    y_axis = file.track_y or table.y_axis
+    if unit is None or y_axis is None:
+        asked = [
+            *([("track_units", "its unit of length", LENGTH_CHOICES)] if unit is None else []),
+            *([("track_y", "which way its y axis points", "up | down")] if y_axis is None else []),
+        ]
+        keys, what, choices = zip(*asked, strict=True)
+        wanted = ", ".join(f"{key}: {words}" for key, words in zip(keys, choices, strict=True))
+        raise InputError(
+            f"{yaml_path}: {', '.join(keys)}: missing; {path.name} does not tell "
+            f"{' and '.join(what)}; write {wanted}"
+        )
+    if unit == "px":
+        scale, origin = _scale(yaml_path, path, file, table.calibration), _origin(file, table)
+        position = _from_pixels(file, table, scale, origin, y_axis)
+    else:
+        scale, origin = None, None
+        away = np.subtract(table.position, np.array(file.track_origin or (0, 0))[:, None])
+        position = away * METRES_PER_UNIT[unit] * [[1.0], [1.0 if y_axis == "up" else -1.0]]
+    position = position * [[1.0 if file.direction == "right" else -1.0], [1.0]]
+    seen: np.ndarray = np.isfinite(position).all(axis=1)
+    first = int(np.flatnonzero(seen.any(axis=0))[0]) if seen.any() else 0
+    observation = _observation(
+        path,
+        tuple(item.name for item in file.objects),
+        times[first:] - times[first],
+        np.where(seen[:, None], position, np.nan)[:, :, first:],
+        is_nominal=unit == "px" and scale is None,
+    )
+    return FileTrack(
+        observation,
+        unit,
+        fps=_frame_rate(times) if table.frames is None else 1 / _frame_s(table, fps),
+        pixels_per_metre=scale,
+        origin_px=origin,
+        warnings=table.warnings + warnings + _doubts(yaml_path, path, table, fps),
+    )
+
+
+def _head(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    if not head.strip():
+        raise InputError(f"{path}: empty; a track file expected")
+    return head
+
+
+def _is_ours(head: bytes) -> bool:
+    """Whether it is the csv that `track` writes, or was meant as one."""
+    titles = [cell for line in first_cells(head, 1) for cell in line]
+    return any(title == "time_s" or title.endswith(("_x_m", "_y_m")) for title in titles)
+
+
+def _reader(path: Path, head: bytes) -> type[TrackReader]:
+    for module in pkgutil.iter_modules(track_files.__path__):
+        importlib.import_module(f"{track_files.__name__}.{module.name}")
+    known = [readers.get(name) for name in readers.names()]
+    for reader in known:
+        if reader.claims(head):
+            return reader
+    raise InputError(
+        f"{path}: not a track file that is known: csv with time_s, object1_x_m, object1_y_m; "
+        f"{'; '.join(reader.meaning for reader in known)}"
+    )
+
+
+def _check_names(yaml_path: Path, path: Path, file: ClipFile, names: tuple[str, ...]) -> None:
+    declared = tuple(item.name for item in file.objects)
+    if declared != names:
+        raise InputError(
+            f"{yaml_path}: objects: {', '.join(declared)} declared, but {path.name} has "
+            f"{', '.join(names)}; the same names in the same order expected"
+        )
+
+
+def _in_declared_order(
+    yaml_path: Path, path: Path, file: ClipFile, table: TrackTable
+) -> tuple[TrackTable, tuple[str, ...]]:
+    """The table with the declared objects alone, in their order, and doubts about who is who.
+
+    An object is found by its `track_name`, else by its own name ('mass A' is mass_A); names
+    that say nothing are taken in order, where there are as many of them as objects.
+    """
+    by_name = {_plain(name): index for index, name in enumerate(table.names)}
+    wanted = [item.track_name or item.name for item in file.objects]
+    order = [by_name.get(_plain(name)) for name in wanted]
+    warnings = ()
+    for item, index in zip(file.objects, order, strict=True):
+        if item.track_name is not None and index is None:
+            raise InputError(
+                f"{yaml_path}: objects ({item.name}): track_name: {item.track_name!r} is not in "
+                f"{path.name}; it has {', '.join(table.names)}"
+            )
+    if None in order:
+        if len(wanted) != len(table.names) or any(index is not None for index in order):
+            raise InputError(
+                f"{yaml_path}: objects: {', '.join(wanted)} declared, but {path.name} has "
+                f"{', '.join(table.names)}; write which is which, such as "
+                f"track_name: {table.names[0]}"
+            )
+        order = list(range(len(wanted)))
+        pairs = zip(wanted, table.names, strict=True)
+        taken = [f"{theirs!r} as {ours}" for ours, theirs in pairs if theirs != ours]
+        warnings = (f"{path}: {', '.join(taken)}: taken in order",) if len(taken) > 1 else ()
+    chosen = [index for index in order if index is not None]
+    names = tuple(table.names[index] for index in chosen)
+    return replace(table, names=names, position=table.position[chosen]), warnings
+
+
+def _plain(name: str) -> str:
+    return "".join(name.replace("_", " ").split()).casefold()
+
+
+def _times(
+    yaml_path: Path, path: Path, file: ClipFile, table: TrackTable, fps: float | None
+) -> np.ndarray:
+    """`[row]`, s."""
+    if table.times_s is not None:
+        return table.times_s
+    assert table.frames is not None  # a reader gives one of the two
+    if fps is None and table.frame_s is None:
+        raise InputError(
+            f"{yaml_path}: fps: missing; {path.name} counts frames; write fps: and the camera's "
+            "true frame rate, such as fps: 30.0"
+        )
+    return table.frames * _frame_s(table, fps)
+
+
+def _frame_s(table: TrackTable, fps: float | None) -> float:
+    frame_s = 1 / fps if fps else table.frame_s
+    assert frame_s is not None  # `_times` has asked for it
+    return frame_s
+
+
+def _doubts(yaml_path: Path, path: Path, table: TrackTable, fps: float | None) -> tuple[str, ...]:
+    if table.frames is None or fps is None or table.frame_s is None:
+        return ()
+    if abs(fps * table.frame_s - 1) <= 0.01:
+        return ()
+    return (
+        f"{yaml_path}: fps: {fps:g} declared, {path.name} says {1 / table.frame_s:.4g}; "
+        "the declared rate is used",
+    )
+
+
+def _scale(
+    yaml_path: Path, path: Path, file: ClipFile, calibration: Calibration | None
+) -> float | None:
+    """Pixels per metre: declared, or else the file's; None = unknown."""
+    if file.pixels_per_metre is not None:
+        return file.pixels_per_metre
+    if calibration is None or not math.isfinite(calibration.pixels_per_unit[0]):
+        return None
+    unit = calibration.unit or file.track_units
+    if unit not in METRES_PER_UNIT:
+        raise InputError(
+            f"{yaml_path}: track_units: missing; {path.name} was calibrated with "
+            f"{calibration.pixels_per_unit[0]:.5g} pixels per unit and does not name the unit; "
+            f"write track_units: {' | '.join(METRES_PER_UNIT)}"
+        )
+    scale = calibration.pixels_per_unit[0] / METRES_PER_UNIT[unit]
+    if not MIN_SCALE_PX_PER_M <= scale <= MAX_SCALE_PX_PER_M:
+        raise InputError(
+            f"{path}: calibrated to {scale:.4g} pixels per metre; {MIN_SCALE_PX_PER_M:g} to "
+            f"{MAX_SCALE_PX_PER_M:g} expected; mend its calibration or give pixels_per_metre"
+        )
+    return scale
+
+
+def _origin(file: ClipFile, table: TrackTable) -> tuple[float, float] | None:
+    """Declared, or else the file's, pixels; None = unknown."""
+    if file.origin_px is not None or table.calibration is None:
+        return file.origin_px
+    return table.calibration.origin_px
+
+
+def _from_pixels(
+    file: ClipFile,
+    table: TrackTable,
+    scale: float | None,
+    origin: tuple[float, float] | None,
+    y_axis: str,
+) -> np.ndarray:
+    """`[object, 2, row]`, m, x right, y up; without an origin from where object 1 begins."""
+    position = table.position
+    if origin is None:
+        seen = np.flatnonzero(np.isfinite(position[0]).all(axis=0))
+        origin = tuple(position[0, :, seen[0]]) if seen.size else (0.0, 0.0)
+    x, y = position[:, 0] - origin[0], position[:, 1] - origin[1]
+    y = -y if y_axis == "down" else y
+    calibration = table.calibration
+    if calibration is not None:
+        if math.isfinite(calibration.pixels_per_unit[0]):
+            y = y * calibration.pixels_per_unit[0] / calibration.pixels_per_unit[1]
+        cos, sin = math.cos(calibration.roll_rad), math.sin(calibration.roll_rad)
+        x, y = cos * x + sin * y, cos * y - sin * x
+    return np.stack([x, y], axis=1) / (scale or NOMINAL_SCALE_PX_PER_M)
+
+
+def _frame_rate(times_s: np.ndarray) -> float:
+    return float(1 / np.median(np.diff(times_s)))
+
+
+def _observation(
+    path: Path, names: tuple[str, ...], times: np.ndarray, position: np.ndarray, *, is_nominal: bool
+) -> Observation:
+    """Checks that positions can be metres, and takes their error from their roughness."""
+    mask = np.isfinite(position[:, 0])
+    covariance = np.full((len(names), 2, 2, len(times)), np.nan)
+    for index, name in enumerate(names):
+        if mask[index].sum() < MIN_ROWS:
+            raise InputError(
+                f"{path}: {name}: seen in {mask[index].sum()} rows; at least {MIN_ROWS} expected"
+            )
+        largest = float(np.nanmax(np.abs(position[index])))
+        if largest > MAX_POSITION_M and not is_nominal:
+            raise InputError(
+                f"{path}: {name}: a position of {largest:g} m; mend track_units, "
+                "pixels_per_metre or the origin"
+            )
+        covariance[index] = roughness_covariance_m2(path, name, times, position[index])
+        covariance[index][:, :, ~mask[index]] = np.nan
+    return Observation(names, times, position, covariance, mask)

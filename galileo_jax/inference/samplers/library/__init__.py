@@ -1,0 +1,1 @@
+"""The samplers that a posterior can be drawn with: one file each, named as the sampler."""

@@ -1,0 +1,87 @@
+"""Metropolis-Hastings from the network, in place of a search: `fit --method mh --init cnn`.
+
+    1. Levenberg-Marquardt from the middle of the network's posterior alone: no scattered starts.
+    2. Every chain starts at a draw of the network's posterior of masses and frictions, and of the
+       nuisances given these, by the normal approximation at the fit.
+
+As Galileo's recognition network starts its chains. The network's intervals are wider than the
+posterior, so that chains start apart, as R-hat needs it.
+
+Source: J. Wu et al., Galileo: perceiving physical object properties by integrating a physics
+engine with deep learning, NIPS 2015, section 5.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.inference.trials import Trials
+from galileo_jax.neural.estimate import cnn_posterior
+from galileo_jax.parameters import inverse
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where chains begin.
+
+    Attributes:
+      fit: the mode next to the network's middle, and its covariance: the first proposals.
+      z: `[chain, parameter]`, a start for every chain.
+      notes: for result.json; `warnings` where the clip is unlike the training clips.
+    """
+
+    fit: GradientFit
+    z: np.ndarray
+    notes: dict[str, Any]
+
+
+def start_from_network(trials: Trials, seed: int, num_chains: int) -> Start:
+    """Asks the network, fits from its answer, and draws the starts.
+
+    Raises:
+      InputError: a clip that the network does not know, see `cnn_posterior`.
+    """
+    posterior, middle, notes = cnn_posterior(trials, seed)
+    free = trials.free(())[: len(trials.model_parameters)]
+    fitter = GradientFitter(trials)
+    (fit,) = fitter.fit_from(middle[None, : len(free)], free[None], np.zeros(1, int))
+    generator = np.random.default_rng([seed, 8])
+    drawn = posterior.flat()[generator.choice(posterior.draws.shape[1], num_chains)]
+    told = np.array([parameter.role == "main" for parameter in trials.parameters])
+    z = np.asarray(inverse(trials.parameters, jnp.asarray(drawn)))
+    return Start(fit, completed(z, told, fit, generator), {"init": "cnn"} | _warnings(notes))
+
+
+def completed(
+    z: np.ndarray, told: np.ndarray, fit: GradientFit, generator: np.random.Generator
+) -> np.ndarray:
+    """Draws of what is not `told`, given what is: N(mode, covariance) of the fit, conditional.
+
+    Args:
+      z: `[chain, parameter]`, right where told.
+      told: `[parameter]`.
+      fit: of all parameters.
+      generator: of the draws.
+    """
+    covariance, rest = fit.covariance, ~told
+    slope = np.linalg.solve(covariance[np.ix_(told, told)], covariance[np.ix_(told, rest)])
+    left = covariance[np.ix_(rest, rest)] - covariance[np.ix_(rest, told)] @ slope
+    noise = generator.standard_normal((len(z), int(rest.sum()))) @ np.linalg.cholesky(left).T
+    whole = z.copy()
+    whole[:, rest] = fit.z[rest] + (z - fit.z)[:, told] @ slope + noise
+    return whole
+
+
+def _warnings(notes: dict[str, Any]) -> dict[str, Any]:
+    """The network's, in so far as they concern a start."""
+    if "warnings" not in notes:
+        return {}
+    return {
+        "warnings": [
+            "--init cnn: this clip is unlike those that the network was trained on; compare with "
+            "--init grad"
+        ]
+    }

@@ -1,0 +1,130 @@
+"""What a prediction says: lines for the terminal, and its section of the report."""
+
+import base64
+import re
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.files import write_text
+from galileo_jax.report.figure import to_inline
+from galileo_jax.report.shell import document, figure_section, header, table
+from galileo_jax.report.write import PAGE
+from galileo_jax.run import Run
+
+ALONE = "prediction.html"  # where there is no report to go into
+HEAD = ("", "will it slide?", "how far", "after the clip", "does it stop?", "where", "when")
+
+
+def told(found: Mapping[str, Any]) -> list[str]:
+    """The answers as lines for the reader."""
+    until = found["predicted_until_s"]
+    lines = [f"until {until:.2f} s, {found['seconds_beyond_clip_s']:g} s after the clip's end:"]
+    for name, entry in found["objects"].items():
+        slides, stops = entry["slides_probability"], entry["stops_probability"]
+        lines.append(f"{name}: will it slide? {_chance(slides)}")
+        if slides == 0:
+            continue
+        lines.append(f"  how far: {_interval(entry['travelled_m'], 'm')}")
+        beyond = entry["travelled_beyond_clip_m"]
+        if beyond["q975"] > 5e-4:
+            lines.append(f"  of that after the clip: {_interval(beyond, 'm')}")
+        lines.append(f"  does it stop? {_chance(stops)}")
+        if entry["rest_x_m"] and entry["rest_time_s"]:
+            lines.append(
+                f"  at x = {_interval(entry['rest_x_m'], 'm')}, "
+                f"after {_interval(entry['rest_time_s'], 's')}"
+            )
+        if stops < 1:
+            lines.append(f"  at the end at x = {_interval(entry['end_x_m'], 'm')}")
+    if found["hit"] is not None:
+        first, second = list(found["objects"])[:2]
+        line = f"does {first} hit {second}? {_chance(found['hit']['probability'])}"
+        if found["hit"]["time_s"]:
+            line += f", after {_interval(found['hit']['time_s'], 's')}"
+        lines.append(line)
+    return lines
+
+
+def _chance(probability: float) -> str:
+    words = {0.0: "no", 1.0: "yes"}.get(probability, "perhaps")
+    return f"{words} (probability {probability:.2f})"
+
+
+def _interval(entry: Mapping[str, float], unit: str) -> str:
+    mean, low, high = (f"{entry[key]:.3f}" for key in ("mean", "q025", "q975"))
+    return f"{mean} {unit} ({low} to {high})"
+
+
+def write_prediction(folder: Path, run: Run, found: Mapping[str, Any], svg: str) -> Path:
+    """Puts the prediction's section into the folder's report, in place of an earlier one.
+
+    Args:
+      folder: with first_and_last.png in it; without a report the section is a page of its own.
+      run: what was continued.
+      found: prediction.json.
+      svg: the motion continued.
+
+    Returns:
+      the page that has it.
+    """
+    section = _section(found, svg, (folder / "first_and_last.png").read_bytes())
+    page = folder / PAGE
+    if page.is_file() and "</main>" in (text := page.read_text(encoding="utf-8")):
+        write_text(page, _inserted(text, section))
+        return page
+    page = folder / ALONE
+    title = ", ".join(Path(clip).name for clip in run.result["clips"])
+    until = f"Until {found['predicted_until_s']:.2f} s after the first frame."
+    write_text(
+        page, document(f"{title}: prediction", [header("prediction", title, until), section])
+    )
+    return page
+
+
+def _inserted(page: str, section: str) -> str:
+    page = re.sub(r'<section id="prediction">.*?</section>\n', "", page, flags=re.DOTALL)
+    if 'href="#prediction"' not in page:
+        page = page.replace("</nav>", '<a href="#prediction">Prediction</a></nav>', 1)
+    before, after = page.rsplit("</main>", 1)
+    return f"{before}{section}</main>{after}"
+
+
+def _section(found: Mapping[str, Any], svg: str, picture: bytes) -> str:
+    rows = [[f"<code>{escape(name)}</code>", *_row(o)] for name, o in found["objects"].items()]
+    hit = ""
+    if found["hit"] is not None:
+        first, second = list(found["objects"])[:2]
+        when = _cell(found["hit"]["time_s"], "s")
+        chance = _chance(found["hit"]["probability"])
+        hit = f"<p>Does {escape(first)} hit {escape(second)}? {chance}, {when}.</p>\n"
+    encoded = base64.b64encode(picture).decode("ascii")
+    stills = f'<img src="data:image/png;base64,{encoded}" style="max-width:100%" alt="the stills">'
+    motion = figure_section(
+        "Prediction",
+        f"{found['seconds_beyond_clip_s']:g} s beyond the clip's end, from {found['num_draws']} "
+        "draws of the posterior: mean and 95 % interval.",
+        {"motion": to_inline(svg, "measured and predicted motion")},
+        "narrow",
+    )
+    caption = "First and last frame of the clip, as filmed and as simulated, and the end."
+    return (
+        f'<section id="prediction">\n{motion}\n{table(HEAD, rows)}\n{hit}'
+        f"<figure><figcaption>{caption}</figcaption>{stills}</figure>\n</section>\n"
+    )
+
+
+def _row(entry: Mapping[str, Any]) -> list[str]:
+    return [
+        _chance(entry["slides_probability"]),
+        _cell(entry["travelled_m"], "m"),
+        _cell(entry["travelled_beyond_clip_m"], "m"),
+        _chance(entry["stops_probability"]),
+        _cell(entry["rest_x_m"], "m"),
+        _cell(entry["rest_time_s"], "s"),
+    ]
+
+
+def _cell(entry: Mapping[str, float] | None, unit: str) -> str:
+    return _interval(entry, unit) if entry else "never"

@@ -1,0 +1,225 @@
+"""The page of a sweep: errors by effect and by method, what was taken for what, what failed."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.files import write_text
+from galileo_jax.report.plotly_chart import figure_element
+from galileo_jax.report.provenance import versions
+from galileo_jax.report.shell import document, figure_section, header, legend, table
+
+COLOURS = ("object2", "object1", "good", "fails", "ink", "soft")
+QUANTITIES = {"k1": "k1", "k2": "k2", "mass_ratio": "m1/m2"}
+CHART_PX, CELL_PX = 300, 34
+EACH = {"type": "category", "tickmode": "linear", "dtick": 1}  # an axis that names each category
+MAX_FAILURES = 50  # listed; the table on disk has all
+Row = Mapping[str, Any]
+
+
+def write_sweep_page(path: Path, title: str, rows: Sequence[Row], command: str) -> None:
+    """Writes the page.
+
+    Args:
+      path: of the HTML file.
+      title: of the sweep.
+      rows: as `sweeping.summary.make_rows` gives them.
+      command: that makes it again.
+    """
+    done = [row for row in rows if row["status"] == "done"]
+    failed = [row for row in rows if row["status"] == "failed"]
+    label = _labels(done)
+    lead = f"{len(done)} of {len(rows)} cells done"
+    lead += f", {len(failed)} failed: see below." if failed else "."
+    sections = [header("sweep", title, lead, is_good=not failed)]
+    sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
+    sections += _errors("Error by method", _METHOD, done, label, label)
+    sections += _confusion(done)
+    if done:
+        sections.append(_methods(done, label))
+    if failed:
+        sections.append(_failures(failed))
+    sections.append(_provenance(command))
+    write_text(path, document(f"{title}: sweep", sections))
+
+
+_EFFECT = (
+    "How far each estimate is from the truth, by the effect that was hidden in the clip. Where "
+    "no truth is known, the velocity error over the tracking noise: 1 is noise alone."
+)
+_METHOD = "The same by method and by those of its options that differ between cells."
+
+
+def _labels(rows: Iterable[Row]) -> Callable[[Row], str]:
+    """A cell's method with those options that differ between cells of this method."""
+    seen: dict[str, dict[str, set[str]]] = {}
+    for row in rows:
+        own = seen.setdefault(row["method"], {})
+        for key, value in _options(row).items():
+            own.setdefault(key, set()).add(value)
+
+    def label(row: Row) -> str:
+        own = seen[row["method"]]
+        shown = [value for key, value in _options(row).items() if len(own[key]) > 1]
+        return " ".join([row["method"], *shown])
+
+    return label
+
+
+def _options(row: Row) -> dict[str, str]:
+    found = dict(part.split("=", 1) for part in row["options"].split())
+    if row["method"] != "diagnose":
+        found["effects"] = f"with {row['effects']}" if row["effects"] != "none" else "no effect"
+    return found
+
+
+def _errors(
+    heading: str,
+    caption: str,
+    rows: Sequence[Row],
+    category: Callable[[Row], str | None],
+    label: Callable[[Row], str],
+) -> list[str]:
+    """Box plots of the errors of each quantity; of the velocity error where none is known."""
+    figures = {}
+    for name, symbol in QUANTITIES.items():
+        known = [row for row in rows if _has_error(row, name)]
+        if known:
+            values = [abs(row[f"{name}_error"]) for row in known]
+            title = f"error of {symbol}"
+            figures[name] = _boxes(title, known, values, category, label)
+    if not figures:
+        known = [row for row in rows if row["rmse"] is not None and row["noise"]]
+        if not known:
+            return []
+        values = [row["rmse"] / row["noise"] for row in known]
+        figures["rmse"] = _boxes("velocity error / noise", known, values, category, label)
+    names = sorted({label(row) for row in rows})
+    key = legend(("dot", COLOURS[i % len(COLOURS)], name) for i, name in enumerate(names))
+    return [figure_section(heading, caption, figures, legend=key)]
+
+
+def _has_error(row: Row, quantity: str) -> bool:
+    """Whether the truth is known and the clip determines the quantity, as far as that is said."""
+    return row[f"{quantity}_error"] is not None and row[f"{quantity}_identified"] is not False
+
+
+def _boxes(
+    title: str,
+    rows: Sequence[Row],
+    values: Sequence[float],
+    category: Callable[[Row], str | None],
+    label: Callable[[Row], str],
+) -> str:
+    names = sorted({label(row) for row in rows})
+    data = []
+    for i, name in enumerate(names):
+        own = [(category(r) or "unknown", v) for r, v in zip(rows, values, strict=True)
+               if label(r) == name]  # fmt: skip
+        colour = COLOURS[i % len(COLOURS)]
+        data.append(
+            {
+                "type": "box",
+                "name": escape(name),
+                "x": [escape(where) for where, _ in own],
+                "y": [float(f"{value:.4g}") for _, value in own],
+                "boxpoints": "all",
+                "jitter": 0.5,
+                "pointpos": 0,
+                "marker": {"color": f"@{colour}", "size": 4},
+                "line": {"color": f"@{colour}", "width": 1},
+                "fillcolor": f"@{colour}/0.15",
+            }
+        )
+    layout = {
+        "boxmode": "overlay" if category is label or len(names) == 1 else "group",
+        "margin": {"l": 62, "r": 12, "t": 12, "b": 96},
+        "xaxis": {"tickangle": -35, **EACH},
+        "yaxis": {"title": {"text": title}, "rangemode": "tozero"},
+    }
+    return figure_element({"data": data, "layout": layout}, f"{title}, box plots", CHART_PX)
+
+
+def _confusion(rows: Sequence[Row]) -> list[str]:
+    """What was hidden against what was said."""
+    told = [(row["hidden"], row["verdict"]) for row in rows if row["verdict"] and row["hidden"]]
+    if not told:
+        return []
+    hidden = sorted({h for h, _ in told})
+    verdicts = sorted({v for _, v in told}, key=lambda v: (v not in hidden, v))
+    count = Counter(told)
+    z = [[count[h, v] for v in verdicts] for h in hidden]
+    figure = {
+        "data": [
+            {
+                "type": "heatmap",
+                "x": [escape(v) for v in verdicts],
+                "y": [escape(h) for h in hidden],
+                "z": z,
+                "text": [[str(n) if n else "" for n in line] for line in z],
+                "texttemplate": "%{text}",
+                "hovertemplate": "hidden %{y}, said %{x}: %{z}<extra></extra>",
+                "colorscale": [[0, "@card"], [1, "@object2"]],
+                "showscale": False,
+                "xgap": 1,
+                "ygap": 1,
+            }
+        ],
+        "layout": {
+            "margin": {"l": 130, "r": 12, "t": 12, "b": 110},
+            "xaxis": {"title": {"text": "said"}, "tickangle": -35, **EACH},
+            "yaxis": {"title": {"text": ""}, "autorange": "reversed", **EACH},
+        },
+    }
+    right = sum(n for (h, v), n in count.items() if h == v)
+    caption = (
+        f"Rows: what was hidden in the clip. Columns: what the diagnosis said. {right} of "
+        f"{len(told)} are named right; none means that nothing is missing."
+    )
+    height = 150 + CELL_PX * len(hidden)
+    element = figure_element(figure, "confusion matrix of hidden and named effects", height)
+    return [figure_section("Hidden and named", caption, {"confusion": element}, "narrow")]
+
+
+def _methods(rows: Sequence[Row], label: Callable[[Row], str]) -> str:
+    """Each method in a line: how many cells, typical errors, and whether intervals hold."""
+    head = ["", "cells", "converged"]
+    for symbol in QUANTITIES.values():
+        head += [f"{symbol}: median error", "in 95 %"]
+    lines = []
+    for name in sorted({label(row) for row in rows}):
+        own = [row for row in rows if label(row) == name]
+        line = [escape(name), str(len(own)), _share(row["converged"] for row in own)]
+        for quantity in QUANTITIES:
+            errors = [abs(row[f"{quantity}_error"]) for row in own if _has_error(row, quantity)]
+            line.append(f"{np.median(errors):.3g}" if errors else "")
+            line.append(_share(row[f"{quantity}_covered"] for row in own))
+        lines.append(line)
+    return "<h2>Methods</h2>\n" + table(head, lines)
+
+
+def _share(values: Iterable[bool | None]) -> str:
+    """How many are true, of those that say anything."""
+    known = [value for value in values if value is not None]
+    return f"{sum(known)} of {len(known)}" if known else ""
+
+
+def _failures(rows: Sequence[Row]) -> str:
+    lines = [[f"<code>{escape(row['cell'])}</code>", escape(row["failure"])] for row in rows]
+    more = len(lines) - MAX_FAILURES
+    note = f"<p>{more} more are in summary.csv.</p>" if more > 0 else ""
+    return "<h2>Failed</h2>\n" + table(["cell", "why"], lines[:MAX_FAILURES]) + note
+
+
+def _provenance(command: str) -> str:
+    told = ", ".join(f"{name} {found}" for name, found in versions().items())
+    return (
+        "<h2>Provenance</h2>\n<p>A cell's name is made from its options, its clips' content and "
+        "the version: the same name is the same numbers.</p>\n"
+        f"<dl><dt>made again by</dt><dd><code>{escape(command)}</code></dd>"
+        f"<dt>versions</dt><dd>{escape(told)}</dd></dl>"
+    )

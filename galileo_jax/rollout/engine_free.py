@@ -1,0 +1,254 @@
+"""The rigid engine's other half: one body that slides on nothing.
+
+A fall, a flight, a swing on a spring, a body in a liquid: between bounces the motion is smooth,
+and a Runge-Kutta step of 1/240 s is of fourth order. A bounce is met at its time, by Newton's
+method on the step itself, so that the motion is a continuous function of the parameters with the
+right derivatives, as in `engine_rigid`.
+
+On a straight path the forces act along it; in the plane gravity is a vector, the effects' forces
+act along the velocity, and the path is how far the body has come along its curve.
+"""
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.effects.effect import Bounce, Effect, Surroundings
+from galileo_jax.rollout.chunks import MOTIONS, in_chunks
+from galileo_jax.rollout.model import Model
+from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
+
+MAX_BOUNCES = 8  # within one recorded step
+PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
+NEWTON_STEPS = 3
+STILL_M2_S2 = 1e-18  # keeps the derivative of the speed finite at rest
+RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
+
+
+class Body(NamedTuple):
+    """The body at one instant, or its rates of change.
+
+    Attributes:
+      position_m, velocity_m_s: `[2]`.
+      way_m: how far it has come along its curve.
+    """
+
+    position_m: jax.Array
+    velocity_m_s: jax.Array
+    way_m: jax.Array
+
+    def moved(self, rate: "Body", time_s: Any) -> "Body":
+        """With constant rates for a time."""
+        return Body(*(value + time_s * change for value, change in zip(self, rate, strict=True)))
+
+
+Rate = Callable[[Body, jax.Array], Body]
+
+
+class EngineFree:
+    """Simulates batches of parameter vectors; compiled once for all clips of a kind."""
+
+    name = "rigid"
+
+    def __init__(self, model: Model):
+        self.model = model
+
+    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
+        return in_chunks(MOTIONS, lambda part: self.traceable(jnp.asarray(part)), np.asarray(theta))
+
+    def traceable(self, theta: jax.Array) -> tuple[jax.Array, jax.Array]:
+        """`simulate` in JAX: can be jitted, vmapped and differentiated."""
+        model = self.model
+        count = model.num_records + 1
+        position, velocity = _roll_out_batch(
+            model.effects + model.nuisances,
+            model.names,
+            -(-count // RECORDS) * RECORDS,
+            model.record_dt_s,
+            theta,
+            model.scene.surroundings,
+        )
+        return position[..., :count], velocity[..., :count]
+
+
+@functools.partial(jax.jit, static_argnums=(0, 1, 2, 3))
+def _roll_out_batch(
+    effects: tuple[Effect, ...],
+    names: tuple[str, ...],
+    num_records: int,
+    dt_s: float,
+    theta: jax.Array,
+    scene: Surroundings,
+) -> tuple[jax.Array, jax.Array]:
+    one = functools.partial(roll_out, effects, names, num_records, dt_s)
+    return jax.vmap(one, (0, None))(theta, scene)
+
+
+def roll_out(
+    effects: tuple[Effect, ...],
+    names: tuple[str, ...],
+    num_records: int,
+    dt_s: float,
+    theta: jax.Array,
+    scene: Surroundings,
+) -> tuple[jax.Array, jax.Array]:
+    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`."""
+    named = {name: theta[i] for i, name in enumerate(names)}
+    law = dynamics(effects, scene, named, jnp)
+    start = jnp.asarray(scene.start_m)[0]
+    tangent = jnp.stack([jnp.cos(law.ramp_rad), -jnp.sin(law.ramp_rad)])
+    floor = floor_of(effects, named, scene)
+    velocity = start_velocity(effects, named, scene)
+    body = Body(
+        start + law.start_m[0] * tangent,
+        law.start_speed_m_s[0] * tangent if velocity is None else velocity[0],
+        jnp.zeros(()),
+    )
+
+    def record(body: Body, index: jax.Array):
+        return _step(body, index * dt_s, dt_s, law, scene, floor), body
+
+    _, bodies = jax.lax.scan(record, body, jnp.arange(num_records))
+    return bodies.position_m.T[None], bodies.velocity_m_s.T[None]
+
+
+def start_velocity(
+    effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings
+) -> Any | None:
+    """The velocity in the plane at the start, `[..., object, 2]`; None on a straight path."""
+    given = [e.start_velocity(theta, scene) for e in effects]
+    found = [velocity for velocity in given if velocity is not None]
+    return sum(found[1:], found[0]) if found else None
+
+
+def floor_of(
+    effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings
+) -> Bounce | None:
+    """The floor at its true height, never above the body's start.
+
+    Its height is told as measured; what magnifies the picture magnifies its depth, too.
+    """
+    floor = next((f for e in effects if (f := e.bounce(theta, scene)) is not None), None)
+    if floor is None:
+        return None
+    xp = floor.height_m.__array_namespace__()
+    start = xp.asarray(scene.start_m)[0]
+    seen = start[None, :, None] + xp.asarray([[0.0, 0.0], [0.0, 1.0]])[None]
+    for effect in effects:
+        seen = effect.measure(seen, theta, scene)
+    magnified = seen[0, 1, 1] - seen[0, 1, 0]
+    depth = xp.maximum((start[1] - floor.height_m) / magnified, xp.zeros_like(magnified))
+    return floor._replace(height_m=start[1] - depth)
+
+
+def rates(body: Body, time_s: Any, law: Dynamics, scene: Surroundings, rests: Any) -> Body:
+    """How a body changes; one that `rests` on the floor is not pulled through it."""
+    xp = body.position_m.__array_namespace__()
+    down = xp.stack([xp.sin(law.ramp_rad), -xp.cos(law.ramp_rad)])
+    if scene.moves_in_plane:
+        speed = xp.sqrt(xp.sum(body.velocity_m_s**2) + STILL_M2_S2)
+        tangent, way = body.velocity_m_s / speed, body.way_m
+        weight = law.gravity * down
+    else:
+        tangent = xp.stack([xp.cos(law.ramp_rad), -xp.sin(law.ramp_rad)])
+        speed = xp.sum(body.velocity_m_s * tangent)
+        way = xp.sum((body.position_m - xp.asarray(scene.start_m)[0]) * tangent)
+        weight = 0.0 * down
+    state = state_at(way[None], speed[None], time_s, scene)
+    a = weight + (law.drive(state) / law.inertia)[0] * tangent
+    upward = xp.where(rests, xp.maximum(a[1], xp.zeros_like(a[1])), a[1])
+    return Body(body.velocity_m_s, xp.stack([a[0], upward]), speed)
+
+
+def _step(
+    body: Body,
+    time_s: jax.Array,
+    dt_s: float,
+    law: Dynamics,
+    scene: Surroundings,
+    floor: Bounce | None,
+) -> Body:
+    """One recorded step, bounce by bounce."""
+    if floor is None:
+        return _runge_kutta(
+            body, lambda at, t: rates(at, t, law, scene, rests=False), time_s, jnp.asarray(dt_s)
+        )
+
+    def is_left(carry: Any) -> jax.Array:
+        _, left, count = carry
+        return (left > 0) & (count < MAX_BOUNCES)
+
+    def phase(carry: Any) -> Any:
+        body, left, count = carry
+        is_last = count == MAX_BOUNCES - 1
+        body, spent = _to_bounce(body, time_s + dt_s - left, left, is_last, law, scene, floor)
+        return body, left - spent, count + 1
+
+    return jax.lax.while_loop(is_left, phase, (body, jnp.asarray(dt_s), 0))[0]
+
+
+def _to_bounce(
+    body: Body,
+    time_s: jax.Array,
+    left_s: jax.Array,
+    is_last: jax.Array,
+    law: Dynamics,
+    scene: Surroundings,
+    floor: Bounce,
+) -> tuple[Body, jax.Array]:
+    """Moves on to the next bounce, or by `left_s`; returns the body and the time it took.
+
+    When `is_last`, by `left_s` in any case: what bounces faster than that rests.
+    """
+    height, climbs = body.position_m[1] - floor.height_m, body.velocity_m_s[1]
+    rests = (height <= 0) & (climbs == 0)
+
+    def after(spent_s: jax.Array) -> Body:
+        return _runge_kutta(body, lambda at, t: rates(at, t, law, scene, rests), time_s, spent_s)
+
+    whole = after(left_s)
+    sinks = left_s * climbs - (whole.position_m[1] - body.position_m[1])
+    hits = (whole.position_m[1] < floor.height_m) & ~rests
+    # On a parabola through the step's ends; then on the step itself.
+    a = jnp.where(hits, 2 * sinks / left_s**2, 1.0)
+    root = jnp.sqrt(jnp.maximum(climbs**2 + 2 * a * height, 0.0))
+    steady = jnp.abs(a) < 1e-6
+    at = jnp.where(steady, -height / jnp.where(steady, climbs, 1.0), (climbs + root) / a)
+    at = jax.lax.stop_gradient(jnp.clip(jnp.where(hits, at, left_s), 0.0, left_s))
+    for _ in range(NEWTON_STEPS):
+        # The last of the steps carries the derivative of the instant.
+        there = after(jax.lax.stop_gradient(at))
+        miss, speed = there.position_m[1] - floor.height_m, there.velocity_m_s[1]
+        way = jax.lax.stop_gradient(jnp.where(hits & (speed < 0), speed, -1.0))
+        at = jnp.where(hits, jnp.clip(jax.lax.stop_gradient(at) - miss / way, 0.0, left_s), left_s)
+    there = after(at)
+    vx, vy = there.velocity_m_s
+    rebound = jnp.where(-vy > PLASTIC_M_S, -floor.restitution * vy, 0.0)
+    rebound = jnp.where(is_last, 0.0, rebound)
+    bounced = Body(
+        jnp.stack([there.position_m[0], floor.height_m]),
+        jnp.stack([vx * (1 - floor.grip), rebound]),
+        there.way_m,
+    )
+    found = jax.tree.map(lambda one, other: jnp.where(hits, one, other), bounced, whole)
+    return found, jnp.where(is_last, left_s, at)
+
+
+def _runge_kutta(body: Body, rate: Rate, time_s: jax.Array, h: jax.Array) -> Body:
+    """One step of the classical fourth-order method."""
+    first = rate(body, time_s)
+    second = rate(body.moved(first, 0.5 * h), time_s + 0.5 * h)
+    third = rate(body.moved(second, 0.5 * h), time_s + 0.5 * h)
+    fourth = rate(body.moved(third, h), time_s + h)
+    mean = Body(
+        *(
+            (a + 2 * b + 2 * c + d) / 6
+            for a, b, c, d in zip(first, second, third, fourth, strict=True)
+        )
+    )
+    return body.moved(mean, h)

@@ -1,0 +1,1 @@
+"""The scores of `--preset thesis`: one file each, named as the similarity."""

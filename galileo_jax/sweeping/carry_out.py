@@ -1,0 +1,78 @@
+"""Carrying out a sweep: tracks the clips, computes the cells, keeps each as it comes."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from galileo_jax.sweeping.cell import Cell
+from galileo_jax.sweeping.clip_files import ClipFiles
+from galileo_jax.sweeping.store import Store
+from galileo_jax.sweeping.task import Engine, Failure, Task
+from galileo_jax.sweeping.work import measure_files, run_cell
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Who is told how far a sweep is.
+
+    Attributes:
+      on_begin: called with "tracking" or "cells", and how many there are.
+      on_done: called after each.
+      on_failure: called with a cell's name and why it has no result.
+    """
+
+    on_begin: Callable[[str, int], None] = lambda what, count: None
+    on_done: Callable[[], None] = lambda: None
+    on_failure: Callable[[str, Failure], None] = lambda name, failure: None
+
+
+def carry_out(cells: Sequence[Cell], store: Store, engine: Engine, watch: Watch = Watch()) -> None:
+    """Computes the cells that have neither a result nor a failure.
+
+    Args:
+      cells: of the sweep.
+      store: where results are and go; each is written before the next is waited for.
+      engine: carries out the tasks.
+      watch: is told.
+    """
+    left = [c for c in cells if not store.has_result(c.name) and store.failure(c.name) is None]
+    clips = {clip.digest: clip for cell in left for clip in cell.clips}
+    wrong = _track(clips, store, engine, watch)
+
+    def fail(name: str, failure: Failure) -> None:
+        store.save_failure(name, failure)
+        watch.on_failure(name, failure)
+
+    for cell in left:
+        if first := next((wrong[c.digest] for c in cell.clips if c.digest in wrong), None):
+            fail(cell.name, first)
+    left = [cell for cell in left if store.failure(cell.name) is None]
+
+    def tasks() -> Iterator[Task]:
+        for cell in left:
+            measured = tuple(store.clip(clip.digest) for clip in cell.clips)
+            yield Task(cell.name, run_cell, (cell.settings, measured))
+
+    watch.on_begin("cells", len(left))
+    for outcome in engine.outcomes(tasks()):
+        if outcome.failure is None:
+            store.save_result(outcome.key, outcome.value)
+        else:
+            fail(outcome.key, outcome.failure)
+        watch.on_done()
+
+
+def _track(
+    clips: dict[str, ClipFiles], store: Store, engine: Engine, watch: Watch
+) -> dict[str, Failure]:
+    """Tracks the clips that are not yet; returns what is wrong with some of them."""
+    left = [clip for digest, clip in clips.items() if not store.has_clip(digest)]
+    wrong: dict[str, Failure] = {}
+    watch.on_begin("tracking", len(left))
+    tasks = (Task(clip.digest, measure_files, (clip.packed(),)) for clip in left)
+    for outcome in engine.outcomes(tasks):
+        if outcome.failure is None:
+            store.save_clip(outcome.key, outcome.value)
+        else:
+            wrong[outcome.key] = outcome.failure
+        watch.on_done()
+    return wrong

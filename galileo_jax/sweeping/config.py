@@ -1,0 +1,202 @@
+"""A sweep's config: one YAML file, with overrides from the command line.
+
+A config with all its keys:
+
+simulate: [{count: 8}, {count: 4, effect: air_drag}]   # clips made for this sweep
+clips: ["clips/*.yaml", [slow.yaml, fast.yaml]]        # each alone; those in a list together
+common: {method: mh}             # options of every cell
+grid: {seed: [0, 1], chains: [4, 8]}                   # all combinations
+list: [{sampler: mixture}, {sampler: random_walk}]     # one by one, each with all of the grid
+"""
+
+import glob
+import itertools
+from collections.abc import Sequence
+from copy import deepcopy
+from pathlib import Path
+from typing import Annotated, Any
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.errors import InputError
+from galileo_jax.sweeping.settings import Settings, make_settings
+
+ClipName = Annotated[str, Field(strict=True, min_length=1)]
+
+
+class Simulated(BaseModel):
+    """Clips to be made with `galileo simulate`.
+
+    Attributes:
+      count: how many; the first has `seed`, the next one more.
+      effect: hidden in them.
+      strength: of the effect, from 0 to 1; drawn where it is not given.
+      video: rendered and to be tracked; else tracks in metres.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    count: Annotated[int, Field(strict=True, ge=1)]
+    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    effect: Annotated[str, Field(strict=True)] | None = None
+    strength: Annotated[float, Field(gt=0, le=1)] | None = None
+    video: Annotated[bool, Field(strict=True)] = False
+
+
+class SweepConfig(BaseModel):
+    """What a sweep does; see the module for an example.
+
+    Attributes:
+      simulate: clips that are made for it.
+      clips: files or patterns, relative to where the command is called; those of a list within
+        the list are trials of the same objects and fitted together.
+      common: options of every cell; see `settings` for those of each method.
+      grid: options with several values each, of which all combinations are taken.
+      list: options that go together, one entry after the other.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    simulate: tuple[Simulated, ...] = ()
+    clips: tuple[ClipName | tuple[ClipName, ...], ...] = ()
+    common: dict[str, Any] = {}
+    grid: dict[str, Annotated[list[Any], Field(min_length=1)]] = {}
+    list: Annotated[tuple[dict[str, Any], ...], Field(min_length=1)] = ({},)
+
+    def all_settings(self) -> tuple[Settings, ...]:
+        """The settings of all cells, each once.
+
+        Raises:
+          InputError: an option is wrong; names it and where it stands.
+        """
+        found: dict[Settings, None] = {}
+        for i, entry in enumerate(self.list):
+            for values in itertools.product(*self.grid.values()):
+                point = dict(zip(self.grid, values, strict=True))
+                if twice := set(entry) & set(point):
+                    raise InputError(f"list.{i}.{min(twice)}: stands in grid, too; keep one")
+                try:
+                    found[make_settings({**self.common, **entry, **point})] = None
+                except InputError as error:
+                    raise InputError(f"{_where(str(error), i, entry, point)}{error}") from None
+        return tuple(found)
+
+    def clip_groups(self) -> tuple[tuple[Path, ...], ...]:
+        """The clips, patterns expanded: those of a group are fitted together.
+
+        Raises:
+          InputError: nothing has such a name.
+        """
+        groups: dict[tuple[Path, ...], None] = {}
+        for entry in self.clips:
+            if isinstance(entry, str):
+                groups |= dict.fromkeys((path,) for path in _matches(entry))
+            else:
+                groups[tuple(path for name in entry for path in _matches(name))] = None
+        return tuple(groups)
+
+
+def load_config(
+    path: Path, changes: Sequence[str] = (), runs: Sequence[str] = ()
+) -> tuple[SweepConfig, ...]:
+    """Reads a config and applies overrides.
+
+    Args:
+      path: a YAML file.
+      changes: "key=value" each, the key with dots (`common.seed=3`), the value YAML.
+      runs: "key=a,b" each: one config for every combination.
+
+    Raises:
+      InputError: unreadable, or a key is unknown or its value is wrong.
+    """
+    content = read_mapping(path)
+    for change in changes:
+        key, value = _split("--set", change)
+        _put(content, f"--set {change}", key, _parsed(f"--set {change}", value))
+    many = [_split("--multirun", run) for run in runs]
+    options = [_parsed(f"--multirun {key}={text}", f"[{text}]") for key, text in many]
+    configs = []
+    for values in itertools.product(*options):
+        one = deepcopy(content)
+        for (key, text), value in zip(many, values, strict=True):
+            _put(one, f"--multirun {key}={text}", key, value)
+        configs.append(_checked(path, one))
+    return tuple(configs)
+
+
+def _checked(path: Path, content: dict[str, Any]) -> SweepConfig:
+    try:
+        config = SweepConfig.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(
+            str(part) for part in first["loc"] if isinstance(part, int) or part.isidentifier()
+        )
+        known = ", ".join(SweepConfig.model_fields)
+        said = f"unknown; known: {known}" if first["type"] == "extra_forbidden" else first["msg"]
+        raise InputError(f"{path}: {key}: {said}; got {first['input']!r}") from None
+    try:
+        config.all_settings()
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    if not config.clips and not config.simulate:
+        raise InputError(f"{path}: clips: missing; files, patterns such as clips/*.yaml expected")
+    return config
+
+
+def _where(message: str, index: int, entry: dict[str, Any], point: dict[str, Any]) -> str:
+    """The part of a config that an error's key stands in."""
+    key = message.split(":")[0].split(".")[0]
+    if key in point:
+        return "grid."
+    return f"list.{index}." if key in entry else "common."
+
+
+def _matches(pattern: str) -> list[Path]:
+    if not glob.has_magic(pattern):
+        if not Path(pattern).is_file():
+            raise InputError(f"clips: {pattern}: no such file")
+        return [Path(pattern)]
+    found = sorted(Path(name) for name in glob.glob(pattern, recursive=True))
+    if not found:
+        raise InputError(f"clips: no file matches {pattern!r}; --set 'clips=[...]' gives others")
+    return found
+
+
+def _split(option: str, text: str) -> tuple[str, str]:
+    key, equals, value = text.partition("=")
+    if not equals or not key:
+        raise InputError(f"{option}: {text!r}: KEY=VALUE expected, such as common.seed=3")
+    return key, value
+
+
+def _parsed(option: str, text: str) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise InputError(f"{option}: not YAML ({error})") from None
+
+
+def _put(content: dict[str, Any], option: str, key: str, value: Any) -> None:
+    """Sets the value at a key with dots; numbers are places in a list."""
+    *path, last = key.split(".")
+    place: Any = content
+    for i, part in enumerate(path):
+        if isinstance(place, list):
+            place = place[_index(option, place, part)]
+        else:
+            place = place.setdefault(part, {})
+        if not isinstance(place, dict | list):
+            raise InputError(f"{option}: {'.'.join(path[: i + 1])} has no keys below it")
+    if isinstance(place, list):
+        place[_index(option, place, last)] = value
+    else:
+        place[last] = value
+
+
+def _index(option: str, place: list[Any], part: str) -> int:
+    if not part.isdecimal() or int(part) >= len(place):
+        raise InputError(f"{option}: {part}: one of 0 to {len(place) - 1} expected")
+    return int(part)

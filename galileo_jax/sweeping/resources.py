@@ -1,0 +1,59 @@
+"""What one worker of a sweep may use, and how its process is told, before it imports JAX."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Resources:
+    """Of one worker.
+
+    Attributes:
+      cpus: cores.
+      gpus: whole GPUs; 0: the worker computes on the CPU, whatever there is.
+    """
+
+    cpus: int = 1
+    gpus: int = 0
+
+    def environment(self) -> dict[str, str]:
+        """Variables of a worker's process.
+
+        One thread for each core it has, so that workers do not wait for each other; with one
+        core XLA never splits a sum, and results have the same digits on every machine of a kind.
+        """
+        threads = {name: str(self.cpus) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+        flags = os.environ.get("XLA_FLAGS", "")
+        if self.cpus == 1 and SINGLE_THREAD not in flags:
+            flags = f"{flags} {SINGLE_THREAD}".strip()
+        platform = {} if self.gpus else {"JAX_PLATFORMS": "cpu"}
+        return threads | platform | ({"XLA_FLAGS": flags} if flags else {})
+
+
+SINGLE_THREAD = "--xla_cpu_multi_thread_eigen=false"
+
+
+def num_workers(each: Resources) -> int:
+    """How many workers this machine has room for, at least one."""
+    room = len(os.sched_getaffinity(0)) // each.cpus
+    if each.gpus:
+        room = min(room, len(local_gpus()) // each.gpus)
+    return max(room, 1)
+
+
+def local_gpus() -> list[str]:
+    """The GPUs of this machine that this process may use, as CUDA names them."""
+    visible = os.environ.get("CUDA_VISIBLE_DEVICES")
+    if visible is not None:
+        return [name for name in visible.split(",") if name]
+    return [str(i) for i in range(len(list(Path("/dev").glob("nvidia[0-9]*"))))]
+
+
+def environment_of(worker: int, each: Resources) -> Mapping[str, str]:
+    """The environment of a machine's worker number `worker`: its own GPUs, no one else's."""
+    if not each.gpus:
+        return each.environment()
+    own = local_gpus()[worker * each.gpus : (worker + 1) * each.gpus]
+    return each.environment() | {"CUDA_VISIBLE_DEVICES": ",".join(own)}

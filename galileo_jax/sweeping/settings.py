@@ -1,0 +1,156 @@
+"""What a cell does with its clips: a method and its options, typed and checked."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+)
+
+from galileo_jax.clip.schema import wrong
+from galileo_jax.errors import InputError
+from galileo_jax.registry import entry_names
+
+Whole = Annotated[int, Field(strict=True, ge=0)]
+Count = Annotated[int, Field(strict=True, ge=1)]
+Name = Annotated[str, Field(strict=True)]
+NoiseModel = Literal["camera", "tracker"]
+
+
+def _entry_of(package: str) -> AfterValidator:
+    """Refuses what is no entry of a package's registry."""
+    known = entry_names(package)
+
+    def check(value: str) -> str:
+        if value not in known:
+            raise wrong(f"unknown value; known: {', '.join(known)}")
+        return value
+
+    return AfterValidator(check)
+
+
+Sampler = Annotated[Name, _entry_of("galileo_jax.inference.samplers.library")]
+Similarity = Annotated[Name, _entry_of("galileo_jax.similarity.library")]
+
+
+class _Settings(BaseModel):
+    """Common to all methods.
+
+    Attributes:
+      seed: of everything random.
+      engine: that rolls out.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    seed: Whole = 0
+    engine: Literal["auto", "rigid", "c", "mjx"] = "auto"
+
+
+class Grad(_Settings):
+    """The gradient fit.
+
+    Attributes:
+      effects: in the model.
+      noise: "camera": the tracker's errors and what a camera is known to do to a picture;
+        "tracker": the tracker's errors alone, of displacements.
+    """
+
+    method: Literal["grad"] = "grad"
+    effects: tuple[Name, ...] = ()
+    noise: NoiseModel = "camera"
+
+
+class Mh(_Settings):
+    """Metropolis-Hastings, started from the gradient fit.
+
+    Attributes:
+      effects, noise: as for `Grad`.
+      sampler: a name in the samplers' registry.
+      chains: how many.
+      max_steps: of every chain, after the warm-up.
+    """
+
+    method: Literal["mh"]
+    effects: tuple[Name, ...] = ()
+    noise: NoiseModel = "camera"
+    sampler: Sampler = "mixture"
+    chains: Annotated[int, Field(strict=True, ge=2)] = 8
+    max_steps: Annotated[int, Field(strict=True, ge=25, multiple_of=25)] = 4000
+
+
+class Cnn(_Settings):
+    """The trained network."""
+
+    method: Literal["cnn"]
+
+
+class Thesis(_Settings):
+    """The thesis's sampler on our rollouts.
+
+    Attributes:
+      similarity: of velocity profiles.
+      acceptance: of a proposal that is worse.
+      selection: how the answer is taken from the chains.
+      chains: how many, of 75 steps.
+    """
+
+    method: Literal["thesis"]
+    similarity: Similarity = "thesis_gaussian"
+    acceptance: Literal["coin", "metropolis"] = "coin"
+    selection: Literal["best", "least_variance"] = "best"
+    chains: Count = 16
+
+
+class Diagnose(_Settings):
+    """Which effect is missing?
+
+    Attributes:
+      add: "auto", "none", or the effect to add.
+    """
+
+    method: Literal["diagnose"]
+    add: Name = "auto"
+
+
+KINDS: dict[str, type[_Settings]] = {
+    "grad": Grad,
+    "mh": Mh,
+    "cnn": Cnn,
+    "thesis": Thesis,
+    "diagnose": Diagnose,
+}
+Settings = Grad | Mh | Cnn | Thesis | Diagnose
+_ADAPTER: TypeAdapter[Settings] = TypeAdapter(Annotated[Settings, Field(discriminator="method")])
+
+
+def make_settings(content: dict[str, Any]) -> Settings:
+    """The settings of a cell.
+
+    Raises:
+      InputError: an unknown method, an option that the method does not have, or a wrong value;
+        the message begins with the key.
+    """
+    content = {"method": "grad"} | content
+    method = content["method"]
+    if not isinstance(method, str) or method not in KINDS:
+        raise InputError(f"method: unknown value {method!r}; known: {', '.join(KINDS)}")
+    known = KINDS[method].model_fields
+    for key in content:
+        if key not in known:
+            having = [name for name, kind in KINDS.items() if key in kind.model_fields]
+            whose = f"; an option of {', '.join(having)}" if having else ""
+            raise InputError(
+                f"{key}: method {method} has no such option{whose}; "
+                f"it has: {', '.join(name for name in known if name != 'method')}"
+            )
+    try:
+        return _ADAPTER.validate_python(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(map(str, first["loc"][1:]))
+        raise InputError(f"{key}: {first['msg']}; got {first['input']!r}") from None

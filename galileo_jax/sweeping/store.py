@@ -1,0 +1,125 @@
+"""A sweep's folder: what is done, and what failed.
+
+    DIR/cells/NAME/result.json    one cell's numbers
+    DIR/cells/NAME/failure.json   or why there are none
+    DIR/clips/DIGEST.npz          a clip as it was tracked
+    DIR/summary.csv ...           all cells in one table
+
+Every file is written under another name first, and only the sweep's own process writes: at a
+kill what was in flight is missing, and nothing is there in part.
+"""
+
+import fcntl
+import json
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from galileo_jax import __version__
+from galileo_jax.clip.schema import Clip
+from galileo_jax.errors import InputError
+from galileo_jax.files import replacing, write_json
+from galileo_jax.measured import Measured
+from galileo_jax.observation import Observation
+from galileo_jax.sweeping.task import Failure
+
+RESULT, FAILURE = "result.json", "failure.json"
+ARRAYS = ("times_s", "position_m", "covariance_m2", "mask")
+
+
+class Store:
+    """Results by name.
+
+    Attributes:
+      folder: of the sweep.
+    """
+
+    def __init__(self, folder: Path):
+        self.folder = folder
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keeps a second sweep out of the folder, and clears away what a kill left.
+
+        Raises:
+          InputError: another sweep is at work there, or the folder is a file.
+        """
+        if self.folder.exists() and not self.folder.is_dir():
+            raise InputError(f"--out: {self.folder} is a file; a folder expected")
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with (self.folder / ".lock").open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise InputError(
+                    f"--out: {self.folder}: another sweep is at work there; take another folder"
+                ) from None
+            for pattern in ("cells/*/.*.json", "clips/.*.npz", ".summary.*"):
+                for left in self.folder.glob(pattern):
+                    left.unlink()
+            for folder in self.folder.glob("simulated/.simulate.*"):
+                shutil.rmtree(folder)
+            yield
+
+    def has_result(self, name: str) -> bool:
+        """Whether a cell is done."""
+        return self._cell(name, RESULT).is_file()
+
+    def result(self, name: str) -> dict[str, Any]:
+        """A cell's result.json."""
+        return json.loads(self._cell(name, RESULT).read_text(encoding="utf-8"))
+
+    def failure(self, name: str) -> Failure | None:
+        """Why a cell has no result; None where it has one, or was not tried."""
+        path = self._cell(name, FAILURE)
+        if not path.is_file() or self.has_result(name):
+            return None
+        return Failure(**json.loads(path.read_text(encoding="utf-8")))
+
+    def save_result(self, name: str, result: dict[str, Any]) -> None:
+        """Keeps a cell's result; a failure before it is forgotten."""
+        write_json(self._cell(name, RESULT), result)
+        self.forget_failure(name)
+
+    def save_failure(self, name: str, failure: Failure) -> None:
+        """Keeps why a cell has no result."""
+        write_json(self._cell(name, FAILURE), vars(failure))
+
+    def forget_failure(self, name: str) -> None:
+        """Has a cell tried again."""
+        self._cell(name, FAILURE).unlink(missing_ok=True)
+
+    def has_clip(self, digest: str) -> bool:
+        """Whether a clip was tracked."""
+        return self._clip(digest).is_file()
+
+    def clip(self, digest: str) -> Measured:
+        """A tracked clip, to the last digit."""
+        with np.load(self._clip(digest)) as file:
+            arrays = {name: file[name] for name in ARRAYS}
+            names = tuple(str(name) for name in file["names"])
+            clip = Clip.model_validate(json.loads(str(file["clip"])))
+            inferred = json.loads(str(file["inferred"]))
+        return Measured(clip, Observation(names=names, **arrays), inferred)
+
+    def save_clip(self, digest: str, measured: Measured) -> None:
+        """Keeps a tracked clip."""
+        seen = measured.observation
+        with replacing(self._clip(digest)) as path:
+            np.savez_compressed(
+                path,
+                names=np.array(seen.names),
+                clip=np.array(measured.clip.model_dump_json()),
+                inferred=np.array(json.dumps(measured.inferred)),
+                **{name: getattr(seen, name) for name in ARRAYS},
+            )
+
+    def _cell(self, name: str, file: str) -> Path:
+        return self.folder / "cells" / name / file
+
+    def _clip(self, digest: str) -> Path:
+        return self.folder / "clips" / f"{digest[:32]}-{__version__}.npz"

@@ -1,0 +1,147 @@
+"""From fitted poses to a track: what is visible, where its point is, and how well that is known."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from galileo_jax.tracking.noise import (
+    BLOW_KNOWN_TO,
+    MEMORY_FRAMES,
+    SAMPLING_SD_PX,
+    blow_shift,
+    is_in_motion,
+    motion_variance,
+)
+from galileo_jax.tracking.pose import rotation
+from galileo_jax.tracking.refiner import Refined, velocities_at
+
+MIN_CORRELATION = 0.7
+MAX_COVERED, MAX_OUTSIDE = 0.25, 0.1
+"""An object is visible if its patch correlates with the template, no more of it than these
+shares differs from the template by more than noise, or lies beyond the picture's border."""
+
+LONG_RUN = 10
+"""A run of so many frames is believed after any gap."""
+SAME_PLACE_PX = 1.0
+"""What comes back this close to where it was last seen had only been covered."""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """One object's part of a track; fields as in `Track`, without the object's axis."""
+
+    position_px: np.ndarray
+    covariance_px2: np.ndarray
+    angle_rad: np.ndarray
+
+
+def finished(
+    fits: Sequence[list[Refined | None]],
+    points_px: Sequence[tuple[float, float]],
+    first_frames: Sequence[int],
+    exposure_share: float,
+) -> list[Finished]:
+    """The objects' tracks from their fits of every frame (None: not found).
+
+    Args:
+      fits: per object, per frame.
+      points_px: the points to follow, each in its object's first frame.
+      first_frames: per object.
+      exposure_share: open share of a frame's time.
+    """
+    seen = [_seen(found) for found in fits]
+    seen = [_at_mid_exposure(poses, noise, exposure_share) for poses, noise in seen]
+    excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
+    return [
+        _anchored(poses, noise, found[first], np.array(point), first, excess)
+        for (poses, noise), found, point, first in zip(
+            seen, fits, points_px, first_frames, strict=True
+        )
+    ]
+
+
+def _seen(fits: list[Refined | None]) -> tuple[np.ndarray, np.ndarray]:
+    """Poses `[frame, 3]` and their image noise `[frame, 2, 2]`; NaN: not visible."""
+    poses = np.full((len(fits), 3), np.nan)
+    noise = np.full((len(fits), 2, 2), np.nan)
+    for index, fit in enumerate(fits):
+        if fit is not None and _is_visible(fit):
+            poses[index], noise[index] = fit.pose, fit.covariance
+    is_doubtful = ~_without_glimpses(poses)
+    poses[is_doubtful], noise[is_doubtful] = np.nan, np.nan
+    return poses, noise
+
+
+def _at_mid_exposure(
+    poses: np.ndarray, noise: np.ndarray, exposure_share: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The poses without what blows within an exposure shift them, and the noise with the rest."""
+    jumps = np.zeros((len(poses), 2))
+    for index in np.flatnonzero(np.isfinite(poses[:, 0])):
+        jumps[index] = velocities_at(poses, int(index)).jump[:2]
+    shift = blow_shift(jumps, exposure_share)
+    unknown = BLOW_KNOWN_TO**2 * (shift**2).sum(axis=1)
+    corrected = poses - np.pad(shift, ((0, 0), (0, 1)))
+    return corrected, noise + unknown[:, None, None] * np.eye(2)
+
+
+def _anchored(
+    poses: np.ndarray,
+    noise: np.ndarray,
+    first_fit: Refined | None,
+    point_px: np.ndarray,
+    first_frame: int,
+    excess: np.ndarray,
+) -> Finished:
+    """The followed point's places: rigid with the poses, `point_px` where the object began.
+
+    Where it began is the mean of the frames before it moves, so that the noise of its first
+    frame is not in every point.
+    """
+    covariance = noise.copy()
+    frames = np.flatnonzero(np.isfinite(poses[:, 0]))
+    moves = is_in_motion(poses[frames, :2], noise[frames])
+    covariance[frames] += np.einsum("fi,ij->fij", moves * excess, np.eye(2))
+
+    anchor = np.array([*point_px, 0.0])
+    if first_fit is not None:
+        anchor, anchor_noise = first_fit.pose, first_fit.covariance
+        at_rest = frames[np.cumprod(~moves.any(axis=1)).astype(bool)] if len(frames) else frames
+        is_unbroken = at_rest == first_frame + np.arange(len(at_rest))
+        began = at_rest[is_unbroken]
+        if len(began):
+            anchor = poses[began].mean(axis=0)
+            anchor_noise = noise[began].mean(axis=0) / max(1.0, len(began) / MEMORY_FRAMES)
+        covariance += anchor_noise
+    covariance += SAMPLING_SD_PX**2 * np.eye(2)
+
+    angle = poses[:, 2] - anchor[2]
+    arm = point_px - anchor[:2]
+    position = poses[:, :2] + np.stack([rotation(a) @ arm for a in angle])
+    return Finished(position, covariance, angle)
+
+
+def _without_glimpses(poses: np.ndarray) -> np.ndarray:
+    """`[frame]`: where `poses` `[frame, 3]` are to be believed.
+
+    What comes back for a few frames after a longer absence is more likely something like it,
+    unless it is where it was.
+    """
+    is_seen = np.isfinite(poses[:, 0])
+    result = np.zeros_like(is_seen)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_seen, [False]]).astype(int)))
+    last_end: int | None = None
+    for begin, end in edges.reshape(-1, 2):
+        is_same = last_end is not None and (
+            np.hypot(*(poses[begin] - poses[last_end - 1])[:2]) < SAME_PLACE_PX
+        )
+        if last_end is None or is_same or end - begin >= min(begin - last_end, LONG_RUN):
+            result[begin:end] = True
+            last_end = end
+    return result
+
+
+def _is_visible(fit: Refined) -> bool:
+    is_shown = fit.covered <= MAX_COVERED and fit.outside <= MAX_OUTSIDE
+    return is_shown and fit.correlation >= MIN_CORRELATION
