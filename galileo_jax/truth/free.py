@@ -32,6 +32,7 @@ from galileo_jax.truth.motion import RECORD_S, Motion
 from galileo_jax.truth.truth import DECLARED_WRONGLY, GRAVITY_M_S2
 
 WATER_KG_M3 = 998.0
+DRAG_COEFFICIENT = (0.4, 0.6)  # of a sphere, at Reynolds numbers of 1e3 to 1e5
 RTOL, ATOL = 1e-10, 1e-12
 LONGEST_DELAY_S = 0.1
 # From weak to strong, in z: what a prior holds for likely.
@@ -145,12 +146,13 @@ def _spring(rng: np.random.Generator, radius: float, given: Mapping[str, float])
 def _liquid(rng: np.random.Generator, radius: float, given: Mapping[str, float]) -> Drawn:
     ratio = float(given.get("density_ratio", rng.uniform(0.1, 0.8)))
     mass = float(given.get("m1", WATER_KG_M3 * 4 / 3 * math.pi * radius**3 / ratio))
-    terminal = rng.uniform(0.3, 1.0)
     pull = GRAVITY_M_S2 * abs(1 - ratio)
+    drag = 0.5 * rng.uniform(*DRAG_COEFFICIENT) * WATER_KG_M3 * math.pi * radius**2
+    terminal = math.sqrt(mass * pull / drag)
     drawn = {
         "m1": mass,
         "density_ratio": ratio,
-        "liquid_drag": mass * pull / terminal**2,
+        "liquid_drag": drag,
         PATH[0]: rng.uniform(0.0, 0.3) * math.copysign(1.0, 1 - ratio),
     }
     # Long enough to come near the terminal speed.
