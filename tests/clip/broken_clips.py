@@ -242,6 +242,12 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
         "scenario: ramp", "scenario: slope", "slope", "fall, flight, incline"
     ),
     "unknown_shape": _edit("shape: box", "shape: cube", "shape", "cube", "box, cylinder"),
+    "box_that_rolls": _edit(
+        "    point_px", "    rolls: true\n    point_px", "objects[0].rolls", "a box slides"
+    ),
+    "rolls_too_much": _edit(
+        "    point_px", "    rolls: 1.5\n    point_px", "objects[0].rolls", "1.5", "hollow ball"
+    ),
     "unknown_direction": _edit("direction: right", "direction: up", "direction", "up", "left"),
     "fps_is_zero": _edit("fps: 30.0", "fps: 0", "fps", "0", "above 0"),
     "fps_is_negative": _edit("fps: 30.0", "fps: -30.0", "fps", "-30"),
