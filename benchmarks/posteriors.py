@@ -268,8 +268,7 @@ def fit_grad(track: Track, same: Same, seed: int) -> Answer:
 
 def fit_mh(track: Track, same: Same, seed: int, sampler: str = "mixture") -> Answer:
     fit, seconds = _fit(track, seed)
-    start_key = jax.random.key(seed)
-    starts = dispersed_starts(start_key, *map(jnp.asarray, (fit.z, fit.covariance)), NUM_CHAINS)
+    starts = _round(fit, seed)
     return _sampled(track, same, seed, fit, starts, sampler, Settings(), seconds)
 
 
@@ -281,9 +280,7 @@ def fit_mh_fixed(track: Track, same: Same, seed: int) -> Answer:
     fit, seconds = _fit(track, seed)
     dim = len(fit.z)
     unlearned = RandomWalk(cholesky=jnp.eye(dim), log_scale=jnp.log(jnp.asarray(NARROW)))
-    starts = dispersed_starts(
-        jax.random.key(seed), *map(jnp.asarray, (fit.z, fit.covariance)), NUM_CHAINS
-    )
+    starts = _round(fit, seed)
     settings = Settings(warmup_steps=0, max_steps=1000, stops_early=False)
     return _sampled(track, same, seed, fit, starts, unlearned, settings, seconds)
 
@@ -339,6 +336,11 @@ METHODS: dict[str, Callable[[Track, Same, int], Answer]] = {
 }
 
 
+def _round(fit: GradientFit, seed: int) -> jax.Array:
+    mode, covariance = jnp.asarray(fit.z), jnp.asarray(fit.covariance)
+    return dispersed_starts(jax.random.key(seed), mode, covariance, NUM_CHAINS)
+
+
 def _fit(track: Track, seed: int) -> tuple[GradientFit, float]:
     began = time.perf_counter()
     fit = GradientFitter(track.trials).fit(seed)
@@ -357,9 +359,10 @@ def _sampled(
 ) -> Answer:
     """Chains from `starts`; `seconds` and the fit's rollouts are what was spent before."""
     trials = track.trials
+    kernel: Any = sampler
     if isinstance(sampler, str):
         kind: Any = sampler_class(sampler)
-        sampler = kind.from_gaussian(jnp.asarray(fit.z), jnp.asarray(fit.covariance))
+        kernel = kind.from_gaussian(jnp.asarray(fit.z), jnp.asarray(fit.covariance))
     columns = [trials.names.index(name) for name in MAIN]
 
     def monitor(z: np.ndarray) -> dict[str, np.ndarray]:
@@ -369,7 +372,7 @@ def _sampled(
     began = time.perf_counter()
     posterior = sample(
         jax.random.fold_in(jax.random.key(seed), 1),
-        sampler,
+        kernel,
         Density(trials.problems[0].data, same),
         starts,
         trials.names,

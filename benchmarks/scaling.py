@@ -42,6 +42,7 @@ CELLS = (100, 1000)
 BATCHES = (1, 4, 16, 64, 256, 1024, 4096)
 BARS = {"marginal_s": 3.0, "memory_ratio": 1.2}
 HEAVY = ("_roll_out_batch", "_jacobian_batch", "_solve", "_white_batch", "_seen_batch")
+LOGGING = ("dispatch", "compiler", "interpreters.pxla")  # JAX's modules that tell of compilations
 PARTS = ("clips", "workers", "rollouts", "memory", "video")
 
 
@@ -161,15 +162,18 @@ def compilations() -> Iterator[Counter[str]]:
             if found := re.match(r"Finished XLA compilation of jit\((\w+)\)", record.getMessage()):
                 names[found[1]] += 1
 
-    logger, handler = logging.getLogger("jax._src.dispatch"), Count()
+    handler = Count()
+    loggers = [logging.getLogger(f"jax._src.{name}") for name in LOGGING]
     jax.config.update("jax_log_compiles", True)
-    logger.addHandler(handler)
-    was, logger.propagate = logger.propagate, False
+    for logger in loggers:
+        logger.propagate = False  # nothing is printed
+        logger.addHandler(handler)
     try:
         yield names
     finally:
-        logger.removeHandler(handler)
-        logger.propagate = was
+        for logger in loggers:
+            logger.removeHandler(handler)
+            logger.propagate = True
         jax.config.update("jax_log_compiles", False)
 
 

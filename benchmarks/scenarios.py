@@ -44,7 +44,6 @@ class Case:
 
 
 CASES = {
-    "fall": Case("fall"),
     "fall_floor": Case("fall", has_floor=True),
     "fall_unscaled": Case("fall", is_scaled=False),
     "flight": Case("flight"),

@@ -23,10 +23,10 @@ def main(argv: Sequence[str]) -> int | None:
     sweeps = {}
     for i, name in enumerate(NAMES):
         theta = np.tile(MIDDLE, (call.num, 1))
-        theta[:, i] = np.linspace(*RANGES[i], call.num)
+        theta[:, i] = np.linspace(RANGES[i, 0], RANGES[i, 1], call.num)
         sweeps[name] = theta
     both = np.tile(MIDDLE, (call.num, 1))
-    both[:, [0, 2]] = np.linspace(*RANGES[0], call.num)[:, None]
+    both[:, [0, 2]] = np.linspace(RANGES[0, 0], RANGES[0, 1], call.num)[:, None]
     sweeps["m1 = m2"] = both
 
     setting.row("varied", ("dv1 m/s", "dv2 m/s", "dx1 m", "dx2 m"))

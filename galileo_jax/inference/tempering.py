@@ -6,7 +6,7 @@
     at t = 1:    resample and move once more, for BlackJAX leaves its last particles weighted
 
 It needs no fit to start from and finds several modes, where they are wide enough to hold particles
-on the way; it costs a hundred times what Metropolis-Hastings from a fit does.
+on the way; it costs many times what Metropolis-Hastings from a fit does.
 
 Source: P. Del Moral, A. Doucet, A. Jasra, Sequential Monte Carlo samplers, J. R. Statist. Soc. B 68
 (2006), 10.1111/j.1467-9868.2006.00553.x; BlackJAX's `adaptive_tempered_smc`.
