@@ -15,6 +15,7 @@ from typing import Any
 import yaml
 
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
 from galileo_jax.effects.effect import Effect, Surroundings
@@ -78,6 +79,12 @@ def make_problem(
     noise: NoiseModel | None = None,
 ) -> Problem:
     """A clip with a model of it: the base model, or one with effects; `noise`: its own."""
+    for effect in effects:
+        if effect.name in SCENARIOS[clip.scenario].without:
+            raise InputError(
+                f"{clip.path}: effects: {effect.name} has no place in scenario {clip.scenario}, "
+                "whose own laws do the same"
+            )
     scene = build_scene(clip, observation)
     # An effect may run the clock faster: the frame rate's does.
     margin = LONGER if effects else 1.0
