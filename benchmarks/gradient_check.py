@@ -110,8 +110,8 @@ def _jacobian(predict: Predict, z: np.ndarray) -> np.ndarray:
 
 def _posterior_sd(problem: Problem, jacobian: np.ndarray) -> np.ndarray:
     """Of every parameter, in z, where the truth is the best fit and the noise is as declared."""
-    whiten = jax.vmap(lambda slope: problem.whiten(problem.data.observed_m - slope, 1.0))
-    slopes = np.asarray(whiten(jacobian.reshape(-1, *problem.data.observed_m.shape)))
+    seen = problem.data.observed_m
+    slopes = problem.whiten(seen - jacobian.reshape(-1, *seen.shape), 1.0)
     covariance = np.linalg.inv(slopes @ slopes.T + np.eye(len(slopes)))
     return np.sqrt(np.diag(covariance))
 

@@ -85,8 +85,8 @@ def _solve_exactly(truth: Truth, times_s: np.ndarray):
     where = truth.surroundings
     sizes = zip(where.half_length_m, where.half_height_m, strict=True)
     experiment = Experiment(
-        mass_kg=truth.mass_kg,
-        friction=truth.friction,
+        mass_kg=(truth.mass_kg[0], truth.mass_kg[1]),
+        friction=(truth.friction[0], truth.friction[1]),
         angle_rad=truth.angle_rad,
         size_m=tuple((2 * length, 2 * height) for length, height in sizes),  # pyright: ignore
         release_m=truth.release_m,

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax import __version__, command, jax_cache
+from galileo_jax.ahead import work_ahead
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
-from galileo_jax.fit import chosen_effects, import_ahead, out_folder
+from galileo_jax.fit import built, out_folder
 from galileo_jax.measured import add_clip_options, load_clips, measure
 
 if TYPE_CHECKING:
@@ -87,14 +88,12 @@ def _of_clips(call: argparse.Namespace) -> Compared:
     """Clips as they are, with the effects asked for."""
     clips = load_clips(call.clips, call.pixels_per_metre)
     out = out_folder(call, clips)
-    effects = chosen_effects(call)
-    import_ahead()
+    ahead = work_ahead(clips, lambda some, seen: built(some, seen, call))
     measured = [measure(clip) for clip in clips]
+    ahead.join()
     clips = [one.clip for one in measured]
     _prepare_jax()
-    from galileo_jax.run import make_trials
-
-    trials = make_trials(clips, [one.observation for one in measured], call.engine, effects)
+    trials = built(clips, [one.observation for one in measured], call)
     out = out if call.out else out / "compare"
     return Compared(trials, tuple(clips), list(call.clips), out)
 

@@ -9,16 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax import __version__, command, jax_cache
+from galileo_jax.ahead import work_ahead
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
-from galileo_jax.fit import import_ahead, out_folder, write_fit
+from galileo_jax.fit import out_folder, write_fit
 from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
 
 if TYPE_CHECKING:
     from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
     from galileo_jax.inference.trials import Trials
+    from galileo_jax.observation import Observation
 
 NUM_CANDIDATES = 5
 FRICTIONS = ("k1", "k2")
@@ -32,9 +34,10 @@ def main(argv: Sequence[str]) -> int | None:
     out = out if call.out else out / "diagnosis"
     hidden = read_hidden(clips[0])
     _check_effects(call)
-    import_ahead()
+    ahead = work_ahead(clips, lambda some, seen: _trials(some, seen, call), num_exact=0)
     timings, began = {}, time.perf_counter()
     measured = [measure(clip) for clip in clips]
+    ahead.join()
     clips = [one.clip for one in measured]
     timings["track"] = time.perf_counter() - began
     began = time.perf_counter()
@@ -104,29 +107,12 @@ def _diagnose(
     jax_cache.enable()
     from galileo_jax.diagnosis.diagnose import diagnose
     from galileo_jax.diagnosis.document import diagnosis_document, history_row
-    from galileo_jax.effects.forms import FORM_NAMES
-    from galileo_jax.effects.registry import effect_names
     from galileo_jax.inference.fits.gradient import Code
-    from galileo_jax.run import make_trials
 
     clips, observations = [m.clip for m in measured], [m.observation for m in measured]
-
-    def trials_with(names: Sequence[str]) -> "Trials":
-        from galileo_jax.effects.forms import FORMS
-        from galileo_jax.effects.registry import make_effects
-
-        forms = tuple(form for form in FORMS if form.name in names)
-        effects = make_effects([name for name in names if name not in FORM_NAMES])
-        return make_trials(clips, observations, call.engine, (*effects, *forms))
-
-    names = (*effect_names(), *FORM_NAMES)
-    without = SCENARIOS[clips[0].scenario].without
-    trials = trials_with([name for name in names if name not in without])
-    absent = [*without, *_without_place(trials)]
-    if call.add in absent:
+    trials = _trials(clips, observations, call)
+    if call.add not in ("auto", "none", *trials.all_effects):
         raise InputError(f"--add: {call.add} has no place in {clips[0].path}")
-    if len(absent) > len(without):
-        trials = trials_with([name for name in names if name not in absent])
     rows: list[dict[str, Any]] = []
     with command.console().status("starting") as status:
 
@@ -149,6 +135,26 @@ def _diagnose(
         )
         record = diagnosis_document(trials, diagnosis, call.seed)
     return diagnosis, trials, record
+
+
+def _trials(
+    clips: Sequence[Clip], observations: "Sequence[Observation]", call: argparse.Namespace
+) -> "Trials":
+    """Trials with the whole library and the forms without a name: all that has a place there."""
+    from galileo_jax.effects.forms import FORM_NAMES, FORMS
+    from galileo_jax.effects.registry import effect_names, make_effects
+    from galileo_jax.run import make_trials
+
+    def trials_with(names: Sequence[str]) -> "Trials":
+        forms = tuple(form for form in FORMS if form.name in names)
+        effects = make_effects([name for name in names if name not in FORM_NAMES])
+        return make_trials(clips, observations, call.engine, (*effects, *forms))
+
+    without = SCENARIOS[clips[0].scenario].without
+    names = [name for name in (*effect_names(), *FORM_NAMES) if name not in without]
+    trials = trials_with(names)
+    absent = _without_place(trials)
+    return trials_with([name for name in names if name not in absent]) if absent else trials
 
 
 def _without_place(trials: "Trials") -> list[str]:

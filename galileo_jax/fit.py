@@ -3,17 +3,16 @@
 import argparse
 import hashlib
 import json
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from galileo_jax import command, jax_cache
+from galileo_jax.ahead import work_ahead
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
     from galileo_jax.inference.posterior import Posterior
     from galileo_jax.inference.trials import Trials
+    from galileo_jax.observation import Observation
 
 BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
@@ -46,10 +46,11 @@ def main(argv: Sequence[str]) -> int | None:
     if call.preset == "thesis" and len(clips) > 1:
         raise InputError("--preset thesis: one clip expected")
     truth = read_truth(clips[0])
-    import_ahead()
+    ahead = work_ahead(clips, lambda some, seen: built(some, seen, call))
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
     measured = [measure(clip) for clip in clips]
+    ahead.join()
     timings["track"] = time.perf_counter() - began
     result = fit_clips(measured, call, out, timings)
     print(_table(result, truth))
@@ -77,19 +78,13 @@ def chosen_effects(call: argparse.Namespace) -> "tuple[Effect, ...]":
     return make_effects([name for name in call.effects.split(",") if name])
 
 
-def import_ahead() -> None:
-    """Imports what the fit needs while the video is tracked: OpenCV leaves a core free."""
+def built(
+    clips: Sequence[Clip], observations: "Sequence[Observation]", call: argparse.Namespace
+) -> "Trials":
+    """Trials of the model that a call asks for."""
+    from galileo_jax.run import make_trials
 
-    def load() -> None:
-        import jax
-
-        jax.config.update("jax_enable_x64", True)
-        for name in ("inference.fits.gradient", "run", "report.write"):
-            import_module(f"galileo_jax.{name}")
-        for name in ("matplotlib.figure", "matplotlib.backends.backend_svg", "xarray"):
-            import_module(name)
-
-    threading.Thread(target=load, daemon=True).start()
+    return make_trials(clips, observations, call.engine, chosen_effects(call))
 
 
 def fit_clips(
@@ -103,10 +98,7 @@ def fit_clips(
 
     jax.config.update("jax_enable_x64", True)
     jax_cache.enable()
-    from galileo_jax.run import make_trials
-
-    clips, observations = [m.clip for m in measured], [m.observation for m in measured]
-    trials = make_trials(clips, observations, call.engine, chosen_effects(call))
+    trials = built([m.clip for m in measured], [m.observation for m in measured], call)
     if call.method == "cnn":
         posterior, z_best, notes = _network(trials, call, timings)
     else:

@@ -4,7 +4,6 @@ import json
 import math
 from pathlib import Path
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -124,7 +123,7 @@ def test_a_weighed_mass_is_held(mass, prior, tmp_path):
 def test_where_the_ball_is_across_its_fall_says_nothing(tmp_path):
     """Half a metre of wind sideways costs no chi2, a tenth of it along the fall does."""
     problem = problem_of(write_fall(tmp_path))
-    seen = jnp.asarray(problem.observation.position_m)
+    seen = problem.observation.position_m
     swing = 0.5 * np.sin(np.arange(FRAMES) / 4.0)
     assert np.sum(problem.whiten(seen + np.array([[swing, 0 * swing]]), 1.0) ** 2) < FRAMES
     assert np.sum(problem.whiten(seen + np.array([[0 * swing, 0.1 * swing]]), 1.0) ** 2) > 1e3

@@ -26,8 +26,8 @@ TRUTH_KEYS |= {"world_to_image", "image_px", "noise_grey_levels", "flicker", "ex
 def reference(truth: Truth, times_s: np.ndarray) -> Solution:
     (size1, size2) = ((item.size_m[0], item.size_m[2]) for item in truth.objects if item.size_m)
     experiment = Experiment(
-        truth.mass_kg,
-        truth.friction,
+        (truth.mass_kg[0], truth.mass_kg[1]),
+        (truth.friction[0], truth.friction[1]),
         truth.angle_rad,
         (size1, size2),
         truth.release_m,

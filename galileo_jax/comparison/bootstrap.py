@@ -11,7 +11,6 @@ Rollouts of all replicates are one batch.
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.trials import Trials
 
 NUM_STEPS = 2
@@ -28,7 +27,7 @@ def whitened(trials: Trials, theta: np.ndarray, noise_scale: np.ndarray) -> list
     found = []
     for clip, problem in enumerate(trials.problems):
         predicted = problem.simulate_batch(trials.of_clip(theta, clip))
-        found.append(_whiten_batch(problem, predicted, float(noise_scale[clip])))
+        found.append(problem.whiten(predicted, float(noise_scale[clip])))
     return found
 
 
@@ -80,13 +79,3 @@ def _at(
     trials: Trials, fit: GradientFit, z: np.ndarray, noise_scale: np.ndarray
 ) -> list[np.ndarray]:
     return whitened(trials, trials.theta(z, fit.free), noise_scale)
-
-
-def _whiten_batch(problem: Problem, predicted: np.ndarray, noise_scale: float) -> np.ndarray:
-    """`GaussianLikelihood.whiten` of `[point, object, 2, frame]`: `[point, value]`."""
-    data = problem.data
-    y = np.einsum("oijt,bojt->boit", data.inverse_root, data.observed_m - predicted)
-    y = y.reshape(len(predicted), -1)
-    basis = data.basis.reshape(len(data.gain), -1)
-    shrink = 1 - noise_scale / np.sqrt(noise_scale**2 + data.gain**2)
-    return (y - ((y @ basis.T) * shrink) @ basis) / noise_scale

@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.comparison.compare import NOISE_SCALE_RANGE, Comparison, compare
+from galileo_jax.comparison.compare import ADEQUATE_P, NOISE_SCALE_RANGE, Comparison, compare
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
@@ -41,9 +41,6 @@ PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
 # In nats, at which a candidate is believed although the comparison shows no misfit: tests that
 # look everywhere see less than one that knows where to look.
 CONVINCING = 10.0
-# A form must be better than a name by this share of what it gains: engines and real bodies differ
-# from the model by a share of every force, and a form with three parameters bends to that.
-FORM_SHARE = 0.05
 LEAST_GAIN = 10.0  # in nats, for another effect to be added
 NUM_JOINED = 8  # of the other effects, to the best: those with the largest scores
 
@@ -222,16 +219,17 @@ def _rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...
 
 def _verdict(candidates: Sequence[Candidate], base: GradientFit, decisive: float) -> Verdict | None:
     """Named or ambiguous, or unknown where only a form will do; None where nothing does."""
-    best = candidates[0].log_evidence
-    adequate = [c for c in candidates if c.p_value is not None and _explains(c, base)]
-    if not adequate or best < 0:
+    if candidates[0].log_evidence < 0:
         return None
-    names, forms = ([c for c in adequate if c.is_form == is_form] for is_form in (False, True))
-    margin = max(decisive, FORM_SHARE * best)
+    compared = [c for c in candidates if c.p_value is not None]
+    names = [c for c in compared if not c.is_form and _explains(c, base)]
+    # A form can bend to much; where it leaves something over, as where engines differ, it is none.
+    forms = [c for c in compared if c.is_form and (c.p_value or 0.0) >= ADEQUATE_P]
     top = max((c.log_evidence for c in names), default=-np.inf)
-    if forms and forms[0].log_evidence - top > margin:
+    if forms and forms[0].log_evidence - top > decisive:
         return Verdict("unknown", (), forms[0].name)
-    if best - top > (margin if candidates[0].is_form else decisive):
+    best = next((c.log_evidence for c in candidates if not c.is_form), -np.inf)
+    if not names or best - top > decisive:
         return None
     equal = [c.name for c in names if top - c.log_evidence < decisive]
     alike = [c.name for c in forms if abs(top - c.log_evidence) < decisive]

@@ -4,7 +4,6 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -79,10 +78,18 @@ class Problem:
         )
         return found[..., : len(times)]
 
-    def whiten(self, predicted_m: jax.Array, noise_scale: Any) -> jax.Array:
-        """Whitened residuals, unit normal if the model is right: `[object * 2 * frame]`."""
-        difference = jnp.asarray(self.data.observed_m) - predicted_m
-        return GaussianLikelihood.whiten(difference, noise_scale, self.data).reshape(-1)
+    def whiten(self, predicted_m: np.ndarray, noise_scale: float) -> np.ndarray:
+        """Whitened residuals, unit normal if the model is right.
+
+        Args:
+          predicted_m: `[..., object, 2, frame]`.
+          noise_scale: on the tracker's errors.
+
+        Returns:
+          `[..., object * 2 * frame]`.
+        """
+        difference = self.data.observed_m - predicted_m
+        return GaussianLikelihood.whiten_batch(difference, noise_scale, self.data)
 
 
 def seen(

@@ -98,7 +98,7 @@ def error_of(
     for clip, problem in enumerate(trials.problems):
         scale = float(np.clip(trials.noise_scale(theta, clip), *scale_range))
         predicted = problem.simulate(trials.of_clip(theta, clip))
-        chi2 += float(np.sum(np.asarray(problem.whiten(jnp.asarray(predicted), scale)) ** 2))
+        chi2 += float(np.sum(problem.whiten(predicted, scale) ** 2))
         count += float(GaussianLikelihood.degrees(scale, problem.data))
         scales.append(scale)
         predictions.append(predicted)
@@ -112,7 +112,7 @@ NUM_PRIOR_DRAWS = 2000
 
 def _derived_by_laws(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, Any]]:
     """What the models' laws derive from draws `[draw, parameter]` of one clip's parameters."""
-    if len(trials.problems) > 1:
+    if len(trials.problems) != 1:
         return {}
     model = trials.problems[0].model
     scene = model.scene.surroundings

@@ -74,13 +74,21 @@ class EngineRigid:
 
     def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
-        return in_chunks(MOTIONS, lambda part: self.traceable(jnp.asarray(part)), np.asarray(theta))
+        motion = in_chunks(MOTIONS, self._roll_out, np.asarray(theta))
+        count = self.model.num_records + 1
+        return motion[0][..., :count], motion[1][..., :count]
 
     def traceable(self, theta: jax.Array) -> tuple[jax.Array, jax.Array]:
         """`simulate` in JAX: can be jitted, vmapped and differentiated."""
+        position, velocity = self._roll_out(theta)
+        count = self.model.num_records + 1
+        return position[..., :count], velocity[..., :count]
+
+    def _roll_out(self, theta: Any) -> tuple[jax.Array, jax.Array]:
+        """As many records as programs are compiled for, so that clips share them."""
         model = self.model
         num_records = -(-(model.num_records + 1) // RECORDS) * RECORDS
-        position, velocity = _roll_out_batch(
+        return _roll_out_batch(
             model.effects + model.nuisances,
             model.names,
             num_records,
@@ -88,8 +96,6 @@ class EngineRigid:
             theta,
             model.scene.surroundings,
         )
-        count = model.num_records + 1
-        return position[..., :count], velocity[..., :count]
 
 
 @functools.partial(jax.jit, static_argnums=(0, 1, 2, 3))

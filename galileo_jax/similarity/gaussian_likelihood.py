@@ -92,6 +92,15 @@ class GaussianLikelihood:
         return (y - jnp.einsum("moit,m->oit", data.basis, shrink * amplitude)) / noise_scale
 
     @staticmethod
+    def whiten_batch(difference_m: np.ndarray, noise_scale: float, data: Whitening) -> np.ndarray:
+        """`whiten` of `[..., object, 2, frame]` in NumPy, nothing to compile: `[..., value]`."""
+        y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
+        y = y.reshape(*difference_m.shape[:-3], -1)
+        basis = data.basis.reshape(len(data.gain), -1)
+        shrink = 1 - noise_scale / np.sqrt(noise_scale**2 + data.gain**2)
+        return (y - ((y @ basis.T) * shrink) @ basis) / noise_scale
+
+    @staticmethod
     def log_density(predicted_m: jax.Array, noise_scale: jax.Array, data: Whitening) -> jax.Array:
         """Log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
         difference = jnp.asarray(data.observed_m) - predicted_m

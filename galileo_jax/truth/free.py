@@ -201,7 +201,7 @@ def solve_free(truth: FreeTruth) -> tuple[Motion, tuple[float, ...]]:
     time = 0.0
 
     def change(t: float, y: np.ndarray) -> np.ndarray:
-        body = Body(y[:2], y[2:4], y[4])
+        body = Body(y[:2], y[2:4], y[4])  # pyright: ignore[reportArgumentType]
         return np.hstack(rates(body, np.asarray(t), law, scene, np.asarray(rests)))
 
     def touch(t: float, y: np.ndarray) -> float:

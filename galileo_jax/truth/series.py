@@ -118,6 +118,6 @@ def _moved(
     first: Truth, ramp_angle_deg: float, given: Mapping[str, float], rng: np.random.Generator
 ) -> Truth:
     """The objects of the first clip without effects, from another height to another place."""
-    shapes = [each.shape for each in first.objects]
+    shapes: list[Shape] = [each.shape for each in first.objects]
     other = draw_truth(rng, ramp_angle_deg, {**given, **first.known}, first.scenario, shapes)
     return replace(other, objects=first.objects)

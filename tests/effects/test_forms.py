@@ -27,6 +27,18 @@ def named(name):
     return next(form for form in FORMS if form.name == name)
 
 
+def friction(form, **given):
+    law = named(form).friction(theta(**given), PAIR)
+    assert law is not None
+    return law
+
+
+def push(form, **given):
+    force = named(form).force(theta(**given), PAIR)
+    assert force is not None
+    return force
+
+
 def test_they_have_no_place_among_the_names():
     assert not set(FORM_NAMES) & set(effect_names())
 
@@ -40,37 +52,40 @@ def test_parameters(form):
 
 
 def test_friction_grows_with_time():
-    law = named("friction_with_time").friction(theta(friction_with_time=0.5), PAIR)
+    law = friction("friction_with_time", friction_with_time=0.5)
     assert law(STATE, K) == pytest.approx(K * 1.2)
 
 
 def test_friction_grows_with_place_and_is_never_negative():
-    law = named("friction_with_place").friction(theta(friction_with_place=2.0), PAIR)
+    law = friction("friction_with_place", friction_with_place=2.0)
     assert law(STATE, K) == pytest.approx(K * [0.4, 1.2])
     assert (law(STATE._replace(path_m=np.array([-0.6, 0.1])), K) >= 0).all()
 
 
 def test_friction_waves_in_place():
-    values = theta(
+    law = friction(
+        "friction_waves_in_place",
         friction_waves_in_place=0.05,
         friction_waves_in_place_later=0.02,
         friction_waves_in_place_length=0.4,
     )
-    law = named("friction_waves_in_place").friction(values, PAIR)
     # Three quarters of a wave before the foot, and a quarter past it.
     assert law(STATE, K) == pytest.approx(K + 0.02)
 
 
 def test_force_waves_in_time():
-    values = theta(force_waves_in_time=1.5, force_waves_in_time_period=0.4)
-    force = named("force_waves_in_time").force(values, PAIR)
+    force = push("force_waves_in_time", force_waves_in_time=1.5, force_waves_in_time_period=0.4)
     assert force(STATE) == pytest.approx(np.array([0.5, 0.25]) * 1.5)
     assert force(STATE._replace(time_s=0.6)) == pytest.approx(np.array([0.5, 0.25]) * -1.5)
 
 
 def test_force_at_a_time():
-    values = theta(force_at_a_time=2.0, force_at_a_time_moment=0.3, force_at_a_time_duration=0.1)
-    force = named("force_at_a_time").force(values, PAIR)
+    force = push(
+        "force_at_a_time",
+        force_at_a_time=2.0,
+        force_at_a_time_moment=0.3,
+        force_at_a_time_duration=0.1,
+    )
     assert force(STATE) == pytest.approx(np.array([0.5 * 2.0 * np.exp(-1.0), 0.0]))
 
 
@@ -78,7 +93,8 @@ def test_force_at_a_time():
 @pytest.mark.parametrize("form", FORMS, ids=FORM_NAMES)
 def test_absent_is_nothing_at_all_with_a_finite_slope(form, scene):
     count = len(scene.names)
-    state = State(*(jnp.asarray(v)[:count] for v in STATE[:2]), STATE[2], STATE[3][:count])
+    path, speed = (jnp.asarray(values)[:count] for values in STATE[:2])
+    state = State(path, speed, STATE.time_s, STATE.is_on_ramp[:count])
     k = jnp.asarray(K)[:count]
     usual = {name: jnp.asarray(value) for name, value in theta().items()}
 

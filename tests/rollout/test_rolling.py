@@ -143,7 +143,7 @@ def test_momentum_of_three():
     objects, mass = [BOX, BOX, BOX], np.array([0.5, 0.3, 0.4])
     model = model_of(objects, scene_of(objects, 20.0, 0.5, [0.2, 0.35]), 1.6)
     for e in (0.0, 0.5):
-        _, v = speeds(model, theta_of(model, mass, [1e-5] * 3, impact_restitution=e))
+        _, v = speeds(model, theta_of(model, list(mass), [1e-5] * 3, impact_restitution=e))
         momentum = mass @ v
         hit = int(np.argmax(v[1] > 0))
         assert v[2, -1] > v[1, -1] - 1e-9 and v[1, -1] > v[0, -1] - 1e-9

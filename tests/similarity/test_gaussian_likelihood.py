@@ -64,6 +64,8 @@ def difference(observation):
 def test_whitened_residuals(observation, difference, noise_scale):
     data = GaussianLikelihood.prepare(observation, SCENE)
     white = np.asarray(GaussianLikelihood.whiten(jnp.asarray(difference), noise_scale, data))
+    in_numpy = GaussianLikelihood.whiten_batch(difference, noise_scale, data)
+    np.testing.assert_allclose(in_numpy, white.reshape(-1), atol=SAME)
     covariance, _, measured = dense(observation, noise_scale)
     r = difference.reshape(-1)[measured]
     assert np.sum(white**2) == pytest.approx(r @ np.linalg.solve(covariance, r), rel=SAME)

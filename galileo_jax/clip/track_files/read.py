@@ -110,7 +110,7 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
         away = np.subtract(table.position, np.array(file.track_origin or (0, 0))[:, None])
         position = away * METRES_PER_UNIT[unit] * [[1.0], [1.0 if y_axis == "up" else -1.0]]
     position = position * [[1.0 if file.direction == "right" else -1.0], [1.0]]
-    seen: np.ndarray = np.isfinite(position).all(axis=1)
+    seen = np.asarray(np.isfinite(position).all(axis=1))
     first = int(np.flatnonzero(seen.any(axis=0))[0]) if seen.any() else 0
     observation = _observation(
         path,

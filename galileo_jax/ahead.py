@@ -1,0 +1,80 @@
+"""What one core can do while another tracks the video: import, and build the programs.
+
+Programs are built for a clip that looks as the tracked one will: as many frames, as many objects,
+the same laws. Where it turns out otherwise (sizes that were null), only time is lost.
+"""
+
+import contextlib
+import threading
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from galileo_jax import jax_cache
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.observation import Observation
+
+if TYPE_CHECKING:
+    from galileo_jax.inference.trials import Trials
+
+START_M, APART_M, SD_M = -0.3, 0.3, 1e-4  # on the ramp; between objects; of the track
+
+Build = Callable[[Sequence[Clip], Sequence[Observation]], "Trials"]
+
+
+def work_ahead(
+    clips: Sequence[Clip], build: Build, num_exact: int | None = None
+) -> threading.Thread:
+    """Starts to import and to compile; to be joined before anything is fitted.
+
+    Args:
+      clips: of the call.
+      build: makes the trials of clips and observations.
+      num_exact: of the gradient fit's settings; None: its default.
+    """
+
+    def work() -> None:
+        import jax
+
+        jax.config.update("jax_enable_x64", True)
+        jax_cache.enable()
+        for name in ("galileo_jax.inference.fits.gradient", "galileo_jax.run"):
+            import_module(name)
+        # What is wrong in a call is told when it is built in earnest.
+        with contextlib.suppress(Exception):
+            _compile(clips, build, num_exact)
+        for name in ("galileo_jax.report.write", "matplotlib.figure", "xarray"):
+            import_module(name)
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    return thread
+
+
+def _compile(clips: Sequence[Clip], build: Build, num_exact: int | None) -> None:
+    from galileo_jax.inference.fits.gradient import GradientFitter, Settings
+
+    filmed = [clip for clip in clips if clip.video is not None]
+    if filmed and all(SCENARIOS[clip.scenario].has_table for clip in filmed):
+        settings = Settings() if num_exact is None else Settings(num_exact=num_exact)
+        trials = build(filmed, [_likely(clip) for clip in filmed])
+        GradientFitter(trials, settings).compile()
+
+
+def _likely(clip: Clip) -> Observation:
+    """Object 1 on the ramp and the others on the table, all at rest."""
+    count, frames = len(clip.objects), clip.frame_count
+    position = np.zeros((count, 2, frames))
+    position[:, 0] = (START_M + APART_M * np.arange(count) + APART_M * (np.arange(count) > 0))[
+        :, None
+    ]
+    return Observation(
+        names=tuple(item.name for item in clip.objects),
+        times_s=np.arange(frames) / clip.fps,
+        position_m=position,
+        covariance_m2=np.tile(SD_M**2 * np.eye(2)[:, :, None], (count, 1, 1, frames)),
+        mask=np.ones((count, frames), bool),
+    )
