@@ -9,7 +9,8 @@ import jax
 import numpy as np
 
 # Sizes are rounded up to multiples of these, so that few programs serve all clips.
-FRAMES, MODES, RECORDS = 64, 64, 512
+FRAMES, RECORDS = 64, 512
+SPARE_MODES = 128  # beside one per object and frame
 MOTIONS = (16, 64)  # of batches of rollouts
 
 

@@ -38,8 +38,8 @@ from galileo_jax.inference.trials import NOISE_SD, Trials
 from galileo_jax.parameters import PriorTable, inverse
 from galileo_jax.rollout.chunks import (
     FRAMES,
-    MODES,
     MOTIONS,
+    SPARE_MODES,
     in_chunks,
     padded_motion,
     rounded_up,
@@ -710,7 +710,9 @@ def _padded(problem: Problem) -> Padded:
     """Pads with frames that count for nothing and modes without gain."""
     times, data = problem.observation.times_s, problem.data
     frames = rounded_up(len(times), FRAMES) - len(times)
-    modes = rounded_up(len(data.gain), MODES) - len(data.gain)
+    # A wobble has as many modes as frames; the others are fewer than those to spare.
+    usual = len(data.observed_m) * (len(times) + frames) + SPARE_MODES
+    modes = max(rounded_up(len(data.gain), FRAMES), usual) - len(data.gain)
     whitening = Whitening(
         np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),
         np.pad(data.inverse_root, [(0, 0), (0, 0), (0, 0), (0, frames)]),
