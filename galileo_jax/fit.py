@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from galileo_jax import command, jax_cache
+from galileo_jax import __version__, command, jax_cache
 from galileo_jax.ahead import work_ahead
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
@@ -217,7 +217,7 @@ def _search(
         if call.preset == "thesis":
             posterior, extra = _thesis(trials, call)
         else:
-            identity = _identity(measured, call)
+            identity = identity_of(measured, trials, call)
             posterior, extra = _metropolis(trials, fit, starts, call, out, identity)
         notes |= extra
     timings["fit"] = time.perf_counter() - began
@@ -295,16 +295,30 @@ def _thesis(trials: "Trials", call):
     }
 
 
-def _identity(measured: Sequence[Measured], call: argparse.Namespace) -> str:
-    """What the chains sample: a checkpoint of anything else is refused."""
+def identity_of(measured: Sequence[Measured], trials: "Trials", call: argparse.Namespace) -> str:
+    """What the chains sample: a checkpoint of anything else is refused.
+
+    Raises:
+      InputError: a file of `--effects-from` has gone since it was run.
+    """
+    from galileo_jax.inference.metropolis import NUM_CHAINS
+
     digest = hashlib.sha256()
     for one in measured:
         seen = one.observation
-        for array in (seen.times_s, seen.position_m, seen.covariance_m2):
+        for array in (seen.times_s, seen.position_m, seen.covariance_m2, seen.mask):
             digest.update(np.ascontiguousarray(array).tobytes())
         digest.update(one.clip.model_dump_json(exclude={"path", "video", "track"}).encode())
-    options = [call.engine, call.sampler, call.seed, call.effects]
-    digest.update(json.dumps(options).encode())
+    for path in call.effects_from:
+        try:
+            source = Path(path).read_bytes()
+        except OSError as error:
+            raise InputError(f"effects from {path}: {error.strerror or error}") from error
+        digest.update(hashlib.sha256(source).digest())
+    # Laws and priors may change with the package, and with others that bring effects.
+    model = [__version__, trials.problems[0].engine.name, repr(trials.parameters)]
+    options = [call.sampler, call.seed, call.effects, call.init, NUM_CHAINS]
+    digest.update(json.dumps(model + options).encode())
     return digest.hexdigest()
 
 

@@ -57,7 +57,7 @@ def load(path: Path, digest: str, like: Carry) -> tuple[Carry, History]:
     """Reads what `save` wrote; `like` gives the structure of the carry.
 
     Raises:
-      InputError: the file is damaged, or belongs to another key, start, sampler or clip.
+      InputError: the file is damaged, or belongs to another key, start, sampler, model or clip.
     """
     try:
         with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
@@ -70,7 +70,7 @@ def load(path: Path, digest: str, like: Carry) -> tuple[Carry, History]:
         raise InputError(f"{path}: not a checkpoint; delete it to start anew") from error
     if found != digest:
         raise InputError(
-            f"{path}: belongs to a run with another seed, start, sampler or clip; "
+            f"{path}: belongs to a run with another seed, start, sampler, model or clip; "
             "delete it to start anew"
         )
     return jax.tree.unflatten(jax.tree.structure(like), leaves), history
