@@ -1,20 +1,33 @@
 """What measurement would tell apart what this one does not."""
 
+from galileo_jax.comparison.phases import free_phase
 from galileo_jax.diagnosis.diagnosis import Verdict
+from galileo_jax.effects.effect import Surroundings
 from galileo_jax.effects.forms import FORM_MEANINGS
-from galileo_jax.inference.trials import Trials
 
-# Groups of effects that imitate each other, and what separates them.
+# How another run gets other speeds and places, by how the objects move.
+ANOTHER_RUN = {
+    "slide": "release object 1 from another height",
+    "fall": "drop the object from another height",
+    "flight": "throw the object at another speed and angle",
+    "swing": "let the object swing much further, or much less",
+    "liquid": "let the object go with another speed",
+}
+BESIDE_THE_CLIP = "measure a known length in the picture and the frame rate"
+# What imitates what, as another gravity, and what separates it; springs and liquids: nothing does.
+LIKE_GRAVITY = {"ramp_angle", "scale_error", "frame_rate", "constant_force"}
+GRAVITY = {
+    "slide": "film the same objects at another ramp angle, and measure the angle, a known length "
+    "in the picture and the frame rate: each of them acts like another gravity",
+    "fall": f"{BESIDE_THE_CLIP}: each of them acts like another gravity",
+    "flight": f"{BESIDE_THE_CLIP}: each of them acts like another gravity",
+}
+# Other groups of effects that imitate each other, and what separates them; {again} is another run.
 SEPARATES = (
     (
         {"air_drag", "viscous_drag", "stribeck"},
-        "release object 1 from two very different heights: quadratic drag grows with the square "
-        "of the speed, linear drag with the speed, and Stribeck friction falls with it",
-    ),
-    (
-        {"ramp_angle", "scale_error", "frame_rate", "constant_force"},
-        "film the same objects at another ramp angle, and measure the angle, a known length in "
-        "the picture and the frame rate: each of them acts like another gravity",
+        "{again}, as different as can be: quadratic drag grows with the square of the speed, "
+        "linear drag with the speed, and Stribeck friction falls with it",
     ),
     (
         {"release_delay", "initial_push", "static_friction"},
@@ -22,8 +35,8 @@ SEPARATES = (
     ),
     (
         {"friction_patch", "magnetic_brake", "surface_friction"},
-        "release from another height: a brake takes force in proportion to the speed, a patch of "
-        "friction does not, and neither moves with the release",
+        "{again}: a brake takes force in proportion to the speed, a patch of friction does not, "
+        "and neither moves with the release",
     ),
     (
         {"table_tilt", "constant_force", "surface_friction"},
@@ -41,9 +54,8 @@ SEPARATES = (
 )
 
 
-def advice(verdict: Verdict, trials: Trials) -> tuple[str, ...]:
+def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, ...]:
     """Sentences for the user: what would tell more. Empty where nothing is open."""
-    several = len(trials.problems) > 1
     if verdict.status == "unknown":
         form = verdict.form
         known = () if form is None else (f"it has the form of {FORM_MEANINGS[form]} ({form})",)
@@ -54,20 +66,25 @@ def advice(verdict: Verdict, trials: Trials) -> tuple[str, ...]:
         )
     if verdict.status != "ambiguous":
         return ()
+    motion = "slide" if scene.has_surface else free_phase(scene)
+    again = ANOTHER_RUN[motion]
+    groups = [(group, how.format(again=again)) for group, how in SEPARATES]
+    if motion in GRAVITY:
+        groups.insert(1, (LIKE_GRAVITY, GRAVITY[motion]))
     named = {name for effects in verdict.effects for name in effects.split("+")}
     said = [
         f"to tell {', '.join(sorted(named & group))} apart: {how}"
-        for group, how in SEPARATES
+        for group, how in groups
         if len(named & group) > 1
     ]
     if forms := named & set(FORM_MEANINGS):
         meant = " or ".join(FORM_MEANINGS[form] for form in sorted(forms))
         said.append(
-            f"it may as well be {meant}: release from another height, for what belongs to a place "
+            f"it may as well be {meant}: {again}, for what belongs to a place "
             "stays there, and what belongs to a speed comes with it"
         )
     if not said:
-        said = ["release object 1 from another height, or use another angle of the ramp"]
-    if not several:
+        said = [f"{again}, or use another angle of the ramp" if scene.has_surface else again]
+    if num_clips == 1:
         said.append("give several clips of the same objects together: they share their parameters")
     return tuple(said)

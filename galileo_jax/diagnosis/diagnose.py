@@ -107,7 +107,8 @@ def diagnose(
         else:
             verdict = Verdict("unknown", ())
     if add == "auto" and verdict.status != "unknown":
-        chosen = next(c for c in candidates if c.name in verdict.effects)
+        names = ("+".join(verdict.effects), verdict.effects[0])  # of all that are named, or of one
+        chosen = next(c for c in candidates if c.name in names)
         extra = Round(chosen.hypothesis, compared[chosen.effects])
         on_round(extra)
         rounds.append(extra)
@@ -120,7 +121,8 @@ def diagnose(
                 on_round(rounds[-1])
             else:
                 rounds.append(_round(trials, best.hypothesis, seed, on_round))
-    verdict = replace(verdict, advice=advice(verdict, trials))
+    scene = trials.problems[0].model.scene.surroundings
+    verdict = replace(verdict, advice=advice(verdict, scene, len(trials.problems)))
     missing = None
     if verdict.status == "unknown":
         on_stage("inferring the missing force without a form")
