@@ -45,7 +45,7 @@ def main(argv: Sequence[str]) -> int | None:
             write_json(out / "prediction.json", found)
         except OSError as error:
             raise InputError(f"--out: {out}: {error.strerror or error}") from error
-    print("\n".join(told(found)))
+    print("\n".join(told(run, found)))
     print(f"{out}/prediction.json, prediction.svg, first_and_last.png, {page.name}")
     return None
 
@@ -54,7 +54,7 @@ def _parser() -> command.Parser:
     parser = command.Parser(
         prog="galileo predict",
         description="Continue a fitted scene beyond its clip, with 95 % intervals from the "
-        "posterior: will it slide, how far, where does it stop, does it hit.",
+        "posterior: will it move, how far, where does it stop, does it hit.",
     )
     add = parser.add_argument
     add("run", type=Path, metavar="RUN", help="the folder that fit wrote")

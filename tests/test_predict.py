@@ -1,6 +1,9 @@
 """Predictions against the closed form; reproducible; wrong calls are one line."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import jax
 import numpy as np
@@ -9,8 +12,11 @@ import pytest
 from galileo_jax import command, predict
 from galileo_jax.prediction import extrapolate
 from galileo_jax.report import gl_view
+from galileo_jax.report.prediction import told
 from galileo_jax.report.shell import document, header
+from galileo_jax.run import Run
 from tests.oracle_run import HIT, MISS, STILL, make_run
+from tests.ramp_model import make_surroundings
 from tests.reference_ramp import solve
 
 CLIP_S = 0.9  # object 1 is on its way across the table
@@ -137,6 +143,27 @@ def test_rendered_where_there_is_opengl_and_always_a_picture(runs, tmp_path):
 def test_a_renderer_that_dies_is_no_error(runs, tmp_path, monkeypatch):
     monkeypatch.setattr(gl_view, "_CHILD", "import os; os.abort()")
     assert call(runs["still"], tmp_path)["picture"] == "drawn"
+
+
+def test_what_slides_on_nothing_moves_and_has_a_height():
+    lasting = {"mean": 0.25, "q025": 0.2, "q975": 0.3}
+    entry = {"slides_probability": 1.0, "stops_probability": 0.0, "rest_x_m": None}
+    entry |= {"rest_time_s": None, "travelled_m": lasting, "travelled_beyond_clip_m": lasting}
+    entry |= {"end_x_m": lasting, "end_y_m": {"mean": -0.75, "q025": -0.8, "q975": -0.7}}
+    found = {"predicted_until_s": 1.0, "seconds_beyond_clip_s": 0.5, "hit": None}
+    found["objects"] = {"ball": entry}
+
+    def said(**scene):
+        surroundings = replace(make_surroundings(HIT), **scene)
+        problem = SimpleNamespace(
+            model=SimpleNamespace(scene=SimpleNamespace(surroundings=surroundings))
+        )
+        return "\n".join(told(cast(Run, SimpleNamespace(problem=problem)), found))
+
+    assert "will it slide?" in said() and "y = " not in said()
+    assert "will it move?" in said(rolls=(True, False))
+    falls = said(has_surface=False)
+    assert "will it move?" in falls and "y = -0.750 m (-0.800 to -0.700)" in falls
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import base64
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -14,16 +14,16 @@ from galileo_jax.report.write import PAGE
 from galileo_jax.run import Run
 
 ALONE = "prediction.html"  # where there is no report to go into
-HEAD = ("", "will it slide?", "how far", "after the clip", "does it stop?", "where", "when")
 
 
-def told(found: Mapping[str, Any]) -> list[str]:
-    """The answers as lines for the reader."""
+def told(run: Run, found: Mapping[str, Any]) -> list[str]:
+    """The answers, prediction.json, as lines for the reader."""
+    verb, is_free = _verb(run), _is_free(run)
     until = found["predicted_until_s"]
     lines = [f"until {until:.2f} s, {found['seconds_beyond_clip_s']:g} s after the clip's end:"]
     for name, entry in found["objects"].items():
         slides, stops = entry["slides_probability"], entry["stops_probability"]
-        lines.append(f"{name}: will it slide? {_chance(slides)}")
+        lines.append(f"{name}: will it {verb}? {_chance(slides)}")
         if slides == 0:
             continue
         lines.append(f"  how far: {_interval(entry['travelled_m'], 'm')}")
@@ -36,8 +36,11 @@ def told(found: Mapping[str, Any]) -> list[str]:
                 f"  at x = {_interval(entry['rest_x_m'], 'm')}, "
                 f"after {_interval(entry['rest_time_s'], 's')}"
             )
-        if stops < 1:
-            lines.append(f"  at the end at x = {_interval(entry['end_x_m'], 'm')}")
+        if stops < 1 or is_free:
+            line = f"  at the end at x = {_interval(entry['end_x_m'], 'm')}"
+            if is_free:
+                line += f", y = {_interval(entry['end_y_m'], 'm')}"
+            lines.append(line)
     if found["hit"] is not None:
         first, second = list(found["objects"])[:2]
         line = f"does {first} hit {second}? {_chance(found['hit']['probability'])}"
@@ -45,6 +48,17 @@ def told(found: Mapping[str, Any]) -> list[str]:
             line += f", after {_interval(found['hit']['time_s'], 's')}"
         lines.append(line)
     return lines
+
+
+def _is_free(run: Run) -> bool:
+    """Whether the height says something of its own: no surface leads the objects."""
+    return not run.problem.model.scene.surroundings.has_surface
+
+
+def _verb(run: Run) -> str:
+    """What the objects do; what may turn does not slide."""
+    turns = any(run.problem.model.scene.surroundings.rolls)
+    return "move" if turns or _is_free(run) else "slide"
 
 
 def _chance(probability: float) -> str:
@@ -69,7 +83,7 @@ def write_prediction(folder: Path, run: Run, found: Mapping[str, Any], svg: str)
     Returns:
       the page that has it.
     """
-    section = _section(found, svg, (folder / "first_and_last.png").read_bytes())
+    section = _section(run, found, svg, (folder / "first_and_last.png").read_bytes())
     page = folder / PAGE
     if page.is_file() and "</main>" in (text := page.read_text(encoding="utf-8")):
         write_text(page, _inserted(text, section))
@@ -91,8 +105,12 @@ def _inserted(page: str, section: str) -> str:
     return f"{before}{section}</main>{after}"
 
 
-def _section(found: Mapping[str, Any], svg: str, picture: bytes) -> str:
-    rows = [[f"<code>{escape(name)}</code>", *_row(o)] for name, o in found["objects"].items()]
+def _section(run: Run, found: Mapping[str, Any], svg: str, picture: bytes) -> str:
+    columns = _columns(run)
+    rows = [
+        [f"<code>{escape(name)}</code>", *(cell(entry) for cell in columns.values())]
+        for name, entry in found["objects"].items()
+    ]
     hit = ""
     if found["hit"] is not None:
         first, second = list(found["objects"])[:2]
@@ -110,20 +128,26 @@ def _section(found: Mapping[str, Any], svg: str, picture: bytes) -> str:
     )
     caption = "First and last frame of the clip, as filmed and as simulated, and the end."
     return (
-        f'<section id="prediction">\n{motion}\n{table(HEAD, rows)}\n{hit}'
+        f'<section id="prediction">\n{motion}\n{table(("", *columns), rows)}\n{hit}'
         f"<figure><figcaption>{caption}</figcaption>{stills}</figure>\n</section>\n"
     )
 
 
-def _row(entry: Mapping[str, Any]) -> list[str]:
-    return [
-        _chance(entry["slides_probability"]),
-        _cell(entry["travelled_m"], "m"),
-        _cell(entry["travelled_beyond_clip_m"], "m"),
-        _chance(entry["stops_probability"]),
-        _cell(entry["rest_x_m"], "m"),
-        _cell(entry["rest_time_s"], "s"),
-    ]
+def _columns(run: Run) -> dict[str, Callable[[Mapping[str, Any]], str]]:
+    """Each column's title, and its cell of an object's entry."""
+    columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
+        f"will it {_verb(run)}?": lambda entry: _chance(entry["slides_probability"]),
+        "how far": lambda entry: _cell(entry["travelled_m"], "m"),
+        "after the clip": lambda entry: _cell(entry["travelled_beyond_clip_m"], "m"),
+        "does it stop?": lambda entry: _chance(entry["stops_probability"]),
+        "where": lambda entry: _cell(entry["rest_x_m"], "m"),
+        "when": lambda entry: _cell(entry["rest_time_s"], "s"),
+    }
+    if _is_free(run):
+        del columns["where"]  # of x alone, which says little here
+        columns["x at the end"] = lambda entry: _cell(entry["end_x_m"], "m")
+        columns["y at the end"] = lambda entry: _cell(entry["end_y_m"], "m")
+    return columns
 
 
 def _cell(entry: Mapping[str, float] | None, unit: str) -> str:
