@@ -105,13 +105,11 @@ def as_measured(model: Model, motions: Motions) -> np.ndarray:
     return shown
 
 
-def hit_s(motions: Motions, surroundings: Surroundings) -> np.ndarray:
-    """When object 1 first touches object 2, `[draw]`, s; NaN where it never does."""
+def hit_s(motions: Motions, surroundings: Surroundings, index: int = 0) -> np.ndarray:
+    """When an object first touches the next, `[draw]`, s; NaN where it never does."""
     when = np.full(len(motions.theta), np.nan)
-    if len(surroundings.names) < 2:
-        return when
-    reach = surroundings.half_length_m[0] + surroundings.half_length_m[1] + TOUCH_M
-    gap = motions.position_m[:, 1, 0] - motions.position_m[:, 0, 0]
+    reach = surroundings.half_length_m[index] + surroundings.half_length_m[index + 1] + TOUCH_M
+    gap = motions.position_m[:, index + 1, 0] - motions.position_m[:, index, 0]
     touches = gap <= reach
     is_hit = touches.any(axis=1)
     before = np.maximum(touches.argmax(axis=1) - 1, 0)

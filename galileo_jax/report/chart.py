@@ -10,12 +10,12 @@ import numpy as np
 
 from galileo_jax.report.phase import Phase
 
-Colour = Literal["object1", "object2", "ink", "soft", "accent", "fails"]
+Colour = Literal["object1", "object2", "object3", "ink", "soft", "accent", "fails"]
 
 
 def object_colour(index: int) -> Colour:
-    """Of the object with this index; a third has the first's again."""
-    return ("object1", "object2")[index % 2]
+    """Of the object with this index; a fourth has the first's again."""
+    return ("object1", "object2", "object3")[index % 3]
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """The posterior's draws: pairs of parameters and, of chains, their traces."""
 
+import re
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,11 +17,11 @@ CELL_IN = 1.25
 
 
 def main_draws(posterior: Posterior, names: list[str]) -> dict[str, np.ndarray]:
-    """`[chain, draw]` by name: the given parameters and, of two objects, the mass ratio."""
+    """`[chain, draw]` by name: the given parameters and the ratios of neighbours' masses."""
     shown = {name: posterior[name] for name in names}
-    if {"m1", "m2"} <= shown.keys():
-        shown["m1 / m2"] = posterior["m1"] / posterior["m2"]
-    return shown
+    masses = [name for name in names if re.fullmatch(r"m\d+", name)]
+    ratios = {f"{a} / {b}": posterior[a] / posterior[b] for a, b in pairwise(masses)}
+    return shown | ratios
 
 
 def pair_figure(posterior: Posterior, names: list[str]) -> "Figure":
@@ -83,4 +85,4 @@ def trace_figure(posterior: Posterior, names: list[str]) -> "Figure":
 
 
 def _shade(chain: int) -> str:
-    return (*COLOURS, INK, "#7a8f3c")[chain % 4]
+    return (*COLOURS, INK)[chain % 4]

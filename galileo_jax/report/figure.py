@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK, PAPER = "#22242a", "#ffffff"  # in the page: the text's colour, and none
-COLOURS = ("#c2592f", "#3273b3")  # object 1, object 2; as scenes/ramp.xml has them
+COLOURS = ("#c2592f", "#3273b3", "#59994d")  # objects 1, 2 (as in scenes/ramp.xml), 3 (scene.py)
 PANEL_IN = (4.8, 2.7)  # one panel is a phone's width
 
 _STYLE: dict[str, Any] = {

@@ -6,8 +6,10 @@ from itertools import pairwise
 import jax
 import numpy as np
 
+from galileo_jax.comparison.phases import free_phase
+from galileo_jax.effects.effect import Surroundings
 from galileo_jax.observation import Observation
-from galileo_jax.prediction import GRID_S, as_measured, draw_theta, hit_s, roll_out
+from galileo_jax.prediction import GRID_S, Motions, as_measured, draw_theta, hit_s, roll_out
 from galileo_jax.report.phase import Phase
 from galileo_jax.run import Run
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -26,7 +28,7 @@ class Fitted:
       offset_m: `[object, 2]`, followed point minus centre; `position_m` contains each draw's.
       residuals: `[object, 2, frame]`, in units of the noise; NaN where nothing was measured.
       phases: of each object.
-      hit_s: when object 1 hits object 2; None = it does not.
+      hits_s: when each object but the last hits the next; None = it does not.
     """
 
     observation: Observation
@@ -35,7 +37,7 @@ class Fitted:
     offset_m: np.ndarray
     residuals: np.ndarray
     phases: tuple[tuple[Phase, ...], ...]
-    hit_s: float | None
+    hits_s: tuple[float | None, ...]
 
     @property
     def moves(self) -> np.ndarray:
@@ -64,17 +66,29 @@ def evaluate(run: Run, seed: int) -> Fitted:
     is_measured = np.broadcast_to(observation.mask[:, None], shown.shape)
     drawn = as_measured(problem.model, draws)
     drawn = drawn + _offset(observation, drawn)[..., None]
-    when = float(hit_s(centre, surroundings)[0])
-    hit = None if np.isnan(when) else when
+    hits = _hits(centre, surroundings)
     return Fitted(
         observation=observation,
         position_m=drawn,
         noise_scale=noise_scale,
         offset_m=_offset(observation, shown),
         residuals=np.where(is_measured, np.asarray(white), np.nan),
-        phases=tuple(_phases(run, shown[i], i, hit) for i in range(len(surroundings.names))),
-        hit_s=hit,
+        phases=tuple(
+            _phases(run, shown[i], i, _first(hits[max(0, i - 1) : i + 1]))
+            for i in range(len(surroundings.names))
+        ),
+        hits_s=hits,
     )
+
+
+def _hits(motions: Motions, surroundings: Surroundings) -> tuple[float | None, ...]:
+    """When each object but the last hits the next in the first of the motions."""
+    when = [float(hit_s(motions, surroundings, i)[0]) for i in range(len(surroundings.names) - 1)]
+    return tuple(None if np.isnan(one) else one for one in when)
+
+
+def _first(hits_s: tuple[float | None, ...]) -> float | None:
+    return min((hit for hit in hits_s if hit is not None), default=None)
 
 
 def _offset(observation: Observation, predicted_m: np.ndarray) -> np.ndarray:
@@ -94,7 +108,7 @@ def _phases(run: Run, centre_m: np.ndarray, index: int, hit: float | None) -> tu
     times = run.problem.observation.times_s
     corner, half = surroundings.corner_m[index], surroundings.half_length_m[index]
     if not surroundings.has_surface:
-        labels = np.full(len(times), "fall")
+        labels = np.full(len(times), free_phase(surroundings))
     elif surroundings.start_m[index][0] < corner:
         beyond = centre_m[0] - corner  # -inf where there is no table
         labels = np.select([beyond < -half, beyond < half], ["ramp", "foot"], "table")

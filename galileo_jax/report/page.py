@@ -1,5 +1,6 @@
 """The page of a fit."""
 
+import re
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
@@ -13,10 +14,10 @@ from galileo_jax.report.fitted import Fitted
 from galileo_jax.report.provenance import provenance
 from galileo_jax.report.residuals import worst_stretch_of
 from galileo_jax.report.shell import details, document, figure_section, header, legend
-from galileo_jax.report.statements import MEANINGS, number
+from galileo_jax.report.statements import meaning, number
 from galileo_jax.run import Run
 
-HEADLINES = ("k1", "k2", "mass_ratio")
+HEADLINES = re.compile(r"k\d+|mass_ratio(_\d+_\d+)?")
 
 
 def render(run: Run, fitted: Fitted, figures: Mapping[str, Mapping[str, str]]) -> str:
@@ -78,11 +79,10 @@ def _key(run: Run) -> str:
 def _headlines(run: Run) -> str:
     known = {**run.result["parameters"], **run.result.get("derived", {})}
     cards = []
-    for name in HEADLINES:
-        if name not in known:
+    for name, entry in known.items():
+        if not HEADLINES.fullmatch(name):
             continue
-        entry = known[name]
-        label = escape(MEANINGS.get(name, name))
+        label = escape(meaning(name) or name)
         if entry["identified"]:
             low, high = (number(entry[key], entry["sd"]) for key in ("q025", "q975"))
             value, note = number(entry["mean"], entry["sd"]), f"{low} to {high} (95 %)"
@@ -102,7 +102,7 @@ def _untold(run: Run, fitted: Fitted) -> str:
     for name, reason in reasons.items():
         by_reason.setdefault(reason, []).append(name)
     items = "".join(
-        f"<li><strong>{escape(', '.join(MEANINGS.get(n, n) for n in names))}</strong>: "
+        f"<li><strong>{escape(', '.join(meaning(n) or n for n in names))}</strong>: "
         f"{escape(reason)}.</li>"
         for reason, names in by_reason.items()
     )
@@ -148,7 +148,9 @@ def _draws_caption(run: Run) -> str:
     size = run.posterior.flat().shape[0]
     told = f"{size} draws of the main parameters."
     if "m2" in run.posterior.names:
-        told += " The straight band of m1 against m2 is the ridge: only the masses' ratio shows."
+        told += (
+            " Straight bands of one mass against another are the ridge: only masses' ratios show."
+        )
     return told
 
 
@@ -161,7 +163,7 @@ def _table(heading: str, entries: Mapping[str, Mapping[str, Any]], note: str = "
         told = "yes" if entry["identified"] else "no"
         rows.append(
             f"<tr><td><code>{escape(name)}</code></td>"
-            f'<td class="meaning">{escape(MEANINGS.get(name, ""))}</td>'
+            f'<td class="meaning">{escape(meaning(name) or "")}</td>'
             f'<td class="n">{number(entry["mean"], sd)} {escape(unit)}</td>'
             f'<td class="n">{number(sd, sd)}</td><td class="n">{low} to {high}</td>'
             f"<td>{told}</td></tr>"

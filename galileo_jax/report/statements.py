@@ -1,6 +1,7 @@
 """What the fit does and does not say, in plain sentences."""
 
 import math
+import re
 import shlex
 from typing import Any
 
@@ -8,10 +9,6 @@ from galileo_jax.report.fitted import Fitted
 from galileo_jax.run import CLIP, Run
 
 MEANINGS = {
-    "m1": "mass of object 1",
-    "k1": "friction of object 1",
-    "m2": "mass of object 2",
-    "k2": "friction of object 2",
     "mass_ratio": "m1 / m2",
     "phi": "(m1 - m2) / (m1 + m2)",
     "pixels_per_metre": "scale of the picture",
@@ -34,12 +31,24 @@ MEANINGS = {
     "foot_transition": "factor on the speed kept at the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
     "release_instant": "release after the first frame",
-    "start_offset_object1": "start of object 1, from where it was marked",
-    "start_offset_object2": "start of object 2, from where it was marked",
     "noise_scale": "tracking noise over what the tracker stated",
 }
+OF_OBJECTS = (  # what parameters' names with numbers in them mean
+    (re.compile(r"m(\d+)"), "mass of object {}"),
+    (re.compile(r"k(\d+)"), "friction of object {}"),
+    (re.compile(r"mass_ratio_(\d+)_(\d+)"), "m{} / m{}"),
+    (re.compile(r"start_offset_object(\d+)"), "start of object {}, from where it was marked"),
+)
 WEIGHED = ("liquid_drag", "stiffness")  # forces: known as far as the mass is
 CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
+
+
+def meaning(name: str) -> str | None:
+    """What a parameter is, in a phrase; None where only its name tells (effects)."""
+    for pattern, phrase in OF_OBJECTS:
+        if found := pattern.fullmatch(name):
+            return phrase.format(*found.groups())
+    return MEANINGS.get(name)
 
 
 def undetermined(run: Run, fitted: Fitted) -> dict[str, str]:
@@ -53,20 +62,23 @@ def undetermined(run: Run, fitted: Fitted) -> dict[str, str]:
 
 def _reason(name: str, run: Run, fitted: Fitted) -> str:
     surroundings = run.problem.model.scene.surroundings
-    has_two, ratio = len(surroundings.names) > 1, run.result.get("derived", {}).get("mass_ratio")
+    derived, count = run.result.get("derived", {}), len(surroundings.names)
+    ratios = [entry for key, entry in derived.items() if key.startswith("mass_ratio")]
     if not fitted.moves.any():
         limit = math.tan(surroundings.angle_rad)
         if name == "k1":
             return f"nothing moves: k1 is at least tan(angle) = {limit:.3f}, more cannot be said"
         return "nothing moves"
-    if name in ("m1", "m2"):
+    if re.fullmatch(r"m\d+", name):
         if run.clip.objects[int(name[1:]) - 1].mass_kg is not None:
             return "declared as weighed; it does not show in the motion"
-        if not has_two:
+        if count < 2:
             return "the mass of a single object does not show in its motion"
-        if ratio is not None and ratio["identified"]:
+        if any(ratio["identified"] for ratio in ratios):
+            every, more = ("ratio", "both") if count == 2 else ("ratios", "all")
             return (
-                "only the ratio of the masses shows in such a clip; doubling both changes nothing"
+                f"only the {every} of the masses shows in such a clip; "
+                f"doubling {more} changes nothing"
             )
         return "masses show in a collision only, and there only their ratio"
     if name in WEIGHED and run.clip.objects[0].mass_kg is None:
@@ -80,11 +92,20 @@ def _reason(name: str, run: Run, fitted: Fitted) -> str:
         )
     if name == "k1" and not surroundings.is_scale_known:
         return "friction and scale cannot both be told from one slope; declare pixels_per_metre"
-    if name in ("k2", "mass_ratio") and fitted.hit_s is None:
-        return "object 1 never hits object 2"
-    if name in ("k2", "mass_ratio"):
-        return "object 2 is hit too weakly or too late in the clip to tell"
+    if struck := _struck(name):
+        if fitted.hits_s[struck - 2] is None:
+            return f"object {struck - 1} never hits object {struck}"
+        return f"object {struck} is hit too weakly or too late in the clip to tell"
     return "the clip narrows it by less than half of what was known before"
+
+
+def _struck(name: str) -> int | None:
+    """The object, counted from 1, whose being hit a parameter takes to be told."""
+    if name == "mass_ratio":
+        return 2
+    found = re.fullmatch(r"k(\d+)|mass_ratio_\d+_(\d+)", name)
+    struck = int(found[1] or found[2]) if found else 1
+    return struck if struck > 1 else None
 
 
 def fit_quality(result: dict[str, Any]) -> str:

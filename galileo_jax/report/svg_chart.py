@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 HEX = {
-    "object1": COLOURS[0], "object2": COLOURS[1], "ink": INK, "soft": "#6a6d76",
-    "accent": COLOURS[0], "fails": "#d4a017",
+    "object1": COLOURS[0], "object2": COLOURS[1], "object3": COLOURS[2], "ink": INK,
+    "soft": "#6a6d76", "accent": COLOURS[0], "fails": "#d4a017",
 }  # fmt: skip
 POINTS = 0.72  # of a CSS pixel; a panel is 480 px of the page wide
 STACKED_IN, EDGE_IN = 1.55, 0.3

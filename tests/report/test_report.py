@@ -158,13 +158,13 @@ def test_what_an_earlier_fit_left_is_gone_and_the_thesis_is_no_posterior(run):
 def test_residuals_are_whitened_and_the_hit_is_found(run):
     fitted = evaluate(run, seed=0)
     assert fitted.residuals.std() == pytest.approx(1.0, abs=0.6)
-    assert fitted.hit_s == pytest.approx(solve(HIT, np.zeros(1)).hit_s, abs=0.02)
+    assert fitted.hits_s[0] == pytest.approx(solve(HIT, np.zeros(1)).hit_s, abs=0.02)
     assert [phase.name for phase in fitted.phases[0]] == ["ramp", "foot", "table", "after the hit"]
 
 
 def test_the_hit_of_objects_that_part_is_where_the_closed_form_has_it(tmp_path):
     fitted = evaluate(make_run(tmp_path, PARTS, 1.8), seed=0)
-    assert fitted.hit_s == pytest.approx(solve(PARTS, np.zeros(1)).hit_s, abs=0.02)
+    assert fitted.hits_s[0] == pytest.approx(solve(PARTS, np.zeros(1)).hit_s, abs=0.02)
 
 
 def not_identified(run, *names):
