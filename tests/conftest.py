@@ -33,3 +33,12 @@ def x64():
 
     with jax.enable_x64(True):
         yield
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """One browser for all pages."""
+    from tests.report.browser import started
+
+    with started() as found:
+        yield found

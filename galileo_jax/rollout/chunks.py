@@ -39,11 +39,13 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
       row until it has one of the sizes. Parts run side by side, one per core.
     """
     count = len(jax.tree.leaves(batches[0])[0])
+    is_64_bit = jax.config.read("jax_enable_x64")  # may be the calling thread's own
 
     def part(begin: int, end: int, size: int) -> Any:
         index = np.concatenate([np.arange(begin, end), np.full(size - (end - begin), begin)])
-        out = function(*jax.tree.map(lambda leaf: np.asarray(leaf)[index], batches))
-        return jax.tree.map(lambda leaf: np.asarray(leaf)[: end - begin], out)
+        with jax.enable_x64(is_64_bit):
+            out = function(*jax.tree.map(lambda leaf: np.asarray(leaf)[index], batches))
+            return jax.tree.map(lambda leaf: np.asarray(leaf)[: end - begin], out)
 
     # XLA runs small operations, one after the other, on a single core.
     with ThreadPoolExecutor(_num_cores()) as pool:

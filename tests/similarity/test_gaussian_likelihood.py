@@ -129,7 +129,7 @@ def test_differences_with_their_exact_covariance(monkeypatch):
     observation = Observation(("object1",), times, position, covariance, np.ones((1, frames), bool))
     flat = np.zeros((2, 1, 2, frames))
     flat[0, 0, 0] = flat[1, 0, 1] = 1e3  # metres: as good as free
-    monkeypatch.setattr(gaussian_likelihood, "modes", lambda *_: flat)
+    monkeypatch.setattr(gaussian_likelihood, "modes", lambda *_, is_filmed: flat)
     monkeypatch.setattr(gaussian_likelihood, "crossing_sd_m", lambda *_: np.zeros((1, frames)))
     data = GaussianLikelihood.prepare(observation, SCENE)
 

@@ -9,7 +9,7 @@ from galileo_jax import command, sweep
 from galileo_jax.errors import InputError
 from galileo_jax.sweeping import carry_out
 from tests.clip.broken_clips import build_good_track
-from tests.report.browser import opened, started
+from tests.report.browser import opened
 
 TRUTH = {"m1": 0.4, "k1": 0.2, "m2": 0.2, "k2": 0.3, "effect": "air_drag"}
 
@@ -149,13 +149,10 @@ def test_multirun_is_one_sweep(tmp_path, clips, calls):
     assert [row["seed"] for row in rows_of(tmp_path / "out")] == ["0", "1"]
 
 
-def test_the_page_shows_errors_and_what_was_taken_for_what(tmp_path, clips, calls):
+def test_the_page_shows_errors_and_what_was_taken_for_what(tmp_path, clips, calls, browser):
     text = "list: [{method: grad}, {method: grad, seed: 13}, {method: diagnose}]"
     assert run(tmp_path, clips[:1], text) == 0
-    with (
-        started() as browser,
-        opened(browser, tmp_path / "out" / "report.html") as (page, complaints),
-    ):
+    with opened(browser, tmp_path / "out" / "report.html") as (page, complaints):
         for width_px in (1280, 390):
             page.set_viewport_size({"width": width_px, "height": 900})
             page.wait_for_function(f"document.documentElement.scrollWidth <= {width_px}")
