@@ -43,11 +43,11 @@ def work_ahead(
         jax_cache.enable()
         for name in ("galileo_jax.inference.fits.gradient", "galileo_jax.run"):
             import_module(name)
-        # What is wrong in a call is told when it is built in earnest.
+        # What is wrong is told when it is done in earnest.
         with contextlib.suppress(Exception):
             _compile(clips, build, num_exact)
-        for name in ("galileo_jax.report.write", "matplotlib.figure", "xarray"):
-            import_module(name)
+            for name in ("galileo_jax.report.write", "matplotlib.figure", "xarray"):
+                import_module(name)
 
     thread = threading.Thread(target=work, daemon=True)
     thread.start()

@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from rich.console import Console
 from rich.progress import (
@@ -19,7 +19,13 @@ from galileo_jax.errors import InputError
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line (an `InputError`), without the usage."""
+    """An argument parser whose errors are one line (an `InputError`), without the usage.
+
+    Options are written out: `--effects` must not be taken for `--effects-from`.
+    """
+
+    def __init__(self, **given: Any):
+        super().__init__(allow_abbrev=False, **given)
 
     def error(self, message: str) -> NoReturn:
         """Raises the complaint as an `InputError`."""

@@ -153,15 +153,8 @@ def _trials(
     without = SCENARIOS[clips[0].scenario].without
     names = [name for name in (*effect_names(), *FORM_NAMES) if name not in without]
     trials = trials_with(names)
-    absent = _without_place(trials)
+    absent = trials.without_place()
     return trials_with([name for name in names if name not in absent]) if absent else trials
-
-
-def _without_place(trials: "Trials") -> list[str]:
-    """Effects that bring no parameters into any of these clips."""
-    scenes = [problem.model.scene.surroundings for problem in trials.problems]
-    effects = trials.problems[0].model.effects
-    return [e.name for e in effects if not any(e.parameters(scene) for scene in scenes)]
 
 
 def _absent(trials: "Trials") -> list[str]:

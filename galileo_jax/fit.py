@@ -3,6 +3,7 @@
 import argparse
 import hashlib
 import json
+import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -46,6 +47,8 @@ def main(argv: Sequence[str]) -> int | None:
     if call.preset == "thesis" and len(clips) > 1:
         raise InputError("--preset thesis: one clip expected")
     truth = read_truth(clips[0])
+    if call.effects or call.effects_from:
+        chosen_effects(call)  # a wrong name is told before anything is tracked
     ahead = work_ahead(clips, lambda some, seen: built(some, seen, call))
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
@@ -81,10 +84,17 @@ def chosen_effects(call: argparse.Namespace) -> "tuple[Effect, ...]":
 def built(
     clips: Sequence[Clip], observations: "Sequence[Observation]", call: argparse.Namespace
 ) -> "Trials":
-    """Trials of the model that a call asks for."""
+    """Trials of the model that a call asks for.
+
+    Raises:
+      InputError: an effect is unknown, or has no place in these clips.
+    """
     from galileo_jax.run import make_trials
 
-    return make_trials(clips, observations, call.engine, chosen_effects(call))
+    trials = make_trials(clips, observations, call.engine, chosen_effects(call))
+    if absent := trials.without_place():
+        raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
+    return trials
 
 
 def fit_clips(
@@ -361,6 +371,14 @@ def _table(result: dict[str, Any], truth: Mapping[str, float]) -> str:
         f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
         f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}); {result['status']}"
     )
+    from galileo_jax.report.statements import CHI2_HIGH
+
+    if not error["chi2_per_dof"] <= CHI2_HIGH:
+        files = shlex.join(result["clips"])
+        lines.append(
+            "The model leaves more over than noise explains: do not trust its parameters. "
+            f"See where it fails: galileo compare {files}"
+        )
     return "\n".join(lines)
 
 

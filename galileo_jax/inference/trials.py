@@ -130,6 +130,12 @@ class Trials:
         """Names of the models' effects."""
         return tuple(effect.name for effect in self.problems[0].model.effects)
 
+    def without_place(self) -> list[str]:
+        """Effects of the models that bring no parameters into any of the clips."""
+        scenes = [problem.model.scene.surroundings for problem in self.problems]
+        effects = self.problems[0].model.effects
+        return [e.name for e in effects if not any(e.parameters(scene) for scene in scenes)]
+
     def theta(self, z: np.ndarray, free: np.ndarray | None = None) -> np.ndarray:
         """Parameters in their units, `[..., parameter]`, noise scales last."""
         theta = np.asarray(_forward(self.priors, jnp.asarray(z)))
