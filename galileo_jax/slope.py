@@ -80,6 +80,11 @@ def slope_of_path(clip: Clip, observation: Observation) -> Slope:
             f"the ramp, too little to tell the slope; {remedy}"
         )
     if along[0] < 0:
+        if clip.is_own_track:
+            raise InputError(
+                f"{clip.path}: track: {name}'s x decreases; x along the travel expected; turn the "
+                "sign of the csv's x columns"
+            )
         other = "left" if clip.direction == "right" else "right"
         raise InputError(
             f"{clip.path}: direction: {clip.direction}, but {name} moves to the {other}; "

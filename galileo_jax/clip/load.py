@@ -111,7 +111,7 @@ def find_yaml(path: Path) -> Path:
             return path.with_suffix(suffix)
     raise InputError(
         f"{path}: no {path.with_suffix('.yaml').name} beside it; "
-        f"write one: python -m galileo_jax.label {path} --help"
+        f"write one: galileo label {path} --help"
     )
 
 
@@ -339,6 +339,7 @@ def _observed(path: Path, file: ClipFile, read: FileTrack) -> dict[str, Any]:
     return {
         "track": track,
         "track_units": read.unit,
+        "is_own_track": read.is_own,
         **(in_pixels if read.unit == "px" else {}),
         "frame_count": len(read.observation.times_s),
         "warnings": warnings,

@@ -28,6 +28,9 @@ TOLERANCE_PER_DISTANCE = 0.06
 
 MEND_PIXELS = "mend point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre"
 MEND_LENGTHS = "mend track_origin, ramp_angle_deg, direction, size_m or track_units"
+MEND_OWN_CSV = (
+    "mend ramp_angle_deg, size_m or the csv (x along the travel, y up, from the foot of the ramp)"
+)
 
 MIN_SIZE_PX = 2.0
 """An object that would appear smaller cannot be followed: its size or the scale is wrong."""
@@ -101,7 +104,12 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
     is_on_ramp = (
         SCENARIOS[clip.scenario].has_ramp and has_origin and clip.ramp_angle_deg is not None
     )
-    mend = MEND_PIXELS if in_pixels else MEND_LENGTHS
+    if clip.is_own_track:
+        mend, mend_pair = MEND_OWN_CSV, "mend size_m or the csv's columns"
+    elif in_pixels:
+        mend, mend_pair = MEND_PIXELS, "mend point_px, size_m or pixels_per_metre"
+    else:
+        mend, mend_pair = MEND_LENGTHS, "mend size_m or track_units"
     angle = math.radians(clip.ramp_angle_deg or 0.0)
     placed = [
         (index, item, _outline(item, centres_m[item.name], angle if is_on_ramp else 0.0))
@@ -121,8 +129,7 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
         if depth_m > _tolerance_m(a, pixel_m) + _tolerance_m(b, pixel_m):
             return (
                 f"objects[{index}] ({b.name})",
-                f"reaches into {a.name} by about {1000 * depth_m:.0f} mm at the start; "
-                "mend point_px, size_m or pixels_per_metre",
+                f"reaches into {a.name} by about {1000 * depth_m:.0f} mm at the start; {mend_pair}",
             )
     return None
 

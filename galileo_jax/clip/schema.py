@@ -312,12 +312,14 @@ class Clip(ClipFile):
         inferred; None or false = none is reached.
       liquid_density: liquid: kg/m^3; None = not known.
       objects: at least one, names unique.
+      is_own_track: the track is our own csv, in metres along our axes.
       frame_count: frames that decode, or rows of the csv track.
       frame_size_px: (width, height); None for a csv track.
       warnings: doubts found while loading, one line each; commands print them.
     """
 
     path: Path
+    is_own_track: bool = False
     frame_count: int
     frame_size_px: tuple[int, int] | None = None
     warnings: tuple[str, ...] = ()

@@ -32,6 +32,7 @@ MIN_SD_M = 1e-5
 MAX_POSITION_M = 100.0
 MAX_SD_M = 1.0
 MAX_STEP_S = 1.0
+"""No motion is seen in frames a second apart; a step of just 1 is a count of frames."""
 
 _ISOTROPIC = ("sd_m",)
 _COVARIANCE = ("sd_x_m", "sd_y_m", "correlation")
@@ -50,15 +51,16 @@ def read_observation_csv(path: Path) -> Observation:
         raise InputError(f"{path}: {len(rows)} rows; at least {MIN_ROWS} expected")
     table = _parse(path, header, rows)
     times = table[:, header.index(TIME)]
-    check_times(path, times, [f"line {line}" for line, _ in rows])
+    lines = [f"line {line}" for line, _ in rows]
+    check_times(path, times, lines)
 
     position = np.empty((len(names), 2, len(times)))
     covariance = np.empty((len(names), 2, 2, len(times)))
     for index, name in enumerate(names):
         column = {field: table[:, at] for field, at in columns[name].items()}
-        position[index] = _positions(path, name, column["x_m"], column["y_m"])
+        position[index] = _positions(path, name, column["x_m"], column["y_m"], lines)
         is_visible = np.isfinite(position[index, 0])
-        covariance[index] = _covariance(path, name, column, times, position[index])
+        covariance[index] = _covariance(path, name, column, times, position[index], lines)
         covariance[index][:, :, ~is_visible] = np.nan
     return Observation(names, times, position, covariance, np.isfinite(position[:, 0]))
 
@@ -240,17 +242,20 @@ def check_times(path: Path, times: np.ndarray, rows: Sequence[str] | None = None
             f"{path}: {rows[at]}: {TIME}: {times[at]:g} is not after {times[at - 1]:g}; "
             "times must increase"
         )
-    if np.median(steps) > MAX_STEP_S:
+    if np.median(steps) >= MAX_STEP_S:
         raise InputError(
-            f"{path}: {TIME}: rows are {np.median(steps):g} s apart; seconds expected; "
-            "are these milliseconds or frame numbers?"
+            f"{path}: {TIME}: rows are {np.median(steps):g} s apart; seconds expected, "
+            f"less than {MAX_STEP_S:g} apart; are these milliseconds or frame numbers (divide them "
+            "by 1000 or by the frame rate)?"
         )
 
 
-def _positions(path: Path, name: str, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def _positions(
+    path: Path, name: str, x: np.ndarray, y: np.ndarray, lines: Sequence[str]
+) -> np.ndarray:
     if (np.isnan(x) != np.isnan(y)).any():
         at = int((np.isnan(x) != np.isnan(y)).argmax())
-        raise InputError(f"{path}: row {at + 1}: {name}: only one of x and y is given")
+        raise InputError(f"{path}: {lines[at]}: {name}: only one of x and y is given")
     if np.isfinite(x).sum() < MIN_ROWS:
         raise InputError(
             f"{path}: {name}: visible in {np.isfinite(x).sum()} rows; at least {MIN_ROWS} expected"
@@ -266,7 +271,12 @@ def _positions(path: Path, name: str, x: np.ndarray, y: np.ndarray) -> np.ndarra
 
 
 def _covariance(
-    path: Path, name: str, column: dict[str, np.ndarray], times: np.ndarray, position: np.ndarray
+    path: Path,
+    name: str,
+    column: dict[str, np.ndarray],
+    times: np.ndarray,
+    position: np.ndarray,
+    lines: Sequence[str],
 ) -> np.ndarray:
     """`[2, 2, row]`, m^2, from the columns or else from the positions' roughness."""
     correlation = np.zeros(len(times))
@@ -282,7 +292,7 @@ def _covariance(
     if not is_right[is_visible].all():
         at = int((is_visible & ~is_right).argmax())
         raise InputError(
-            f"{path}: row {at + 1}: {name}: standard deviation {sd[0, at]:g} m; more than 0 and at "
+            f"{path}: {lines[at]}: {name}: standard deviation {sd[0, at]:g} m; more than 0 and at "
             f"most {MAX_SD_M:g} expected, correlation between -1 and 1"
         )
     shared = correlation * sd[0] * sd[1]

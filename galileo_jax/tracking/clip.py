@@ -65,7 +65,7 @@ def _with_points(
         raise InputError(
             f"{clip.path}: objects ({name}): point_px: missing, and only {len(movers)} moving "
             f"object(s) found to take for {len(missing)}; mark it: "
-            f"python -m galileo_jax.label {clip.video or clip.path} --help"
+            f"galileo label {clip.video or clip.path} --help"
         )
     first = grey(next(open_frames()))
     found: dict[str, ClipObject] = {}

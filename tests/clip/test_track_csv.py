@@ -111,12 +111,12 @@ GOOD = "time_s,object1_x_m,object1_y_m,object1_sd_m\n" + ROWS
     (",object1_x_m,object1_y_m,object1_sd_m", "", "no object in the header|cells"),
     ("0.1000,0.030", "0.1000,thirty", "line 5: object1_x_m: 'thirty' is not a number"),
     ("0.1000,0.030", "0.1000,inf", "line 5: object1_x_m: 'inf' is not a number"),
-    ("0.1000,0.030", "0.1000,", "row 4: object1: only one of x and y"),
+    ("0.1000,0.030", "0.1000,", "line 5: object1: only one of x and y"),
     ("0.1000,0.030", ",0.030", "line 5: time_s: empty"),
     ("0.1000,0.030", "0.0667,0.030", "line 5: time_s: 0.0667 is not after 0.0667"),
     ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5", "line 5: 3 cells; 4 expected"),
-    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5,", "row 4: object1: standard deviation nan"),
-    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5,-1", "row 4: object1: standard deviation -1"),
+    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5,", "line 5: object1: standard deviation nan"),
+    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5,-1", "line 5: object1: standard deviation -1"),
     ("0.1000,0.030,0.5,0.001", "0.1000,0.030,500,1", "500 m; metres expected"),
     (ROWS, ROWS[:46], "2 rows; at least 4"),
     (ROWS, ROWS.replace("0.5", ""), "only one of x and y"),
@@ -136,6 +136,23 @@ def test_times_in_milliseconds_are_named(tmp_path: Path) -> None:
     path.write_text("time_s,a_x_m,a_y_m,a_sd_m\n" + "".join(f"{33 * i},0,0,1\n" for i in range(9)))
     with pytest.raises(InputError, match="33 s apart; seconds expected"):
         read_observation_csv(path)
+
+
+@pytest.mark.parametrize("step_s", [1.0, 2.0])
+def test_frame_numbers_are_no_seconds(step_s: float, tmp_path: Path) -> None:
+    path = tmp_path / "track.csv"
+    rows = "".join(f"{step_s * i},0,0,1\n" for i in range(9))
+    path.write_text("time_s,a_x_m,a_y_m,a_sd_m\n" + rows)
+    with pytest.raises(InputError, match=f"{step_s:g} s apart; .*frame numbers"):
+        read_observation_csv(path)
+
+
+@pytest.mark.parametrize("fps", [1.5, 15.0])
+def test_slow_cameras_are_read(fps: float, tmp_path: Path) -> None:
+    path = tmp_path / "track.csv"
+    rows = "".join(f"{i / fps},0,0,1\n" for i in range(9))
+    path.write_text("time_s,a_x_m,a_y_m,a_sd_m\n" + rows)
+    assert len(read_observation_csv(path).times_s) == 9
 
 
 def test_too_few_rows_to_estimate_the_error(tmp_path: Path) -> None:

@@ -178,6 +178,35 @@ def test_direction_and_origin_of_lengths(tmp_path: Path) -> None:
     check_motion(observation_of(clip))
 
 
+OWN_CSV = "time_s,object1_x_m,object1_y_m\n" + "".join(
+    f"{t:.6f},{x:.6f},{y:.6f}\n" for t, x, y in zip(make.times(), *make.path_m(), strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    "keys", ["track_units: cm", "track_y: down", "track_origin: [0.3, 0.2]", "direction: left"]
+)
+def test_own_csv_refuses_what_its_columns_say(keys: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"slide.yaml: {keys.split(':')[0]}: .*mend the columns"):
+        clip_of(tmp_path, "slide.csv", OWN_CSV, keys)
+
+
+def test_own_csv_may_be_told_what_it_says(tmp_path: Path) -> None:
+    """So a run's yaml, which has every key, loads again."""
+    keys = "track_units: m; track_y: up; track_origin: [0, 0]; direction: right"
+    check_motion(observation_of(clip_of(tmp_path, "slide.csv", OWN_CSV, keys)))
+
+
+def test_misplaced_own_csv_is_not_advised_to_take_such_keys(tmp_path: Path) -> None:
+    (tmp_path / "slide.csv").write_text(OWN_CSV)
+    text = YAML.format(name="slide.csv", keys="", objects="")
+    item = "  - {name: object1, shape: box, size_m: [0.9, 0.9, 0.9]}\n"
+    (tmp_path / "slide.yaml").write_text(text + item)
+    with pytest.raises(InputError, match="inside the ramp .*mend .*size_m or the csv") as caught:
+        load_clip(tmp_path / "slide.yaml")
+    assert not any(key in str(caught.value) for key in ("track_", "direction", "_px"))
+
+
 def broken(content: str, old: str, new: str) -> str:
     assert old in content
     return content.replace(old, new)

@@ -100,7 +100,7 @@ def test_nothing_moves_and_no_point_asks_for_label(tmp_path, frames, capsys):
     assert command.run(main, [str(clip), "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
-    assert "object1" in error and "point_px" in error and "galileo_jax.label" in error
+    assert "object1" in error and "point_px" in error and "galileo label" in error
     assert not (tmp_path / "out").exists()
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from galileo_jax.clip import track_files
-from galileo_jax.clip.schema import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, ClipFile
+from galileo_jax.clip.schema import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, ClipFile, short
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
     MIN_ROWS,
@@ -36,6 +36,14 @@ TRACK_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".trk", ".trz", ".h5", ".hdf5"
 """Files taken for a track when given as CLIP; what is in them decides the rest."""
 
 
+OWN_CSV_SAYS = {
+    "track_units": "m",
+    "track_y": "up",
+    "track_origin": (0.0, 0.0),
+    "direction": "right",
+}
+"""What the titles and axes of our own csv say already; a yaml can only repeat it."""
+
 LENGTH_CHOICES = " | ".join((*METRES_PER_UNIT, "px"))
 
 
@@ -46,6 +54,7 @@ class FileTrack:
     Attributes:
       observation: in metres, axes as `Observation` has them.
       unit: of the file: "m", "cm", ..., or "px".
+      is_own: our own csv, whose titles and axes are fixed.
       fps: frames per second.
       pixels_per_metre: of a file in pixels; None = unknown (lengths are in nominal metres).
       origin_px: of a file in pixels; None = unknown.
@@ -55,6 +64,7 @@ class FileTrack:
     observation: Observation
     unit: str
     fps: float
+    is_own: bool = False
     pixels_per_metre: float | None = None
     origin_px: tuple[float, float] | None = None
     warnings: tuple[str, ...] = ()
@@ -80,9 +90,10 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
     """
     head = _head(path)
     if _is_ours(head):
+        _check_own_keys(yaml_path, path, file)
         observation = read_observation_csv(path)
         _check_names(yaml_path, path, file, observation.names)
-        return FileTrack(observation, "m", _frame_rate(observation.times_s))
+        return FileTrack(observation, "m", _frame_rate(observation.times_s), is_own=True)
     table = _reader(path, head).read(path)
     table, warnings = _in_declared_order(yaml_path, path, file, table)
     times = _times(yaml_path, path, file, table, fps)
@@ -159,6 +170,18 @@ def _reader(path: Path, head: bytes) -> type[TrackReader]:
         f"{path}: not a track file that is known: csv with time_s, object1_x_m, object1_y_m; "
         f"{'; '.join(reader.meaning for reader in known)}"
     )
+
+
+def _check_own_keys(yaml_path: Path, path: Path, file: ClipFile) -> None:
+    """Refuses keys that contradict our own csv. A run's yaml repeats what it says: that is no fault."""
+    for key, said in OWN_CSV_SAYS.items():
+        given = getattr(file, key)
+        if given is not None and given != said:
+            raise InputError(
+                f"{yaml_path}: {key}: {short(given)} means nothing for {path.name}, whose columns "
+                "are in metres, x along the travel, y up, from the foot of the ramp; leave it out, "
+                "and mend the columns if they are not"
+            )
 
 
 def _check_names(yaml_path: Path, path: Path, file: ClipFile, names: tuple[str, ...]) -> None:
