@@ -202,7 +202,7 @@ def test_misplaced_own_csv_is_not_advised_to_take_such_keys(tmp_path: Path) -> N
     text = YAML.format(name="slide.csv", keys="", objects="")
     item = "  - {name: object1, shape: box, size_m: [0.9, 0.9, 0.9]}\n"
     (tmp_path / "slide.yaml").write_text(text + item)
-    with pytest.raises(InputError, match="inside the ramp .*mend .*size_m or the csv") as caught:
+    with pytest.raises(InputError, match=r"inside the ramp .*mend .*size_m or the csv") as caught:
         load_clip(tmp_path / "slide.yaml")
     assert not any(key in str(caught.value) for key in ("track_", "direction", "_px"))
 

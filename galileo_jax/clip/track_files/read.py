@@ -173,12 +173,13 @@ def _reader(path: Path, head: bytes) -> type[TrackReader]:
 
 
 def _check_own_keys(yaml_path: Path, path: Path, file: ClipFile) -> None:
-    """Refuses keys that contradict our own csv. A run's yaml repeats what it says: that is no fault."""
+    """Refuses keys that contradict our own csv; a run's yaml repeats what it says."""
     for key, said in OWN_CSV_SAYS.items():
         given = getattr(file, key)
         if given is not None and given != said:
+            found = list(given) if isinstance(given, tuple) else given
             raise InputError(
-                f"{yaml_path}: {key}: {short(given)} means nothing for {path.name}, whose columns "
+                f"{yaml_path}: {key}: {short(found)} means nothing for {path.name}, whose columns "
                 "are in metres, x along the travel, y up, from the foot of the ramp; leave it out, "
                 "and mend the columns if they are not"
             )
