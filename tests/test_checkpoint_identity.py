@@ -7,6 +7,7 @@ import pytest
 
 from galileo_jax import fit
 from galileo_jax.clip.load import load_clip
+from galileo_jax.effects import registry
 from galileo_jax.errors import InputError
 from galileo_jax.inference import metropolis
 from galileo_jax.measured import measure
@@ -22,6 +23,14 @@ class {name}(Effect):
     def parameters(self, scene):
         return (Parameter("{name}", "N", LogNormal(0.3, 1.2), 0.0, "effect", 0.1),)
 """
+
+
+@pytest.fixture(autouse=True)
+def forgotten(monkeypatch):
+    """What a test registers is gone after it."""
+    entries = {name: registry.effect_registry.get(name) for name in registry.effect_names()}
+    monkeypatch.setattr(registry.effect_registry, "_entries", entries)
+    registry._load_resolved.cache_clear()
 
 
 @pytest.fixture(scope="module")
