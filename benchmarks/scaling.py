@@ -142,7 +142,7 @@ def cost_of_clips(paths: Sequence[Path]) -> dict[str, Any]:
 def shape_of(measured: Any) -> tuple[int, ...]:
     """What programs are compiled for: objects, frames, recorded instants."""
     from galileo_jax.rollout.chunks import FRAMES, rounded_up
-    from galileo_jax.rollout.engine_rigid import RECORDS
+    from galileo_jax.rollout.engine_jax import RECORDS
     from galileo_jax.run import make_problem
 
     problem = make_problem(measured.clip, measured.observation)

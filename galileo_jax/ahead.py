@@ -18,22 +18,19 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.observation import Observation
 
 if TYPE_CHECKING:
-    from galileo_jax.inference.trials import Trials
+    from galileo_jax.inference.fits.gradient import GradientFitter
 
 START_M, APART_M, SD_M = -0.3, 0.3, 1e-4  # on the ramp; between objects; of the track
 
-Build = Callable[[Sequence[Clip], Sequence[Observation]], "Trials"]
+Build = Callable[[Sequence[Clip], Sequence[Observation]], "GradientFitter"]
 
 
-def work_ahead(
-    clips: Sequence[Clip], build: Build, num_exact: int | None = None
-) -> threading.Thread:
+def work_ahead(clips: Sequence[Clip], build: Build | None) -> threading.Thread:
     """Starts to import and to compile; to be joined before anything is fitted.
 
     Args:
       clips: of the call.
-      build: makes the trials of clips and observations.
-      num_exact: of the gradient fit's settings; None: its default.
+      build: makes what will fit them, of clips and observations; None: nothing is compiled.
     """
 
     def work() -> None:
@@ -45,7 +42,8 @@ def work_ahead(
             import_module(name)
         # What is wrong is told when it is done in earnest.
         with contextlib.suppress(Exception):
-            _compile(clips, build, num_exact)
+            if build is not None:
+                _compile(clips, build)
             for name in ("galileo_jax.report.write", "matplotlib.figure", "xarray"):
                 import_module(name)
 
@@ -54,14 +52,10 @@ def work_ahead(
     return thread
 
 
-def _compile(clips: Sequence[Clip], build: Build, num_exact: int | None) -> None:
-    from galileo_jax.inference.fits.gradient import GradientFitter, Settings
-
+def _compile(clips: Sequence[Clip], build: Build) -> None:
     filmed = [clip for clip in clips if clip.video is not None]
     if filmed and all(SCENARIOS[clip.scenario].has_table for clip in filmed):
-        settings = Settings() if num_exact is None else Settings(num_exact=num_exact)
-        trials = build(filmed, [_likely(clip) for clip in filmed])
-        GradientFitter(trials, settings).compile()
+        build(filmed, [_likely(clip) for clip in filmed]).compile()
 
 
 def _likely(clip: Clip) -> Observation:

@@ -12,7 +12,7 @@ from galileo_jax import __version__, command, jax_cache
 from galileo_jax.ahead import work_ahead
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
-from galileo_jax.fit import built, chosen_effects, out_folder
+from galileo_jax.fit import built, chosen_effects, fitter_of, out_folder
 from galileo_jax.measured import add_clip_options, load_clips, measure
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def _of_clips(call: argparse.Namespace) -> Compared:
     out = out_folder(call, clips)
     if call.effects or call.effects_from:
         chosen_effects(call)  # a wrong name is told before anything is tracked
-    ahead = work_ahead(clips, lambda some, seen: built(some, seen, call))
+    ahead = work_ahead(clips, fitter_of(call))
     measured = [measure(clip) for clip in clips]
     ahead.join()
     clips = [one.clip for one in measured]

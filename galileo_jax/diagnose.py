@@ -19,6 +19,7 @@ from galileo_jax.measured import Measured, add_clip_options, inferred, load_clip
 
 if TYPE_CHECKING:
     from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
+    from galileo_jax.inference.fits.gradient import GradientFitter
     from galileo_jax.inference.trials import Trials
     from galileo_jax.observation import Observation
 
@@ -34,7 +35,7 @@ def main(argv: Sequence[str]) -> int | None:
     out = out if call.out else out / "diagnosis"
     hidden = read_hidden(clips[0])
     _check_effects(call)
-    ahead = work_ahead(clips, lambda some, seen: _trials(some, seen, call), num_exact=0)
+    ahead = work_ahead(clips, lambda some, seen: _fitter(_trials(some, seen, call)))
     timings, began = {}, time.perf_counter()
     measured = [measure(clip) for clip in clips]
     ahead.join()
@@ -135,6 +136,13 @@ def _diagnose(
         )
         record = diagnosis_document(trials, diagnosis, call.seed)
     return diagnosis, trials, record
+
+
+def _fitter(trials: "Trials") -> "GradientFitter":
+    """What `diagnose` fits them with."""
+    from galileo_jax.diagnosis.diagnose import fitter_of
+
+    return fitter_of(trials)
 
 
 def _trials(

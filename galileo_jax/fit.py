@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from galileo_jax import __version__, command, jax_cache
-from galileo_jax.ahead import work_ahead
+from galileo_jax.ahead import Build, work_ahead
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
@@ -49,7 +49,7 @@ def main(argv: Sequence[str]) -> int | None:
     truth = read_truth(clips[0])
     if call.effects or call.effects_from:
         chosen_effects(call)  # a wrong name is told before anything is tracked
-    ahead = work_ahead(clips, lambda some, seen: built(some, seen, call))
+    ahead = work_ahead(clips, None if call.method == "cnn" else fitter_of(call))
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
     measured = [measure(clip) for clip in clips]
@@ -95,6 +95,17 @@ def built(
     if absent := trials.without_place():
         raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
     return trials
+
+
+def fitter_of(call: argparse.Namespace) -> Build:
+    """What fits the clips of a call by gradients."""
+
+    def build(clips: Sequence[Clip], observations: "Sequence[Observation]") -> "GradientFitter":
+        from galileo_jax.inference.fits.gradient import GradientFitter
+
+        return GradientFitter(built(clips, observations, call))
+
+    return build
 
 
 def fit_clips(

@@ -93,19 +93,11 @@ def score_tests(
     Returns:
       `[candidate]`, of the last effect of each, without a refit; signed strengths by size.
     """
-    count = len(trials.model_parameters)
-    theta = trials.theta(base.fit.z, base.fit.free)
-    scale = theta[count:]
-    probes, sizes = [theta], []
-    for effects in candidates:
+    probes = np.tile(trials.theta(base.fit.z, base.fit.free), (len(candidates), 1))
+    for probe, effects in zip(probes, candidates, strict=True):
         where, size = _strength(trials, effects[-1])
-        probe = theta.copy()
         probe[where] = size
-        probes.append(probe)
-        sizes.append(size)
-    white = np.concatenate(whitened(trials, np.stack(probes), scale), axis=1)
-    residual, slopes = white[0], white[1:] - white[:1]
-    residual, slopes = _beside(base.fit, residual, slopes)
+    residual, slopes = _beside(trials, base.fit, probes)
     length = np.linalg.norm(slopes, axis=1)
     return np.abs(slopes @ residual) / np.where(length > SHOWS, length, np.inf)
 
@@ -154,11 +146,9 @@ def _matched(trials: Trials, base: GradientFit, effects: Sequence[str], seed: in
     generator = np.random.default_rng([seed, 43])
     z = np.tile(base.z, (number, 1))
     z[:, shape] = ndtri(np.clip(_latin(generator, number, len(shape)), 0.02, 0.98))
-    here = trials.theta(base.z, base.free)
     probes = np.array(trials.theta(z, np.append(free, base.free[count:])))
     probes[:, where] = size
-    white = np.concatenate(whitened(trials, np.vstack([here, probes]), here[count:]), axis=1)
-    residual, slopes = _beside(base, white[0], white[1:] - white[:1])
+    residual, slopes = _beside(trials, base, probes)
     power = np.sum(slopes**2, axis=1)
     along = slopes @ residual
     gain = np.where(power > SHOWS, along**2 / np.maximum(power, SHOWS), 0.0)
@@ -173,13 +163,16 @@ def _matched(trials: Trials, base: GradientFit, effects: Sequence[str], seed: in
     return np.where(free, z[best, :count], 0.0)
 
 
-def _beside(
-    base: GradientFit, residual: np.ndarray, slopes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals and slopes without what the parameters that are there can take up.
+def _beside(trials: Trials, base: GradientFit, probes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The base fit's whitened residuals, and how they change to each of `probes`.
 
-    The priors' residuals count among both: a nuisance that is bent is a misfit, too.
+    Both without what the parameters that are there can take up. The priors' residuals count
+    among them: a nuisance that is bent is a misfit, too.
     """
+    here = trials.theta(base.z, base.free)
+    scale = here[len(trials.model_parameters) :]
+    white = np.concatenate(whitened(trials, np.vstack([here, probes]), scale), axis=1)
+    residual, slopes = white[0], white[1:] - white[:1]
     free = base.free[: base.jacobian.shape[1]]
     used = np.vstack([base.jacobian[:, free], np.eye(int(free.sum()))])
     basis, _ = np.linalg.qr(used)

@@ -67,7 +67,7 @@ def diagnose(
     Raises:
       ValueError: `add` names no effect of the trials' models.
     """
-    fitter = GradientFitter(trials, Settings(num_exact=0))
+    fitter = fitter_of(trials)
     on_stage("fitting the model without effects")
     base = Hypothesis((), fitter.fit(seed, effects=()))
     on_stage("comparing it with the data")
@@ -134,6 +134,11 @@ def diagnose(
         after = left_out_rmse(trials, rounds[-1].hypothesis)
         left_out = tuple(zip((p.name for p in trials.problems), before, after, strict=True))
     return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out)
+
+
+def fitter_of(trials: Trials) -> GradientFitter:
+    """What fits all hypotheses: with linear steps, many at once."""
+    return GradientFitter(trials, Settings(num_exact=0))
 
 
 def _round(

@@ -9,24 +9,20 @@ On a straight path the forces act along it; in the plane gravity is a vector, th
 act along the velocity, and the path is how far the body has come along its curve.
 """
 
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from galileo_jax.effects.effect import Bounce, Effect, Surroundings
-from galileo_jax.rollout.chunks import MOTIONS, in_chunks
-from galileo_jax.rollout.model import Model
+from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 
 MAX_BOUNCES = 8  # within one recorded step
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 NEWTON_STEPS = 3
 STILL_M2_S2 = 1e-18  # keeps the derivative of the speed finite at rest
-RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
 
 
 class Body(NamedTuple):
@@ -47,46 +43,6 @@ class Body(NamedTuple):
 
 
 Rate = Callable[[Body, jax.Array], Body]
-
-
-class EngineFree:
-    """Simulates batches of parameter vectors; compiled once for all clips of a kind."""
-
-    name = "rigid"
-
-    def __init__(self, model: Model):
-        self.model = model
-
-    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
-        return in_chunks(MOTIONS, lambda part: self.traceable(jnp.asarray(part)), np.asarray(theta))
-
-    def traceable(self, theta: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """`simulate` in JAX: can be jitted, vmapped and differentiated."""
-        model = self.model
-        count = model.num_records + 1
-        position, velocity = _roll_out_batch(
-            model.effects + model.nuisances,
-            model.names,
-            -(-count // RECORDS) * RECORDS,
-            model.record_dt_s,
-            theta,
-            model.scene.surroundings,
-        )
-        return position[..., :count], velocity[..., :count]
-
-
-@functools.partial(jax.jit, static_argnums=(0, 1, 2, 3))
-def _roll_out_batch(
-    effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
-    scene: Surroundings,
-) -> tuple[jax.Array, jax.Array]:
-    one = functools.partial(roll_out, effects, names, num_records, dt_s)
-    return jax.vmap(one, (0, None))(theta, scene)
 
 
 def roll_out(
@@ -252,3 +208,9 @@ def _runge_kutta(body: Body, rate: Rate, time_s: jax.Array, h: jax.Array) -> Bod
         )
     )
     return body.moved(mean, h)
+
+
+class EngineFree(EngineJax):
+    """One body in the plane, see the module."""
+
+    roll_out = staticmethod(roll_out)

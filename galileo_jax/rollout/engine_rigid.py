@@ -19,19 +19,15 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from galileo_jax.effects.effect import Effect, Surroundings
-from galileo_jax.rollout.chunks import MOTIONS, in_chunks
-from galileo_jax.rollout.devices import over_devices
-from galileo_jax.rollout.model import Model
+from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
 
 MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few bounces
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 TOUCH_M, TOUCH_M_S = 1e-9, 1e-9
 PAST_FOOT_M = 1e-12
-RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
 
 
 class Bodies(NamedTuple):
@@ -62,53 +58,6 @@ class Bodies(NamedTuple):
         """Whether neighbours rest against each other or move as one, `[object - 1]`."""
         apart = jnp.abs(self.speed_m_s[1:] - self.speed_m_s[:-1])
         return (self.gap_m(scene) < TOUCH_M) & (apart < TOUCH_M_S)
-
-
-class EngineRigid:
-    """Simulates batches of parameter vectors; compiled once for all clips of a kind."""
-
-    name = "rigid"
-
-    def __init__(self, model: Model):
-        self.model = model
-
-    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
-        motion = in_chunks(MOTIONS, self._roll_out, np.asarray(theta))
-        count = self.model.num_records + 1
-        return motion[0][..., :count], motion[1][..., :count]
-
-    def traceable(self, theta: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """`simulate` in JAX: can be jitted, vmapped and differentiated."""
-        position, velocity = self._roll_out(theta)
-        count = self.model.num_records + 1
-        return position[..., :count], velocity[..., :count]
-
-    def _roll_out(self, theta: Any) -> tuple[jax.Array, jax.Array]:
-        """As many records as programs are compiled for, so that clips share them."""
-        model = self.model
-        num_records = -(-(model.num_records + 1) // RECORDS) * RECORDS
-        return _roll_out_batch(
-            model.effects + model.nuisances,
-            model.names,
-            num_records,
-            model.record_dt_s,
-            theta,
-            model.scene.surroundings,
-        )
-
-
-@functools.partial(jax.jit, static_argnums=(0, 1, 2, 3))
-def _roll_out_batch(
-    effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
-    scene: Surroundings,
-) -> tuple[jax.Array, jax.Array]:
-    one = functools.partial(roll_out, effects, names, num_records, dt_s)
-    return over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, scene)
 
 
 def roll_out(
@@ -344,3 +293,9 @@ def _after_hits(bodies: Bodies, hits: jax.Array, law: Dynamics, scene: Surroundi
             weight = together.astype(v.dtype)
             common = weight @ (law.inertia * (v - ahead)) / (weight @ law.inertia)
     return jnp.where(jnp.any(hits), common + ahead, v)
+
+
+class EngineRigid(EngineJax):
+    """Bodies on their path, see the module."""
+
+    roll_out = staticmethod(roll_out)
