@@ -1,6 +1,5 @@
 """The inverse problem of one clip: its data, and a model of it."""
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.effects.effect import Effect, Surroundings
+from galileo_jax.kept import kept
 from galileo_jax.observation import Observation
 from galileo_jax.parameters import Parameter
 from galileo_jax.rollout.chunks import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
@@ -118,7 +118,7 @@ def _seen_one(kind, theta, position, velocity, times_s, scene):
     return seen(effects, names, theta, motion, times_s, scene)
 
 
-@functools.partial(jax.jit, static_argnums=0)
+@kept(num_static=1)
 def _seen_batch(kind, theta, position, velocity, times_s, scene):
     return jax.vmap(lambda t, p, v: _seen_one(kind, t, p, v, times_s, scene))(
         theta, position, velocity

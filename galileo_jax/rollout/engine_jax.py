@@ -8,6 +8,7 @@ import jax
 import numpy as np
 
 from galileo_jax.effects.effect import Effect, Surroundings
+from galileo_jax.kept import kept
 from galileo_jax.rollout.chunks import MOTIONS, in_chunks, rounded_up
 from galileo_jax.rollout.devices import over_devices
 from galileo_jax.rollout.model import Model
@@ -57,7 +58,7 @@ class EngineJax:
         )
 
 
-@functools.partial(jax.jit, static_argnums=(0, 1, 2, 3, 4))
+@kept(num_static=5)
 def _roll_out_batch(
     roll_out: Callable[..., Motion],
     effects: tuple[Effect, ...],

@@ -20,7 +20,6 @@ scattered starts cost one batch.
 Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983.
 """
 
-import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -35,6 +34,7 @@ from scipy.special import ndtri
 from galileo_jax.effects.effect import Surroundings
 from galileo_jax.inference.problem import Problem, seen
 from galileo_jax.inference.trials import NOISE_SD, Trials
+from galileo_jax.kept import kept
 from galileo_jax.parameters import PriorTable, inverse
 from galileo_jax.rollout.chunks import (
     FRAMES,
@@ -635,7 +635,7 @@ def _white(kind: Kind, theta, position, velocity, noise, data: Any, scene):
     return jnp.where(jnp.isfinite(white), white, FAILED)
 
 
-@functools.partial(jax.jit, static_argnums=0)
+@kept(num_static=1)
 def _white_batch(kind: Kind, theta, position, velocity, noise, data, scene):
     return jax.vmap(lambda t, p, v, n: _white(kind, t, p, v, n, data, scene))(
         theta, position, velocity, noise
@@ -653,7 +653,7 @@ def _white_near(kind: Kind, u, z, free, index, noise, motion, clip: ClipArrays):
     return _white(kind, theta, position, velocity, noise, clip.data, clip.scene)
 
 
-@functools.partial(jax.jit, static_argnums=0)
+@kept(num_static=1)
 def _jacobian_batch(kind: Kind, z, free, noise, index, p, v, dp, dv, clip):
     def one(z, free, noise, index, *motion):
         def residuals(u):
@@ -667,7 +667,7 @@ def _jacobian_batch(kind: Kind, z, free, noise, index, p, v, dp, dv, clip):
     return jax.vmap(one)(z, free, noise, index, p, v, dp, dv)
 
 
-@functools.partial(jax.jit, static_argnums=0)
+@kept(num_static=1)
 def _solve(kinds, dampings, size, z, free, noise, index, motions, clips):
     """The damped problems' solutions, `[point, damping, model parameter]`."""
     solver = optx.GaussNewton(rtol=1e-3, atol=1e-3)
@@ -690,7 +690,10 @@ def _solve(kinds, dampings, size, z, free, noise, index, motions, clips):
     return jax.vmap(for_dampings, (None, *[0] * 6))(dampings, size, z, free, noise, index, motions)
 
 
-_forward = jax.jit(lambda priors, z: priors.forward(z))
+@kept(num_static=0)
+def _forward(priors, z):
+    return priors.forward(z)
+
 
 POINTS = (4, 16)  # sizes of compiled batches of hypotheses
 FREE = 4  # numbers of free parameters are rounded up to multiples
