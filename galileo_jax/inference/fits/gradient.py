@@ -29,7 +29,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from galileo_jax.effects.effect import Surroundings
 from galileo_jax.inference.problem import Problem, seen
@@ -54,6 +54,7 @@ DAMPINGS = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
 # engine rounds; above the largest a step may leave a plateau (nothing moves) over its edge, and
 # the plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
+LEFT_OF_WAY = 0.1  # to the edge of a prior, by the longest step
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 # A fit that is so many nats behind another, and makes up less than this share of it in a step, is
 # left where it is.
@@ -171,6 +172,10 @@ class GradientFitter:
         zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
         self._rest = np.clip(zero, -1.0, 1.0)
         self._is_positive_nuisance = self._is_nuisance & ~np.isfinite(zero)
+        table = PriorTable.of(parameters)
+        self._is_bounded = table.kind == 2
+        is_effect = np.array([p.role == "effect" for p in parameters])
+        self._is_strength, self._log_sd = (table.kind == 1) & is_effect, table.b
         self._num_rollouts = 0
 
     def compile(self) -> None:
@@ -375,7 +380,7 @@ class GradientFitter:
         """The best point along the softest directions, and its cost, of each."""
         best, lowest = points.z.copy(), np.full(len(points.z), np.inf)
         walks = [
-            _along_soft_directions(z, c, free)
+            self._curve(z, _along_soft_directions(z, c, free) - z)
             for z, c, free in zip(points.z, covariance, points.free, strict=True)
         ]
         owner = np.concatenate([np.full(len(walk), i) for i, walk in enumerate(walks)])
@@ -401,7 +406,8 @@ class GradientFitter:
             tried = self._propose_near(points, motions, jacobian)
         else:
             tried = _propose_linear(points, jacobian, white)
-        tried = np.where(np.isfinite(tried), tried, points.z[:, None])
+        here = points.z[:, None]
+        tried = self._curve(here, np.where(np.isfinite(tried), tried - here, 0.0))
         count, dampings, _ = tried.shape
         owner = np.repeat(np.arange(count), dampings)
         after = self._costs(points.take(owner)._replace(z=tried.reshape(count * dampings, -1)))
@@ -425,6 +431,22 @@ class GradientFitter:
             lambda *rows: _solve(kinds, DAMPINGS, *rows, arrays),
             *(size, points.z, points.free, points.noise, index, motions),
         )
+
+    def _curve(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Takes steps that are straight in z as straight in the units that motion is linear in.
+
+        Accelerations are linear in coefficients of friction and in strengths. In z, at the edge
+        of a prior, these hardly move, and a straight step would leap over all that matters. No
+        step goes further than most of the way to an edge. Both agree to first order.
+        """
+        share, slope = ndtr(z), np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
+        nearest, furthest = LEFT_OF_WAY * share, 1 - LEFT_OF_WAY * (1 - share)
+        bounded = ndtri(np.clip(share + slope * step, nearest, furthest))
+        sd = np.where(self._is_strength, self._log_sd, 1.0)
+        positive = z + np.log(np.maximum(1 + sd * step, LEFT_OF_WAY)) / sd
+        straight = np.where(self._is_strength, positive, z + step)
+        curved = np.where(self._is_bounded, bounded, straight)
+        return np.where(step == 0, z, curved)
 
     def _simulate(self, clip: "_Clip", z: np.ndarray, free: np.ndarray, noise: np.ndarray):
         """`[point, ...]`: parameters in their units, centres and velocities."""
