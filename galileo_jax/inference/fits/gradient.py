@@ -6,7 +6,8 @@
          a. one batch of rollouts gives the motions and their slopes (differences) at z;
          b. optimistix (Gauss-Newton) solves, for several dampings at once (vmapped), the
             problem in which the motion is linear in z but clock and camera are exact; where
-            there are many hypotheses, all is taken as linear: more steps, each far cheaper;
+            there are many hypotheses, all is taken as linear (`steps.py`): more steps, each
+            far cheaper;
          c. one batch of rollouts tries all dampings; the best is taken.
     3. At the fit, with steps of half a conditional standard deviation: slopes, noise scale, one
        or two steps more.
@@ -29,9 +30,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 
 from galileo_jax.effects.effect import Surroundings
+from galileo_jax.inference.fits.steps import DAMPINGS, Damped, Edges, normal_matrices
 from galileo_jax.inference.problem import Problem, seen
 from galileo_jax.inference.trials import NOISE_SD, Trials
 from galileo_jax.kept import kept
@@ -47,14 +49,10 @@ from galileo_jax.rollout.chunks import (
 from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 
-# Against the columns' sizes. Valleys are narrow (masses against friction): most of the range is
-# needed below 1e-2, where steps along them differ.
-DAMPINGS = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
 # Of a parameter's coarse step: below the smallest MuJoCo's contacts are rough, and the rigid
 # engine rounds; above the largest a step may leave a plateau (nothing moves) over its edge, and
 # the plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
-LEFT_OF_WAY = 0.1  # to the edge of a prior, by the longest step
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 # A fit that is so many nats behind another, and makes up less than this share of it in a step, is
 # left where it is.
@@ -172,10 +170,7 @@ class GradientFitter:
         zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
         self._rest = np.clip(zero, -1.0, 1.0)
         self._is_positive_nuisance = self._is_nuisance & ~np.isfinite(zero)
-        table = PriorTable.of(parameters)
-        self._is_bounded = table.kind == 2
-        is_effect = np.array([p.role == "effect" for p in parameters])
-        self._is_strength, self._log_sd = (table.kind == 1) & is_effect, table.b
+        self._edges = Edges.of(parameters)
         self._num_rollouts = 0
 
     def compile(self) -> None:
@@ -380,7 +375,7 @@ class GradientFitter:
         """The best point along the softest directions, and its cost, of each."""
         best, lowest = points.z.copy(), np.full(len(points.z), np.inf)
         walks = [
-            self._curve(z, _along_soft_directions(z, c, free) - z)
+            self._edges.curve(z, _along_soft_directions(z, c, free) - z)
             for z, c, free in zip(points.z, covariance, points.free, strict=True)
         ]
         owner = np.concatenate([np.full(len(walk), i) for i, walk in enumerate(walks)])
@@ -402,18 +397,24 @@ class GradientFitter:
         self, points: Batch, motions: tuple, jacobian: list, white: list, costs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """The best of all dampings' proposals, or the point itself."""
-        if len(points.z) <= self.settings.num_exact:
-            tried = self._propose_near(points, motions, jacobian)
-        else:
-            tried = _propose_linear(points, jacobian, white)
         here = points.z[:, None]
-        tried = self._curve(here, np.where(np.isfinite(tried), tried - here, 0.0))
-        count, dampings, _ = tried.shape
-        owner = np.repeat(np.arange(count), dampings)
-        after = self._costs(points.take(owner)._replace(z=tried.reshape(count * dampings, -1)))
-        after = after.reshape(count, dampings)
+        if len(points.z) <= self.settings.num_exact:
+            found = self._propose_near(points, motions, jacobian)
+            tried = self._edges.curve(here, np.where(np.isfinite(found), found - here, 0.0))
+            after = self._costs_of(tried, points)
+        else:
+            damped = Damped.of(points.free, jacobian)
+            tried = self._edges.curve(
+                here, damped.steps(here, [w[:, None] for w in white], self._edges.reach(here))
+            )
+            there = self._whites_of(tried, points)
+            # Once more from where each step ends, with the slopes of where it began: a valley's
+            # bend is followed at the price of a rollout.
+            again = self._edges.curve(tried, damped.steps(tried, there, self._edges.reach(tried)))
+            after = np.concatenate([_cost(there, tried), self._costs_of(again, points)], axis=1)
+            tried = np.concatenate([tried, again], axis=1)
         best = np.argmin(after, axis=1)
-        rows = np.arange(count)
+        rows = np.arange(len(points.z))
         lowest = after[rows, best]
         improves = lowest < costs
         z = np.where(improves[:, None], tried[rows, best], points.z)
@@ -432,22 +433,6 @@ class GradientFitter:
             *(size, points.z, points.free, points.noise, index, motions),
         )
 
-    def _curve(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Takes steps that are straight in z as straight in the units that motion is linear in.
-
-        Accelerations are linear in coefficients of friction and in strengths. In z, at the edge
-        of a prior, these hardly move, and a straight step would leap over all that matters. No
-        step goes further than most of the way to an edge. Both agree to first order.
-        """
-        share, slope = ndtr(z), np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
-        nearest, furthest = LEFT_OF_WAY * share, 1 - LEFT_OF_WAY * (1 - share)
-        bounded = ndtri(np.clip(share + slope * step, nearest, furthest))
-        sd = np.where(self._is_strength, self._log_sd, 1.0)
-        positive = z + np.log(np.maximum(1 + sd * step, LEFT_OF_WAY)) / sd
-        straight = np.where(self._is_strength, positive, z + step)
-        curved = np.where(self._is_bounded, bounded, straight)
-        return np.where(step == 0, z, curved)
-
     def _simulate(self, clip: "_Clip", z: np.ndarray, free: np.ndarray, noise: np.ndarray):
         """`[point, ...]`: parameters in their units, centres and velocities."""
         self._num_rollouts += len(z)
@@ -457,6 +442,20 @@ class GradientFitter:
 
     def _costs(self, points: Batch) -> np.ndarray:
         """chi2 / 2 and the prior's part, `[point]`."""
+        return _cost(self._whites(points), points.z)
+
+    def _costs_of(self, z: np.ndarray, points: Batch) -> np.ndarray:
+        """`_costs` of several z of each point, `[point, z, model parameter]`: `[point, z]`."""
+        return _cost(self._whites_of(z, points), z)
+
+    def _whites_of(self, z: np.ndarray, points: Batch) -> list[np.ndarray]:
+        """Residuals of several z of each point, `[point, z, value]`, clip by clip."""
+        owner = np.repeat(np.arange(len(z)), z.shape[1])
+        whites = self._whites(points.take(owner)._replace(z=z.reshape(len(owner), -1)))
+        return [white.reshape(*z.shape[:2], -1) for white in whites]
+
+    def _whites(self, points: Batch) -> list[np.ndarray]:
+        """Whitened residuals, `[point, value]`, clip by clip."""
         white = []
         for c, clip in enumerate(self._clips):
             theta, position, velocity = self._simulate(clip, *points)
@@ -467,7 +466,7 @@ class GradientFitter:
                     *(theta, position, velocity, points.noise[:, c]),
                 )
             )
-        return _cost(white, points.z)
+        return white
 
     def _slopes(self, points: Batch, steps: np.ndarray, is_central: bool):
         """Motions with their slopes, Jacobians and residuals, clip by clip.
@@ -748,33 +747,13 @@ def _padded(problem: Problem) -> Padded:
     return Padded(np.pad(times, (0, frames), mode="edge"), whitening)
 
 
-def _propose_linear(points: Batch, jacobian: list, white: list) -> np.ndarray:
-    """Of many points: the damped linear problems' solutions, `[point, damping, parameter]`."""
-    normal = _normal(jacobian)
-    slope = np.sum(
-        [np.einsum("bvi,bv->bi", j, w) for j, w in zip(jacobian, white, strict=True)], axis=0
-    )
-    tried = np.repeat(points.z[:, None], len(DAMPINGS), axis=1)
-    for i, own in enumerate(points.free):
-        block = normal[i][np.ix_(own, own)] + np.eye(int(own.sum()))
-        damped = block + DAMPINGS[:, None, None] * np.diag(np.diag(block))
-        right = -(slope[i][own] + points.z[i][own])
-        tried[i][:, own] += np.linalg.solve(damped, right[None, :, None])[..., 0]
-    return tried
-
-
-def _normal(jacobian: Sequence[np.ndarray]) -> np.ndarray:
-    """J^T J of all clips, `[point, parameter, parameter]`."""
-    return np.sum([np.einsum("bvi,bvj->bij", j, j) for j in jacobian], axis=0)
-
-
 def _cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
-    return 0.5 * (sum(np.sum(w**2, axis=1) for w in white) + np.sum(z**2, axis=1))
+    return 0.5 * (sum(np.sum(w**2, axis=-1) for w in white) + np.sum(z**2, axis=-1))
 
 
 def _covariances(jacobian: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
     """Laplace covariances of z, `[point, parameter, parameter]`; 0 where pinned."""
-    normal = _normal(jacobian)
+    normal = normal_matrices(jacobian)
     covariance = np.zeros(normal.shape)
     for i, own in enumerate(free):
         block = np.ix_(own, own)
