@@ -20,15 +20,14 @@ from galileo_jax.comparison.bootstrap import replicates, whitened
 from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.result import error_of
+from galileo_jax.inference.result import NOISE_SCALE_RANGE, error_of, told_scale
 from galileo_jax.inference.trials import Trials
 
 NUM_REPLICATES = 200
 ADEQUATE_P = 0.01
 # Residuals are judged by the tracker's own noise, or what the fit says of it if that is more:
-# a camera that sees still objects better than it states still blurs moving ones. The tracker
-# knows its noise within thirty per cent, so that beyond the upper bound it is no noise.
-NOISE_SCALE_RANGE = (1.0, 1.5)
+# a camera that sees still objects better than it states still blurs moving ones.
+JUDGED_SCALE_RANGE = (1.0, NOISE_SCALE_RANGE[1])
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class Place:
     Attributes:
       clip, object, axis, phase: where.
       rmse: of the velocity's residuals, m/s.
-      noise: what tracking errors alone give, m/s.
+      noise: what tracking errors alone give, m/s, at the scale of `error_of`.
       z: the largest of its statistics, in standard deviations of the replicates.
       whiteness: correlation of neighbouring whitened residuals.
     """
@@ -93,7 +92,7 @@ def compare(trials: Trials, fit: GradientFit, seed: int) -> Comparison:
     """Compares a fitted hypothesis with the data; the same seed gives the same result."""
     theta = trials.theta(fit.z, fit.free)
     scales = np.array([trials.noise_scale(theta, c) for c in range(len(trials.problems))])
-    scales = np.clip(scales, *NOISE_SCALE_RANGE)
+    scales = np.clip(scales, *JUDGED_SCALE_RANGE)
     measured = whitened(trials, theta[None], scales)
     drawn = replicates(trials, fit, scales, NUM_REPLICATES, seed)
     labels, cells = [], []
@@ -112,14 +111,14 @@ def compare(trials: Trials, fit: GradientFit, seed: int) -> Comparison:
         p_pull = 2 * len(pulls) * float(stats.norm.sf(max(abs(p.z) for p in pulls)))
     p = float(np.clip(2 * min(p_local, p_pull), 0.0, 1.0))
     places = [
-        _place(trials, theta, scales, measured, cell, float(own.max()))
+        _place(trials, theta, measured, cell, float(own.max()))
         for cell, (own, _) in zip(cells, of_cells, strict=True)
     ]
     return Comparison(
         p_value=p,
         where=tuple(sorted(places, key=lambda place: -place.z)),
         pulls=tuple(sorted(pulls, key=lambda pull: -abs(pull.z))),
-        error=error_of(trials, theta, fit.num_used, fit.pull, NOISE_SCALE_RANGE),
+        error=error_of(trials, theta, fit.num_used, fit.pull),
         labels=tuple(labels),
         white=tuple(
             w[0].reshape(len(p.observation.names), 2, -1)
@@ -160,7 +159,6 @@ def _pulls(trials: Trials, fit: GradientFit, theta: np.ndarray) -> list[Pull]:
 def _place(
     trials: Trials,
     theta: np.ndarray,
-    scales: np.ndarray,
     measured: list[np.ndarray],
     cell: Cell,
     z: float,
@@ -175,7 +173,7 @@ def _place(
     follows = np.diff(index) == 1
     dt = np.diff(observation.times_s[index])[follows]
     speed = np.diff(residual)[follows] / dt
-    variance = scales[cell.clip] ** 2 * observation.covariance_m2[i, a, a, index]
+    variance = told_scale(trials, theta, cell.clip) ** 2 * observation.covariance_m2[i, a, a, index]
     noise = (variance[1:] + variance[:-1])[follows] / dt**2
     white = measured[cell.clip][0, cell.index]
     neighbours = float(np.sum(white[1:] * white[:-1]) / max(np.sum(white**2), 1e-12))

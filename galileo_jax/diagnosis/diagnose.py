@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.comparison.compare import ADEQUATE_P, NOISE_SCALE_RANGE, Comparison, compare
+from galileo_jax.comparison.compare import ADEQUATE_P, Comparison, compare
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
@@ -172,9 +172,7 @@ def _candidates(
             Candidate(
                 effects=found[i].effects,
                 hypothesis=found[i],
-                error=error_of(
-                    trials, trials.theta(fit.z, fit.free), fit.num_used, fit.pull, NOISE_SCALE_RANGE
-                ),
+                error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_used, fit.pull),
                 score_z=float(scores[i]),
                 log_evidence=float(evidence[i]),
                 probability=float(probability[i]),

@@ -27,8 +27,9 @@ FREE_SCALE_WARNING = (
     "nothing in this motion tells the scale: give --pixels-per-metre to have lengths in metres"
 )
 
-# chi2 is told at the fitted noise scale, but not at one that no camera explains.
-NOISE_SCALE_RANGE = (0.5, 2.0)
+# Of the tracker's own noise: errors are told at the fitted scale within this range. The tracker
+# knows its noise within thirty per cent, so that beyond the upper bound it is no noise.
+NOISE_SCALE_RANGE = (0.5, 1.5)
 
 
 def summarise(draws: np.ndarray) -> dict[str, float]:
@@ -78,25 +79,28 @@ def velocity_error(
     }
 
 
+def told_scale(trials: Trials, theta: np.ndarray, clip: int) -> float:
+    """The fitted noise scale of a clip, as far as noise explains it."""
+    return float(np.clip(trials.noise_scale(theta, clip), *NOISE_SCALE_RANGE))
+
+
 def error_of(
-    trials: Trials,
-    theta: np.ndarray,
-    num_used: float,
-    pull: float = 0.0,
-    scale_range: tuple[float, float] = NOISE_SCALE_RANGE,
+    trials: Trials, theta: np.ndarray, num_used: float, pull: float = 0.0
 ) -> dict[str, float]:
     """`velocity_error` and chi2 per degree of freedom at parameters `theta` `[parameter]`.
+
+    The same in result.json, compare.json and diagnosis.json: what the model leaves over, in
+    units of the noise that the fit asks for within `NOISE_SCALE_RANGE` of the tracker's own.
 
     Args:
       trials: the clips.
       theta: in the parameters' units, noise scales last.
       num_used: how many numbers' worth the parameters were fitted with.
       pull: of the nuisances, which are data, too: the sum of their squared prior deviations.
-      scale_range: within which fitted noise scales are believed.
     """
     scales, predictions, chi2, count = [], [], pull, 0.0
     for clip, problem in enumerate(trials.problems):
-        scale = float(np.clip(trials.noise_scale(theta, clip), *scale_range))
+        scale = told_scale(trials, theta, clip)
         predicted = problem.simulate(trials.of_clip(theta, clip))
         chi2 += float(np.sum(problem.whiten(predicted, scale) ** 2))
         count += float(GaussianLikelihood.degrees(scale, problem.data))

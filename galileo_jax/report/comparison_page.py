@@ -59,7 +59,7 @@ def write_comparison_page(path: Path, title: str, told: Compared) -> None:
     comparison, error = told.comparison, told.comparison.error
     more = (
         f"<p>chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
-        f"{error['rmse']:.4f} m/s.</p>\n"
+        f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}).</p>\n"
         f"{items(findings.pull_text(pull) for pull in pulled(comparison))}\n"
         f'<p class="soft">The model: {escape(findings.effects_text(told.effects))}.</p>'
     )
