@@ -13,6 +13,7 @@ from galileo_jax.ahead import work_ahead
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.fit import built, chosen_effects, fitter_of, out_folder
+from galileo_jax.leftovers import TRACKS, digest
 from galileo_jax.measured import add_clip_options, load_clips, measure
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ def main(argv: Sequence[str]) -> int | None:
         comparison_page.write_comparison_page(page, title, told)
     document: dict[str, Any] = {
         "clips": compared.clips,
+        TRACKS: [digest(problem.observation) for problem in trials.problems],
         "effects": list(trials.all_effects),
         **comparison_document(comparison),
         "converged": fit.code is Code.CONVERGED,

@@ -15,6 +15,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.fit import out_folder, write_fit
+from galileo_jax.leftovers import TRACKS, digest
 from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def main(argv: Sequence[str]) -> int | None:
     timings["diagnose"] = time.perf_counter() - began
     document = {
         "clips": call.clips,
+        TRACKS: [digest(one.observation) for one in measured],
         **record,
         **inferred(measured),
         "left_out": _absent(trials),

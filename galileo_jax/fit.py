@@ -18,6 +18,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.inference.mass_ratios import mass_ratios
+from galileo_jax.leftovers import PREDICTION, outdated
 from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
 from galileo_jax.registry import entry_names
 
@@ -55,8 +56,17 @@ def main(argv: Sequence[str]) -> int | None:
     measured = [measure(clip) for clip in clips]
     ahead.join()
     timings["track"] = time.perf_counter() - began
+    has_prediction = (out / PREDICTION).is_file()
     result = fit_clips(measured, call, out, timings)
     print(_table(result, truth))
+    if has_prediction and not (out / PREDICTION).is_file():
+        command.console().print(
+            f"{out}: the earlier fit's prediction is gone; make it again: galileo predict {out} "
+            "--seconds S",
+            soft_wrap=True,
+        )
+    for sentence in outdated(out, [one.observation for one in measured]):
+        command.console().print(f"warning: {sentence}", soft_wrap=True)
     for warning in result.get("warnings", []):
         command.console().print(f"warning: {warning}")
     pages = [out] if len(clips) == 1 else [out / one.name for one in measured]
@@ -173,6 +183,7 @@ def write_fit(
       with_pages: whether every run gets its report.
     """
     from galileo_jax.inference.result import make_result
+    from galileo_jax.leftovers import forget_prediction, forget_single_run
     from galileo_jax.report import write_report
     from galileo_jax.run import Run, save_run
 
@@ -191,14 +202,18 @@ def write_fit(
     result = told(trials, posterior, z_best, list(files))
     if len(measured) == 1:
         clip, observation = measured[0].clip, measured[0].observation
+        forget_prediction(out)
         save_run(out, clip, observation, posterior, result)
         if with_pages:
             write_report(Run(out, clip, trials.problems[0], posterior, result))
         return result
+    forget_prediction(out)
+    forget_single_run(out)
     for i, one in enumerate(measured):
         alone, columns = trials.alone(i), trials.columns_of(i)
         own = posterior.chosen(columns, alone.names)
         told_of = told(alone, own, z_best[columns], [files[i]])
+        forget_prediction(out / one.name)
         save_run(out / one.name, one.clip, one.observation, own, told_of)
         if with_pages:
             write_report(Run(out / one.name, one.clip, trials.problems[i], own, told_of))

@@ -19,6 +19,7 @@ from galileo_jax.report.svg_chart import chart_svg
 from galileo_jax.run import Run
 
 PAGE, PLOTS = "report.html", "plots"
+OURS = ("velocity_", "position_", "residuals_", "pairs", "trace")  # names of plots begin so
 
 
 def write_report(run: Run) -> Path:
@@ -35,7 +36,7 @@ def write_report(run: Run) -> Path:
     for name, svg in files.items():
         write_text(run.folder / PLOTS / f"{name}.svg", svg)
     for path in (run.folder / PLOTS).glob("*.svg"):
-        if path.stem not in files:  # of an earlier fit into the same folder
+        if path.stem.startswith(OURS) and path.stem not in files:  # of an earlier fit
             path.unlink()
     model = ", ".join(run.result["effects"]) or "fitted"
     centres = np.median(fitted.position_m, axis=0) - fitted.offset_m[..., None]
