@@ -250,14 +250,13 @@ def _told(
     for made, told in list(zip(diagnosis.candidates, record["candidates"], strict=True))[
         :NUM_CANDIDATES
     ]:
-        strengths = findings.strengths(made.effects, told["parameters"]).values()
+        strengths = findings.strength_texts(made.effects, told).values()
         is_behind = diagnosis.candidates[0].log_evidence - told["score"] > BEHIND
         is_settled = made.hypothesis.fit.code is Code.CONVERGED
         evidence = "far behind" if is_behind and not is_settled else f"{told['score']:+.1f}"
         lines.append(
             f"{told['effect']:<26}{told['probability']:>12.3f}{evidence:>12}"
-            f"{findings.p_text(told['p_value']):>9}  "
-            + ", ".join(findings.value_text(entry) for entry in strengths)
+            f"{findings.p_text(told['p_value']):>9}  " + ", ".join(strengths)
         )
     lines += ["", findings.verdict(diagnosis)]
     if hidden is not None:

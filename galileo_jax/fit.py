@@ -383,11 +383,15 @@ def read_truth(clip: Clip) -> dict[str, float]:
 
 def _table(result: dict[str, Any], truth: Mapping[str, float]) -> str:
     """What the user asked for, in a few lines; with a column for the truth if it is known."""
+    from galileo_jax.inference.per_mass import SUFFIX
+
     lines = [f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"]
     for name, entry in (result["parameters"] | result["derived"]).items():
         unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
         interval = f"[{entry['q025']:.4g}, {entry['q975']:.4g}]{unit}"
         known = "" if entry["identified"] else "   not determined by this clip"
+        if f"{name}{SUFFIX}" in result["derived"]:
+            known = "   not determined by this clip: only per mass, below"
         true = f"{truth[name]:.4g}" if name in truth else ""
         lines.append(
             f"{name:<18}{true:>10}{entry['mean']:>10.4g}{entry['sd']:>10.2g}   {interval}{known}"

@@ -9,7 +9,13 @@ from galileo_jax.comparison.document import comparison_document
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.laplace import laplace_posterior
-from galileo_jax.inference.result import IDENTIFIED_SD_Z, summarise
+from galileo_jax.inference.per_mass import SUFFIX
+from galileo_jax.inference.result import (
+    IDENTIFIED_SD_Z,
+    per_mass_entries,
+    summarise,
+    undetermined_by_mass,
+)
 from galileo_jax.inference.trials import Trials
 
 
@@ -58,23 +64,40 @@ def history_row(trials: Trials, one: Round, seed: int) -> dict[str, Any]:
 
 def parameter_entries(trials: Trials, fit: GradientFit, seed: int) -> dict[str, dict[str, Any]]:
     """Entries as in result.json of all that the hypothesis leaves free, nuisances left out."""
+    return _entries(trials, fit, seed)[0]
+
+
+def _entries(
+    trials: Trials, fit: GradientFit, seed: int
+) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
+    """Those of the parameters, and those of the force constants per mass."""
     posterior = laplace_posterior(trials, fit, seed)
     spread = np.sqrt(np.diagonal(fit.covariance))
-    return {
+    free = [name for i, name in enumerate(trials.names) if fit.free[i]]
+    forces = {
+        name: entry
+        for name, entry in per_mass_entries(trials, posterior.flat()).items()
+        if name.removesuffix(SUFFIX) in free
+    }
+    unknown = undetermined_by_mass(trials, forces)
+    entries = {
         parameter.name: {
             **summarise(posterior[parameter.name].reshape(-1)),
             "unit": parameter.unit,
-            "identified": bool(spread[i] < IDENTIFIED_SD_Z),
+            "identified": bool(spread[i] < IDENTIFIED_SD_Z) and parameter.name not in unknown,
         }
         for i, parameter in enumerate(trials.parameters)
         if fit.free[i] and parameter.role != "nuisance"
     }
+    return entries, forces
 
 
 def _candidate(trials: Trials, candidate: Candidate, seed: int) -> dict[str, Any]:
+    parameters, derived = _entries(trials, candidate.hypothesis.fit, seed)
     return {
         "effect": candidate.name,
-        "parameters": parameter_entries(trials, candidate.hypothesis.fit, seed),
+        "parameters": parameters,
+        "derived": derived,
         "rmse": candidate.error["rmse"],
         "chi2_per_dof": candidate.error["chi2_per_dof"],
         "score": candidate.log_evidence,

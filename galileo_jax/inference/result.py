@@ -1,7 +1,7 @@
 """result.json: the numbers of a fit by contract (DESIGN.md 2.3)."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax.numpy as jnp
@@ -9,6 +9,13 @@ import numpy as np
 
 from galileo_jax import __version__
 from galileo_jax.inference.mass_ratios import mass_ratios
+from galileo_jax.inference.per_mass import (
+    SUFFIX,
+    force_constants,
+    is_any_weighed,
+    is_mass_known,
+    per_mass,
+)
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.trials import Trials
@@ -114,6 +121,47 @@ def error_of(
 NUM_PRIOR_DRAWS = 2000
 
 
+def per_mass_entries(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, Any]]:
+    """Entries of the force constants over m1, by name; empty where the mass is known.
+
+    Args:
+      trials: what was fitted.
+      draws: `[draw, parameter]`, in the parameters' units.
+    """
+    if not force_constants(trials) or is_mass_known(trials, draws):
+        return {}
+    z = np.random.default_rng(0).standard_normal((NUM_PRIOR_DRAWS, len(trials.parameters)))
+    before = per_mass(trials, trials.theta(z))
+    return {
+        name: {
+            **summarise(values),
+            "unit": unit,
+            "identified": _width(values) < IDENTIFIED_SD_Z * _width(before[name][0]),
+        }
+        for name, (values, unit) in per_mass(trials, draws).items()
+    }
+
+
+def undetermined_by_mass(trials: Trials, forces: Mapping[str, Any]) -> set[str]:
+    """Masses that nothing told of, and the force constants that are known per mass only.
+
+    Several masses tied by their ratios share what the prior says, which looks like knowledge.
+
+    Args:
+      trials: what was fitted.
+      forces: `per_mass_entries`.
+    """
+    names = {name.removesuffix(SUFFIX) for name in forces}
+    if not is_any_weighed(trials):
+        names |= {name for name in trials.names if re.fullmatch(r"m\d+", name)}
+    return names
+
+
+def _width(values: np.ndarray) -> float:
+    """Of the central two thirds of draws."""
+    return float(np.diff(np.quantile(values, [0.16, 0.84]))[0])
+
+
 def _derived_by_laws(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, Any]]:
     """What the models' laws derive from draws `[draw, parameter]` of one clip's parameters."""
     if len(trials.problems) != 1:
@@ -127,16 +175,13 @@ def _derived_by_laws(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, A
             found |= effect.derived(model.by_name(rows), scene)
         return found
 
-    def width(values: np.ndarray) -> float:
-        return float(np.diff(np.quantile(values, [0.16, 0.84]))[0])
-
     z = np.random.default_rng(0).standard_normal((NUM_PRIOR_DRAWS, len(trials.parameters)))
     before = told(trials.theta(z))
     return {
         name: {
             **summarise(values),
             "unit": unit,
-            "identified": width(values) < IDENTIFIED_SD_Z * width(before[name][0]),
+            "identified": _width(values) < IDENTIFIED_SD_Z * _width(before[name][0]),
         }
         for name, (values, unit) in told(draws).items()
     }
@@ -184,6 +229,11 @@ def make_result(
         is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
         derived[name] = {**summarise(values), "unit": "1", "identified": is_identified}
     derived |= _derived_by_laws(trials, draws)
+    forces = per_mass_entries(trials, draws)
+    derived |= forces
+    for name in undetermined_by_mass(trials, forces):
+        if name in table["parameters"]:
+            table["parameters"][name]["identified"] = False
     has_surface = trials.problems[0].model.scene.surroundings.has_surface
     if not table["parameters"].get("pixels_per_metre", {}).get("identified", True):
         # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.

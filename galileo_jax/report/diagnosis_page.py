@@ -148,8 +148,7 @@ def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -
     rows = []
     for made, told in zip(diagnosis.candidates, candidates[:NUM_CANDIDATES], strict=False):
         strengths = ", ".join(
-            f"{name} = {findings.value_text(entry)}"
-            for name, entry in findings.strengths(made.effects, told["parameters"]).items()
+            f"{name} = {text}" for name, text in findings.strength_texts(made.effects, told).items()
         )
         rows.append(
             [

@@ -6,6 +6,7 @@ from typing import Any
 
 from galileo_jax.comparison.compare import Comparison, Place, Pull
 from galileo_jax.diagnosis.diagnosis import Diagnosis
+from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.statements import number
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
@@ -91,6 +92,23 @@ def how_to_go_on(
         return f"galileo diagnose {files}{more} --effects-from my_effect.py"
     effects = found.effects if found.status == "named" else found.effects[0].split("+")
     return f"galileo fit {files}{more} --effects {','.join(effects)}"
+
+
+def strength_texts(effects: Sequence[str], told: Mapping[str, Any]) -> dict[str, str]:
+    """The strengths of a candidate's effects as text, by name.
+
+    Where nobody weighed the objects, a force is told per mass: its constant is not determined.
+
+    Args:
+      effects: of the candidate.
+      told: its entry in diagnosis.json.
+    """
+    derived = told.get("derived", {})
+    found = {}
+    for name, entry in strengths(effects, told["parameters"]).items():
+        of_mass = derived.get(f"{name}{SUFFIX}")
+        found[name] = f"{value_text(of_mass)} (over m1)" if of_mass else value_text(entry)
+    return found
 
 
 def strengths(

@@ -5,6 +5,7 @@ import re
 import shlex
 from typing import Any
 
+from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fitted import Fitted
 from galileo_jax.run import CLIP, Run
 
@@ -48,6 +49,8 @@ def meaning(name: str) -> str | None:
     for pattern, phrase in OF_OBJECTS:
         if found := pattern.fullmatch(name):
             return phrase.format(*found.groups())
+    if name.endswith(SUFFIX):
+        return f"{name.removesuffix(SUFFIX)} / m1"
     return MEANINGS.get(name)
 
 
@@ -81,6 +84,8 @@ def _reason(name: str, run: Run, fitted: Fitted) -> str:
                 f"doubling {more} changes nothing"
             )
         return "masses show in a collision only, and there only their ratio"
+    if f"{name}{SUFFIX}" in derived:
+        return f"only its ratio to the mass shows ({name}{SUFFIX}); weigh the object (mass_kg)"
     if name in WEIGHED and run.clip.objects[0].mass_kg is None:
         return "only its ratio to the mass shows; weigh the object (mass_kg)"
     if name == "pixels_per_metre" and not surroundings.has_surface:
