@@ -48,6 +48,23 @@ def whole_number(least: int, multiple_of: int = 1) -> Callable[[str], int]:
     return parse
 
 
+def refuse_ignored(argv: Sequence[str], options: Sequence[str], why: str) -> None:
+    """Refuses options that this call would ignore.
+
+    Args:
+      argv: of the call.
+      options: as they are written, such as --angle.
+      why: where they belong, or why not here.
+
+    Raises:
+      InputError: one of them is given; names it.
+    """
+    given = {word.partition("=")[0] for word in argv}
+    for option in options:
+        if option in given:
+            raise InputError(f"{option}: {why}")
+
+
 def console() -> Console:
     """Progress and notes go to stderr; stdout is for results."""
     return Console(stderr=True, highlight=False)

@@ -33,6 +33,10 @@ BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
 METHODS = ("grad", "mh", "cnn")
 PRESETS = ("galileo", "thesis")
+OF_GALILEO, OF_THESIS = (
+    ("--sampler", "--max-steps", "--init"),
+    ("--similarity", "--acceptance", "--selection"),
+)
 INITS = ("grad", "cnn")
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
 SIMILARITIES = entry_names("galileo_jax.similarity.library")
@@ -41,8 +45,7 @@ SIMILARITIES = entry_names("galileo_jax.similarity.library")
 def main(argv: Sequence[str]) -> int | None:
     """Fits a clip, or several trials together, and writes a run."""
     call = _parser().parse_args(argv)
-    if call.init == "cnn" and (call.method, call.preset) != ("mh", "galileo"):
-        raise InputError("--init cnn: it starts the chains of --method mh --preset galileo")
+    _refuse_ignored(call, argv)
     clips = load_clips(call.clips, call.pixels_per_metre)
     out = out_folder(call, clips)
     if call.preset == "thesis" and len(clips) > 1:
@@ -72,6 +75,17 @@ def main(argv: Sequence[str]) -> int | None:
     pages = [out] if len(clips) == 1 else [out / one.name for one in measured]
     command.console().print(", ".join([f"{out}/result.json", *(f"{p}/report.html" for p in pages)]))
     return None
+
+
+def _refuse_ignored(call: argparse.Namespace, argv: Sequence[str]) -> None:
+    """Options of a sampler that does not run."""
+    if call.method != "mh":
+        where = f"of --method mh, not of {call.method}"
+        command.refuse_ignored(argv, ("--preset", *OF_GALILEO, *OF_THESIS), where)
+    elif call.preset == "thesis":
+        command.refuse_ignored(argv, OF_GALILEO, "not of --preset thesis")
+    else:
+        command.refuse_ignored(argv, OF_THESIS, "of --preset thesis only")
 
 
 def out_folder(call: argparse.Namespace, clips: Sequence[Clip]) -> Path:

@@ -16,6 +16,7 @@ from galileo_jax.clip.load import (
     check_place,
     find_yaml,
     has_yaml,
+    with_unused,
 )
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_files.read import is_track
@@ -44,6 +45,7 @@ KEY_ORDER = (
     "track",
     "track_units",
     "track_y",
+    "track_origin",
     "scenario",
     "fps",
     "ramp_angle_deg",
@@ -61,6 +63,7 @@ def main(argv: Sequence[str]) -> int | None:
     clip_path: Path = arguments.clip
     if (place := physics101.place_of(clip_path)) and not has_yaml(clip_path):
         return _label_place(place, arguments)
+    command.refuse_ignored(argv, ["--level"], f"{clip_path} is not in folders of Physics 101")
     yaml_path = _yaml_path(clip_path)
     is_new = not yaml_path.exists()
     old = {} if is_new else read_mapping(yaml_path)
@@ -70,7 +73,7 @@ def main(argv: Sequence[str]) -> int | None:
         raise InputError(f"{clip_path}: nothing to write; see galileo label --help")
 
     content = _applied(old, changes | defaults)
-    clip = check_clip(yaml_path, content)
+    clip = with_unused(check_clip(yaml_path, content))
     check_belongs(clip, clip_path)
     old_text = "" if is_new else yaml_path.read_text(encoding="utf-8-sig")
     if is_new:
@@ -191,6 +194,13 @@ def _parser() -> command.Parser:
     )
     parser.add_argument("--track-units", help="of a track file: m, cm, mm, in, ft or px")
     parser.add_argument("--track-y", help="of a track file: y points up or down")
+    parser.add_argument(
+        "--track-origin",
+        nargs=2,
+        type=float,
+        metavar=("X", "Y"),
+        help="of a track file: the foot of the ramp, in its unit and along its axes",
+    )
     parser.add_argument("--direction", help="which way the objects travel: right or left")
     parser.add_argument(
         "--origin", nargs=2, type=float, metavar=("X", "Y"), help="foot of the ramp, pixels"
@@ -237,6 +247,8 @@ def _changes(arguments: Namespace, yaml_path: Path, old: dict[str, Any]) -> dict
         changes["pixels_per_metre",] = _pixels_per_metre(*arguments.scale)
     if arguments.origin is not None:
         changes["origin_px",] = arguments.origin
+    if arguments.track_origin is not None:
+        changes["track_origin",] = arguments.track_origin
     for key in SCALARS:
         value = getattr(arguments, key)
         if value is not None:

@@ -45,6 +45,14 @@ SHAPES: dict[str, tuple[Shape, ...]] = {
     "multi": ("box", "box", "box"),
     "incline": ("box",),
 }
+RAMP_OPTIONS = (
+    *("--angle", "--shapes", "--m1", "--k1", "--m2", "--k2", "--series", "--solver"),
+    *("--faults", "--hand", "--camera-fault", "--no-points", "--missed-frames"),
+)
+FILM_OPTIONS = (
+    *("--camera-fault", "--size", "--direction", "--no-points", "--hand"),
+    *("--noise", "--exposure", "--defocus", "--missed-frames"),
+)
 TRACK_SUFFIX, VIDEO_SUFFIX = ".csv", ".mp4"
 
 
@@ -55,11 +63,9 @@ def main(argv: Sequence[str]) -> int | None:
     suffix = TRACK_SUFFIX if call.track_only else VIDEO_SUFFIX
     if out.suffix != suffix:
         raise InputError(f"--out: {out.name} does not end in {suffix}")
-    if call.track_only and call.camera_fault:
-        raise InputError("--camera-fault: a track (--track-only) has no camera")
+    _refuse_ignored(call, argv)
     hidden = _hidden(call)
     if call.scenario not in SHAPES:
-        _refuse_ramp_options(call)
         path = out.parent / out.name
         try:
             with _all_or_nothing(out.parent) as folder:
@@ -69,8 +75,6 @@ def main(argv: Sequence[str]) -> int | None:
         for end in (suffix, ".yaml", ".truth.json"):
             print(path.with_suffix(end))
         return None
-    if call.floor:
-        raise InputError("--floor: not of a ramp")
     shapes = _shapes(call)
     looks, things, faults, secrets = np.random.default_rng(call.seed).spawn(4)
     given = {key: getattr(call, key) for key in ("m1", "k1", "m2", "k2")}
@@ -124,14 +128,22 @@ def _masses_and_frictions(given: Sequence[tuple[str, float]], count: int) -> dic
     return dict(given)
 
 
-def _refuse_ramp_options(call: argparse.Namespace) -> None:
-    """What only a ramp has."""
-    if call.shapes:
-        raise InputError(f"--shapes: of a ramp only, not of scenario {call.scenario}")
-    given = {f"--{key}": getattr(call, key) is not None for key in ("m1", "k1", "m2", "k2")}
-    given |= {"--series": bool(call.series), "--hand": call.hand, "--faults": call.faults}
-    for option in (option for option, is_given in given.items() if is_given):
-        raise InputError(f"{option}: of a ramp only, not of scenario {call.scenario}")
+def _refuse_ignored(call: argparse.Namespace, argv: Sequence[str]) -> None:
+    """Options that have no part in the clip asked for."""
+    if call.scenario not in SHAPES:
+        where = f"of a ramp only, not of scenario {call.scenario}"
+        command.refuse_ignored(argv, RAMP_OPTIONS, where)
+    else:
+        command.refuse_ignored(argv, ["--floor"], "not of a ramp")
+    if call.scenario == "incline":
+        command.refuse_ignored(argv, ["--m2", "--k2"], "an incline has one object")
+    if call.track_only:
+        command.refuse_ignored(argv, FILM_OPTIONS, "a track (--track-only) has no camera")
+    else:
+        command.refuse_ignored(argv, ["--track-noise"], "of a track only (--track-only)")
+    if not call.effect:
+        command.refuse_ignored(argv, ["--strength"], "of what? name an effect with --effect NAME")
+        command.refuse_ignored(argv, ["--effects-from"], "nothing of it is used without --effect")
 
 
 def _hidden(call: argparse.Namespace) -> list[Hidden]:

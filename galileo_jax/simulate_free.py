@@ -29,7 +29,7 @@ def write_free_clip(out: Path, call: argparse.Namespace, hidden: Sequence[Hidden
     things, secrets, looks = np.random.default_rng(call.seed).spawn(3)
     truth = draw_free(things, call.scenario, dict(call.set), call.floor)
     for each in hidden:
-        truth = hide_free(truth, each.effect, each.given, secrets)
+        truth = hide_free(truth, each, secrets)
     motion, bounces = solve_free(truth)
     seconds = call.seconds or truth.seconds
     frames = seen_motion(truth, motion, call.fps, seconds)

@@ -314,6 +314,11 @@ def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
         (["--preset", "foo"], "--preset: invalid choice: 'foo'"),
         (["--effects", "nonsense"], "'nonsense'"),
         (["--thing"], "unrecognized arguments: --thing"),
+        (["--sampler", "mixture"], "--sampler: of --method mh, not of grad"),
+        (["--method", "cnn", "--preset=thesis"], "--preset: of --method mh, not of cnn"),
+        (["--init", "cnn"], "--init: of --method mh, not of grad"),
+        (["--method", "mh", "--preset", "thesis", "--init", "cnn"], "--init: not of --preset th"),
+        (["--method", "mh", "--selection", "best"], "--selection: of --preset thesis only"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )

@@ -8,6 +8,7 @@ import yaml
 
 from galileo_jax import command, label
 from galileo_jax.clip.load import load_clip
+from galileo_jax.measured import measure
 from tests.clip.broken_clips import build_good, build_good_track, good_track, good_video
 
 NEW = shlex.split(
@@ -192,3 +193,20 @@ def test_module_runs(tmp_path: Path) -> None:
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{path}\n", "")
     assert load_clip(path).gravity == 9.8
+
+
+def test_the_foot_of_a_track(tmp_path: Path) -> None:
+    """In the unit and along the axes of another program's file."""
+    rows = [f"{i / 30},0,{100 + 490 * (i / 30) ** 2}" for i in range(12)]
+    (tmp_path / "fall.csv").write_text("\n".join(["t,x,y", *rows]))
+    words = "--scenario fall --track-units cm --track-y down --track-origin 0 160"
+    assert run(tmp_path / "fall.csv", *words.split(), "--shape", "ball", "sphere") == 0
+    clip = load_clip(tmp_path / "fall.csv")
+    assert clip.track_origin == (0, 160)
+    assert measure(clip).observation.position_m[0, 1, 0] == pytest.approx(0.6)
+
+
+def test_a_level_is_of_physics_101(tmp_path: Path, capfd) -> None:
+    path = build_good(tmp_path)
+    assert run(path, "--level", "object", "--gravity", "9.8") == 2
+    assert "--level:" in capfd.readouterr().err

@@ -243,3 +243,14 @@ def test_the_commands_go_through(scenario, tmp_path, capsys):
     assert command.run(diagnose.main, [str(out), "--out", str(tmp_path / "diagnosis")]) == 0
     found = json.loads((tmp_path / "diagnosis" / "diagnosis.json").read_text())
     assert found["verdict"]["status"] == "none"
+
+
+def test_the_strength_of_what_is_hidden_counts_without_a_ramp(tmp_path):
+    found = []
+    for strength in ("0", "1"):
+        path = tmp_path / f"fall{strength}.csv"
+        call = ["--scenario", "fall", "--track-only", "--effect", "air_drag", "--seed", "1"]
+        assert command.run(simulate.main, [*call, "--strength", strength, "--out", str(path)]) == 0
+        truth = json.loads(path.with_suffix(".truth.json").read_text())
+        found.append(truth["effect_parameters"]["air_drag"])
+    assert found[1] > 2 * found[0]

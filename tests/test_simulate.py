@@ -140,9 +140,17 @@ def test_track_has_the_declared_noise(tmp_path):
         (["--out", "clip.mp4", "--effect", "air_drag:c=1"], "no parameter 'c'; known: air_drag"),
         (["--out", "clip.mp4", "--effect", "air_drag:air_drag=x"], "is not PARAMETER=NUMBER"),
         (["--out", "clip.mp4", "--effect", "rolling", "--effect", "rolling"], "named twice"),
-        (["--out", "clip.mp4", "--effects-from", "none.py"], "none.py"),
+        (["--out", "clip.mp4", "--effect", "x", "--effects-from", "none.py"], "none.py"),
+        (["--out", "clip.mp4", "--effects-from", "none.py"], "--effects-from: nothing of it is"),
         (["--out", "c.csv", "--track-only", "--camera-fault", "roll"], "has no camera"),
         (["--out", "/proc/none/clip.mp4"], "/proc/none/clip.mp4"),
+        (["--out", "clip.mp4", "--strength", "1"], "--strength: of what? name an effect"),
+        (["--out", "clip.mp4", "--track-noise", "0.001"], "--track-noise: of a track only"),
+        (["--out", "clip.mp4", "--floor"], "--floor: not of a ramp"),
+        (["--out", "clip.mp4", "--scenario", "flight", "--angle=20"], "--angle: of a ramp only"),
+        (["--out", "clip.mp4", "--scenario", "fall", "--hand"], "--hand: of a ramp only"),
+        (["--out", "clip.mp4", "--scenario", "incline", "--k2", "0.1"], "--k2: an incline has one"),
+        (["--out", "c.csv", "--track-only", "--size", "640x360"], "--size: a track (--track-only)"),
     ],
 )
 def test_wrong_calls_are_one_line_and_leave_nothing(call, complaint, capsys, tmp_path, monkeypatch):

@@ -53,12 +53,33 @@ def load_clip(path: str | Path, **overrides: Any) -> Clip:
         return check_place(place, physics101.read_labels(place.labels), given)
     yaml_path = find_yaml(path)
     content = read_mapping(yaml_path)
+    is_shared = content.get("video") is not None and is_track(path)
     if is_track(path):
         content = {key: value for key, value in content.items() if key != "video"}
         content.setdefault("track", path.name)
     clip = check_clip(yaml_path, content | given, overridden=frozenset(given))
     check_belongs(clip, path)
-    return clip
+    # Beside a video the same yaml needs what the track does not.
+    return clip if is_shared else with_unused(clip)
+
+
+def with_unused(clip: Clip) -> Clip:
+    """The clip with a warning for every key that means nothing beside its track."""
+    if clip.track is None:
+        return clip
+    unused = {
+        f"objects[{index}].point_px": "the track says where it is"
+        for index, item in enumerate(clip.objects)
+        if item.point_px is not None
+    }
+    if clip.origin_px is not None and clip.track_units != "px":
+        unused["origin_px"] = "the track is in units of length" + (
+            ", from the foot of the ramp on" if clip.is_own_track else "; track_origin is the foot"
+        )
+    if clip.track_origin is not None and clip.track_units == "px":
+        unused["track_origin"] = "the track is in pixels; origin_px is the foot"
+    told = tuple(f"{clip.path}: {key}: not used; {why}" for key, why in unused.items())
+    return clip.model_copy(update={"warnings": clip.warnings + told})
 
 
 def check_place(

@@ -28,6 +28,7 @@ from galileo_jax.rollout.engine_free import (
 )
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.scene.scene import extents
+from galileo_jax.truth.hidden import Hidden
 from galileo_jax.truth.motion import RECORD_S, Motion
 from galileo_jax.truth.truth import DECLARED_WRONGLY, GRAVITY_M_S2
 
@@ -159,14 +160,15 @@ def _liquid(rng: np.random.Generator, radius: float, given: Mapping[str, float])
     return drawn, 2.5, 4 * terminal * (1 + ADDED_MASS * ratio) / pull + 0.5
 
 
-def hide_free(
-    truth: FreeTruth, effect: Effect, given: Mapping[str, float], rng: np.random.Generator
-) -> FreeTruth:
+def hide_free(truth: FreeTruth, hidden: Hidden, rng: np.random.Generator) -> FreeTruth:
     """Puts an effect into a truth; what is not given is drawn from its prior.
+
+    A strength from 0 (weak) to 1 (strong) says where in the prior the first parameter is.
 
     Raises:
       InputError: the effect has no place in the scenario, or no such parameter.
     """
+    effect, given, strength = hidden
     parameters = effect.parameters(truth.surroundings)
     if effect.name in SCENARIOS[truth.scenario].without or not parameters:
         raise InputError(f"--effect: {effect.name} has no place in scenario {truth.scenario}")
@@ -176,12 +178,17 @@ def hide_free(
             raise InputError(
                 f"--effect: {effect.name} has no parameter {name!r}; known: {', '.join(names)}"
             )
-    hidden = {p.name: given.get(p.name, _drawn(p, rng)) for p in parameters}
-    return replace(truth, values={**truth.values, **hidden}, effects=(*truth.effects, effect))
+    share = {parameters[0].name: strength}
+    drawn = {p.name: given.get(p.name, _drawn(p, rng, share.get(p.name))) for p in parameters}
+    return replace(truth, values={**truth.values, **drawn}, effects=(*truth.effects, effect))
 
 
-def _drawn(parameter: Parameter, rng: np.random.Generator) -> float:
-    return float(parameter.prior.forward(np.asarray(rng.uniform(WEAK_Z, STRONG_Z))))  # pyright: ignore[reportArgumentType]
+def _drawn(parameter: Parameter, rng: np.random.Generator, share: float | None) -> float:
+    """From weak (share 0) to strong (1) in the prior; None draws the share."""
+    z = rng.uniform(WEAK_Z, STRONG_Z)
+    if share is not None:
+        z = WEAK_Z + share * (STRONG_Z - WEAK_Z)
+    return float(parameter.prior.forward(np.asarray(z)))  # pyright: ignore[reportArgumentType]
 
 
 def solve_free(truth: FreeTruth) -> tuple[Motion, tuple[float, ...]]:

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import (
     MIN_SD_M,
     position_noise_m,
@@ -13,6 +14,7 @@ from galileo_jax.clip.track_csv import (
 )
 from galileo_jax.errors import InputError
 from galileo_jax.observation import Observation
+from tests.clip.broken_clips import build_good_track
 
 
 def make_observation(seed: int, is_isotropic: bool, num_frames: int = 40) -> Observation:
@@ -169,3 +171,17 @@ def test_garbage_gives_one_line(text: str, tmp_path_factory) -> None:
     path.write_text(text)
     with pytest.raises(InputError, match=r"garbage\.csv"):
         read_observation_csv(path)
+
+
+def test_keys_that_a_track_does_not_need_are_told_of(tmp_path):
+    """But not where the same yaml declares the video, which needs them."""
+    path = build_good_track(tmp_path)
+    assert load_clip(path).warnings == ()
+    text = path.read_text() + "origin_px: [160.0, 150.0]\n"
+    text = text.replace("name: object1", "name: object1\n    point_px: [73.1, 108.8]")
+    path.write_text(text)
+    point, origin = load_clip(path).warnings
+    assert point.startswith(f"{path}: objects[0].point_px: not used")
+    assert origin.startswith(f"{path}: origin_px: not used")
+    path.write_text(text.replace("track: clip.csv", "video: clip.mp4"))
+    assert load_clip(tmp_path / "clip.csv").warnings == ()
