@@ -70,7 +70,8 @@ def main(argv: Sequence[str]) -> int | None:
         )
     for sentence in outdated(out, [one.observation for one in measured]):
         command.console().print(f"warning: {sentence}", soft_wrap=True)
-    for warning in result.get("warnings", []):
+    told = {doubt for one in measured for doubt in one.doubts}  # when they were found
+    for warning in (each for each in result.get("warnings", []) if each not in told):
         command.console().print(f"warning: {warning}")
     pages = [out] if len(clips) == 1 else [out / one.name for one in measured]
     command.console().print(", ".join([f"{out}/result.json", *(f"{p}/report.html" for p in pages)]))
@@ -213,6 +214,8 @@ def write_fit(
             notes=notes | inferred(measured),
         )
 
+    if doubts := [doubt for one in measured for doubt in one.doubts]:
+        notes = notes | {"warnings": [*doubts, *notes.get("warnings", [])]}
     result = told(trials, posterior, z_best, list(files))
     if len(measured) == 1:
         clip, observation = measured[0].clip, measured[0].observation

@@ -10,6 +10,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
+from galileo_jax.clock import clock_doubt
 from galileo_jax.errors import InputError
 from galileo_jax.foot import foot_of_path, needs_foot
 from galileo_jax.observation import Observation, observe
@@ -26,11 +27,13 @@ class Measured:
       clip: with what was inferred filled in.
       observation: in metres.
       inferred: key of the clip that was left null to value and sd.
+      doubts: of what is declared, one line each.
     """
 
     clip: Clip
     observation: Observation
     inferred: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -107,7 +110,11 @@ def measure(clip: Clip) -> Measured:
         found["origin_px"] = {"mean": list(clip.origin_px or ()), "sd": _foot_sd_px(clip)}
     measured = _with_slope(clip) if needs_slope(clip) else Measured(clip, _observed(clip))
     measured = _with_sizes(measured) if needs_sizes(measured.clip) else measured
-    return replace(measured, inferred={**found, **measured.inferred})
+    doubt = clock_doubt(measured.clip, measured.observation)
+    if doubt is not None:
+        _warn(doubt)
+    doubts = () if doubt is None else (doubt,)
+    return replace(measured, inferred={**found, **measured.inferred}, doubts=doubts)
 
 
 def _with_foot(clip: Clip) -> Clip:

@@ -343,6 +343,7 @@ def _filmed(path: Path, file: ClipFile) -> dict[str, Any]:
         "video": video,
         "frame_count": info.frame_count,
         "frame_size_px": info.size_px,
+        "container_fps": info.container_fps or None,
         "warnings": info.warnings,
     }
 

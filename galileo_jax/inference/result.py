@@ -239,7 +239,8 @@ def make_result(
         # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.
         for name, entry in table["parameters"].items():
             entry["identified"] = entry["identified"] and not name.startswith("k")
-        notes = notes | {"warnings": [SCALE_WARNING if has_surface else FREE_SCALE_WARNING]}
+        unscaled = SCALE_WARNING if has_surface else FREE_SCALE_WARNING
+        notes = notes | {"warnings": [*notes.get("warnings", []), unscaled]}
     # Every parameter takes from the residuals what the data told of it.
     effective = float(np.sum(1 - np.clip(spread[: len(trials.model_parameters)] ** 2, 0, 1)))
     nuisance = [p.role == "nuisance" for p in trials.model_parameters]

@@ -56,7 +56,8 @@ def _header(title: str, run: Run) -> str:
     effects = ", ".join(result["effects"]) or "none beyond friction and impact"
     mark = "" if result["converged"] else ' class="warn"'
     caution = statements.caution(result)
-    warning = f'<p class="warn">{escape(caution)}</p>\n' if caution else ""
+    said = [*([caution] if caution else []), *result.get("warnings", [])]
+    warning = "".join(f'<p class="warn">{escape(line)}</p>\n' for line in said)
     more = (
         f"<p{mark}>{escape(statements.convergence(run))}</p>\n{warning}"
         f'<p class="soft">Method {escape(result["method"])}; effects: {escape(effects)}.</p>\n'
