@@ -4,13 +4,12 @@ import argparse
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from galileo_jax import command
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
 
-NUM_DRAWS = 200
+NUM_DRAWS, MOST_DRAWS = 200, 10_000
 LONGEST_S = 60.0
 
 
@@ -60,8 +59,13 @@ def _parser() -> command.Parser:
     add("run", type=Path, metavar="RUN", help="the folder that fit wrote")
     add("--seconds", type=_seconds, required=True, metavar="S", help="how long beyond the clip")
     add("--out", type=Path, metavar="DIR", help="default: RUN")
-    add("--seed", type=_whole(0), default=0)
-    add("--draws", type=_whole(2), default=NUM_DRAWS, help=f"rollouts (default {NUM_DRAWS})")
+    add("--seed", type=command.whole_number(0), default=0)
+    add(
+        "--draws",
+        type=command.whole_number(2, most=MOST_DRAWS),
+        default=NUM_DRAWS,
+        help=f"rollouts (default {NUM_DRAWS})",
+    )
     return parser
 
 
@@ -73,19 +77,6 @@ def _seconds(text: str) -> float:
     if not 0 < value <= LONGEST_S:
         raise argparse.ArgumentTypeError(f"{text!r} is no time; seconds in (0, {LONGEST_S:g}]")
     return value
-
-
-def _whole(low: int) -> Any:
-    def parse(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            value = low - 1
-        if value < low or (value > 10_000 and low > 0):
-            raise argparse.ArgumentTypeError(f"{text!r} is no whole number from {low} on")
-        return value
-
-    return parse
 
 
 if __name__ == "__main__":

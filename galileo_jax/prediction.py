@@ -113,7 +113,7 @@ def hit_s(motions: Motions, surroundings: Surroundings, index: int = 0) -> np.nd
     touches = gap <= reach
     is_hit = touches.any(axis=1)
     before = np.maximum(touches.argmax(axis=1) - 1, 0)
-    when[is_hit] = _crossing_s(motions.times_s, gap, before, reach)[is_hit]
+    when[is_hit] = crossing_s(motions.times_s, gap, before, reach)[is_hit]
     return when
 
 
@@ -135,7 +135,7 @@ def answers(run: Run, motions: Motions, seconds: float, seed: int) -> dict[str, 
         slides = steps[:, i].sum(axis=1) > SLIDES_M
         stops = ~is_moving[:, i, -1]
         last = motions.times_s.size - 1 - is_moving[:, i, ::-1].argmax(axis=1)
-        rest_s = _crossing_s(motions.times_s, motions.speed_m_s[:, i], last, MOVING_M_S)
+        rest_s = crossing_s(motions.times_s, motions.speed_m_s[:, i], last, MOVING_M_S)
         end_x = motions.position_m[:, i, 0, -1]
         objects[name] = {
             "slides_probability": float(slides.mean()),
@@ -176,15 +176,16 @@ def _since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.n
     return times_s
 
 
-def _crossing_s(
+def crossing_s(
     times_s: np.ndarray, values: np.ndarray, index: np.ndarray, level: float
 ) -> np.ndarray:
     """When `values` `[draw, time]` fall through `level` between `index` `[draw]` and the next."""
     index = np.minimum(index, len(times_s) - 2)
     rows = np.arange(len(values))
     before, after = values[rows, index], values[rows, index + 1]
-    falls = np.maximum(before - after, np.finfo(float).tiny)
-    share = np.clip((before - level) / falls, 0.0, 1.0)
+    falls = before > after  # what goes on moving crosses nothing
+    share = np.divide(before - level, before - after, out=(before > level) * 1.0, where=falls)
+    share = np.clip(share, 0.0, 1.0)
     return times_s[index] + share * (times_s[index + 1] - times_s[index])
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from galileo_jax import command, predict
-from galileo_jax.prediction import extrapolate
+from galileo_jax.prediction import crossing_s, extrapolate
 from galileo_jax.report import gl_view
-from galileo_jax.report.prediction import told
+from galileo_jax.report.prediction import is_over, told
 from galileo_jax.report.shell import document, header
 from galileo_jax.run import Run
 from tests.oracle_run import HIT, MISS, STILL, make_run
@@ -166,6 +166,23 @@ def test_what_slides_on_nothing_moves_and_has_a_height():
     assert "will it move?" in falls and "y = -0.750 m (-0.800 to -0.700)" in falls
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_what_goes_on_moving_crosses_no_speed():
+    times = np.array([0.0, 0.5, 1.0])
+    falling = np.array([[0.0, 2.0, 9.0], [4.0, 2.0, 0.0], [1.0, 1.0, 1.0]])
+    found = crossing_s(times, falling, np.array([1, 1, 1]), 1.0)
+    assert found == pytest.approx([1.0, 0.75, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("beyond_m", "slides", "is_told"), [(0.0, 1.0, True), (0.1, 1.0, False), (0.0, 0.0, False)]
+)
+def test_what_is_over_is_called_past(beyond_m, slides, is_told):
+    entry = {"slides_probability": slides, "stops_probability": 1.0}
+    entry |= {"travelled_beyond_clip_m": {"q975": beyond_m}}
+    assert is_over({"objects": {"object1": entry}}) == is_told
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -178,6 +195,7 @@ def test_what_slides_on_nothing_moves_and_has_a_height():
         (["{run}"], "--seconds"),
         (["{run}", "--seconds", "1", "--draws", "1"], "--draws"),
         (["{run}", "--seconds", "1", "--seed", "x"], "--seed"),
+        (["{run}", "--seconds", "1", "--draws", "20000"], "no whole number, 2 to 10000"),
         (["{run}", "--seconds", "1", "--out", "{file}"], "is a file"),
     ],
 )

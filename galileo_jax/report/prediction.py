@@ -13,6 +13,8 @@ from galileo_jax.report.shell import document, figure_section, header, table
 from galileo_jax.report.write import PAGE
 from galileo_jax.run import Run
 
+LEAST_M = 5e-4  # after the clip, that is worth telling
+OVER = "all is at rest when the clip ends, and stays so; what follows happened in the clip"
 ALONE = "prediction.html"  # where there is no report to go into
 
 
@@ -21,6 +23,8 @@ def told(run: Run, found: Mapping[str, Any]) -> list[str]:
     verb, is_free = _verb(run), _is_free(run)
     until = found["predicted_until_s"]
     lines = [f"until {until:.2f} s, {found['seconds_beyond_clip_s']:g} s after the clip's end:"]
+    if is_over(found):
+        lines.append(OVER)
     for name, entry in found["objects"].items():
         slides, stops = entry["slides_probability"], entry["stops_probability"]
         lines.append(f"{name}: will it {verb}? {_chance(slides)}")
@@ -28,7 +32,7 @@ def told(run: Run, found: Mapping[str, Any]) -> list[str]:
             continue
         lines.append(f"  how far: {_interval(entry['travelled_m'], 'm')}")
         beyond = entry["travelled_beyond_clip_m"]
-        if beyond["q975"] > 5e-4:
+        if beyond["q975"] > LEAST_M:
             lines.append(f"  of that after the clip: {_interval(beyond, 'm')}")
         lines.append(f"  does it stop? {_chance(stops)}")
         if entry["rest_x_m"] and entry["rest_time_s"]:
@@ -48,6 +52,16 @@ def told(run: Run, found: Mapping[str, Any]) -> list[str]:
             line += f", after {_interval(found['hit']['time_s'], 's')}"
         lines.append(line)
     return lines
+
+
+def is_over(found: Mapping[str, Any]) -> bool:
+    """Whether something moved in the clip and nothing does after it."""
+    objects = found["objects"].values()
+    moves_on = any(
+        entry["stops_probability"] < 1 or entry["travelled_beyond_clip_m"]["q975"] > LEAST_M
+        for entry in objects
+    )
+    return not moves_on and any(entry["slides_probability"] > 0 for entry in objects)
 
 
 def _is_free(run: Run) -> bool:
@@ -117,6 +131,7 @@ def _section(run: Run, found: Mapping[str, Any], svg: str, picture: bytes) -> st
         when = _cell(found["hit"]["time_s"], "s")
         chance = _chance(found["hit"]["probability"])
         hit = f"<p>Does {escape(first)} hit {escape(second)}? {chance}, {when}.</p>\n"
+    over = f"<p>{OVER[0].upper()}{OVER[1:]}.</p>\n" if is_over(found) else ""
     encoded = base64.b64encode(picture).decode("ascii")
     stills = f'<img src="data:image/png;base64,{encoded}" style="max-width:100%" alt="the stills">'
     motion = figure_section(
@@ -128,7 +143,7 @@ def _section(run: Run, found: Mapping[str, Any], svg: str, picture: bytes) -> st
     )
     caption = "First and last frame of the clip, as filmed and as simulated, and the end."
     return (
-        f'<section id="prediction">\n{motion}\n{table(("", *columns), rows)}\n{hit}'
+        f'<section id="prediction">\n{motion}\n{over}{table(("", *columns), rows)}\n{hit}'
         f"<figure><figcaption>{caption}</figcaption>{stills}</figure>\n</section>\n"
     )
 
