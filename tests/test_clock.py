@@ -61,7 +61,8 @@ def test_the_right_clock_is_not_doubted(make, tmp_path):
 @pytest.mark.parametrize("make", [ramp, fall])
 @pytest.mark.parametrize("factor", [0.125, 0.5, 2.0, 10.0])
 def test_a_factor_is_told_with_the_likely_rate(make, factor, tmp_path):
-    told = clock_doubt(*off(*make(tmp_path), factor))
+    clip, seen = make(tmp_path)
+    told = clock_doubt(*off(clip, seen, factor))
     assert told is not None
     assert f"fps: {factor * FPS:g}, but" in told and "likely fps: " in told
     likely = float(told.split("likely fps: ")[1].split()[0])
@@ -83,7 +84,8 @@ def test_drags_and_small_errors_are_not_taken_for_it(gravity, tmp_path):
 
 
 def test_every_command_that_fits_tells_it(tmp_path, capfd):
-    clip, seen = off(*fall(tmp_path), 10.0)
+    clip, seen = fall(tmp_path)
+    clip, seen = off(clip, seen, 10.0)
     write_observation_csv(tmp_path / "fall.csv", seen)
     assert measure(clip).doubts == (clock_doubt(clip, seen),)
     assert "likely fps: 60" in capfd.readouterr().err

@@ -13,6 +13,7 @@ from galileo_jax.files import write_text
 from galileo_jax.inference.trials import Trials
 from galileo_jax.report import findings
 from galileo_jax.report.along import Along, along_paths
+from galileo_jax.report.chart import Chart
 from galileo_jax.report.comparison_page import cells, failures, motion
 from galileo_jax.report.failure import before_after_chart
 from galileo_jax.report.missing_force import is_told, missing_force_chart
@@ -21,8 +22,11 @@ from galileo_jax.report.provenance import provenance
 from galileo_jax.report.rounds import HEIGHT_PX, rounds_figure
 from galileo_jax.report.shell import document, figure_section, header, items, legend, table
 from galileo_jax.report.statements import number
+from galileo_jax.report.svg_chart import chart_svg
+from galileo_jax.report.write import PLOTS
 
 NUM_CANDIDATES = 8
+ONLY_WIDE = ("", "log evidence", "chi2 per dof", "p")  # of the candidates
 BAR = '<div class="bar"><div style="width:{:.1f}%"></div></div>'
 
 
@@ -50,24 +54,23 @@ class Told:
 
 
 def write_diagnosis_page(path: Path, title: str, trials: Trials, told: Told) -> None:
-    """Writes the page."""
+    """Writes the page, and what was left before and after an effect as SVG into plots/."""
     diagnosis = told.diagnosis
     shown = [
         along_paths(trials, one.hypothesis.fit, one.comparison, told.seed)
         for one in diagnosis.rounds
     ]
+    rounds = list(pairwise(zip(shown, map(_title, diagnosis.rounds), strict=True)))
+    added = [(after[1], _before_after(before, after)) for before, after in rounds]
+    for chart in (chart for _, charts in added for chart in charts):
+        write_text(path.parent / PLOTS / f"{chart.name}.svg", chart_svg(chart))
     sections = [
         _verdict(title, told),
         _rounds(told.record["history"]),
         _candidates(diagnosis, told.record["candidates"]),
         motion(told.clips, trials, _fitted(trials, diagnosis)),
         failures(f"Where it fails: {_title(diagnosis.rounds[0])}", shown[0]),
-        *(
-            _before_after(before, after, _title(one), _title(two))
-            for (before, after), (one, two) in zip(
-                pairwise(shown), pairwise(diagnosis.rounds), strict=True
-            )
-        ),
+        *(_added(name, charts) for name, charts in added),
         _missing(told, trials.problems[0].observation.names),
         cells(diagnosis.base, several=len(trials.problems) > 1),
         _left_one_out(told.record.get("left_one_out", [])),
@@ -129,12 +132,16 @@ def _rounds(history: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _before_after(
-    before: Sequence[Along], after: Sequence[Along], title_before: str, title_after: str
-) -> str:
-    charts = [
-        before_after_chart(one, two, (title_before, title_after))
-        for one, two in zip(before, after, strict=True)
+    before: tuple[Sequence[Along], str], after: tuple[Sequence[Along], str]
+) -> list[Chart]:
+    """One chart for each object, of two rounds: what is left, and the model's effects."""
+    return [
+        before_after_chart(one, two, (before[1], after[1]))
+        for one, two in zip(before[0], after[0], strict=True)
     ]
+
+
+def _added(title_after: str, charts: Sequence[Chart]) -> str:
     pictures = {chart.name: chart_element(chart) for chart in charts}
     return figure_section(
         f"Added: {title_after}",
@@ -147,26 +154,28 @@ def _before_after(
 def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -> str:
     rows = []
     for made, told in zip(diagnosis.candidates, candidates[:NUM_CANDIDATES], strict=False):
-        strengths = ", ".join(
-            f"{name} = {text}" for name, text in findings.strength_texts(made.effects, told).items()
-        )
+        texts = findings.strength_texts(made.effects, told)
+        named = [text if len(texts) == 1 else f"{name} = {text}" for name, text in texts.items()]
+        strengths = ", ".join(named)
         rows.append(
             [
-                escape(told["effect"]),
+                escape(told["effect"]).replace("_", "_<wbr>").replace("+", "+<wbr>"),
                 BAR.format(100 * told["probability"]),
                 f"{told['probability']:.3f}",
                 escape(strengths),
                 f"{told['score']:+.1f}",
                 f"{told['chi2_per_dof']:.2f}",
                 escape(findings.p_text(told["p_value"])),
-                escape(", ".join(told["confounded_with"])),
+                escape(", ".join(told["confounded_with"])).replace("_", "_<wbr>"),
             ]
         )
     head = ["effect", "", "probability", "strength", "log evidence", "chi2 per dof", "p",
             "not told from"]  # fmt: skip
+    if not any(row[-1] for row in rows):
+        head, rows = head[:-1], [row[:-1] for row in rows]
     rest = len(candidates) - len(rows)
     note = f"<p class='soft'>{rest} more are less probable; diagnosis.json has them.</p>"
-    return f"<h2>Candidates</h2>\n{table(head, rows)}\n{note if rest > 0 else ''}"
+    return f"<h2>Candidates</h2>\n{table(head, rows, ONLY_WIDE)}\n{note if rest > 0 else ''}"
 
 
 def _missing(told: Told, names: Sequence[str]) -> str:

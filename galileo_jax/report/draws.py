@@ -43,7 +43,8 @@ def pair_figure(posterior: Posterior, names: list[str]) -> "Figure":
                     axes.set_visible(False)
                     continue
                 axes.tick_params(labelsize=7, length=2)
-                axes.locator_params(nbins=3)
+                axes.locator_params(axis="x", nbins=2)
+                axes.locator_params(axis="y", nbins=3)
                 if row == column:
                     bins = 30 if np.ptp(x) > 1e-6 * np.abs(x).max() else 1  # a stuck chain
                     axes.hist(x, bins=bins, color=COLOURS[1], alpha=0.75, histtype="stepfilled")

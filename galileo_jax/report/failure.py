@@ -49,7 +49,8 @@ def before_after_chart(before: Along, after: Along, titles: tuple[str, str]) -> 
         for one, title in zip((before, after), titles, strict=True)
     )
     label = f"{after.title}: what is left before and after {titles[1]} was added"
-    return Chart(f"before_after_{after.clip}_{after.name}_{titles[1]}", label, panels, after.clip)
+    added = titles[1].replace(", ", "+").replace(" ", "_")
+    return Chart(f"before_after_{after.clip}_{after.name}_{added}", label, panels, after.clip)
 
 
 def _title(one: Along) -> str:

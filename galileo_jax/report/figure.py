@@ -14,6 +14,7 @@ INK, PAPER = "#22242a", "#ffffff"  # in the page: the text's colour, and none
 COLOURS = ("#c2592f", "#3273b3", "#59994d")  # objects 1, 2 (as in scenes/ramp.xml), 3 (scene.py)
 PANEL_IN = (4.8, 2.7)  # one panel is a phone's width
 
+PX_PER_PT = 4 / 3
 _STYLE: dict[str, Any] = {
     "svg.fonttype": "none",  # the page's own font
     "font.family": "sans-serif",
@@ -71,6 +72,10 @@ def to_inline(svg: str, label: str) -> str:
     """An SVG document as an element of the page, in the page's colours."""
     element = svg[svg.index("<svg") :]
     element = re.sub(r"<metadata>.*?</metadata>", "", element, flags=re.DOTALL)
+    if found := re.search(r'<svg[^>]*? width="([\d.]+)pt"', element):
+        # No larger than it was drawn: a small figure's words would be.
+        natural = f'<svg style="--natural: {float(found[1]) * PX_PER_PT:.0f}px"'
+        element = element.replace("<svg", natural, 1)
     element = re.sub(r'(<svg[^>]*?) width="[^"]*pt"', r"\1", element, count=1)
     element = re.sub(r'(<svg[^>]*?) height="[^"]*pt"', r"\1", element, count=1)
     element = element.replace(INK, "currentColor").replace(f"fill: {PAPER}", "fill: none")

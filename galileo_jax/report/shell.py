@@ -95,11 +95,18 @@ def details(summary: str, inner: str) -> str:
     return f"<details><summary>{escape(summary)}</summary>{inner}</details>"
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of cells that are HTML already."""
-    top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], only_wide: Sequence[str] = ()) -> str:
+    """A table of cells that are HTML already; columns `only_wide` are left out on a phone."""
+    kinds = ["n wide" if name in only_wide else "n" for name in head]
+    top = "".join(
+        f'<th scope="col" class="{kind}">{escape(name)}</th>'
+        for name, kind in zip(head, kinds, strict=True)
+    )
     body = "".join(
-        "<tr>" + "".join(f'<td class="n">{cell}</td>' for cell in row) + "</tr>" for row in rows
+        "<tr>"
+        + "".join(f'<td class="{k}">{cell}</td>' for cell, k in zip(row, kinds, strict=True))
+        + "</tr>"
+        for row in rows
     )
     return f'<div class="table"><table><tr>{top}</tr>{body}</table></div>'
 

@@ -72,6 +72,9 @@ def test_tells_the_verdict_and_needs_nothing_from_outside(status, trials, clip, 
     assert ("0.99 sin(6 t)" in page) == (status == "unknown")
     assert ("Added: air_drag" in page) == (status in ("named", "ambiguous"))
     assert AGAIN in page and digest(clip.track) in page
+    plots = sorted(plot.name for plot in tmp_path.glob("plots/*.svg"))
+    added = [f"before_after_oracle_object{i}_air_drag.svg" for i in (1, 2)]
+    assert plots == (added if status in ("named", "ambiguous") else [])
     check_needs_nothing_from_outside(page)
     assert "<h1>&lt;/script&gt;&lt;b&gt;&amp;" in page, "names are escaped"
 
