@@ -99,8 +99,8 @@ def _seconded(
     count = len(trials.model_parameters)
     without = replace(base, z=np.where(base.free, fits[best].z, 0.0), jacobian=fits[best].jacobian)
     others = [i for i in range(len(candidates)) if i != best]
-    starts = [_matched(trials, without, candidates[i], seed) for i in others]
-    of = np.repeat(np.arange(len(others)), [len(own) for own in starts])
+    starts = [_matched(trials, without, candidates[i], seed)[:1] for i in others]
+    of = np.arange(len(others))
     free = np.stack([trials.free(candidates[i])[:count] for i in others])
     found = fitter.fit_from(np.concatenate(starts), free[of], of) if others else []
     for i, fit in zip(others, found, strict=True):

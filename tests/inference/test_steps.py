@@ -22,6 +22,7 @@ PARAMETERS = (
 )
 EDGES = Edges.of(PARAMETERS)
 Z = st.floats(-6, 6)
+ALL = np.arange(len(DAMPINGS))[None]
 
 
 def theta(z: np.ndarray) -> np.ndarray:
@@ -51,7 +52,7 @@ def test_with_one_edge_in_the_way_the_rest_is_solved_exactly(seed):
     jacobian, white = rng.normal(size=(1, 12, 3)), rng.normal(size=(1, 1, 12))
     z = rng.normal(size=(1, 1, 3))
     low = np.array([[[-0.1, -np.inf, -np.inf]]])
-    steps = Damped.of(np.ones((1, 3), bool), [jacobian]).steps(z, [white], (low, -low))
+    steps = Damped.of(np.ones((1, 3), bool), [jacobian]).steps(z, [white], (low, -low), ALL)
     for damping, step in zip(DAMPINGS, steps[0], strict=True):
         size = np.sqrt(damping * (1 + np.sum(jacobian[0] ** 2, axis=0)))
         rows = np.vstack([jacobian[0], np.eye(3), np.diag(size)])
@@ -65,7 +66,7 @@ def test_pinned_parameters_stay():
     jacobian = np.random.default_rng(0).normal(size=(1, 9, 3))
     infinite = np.full((1, 1, 3), np.inf)
     damped = Damped.of(free, [jacobian])
-    steps = damped.steps(np.zeros((1, 1, 3)), [np.ones((1, 1, 9))], (-infinite, infinite))
+    steps = damped.steps(np.zeros((1, 1, 3)), [np.ones((1, 1, 9))], (-infinite, infinite), ALL)
     assert np.all(steps[..., 1] == 0) and np.all(steps[:, 0, [0, 2]] != 0)
 
 

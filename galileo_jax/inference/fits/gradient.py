@@ -53,6 +53,7 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, White
 # engine rounds; above the largest a step may leave a plateau (nothing moves) over its edge, and
 # the plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
+NUM_FOLLOWED = 3  # of a step's dampings
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 # A fit that is so many nats behind another, and makes up less than this share of it in a step, is
 # left where it is.
@@ -403,15 +404,20 @@ class GradientFitter:
             tried = self._edges.curve(here, np.where(np.isfinite(found), found - here, 0.0))
             after = self._costs_of(tried, points)
         else:
-            damped = Damped.of(points.free, jacobian)
-            tried = self._edges.curve(
-                here, damped.steps(here, [w[:, None] for w in white], self._edges.reach(here))
-            )
+            damped, edges = Damped.of(points.free, jacobian), self._edges
+            which = np.tile(np.arange(len(DAMPINGS)), (len(here), 1))
+            step = damped.steps(here, [w[:, None] for w in white], edges.reach(here), which)
+            tried = edges.curve(here, step)
             there = self._whites_of(tried, points)
-            # Once more from where each step ends, with the slopes of where it began: a valley's
+            after = _cost(there, tried)
+            # Once more from where the best end, with the slopes of where they began: a valley's
             # bend is followed at the price of a rollout.
-            again = self._edges.curve(tried, damped.steps(tried, there, self._edges.reach(tried)))
-            after = np.concatenate([_cost(there, tried), self._costs_of(again, points)], axis=1)
+            which = np.argsort(after, axis=1)[:, :NUM_FOLLOWED, None]
+            bent = np.take_along_axis(tried, which, axis=1)
+            there = [np.take_along_axis(w, which, axis=1) for w in there]
+            step = damped.steps(bent, there, edges.reach(bent), which[..., 0])
+            again = edges.curve(bent, step)
+            after = np.concatenate([after, self._costs_of(again, points)], axis=1)
             tried = np.concatenate([tried, again], axis=1)
         best = np.argmin(after, axis=1)
         rows = np.arange(len(points.z))

@@ -95,24 +95,30 @@ class Damped(NamedTuple):
         return cls(jacobian, free, matrices)
 
     def steps(
-        self, z: np.ndarray, white: Sequence[np.ndarray], reach: tuple[np.ndarray, np.ndarray]
+        self,
+        z: np.ndarray,
+        white: Sequence[np.ndarray],
+        reach: tuple[np.ndarray, np.ndarray],
+        which: np.ndarray,
     ) -> np.ndarray:
-        """Steps from z `[point, 1 or damping, parameter]`, with residuals `[..., value]` there.
+        """Damped steps.
 
         Args:
-          z: where.
-          white: residuals, clip by clip.
+          z: `[point, 1 or step, parameter]`, where they begin.
+          white: residuals there, `[point, 1 or step, value]`, clip by clip.
           reach: the shortest and the longest step, as `z`.
+          which: `[point, step]`, index of each one's damping.
 
         Returns:
-          `[point, damping, parameter]`.
+          `[point, step, parameter]`.
         """
         pairs = zip(self.jacobian, white, strict=True)
         slope = z + np.sum([np.einsum("bvi,bdv->bdi", j, w) for j, w in pairs], axis=0)
-        shape = (len(z), len(DAMPINGS), z.shape[-1])
+        shape = (*which.shape, z.shape[-1])
         slope, low, high = (np.broadcast_to(array, shape) for array in (slope, *reach))
         steps = np.zeros(shape)
-        for i, (own, matrix) in enumerate(zip(self.free, self.matrix, strict=True)):
+        for i, own in enumerate(self.free):
+            matrix = self.matrix[i][which[i]]
             found = np.linalg.solve(matrix, -slope[i][:, own, None])[..., 0]
             sides = low[i][:, own], high[i][:, own]
             for d in np.flatnonzero(((found < sides[0]) | (found > sides[1])).any(axis=1)):
