@@ -21,6 +21,7 @@ from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.leftovers import PREDICTION, outdated
 from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
 from galileo_jax.registry import entry_names
+from galileo_jax.rollout.engine_names import MOTIONS
 
 if TYPE_CHECKING:
     from galileo_jax.effects.effect import Effect
@@ -38,6 +39,7 @@ OF_GALILEO, OF_THESIS = (
     ("--similarity", "--acceptance", "--selection"),
 )
 INITS = ("grad", "cnn")
+OFF_THE_PLANE = "an object has a z_m: motion in a plane takes no notice; see --motion free"
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
 SIMILARITIES = entry_names("galileo_jax.similarity.library")
 
@@ -46,6 +48,8 @@ def main(argv: Sequence[str]) -> int | None:
     """Fits a clip, or several trials together, and writes a run."""
     call = _parser().parse_args(argv)
     _refuse_ignored(call, argv)
+    if call.motion == "free":
+        _refuse_planar_only(call)
     clips = load_clips(call.clips, call.pixels_per_metre)
     out = out_folder(call, clips)
     if call.preset == "thesis" and len(clips) > 1:
@@ -53,7 +57,7 @@ def main(argv: Sequence[str]) -> int | None:
     truth = read_truth(clips[0])
     if call.effects or call.effects_from:
         chosen_effects(call)  # a wrong name is told before anything is tracked
-    ahead = work_ahead(clips, None if call.method == "cnn" else fitter_of(call))
+    ahead = work_ahead(clips, None if call.method == "cnn" else fitter_of(call, call.motion))
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
     measured = [measure(clip) for clip in clips]
@@ -89,6 +93,16 @@ def _refuse_ignored(call: argparse.Namespace, argv: Sequence[str]) -> None:
         command.refuse_ignored(argv, OF_THESIS, "of --preset thesis only")
 
 
+def _refuse_planar_only(call: argparse.Namespace) -> None:
+    if call.engine not in ("auto", "c"):
+        raise InputError(
+            f"--engine {call.engine}: it moves objects in a plane; --motion free takes c"
+        )
+    for option in ("method", "init"):
+        if getattr(call, option) == "cnn":
+            raise InputError(f"--{option} cnn: the network knows motion in a plane only")
+
+
 def out_folder(call: argparse.Namespace, clips: Sequence[Clip]) -> Path:
     """Where a call's results go: `--out`, or runs/ and the clips' names."""
     out = Path(call.out) if call.out else Path("runs") / "+".join(clip.path.stem for clip in clips)
@@ -107,7 +121,10 @@ def chosen_effects(call: argparse.Namespace) -> "tuple[Effect, ...]":
 
 
 def built(
-    clips: Sequence[Clip], observations: "Sequence[Observation]", call: argparse.Namespace
+    clips: Sequence[Clip],
+    observations: "Sequence[Observation]",
+    call: argparse.Namespace,
+    motion: str = "planar",
 ) -> "Trials":
     """Trials of the model that a call asks for.
 
@@ -116,19 +133,20 @@ def built(
     """
     from galileo_jax.run import make_trials
 
-    trials = make_trials(clips, observations, call.engine, chosen_effects(call))
+    effects = chosen_effects(call)
+    trials = make_trials(clips, observations, call.engine, effects, motion=motion)
     if absent := trials.without_place():
         raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
     return trials
 
 
-def fitter_of(call: argparse.Namespace) -> Build:
+def fitter_of(call: argparse.Namespace, motion: str = "planar") -> Build:
     """What fits the clips of a call by gradients."""
 
     def build(clips: Sequence[Clip], observations: "Sequence[Observation]") -> "GradientFitter":
         from galileo_jax.inference.fits.gradient import GradientFitter
 
-        return GradientFitter(built(clips, observations, call))
+        return GradientFitter(built(clips, observations, call, motion))
 
     return build
 
@@ -144,11 +162,15 @@ def fit_clips(
 
     jax.config.update("jax_enable_x64", True)
     jax_cache.enable()
-    trials = built([m.clip for m in measured], [m.observation for m in measured], call)
+    observations = [m.observation for m in measured]
+    trials = built([m.clip for m in measured], observations, call, call.motion)
     if call.method == "cnn":
         posterior, z_best, notes = _network(trials, call, timings)
     else:
         posterior, z_best, notes = _search(trials, measured, call, out, timings)
+    notes["motion"] = call.motion
+    if call.motion == "planar" and any(item.z_m for m in measured for item in m.clip.objects):
+        notes["warnings"] = [OFF_THE_PLANE]
     if call.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in call.effects_from]
 
@@ -370,6 +392,7 @@ def identity_of(measured: Sequence[Measured], trials: "Trials", call: argparse.N
         digest.update(hashlib.sha256(source).digest())
     # Laws and priors may change with the package, and with others that bring effects.
     model = [__version__, trials.problems[0].engine.name, repr(trials.parameters)]
+    model += [trials.problems[0].model.motion]
     options = [call.sampler, call.seed, call.effects, call.init, NUM_CHAINS]
     digest.update(json.dumps(model + options).encode())
     return digest.hexdigest()
@@ -435,6 +458,12 @@ def _parser() -> command.Parser:
     parser.add_argument("--method", choices=METHODS, default="grad")
     parser.add_argument("--effects", default="", help="a,b: effects in the model")
     add_clip_options(parser, out="folder of the run (default runs/CLIP)")
+    parser.add_argument(
+        "--motion",
+        choices=MOTIONS,
+        default="planar",
+        help="free: from the first hit on objects turn and tip (MuJoCo's C engine)",
+    )
     group = parser.add_argument_group("--method mh")
     group.add_argument("--sampler", choices=SAMPLERS, default="mixture")
     group.add_argument(

@@ -77,6 +77,7 @@ def make_problem(
     engine: str = "auto",
     effects: tuple[Effect, ...] = (),
     noise: NoiseModel | None = None,
+    motion: str = "planar",
 ) -> Problem:
     """A clip with a model of it: the base model, or one with effects; `noise`: its own."""
     for effect in effects:
@@ -88,7 +89,7 @@ def make_problem(
     scene = build_scene(clip, observation)
     # An effect may run the clock faster: the frame rate's does.
     margin = LONGER if effects else 1.0
-    model = Model(scene, margin * float(observation.times_s[-1]), effects)
+    model = Model(scene, margin * float(observation.times_s[-1]), effects, motion=motion)
     noise = noise or noise_of(clip, scene.surroundings)
     return Problem(observation, model, make_engine(engine, model), clip.path.stem, noise)
 
@@ -99,11 +100,12 @@ def make_trials(
     engine: str = "auto",
     effects: tuple[Effect, ...] = (),
     noise: NoiseModel | None = None,
+    motion: str = "planar",
 ) -> Trials:
     """Clips of the same objects with the same model."""
     return Trials(
         tuple(
-            make_problem(clip, observation, engine, effects, noise)
+            make_problem(clip, observation, engine, effects, noise, motion)
             for clip, observation in zip(clips, observations, strict=True)
         )
     )
@@ -143,4 +145,6 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     for path in result.get("effects_from", []):
         load_file(path)
     effects = make_effects(result["effects"])
-    return Run(folder, clip, make_problem(clip, observation, engine, effects), posterior, result)
+    motion = result.get("motion", "planar")
+    problem = make_problem(clip, observation, engine, effects, motion=motion)
+    return Run(folder, clip, problem, posterior, result)

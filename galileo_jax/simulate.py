@@ -12,12 +12,13 @@ import numpy as np
 
 from galileo_jax import command
 from galileo_jax.clip.load import check_clip
-from galileo_jax.clip.schema import ClipObject, Shape
+from galileo_jax.clip.schema import MAX_ACROSS_M, ClipObject, Shape
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.clip.yaml_edit import dump
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
 from galileo_jax.observation import Observation
+from galileo_jax.rollout.engine_names import MOTIONS
 from galileo_jax.scene.scene import extents
 from galileo_jax.simulate_free import FREE_SCENARIOS, write_free_clip
 from galileo_jax.truth import (
@@ -64,6 +65,10 @@ def main(argv: Sequence[str]) -> int | None:
     if out.suffix != suffix:
         raise InputError(f"--out: {out.name} does not end in {suffix}")
     _refuse_ignored(call, argv)
+    if call.motion == "free":
+        _refuse_planar_only(call)
+    elif call.z2 is not None:
+        raise InputError("--z2: of --motion free only")
     hidden = _hidden(call)
     if call.scenario not in SHAPES:
         path = out.parent / out.name
@@ -77,14 +82,14 @@ def main(argv: Sequence[str]) -> int | None:
         return None
     shapes = _shapes(call)
     looks, things, faults, secrets = np.random.default_rng(call.seed).spawn(4)
-    given = {key: getattr(call, key) for key in ("m1", "k1", "m2", "k2")}
+    given = {key: getattr(call, key) for key in ("m1", "k1", "m2", "k2", "z2")}
     given |= _masses_and_frictions(call.set, len(shapes))
     trials = draw_series(
         call.angle,
         {key: value for key, value in given.items() if value is not None},
         hidden,
         call.series or 1,
-        solver=call.solver,
+        solver="free" if call.motion == "free" else call.solver,
         things=things,
         secrets=secrets,
         frame_s=1 / call.fps if call.faults else None,
@@ -144,6 +149,16 @@ def _refuse_ignored(call: argparse.Namespace, argv: Sequence[str]) -> None:
     if not call.effect:
         command.refuse_ignored(argv, ["--strength"], "of what? name an effect with --effect NAME")
         command.refuse_ignored(argv, ["--effects-from"], "nothing of it is used without --effect")
+
+
+def _refuse_planar_only(call: argparse.Namespace) -> None:
+    """What bodies that turn out of the plane cannot be."""
+    if call.scenario not in ("ramp", "multi"):
+        raise InputError(f"--motion free: of ramp and multi, not of scenario {call.scenario}")
+    if not call.track_only:
+        raise InputError("--motion free: pictures show motion in a plane only; add --track-only")
+    if call.solver != "rigid":
+        raise InputError(f"--solver {call.solver}: of --motion planar only")
 
 
 def _hidden(call: argparse.Namespace) -> list[Hidden]:
@@ -348,6 +363,7 @@ def _clip_content(
     objects: list[dict[str, Any]] = [
         {"name": each.name, "shape": each.shape, "size_m": list(each.size_m or ())}
         | ({} if each.rolls is None else {"rolls": each.rolls})
+        | ({"z_m": each.z_m} if each.z_m else {})
         for each in truth.objects
     ]
     seen: dict[str, Any] = {}
@@ -404,6 +420,18 @@ def _parser() -> command.Parser:
     for index in (1, 2):
         add(f"--m{index}", type=_number(float, 0.01, 100), metavar="KG")
         add(f"--k{index}", type=_number(float, 0, 2), metavar="FRICTION")
+    add(
+        "--motion",
+        choices=MOTIONS,
+        default="planar",
+        help="free: from the first hit on objects turn and tip (MuJoCo's C engine; tracks only)",
+    )
+    add(
+        "--z2",
+        type=_number(float, -MAX_ACROSS_M, MAX_ACROSS_M),
+        metavar="M",
+        help="how far object 2 stands off the plane, towards the camera (--motion free; default 0)",
+    )
     add("--solver", choices=SOLVERS, default="rigid", help="fine: not the engine that fits")
     add(
         "--set",

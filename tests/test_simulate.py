@@ -14,6 +14,9 @@ from tests.reference_ramp import Experiment, Solution, solve
 # The motion is exact at the records; an event is looked for on straight lines between them.
 EXACT_M = 1e-9
 BETWEEN_RECORDS_S = 1e-4
+# Faces give way by 0.5 mm, and boxes rock on their edges for some hundredths of a second.
+FREE_ATOL_M, FREE_TIPPED_RAD = 0.001, 0.03
+FREE = ("--track-only", "--motion", "free")
 
 # What readers of truth files (../shared/data, benchmarks) rely on.
 TRUTH_KEYS = {"name", "engine", "effect", "effect_parameters", "m1", "k1", "m2", "k2", "gravity"}
@@ -123,6 +126,45 @@ def test_track_has_the_declared_noise(tmp_path):
     assert observed.covariance_m2[:, 0, 0] == pytest.approx(1e-6)
 
 
+def test_free_motion(tmp_path, capsys):
+    """An object hit off centre turns; the yaml says where it stands, the truth where it goes."""
+    path = tmp_path / "c.csv"
+    call = [*FREE, "--z2", "0.015", "--seed", "1", "--seconds", "1.4", "--out", str(path)]
+    assert command.run(simulate.main, call) == 0
+    clip = load_clip(path)
+    assert [each.z_m for each in clip.objects] == [0.0, 0.015]
+    truth = json.loads(path.with_suffix(".truth.json").read_text())
+    assert truth["motion"] == "free"
+    assert truth["z_m"] == {"object1": 0.0, "object2": 0.015}
+    moved = truth["trajectory"]["object2"]
+    assert moved["across"][0] == 0.015
+    assert moved["across"][-1] > 0.016
+    assert np.linalg.norm(moved["quaternion"], axis=1) == pytest.approx(1.0, abs=1e-5)
+    assert moved["quaternion"][0] == [1, 0, 0, 0]
+    assert abs(moved["quaternion"][-1][3]) > 0.2, "turned about the vertical"
+    observed = read_observation_csv(path)
+    assert observed.position_m[1, 0] == pytest.approx(np.array(moved["y"]), abs=0.001)
+
+
+def test_free_motion_of_what_meets_squarely_is_planar():
+    truth = draw_truth(np.random.default_rng(1), 20.0, {})
+    size = (0.06, 0.06, 0.06)
+    objects = tuple(each.model_copy(update={"size_m": size}) for each in truth.objects)
+    truth = replace(truth, objects=objects)
+    free, planar = (roll_out(truth, solver, 1.6) for solver in ("free", "rigid"))
+    count = planar.position_m.shape[-1]
+    apart = np.abs(free.position_m[..., :count] - planar.position_m)
+    assert apart.max() < FREE_ATOL_M
+    hit_s = planar.events_s(truth)["hit"]
+    assert hit_s is not None
+    before = planar.times_s < hit_s - 0.01
+    assert apart[..., before].max() < EXACT_M
+    assert free.pitch_rad[:, :count][:, before] == pytest.approx(planar.pitch_rad[:, before])
+    tipped = np.abs(free.pitch_rad[:, :count] - planar.pitch_rad)
+    assert tipped.max() < FREE_TIPPED_RAD
+    assert tipped[:, -1].max() < 1e-3
+
+
 @pytest.mark.parametrize(
     ("call", "complaint"),
     [
@@ -151,6 +193,12 @@ def test_track_has_the_declared_noise(tmp_path):
         (["--out", "clip.mp4", "--scenario", "fall", "--hand"], "--hand: of a ramp only"),
         (["--out", "clip.mp4", "--scenario", "incline", "--k2", "0.1"], "--k2: an incline has one"),
         (["--out", "c.csv", "--track-only", "--size", "640x360"], "--size: a track (--track-only)"),
+        (["--out", "c.mp4", "--motion", "free"], "in a plane only; add --track-only"),
+        (["--out", "c.csv", "--track-only", "--z2", "0.01"], "--z2: of --motion free only"),
+        (["--out", "c.csv", *FREE, "--z2", "0.6"], "'0.6' is no number in [-0.5, 0.5]"),
+        (["--out", "c.csv", *FREE, "--solver", "fine"], "--solver fine: of --motion planar only"),
+        (["--out", "c.csv", *FREE, "--scenario", "fall"], "not of scenario fall"),
+        (["--out", "c.csv", *FREE, "--shapes", "box,sphere"], "nothing may roll"),
     ],
 )
 def test_wrong_calls_are_one_line_and_leave_nothing(call, complaint, capsys, tmp_path, monkeypatch):

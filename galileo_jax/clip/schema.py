@@ -28,6 +28,7 @@ SIZE_MEANING: dict[str, str] = {
 }
 
 MIN_SIZE_M, MAX_SIZE_M = 0.001, 2.0
+MAX_ACROSS_M = 0.5
 MIN_SCALE_PX_PER_M, MAX_SCALE_PX_PER_M = 5.0, 100_000.0
 MIN_MASS_KG, MAX_MASS_KG = 1e-5, 100.0
 MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
@@ -56,6 +57,13 @@ def _metres(value: float) -> float:
         raise wrong(f"{value:g} m is too large for an object; metres expected; {hint}")
     if value < MIN_SIZE_M:
         raise wrong(f"{value:g} m is smaller than a millimetre; metres expected")
+    return value
+
+
+def _across(value: float) -> float:
+    if abs(value) > MAX_ACROSS_M:
+        hint = _suggestion(value, (0.01, "cm") if abs(value) < 20 else (0.001, "mm"))
+        raise wrong(f"{value:g} m is too far from the plane of the motion; metres expected; {hint}")
     return value
 
 
@@ -231,6 +239,8 @@ class ClipObject(BaseModel):
         not used for it. None = not known: the release is found from the motion.
       rolls: whether it may roll: a cylinder on its side, a torus on edge; a sphere always may.
         A number is its moment of inertia over m r^2, where it is not that of a solid.
+      z_m: how far its centre is from the plane in which object 1 moves, m, positive towards the
+        camera; of use to `--motion free` only.
       track_name: what another tool's track file calls it; None = the same, or the only one.
     """
 
@@ -243,6 +253,7 @@ class ClipObject(BaseModel):
     point_px: Annotated[Point, AfterValidator(_point_px)] | None = None
     first_frame: Annotated[int, Field(strict=True, ge=0)] | None = 0
     rolls: Annotated[bool | float | None, BeforeValidator(_rolls)] = None
+    z_m: Annotated[Number, AfterValidator(_across)] = 0.0
     track_name: OneLine | None = None
 
     @property

@@ -174,4 +174,6 @@ def command_again(run: Run) -> str:
     if result["effects"]:
         words.append(f"--effects {','.join(result['effects'])}")
     words += [f"--{key} {result[key]}" for key in ("preset", "sampler") if result.get(key)]
+    if run.problem.model.motion != "planar":
+        words.append(f"--motion {run.problem.model.motion}")
     return " ".join([*words, f"--engine {run.problem.engine.name}", f"--seed {result['seed']}"])

@@ -69,7 +69,7 @@ class EngineC:
             np.add(qpos.reshape(shape), home, out=positions[record])
             velocities[record] = qvel.reshape(shape)
             is_look = loads.is_steady and record and record % LOOK_EVERY == 0
-            if is_look and _is_at_rest(velocities[record - 1 :]):
+            if is_look and is_at_rest(velocities[record - 1 :]):
                 positions[record:] = positions[record]
                 velocities[record:] = 0.0
                 break
@@ -119,7 +119,7 @@ class EngineC:
                 written[:, i, :2] = friction[:, which, None]
 
 
-def _is_at_rest(velocities: np.ndarray) -> bool:
+def is_at_rest(velocities: np.ndarray) -> bool:
     """Whether two records on end, `[2, ...]` and more, show nothing that moves or starts to."""
     before, now = velocities[0], velocities[1]
     return bool(np.abs(now).max() < REST_SPEED_M_S and np.abs(now - before).max() < REST_CHANGE_M_S)

@@ -14,9 +14,12 @@ def make_engine(name: str, model: Model) -> Engine:
 
     Raises:
       InputError: unknown name (lists the known), or a scene that MuJoCo's engines do not have.
+        Free motion is the C engine's alone.
     """
     if name not in ENGINES:
         raise InputError(f"engine: unknown value {name!r}; known: {', '.join(ENGINES)}")
+    if model.motion == "free":
+        return _free(name, model)
     if name == "auto":
         name = "rigid"
     is_free = not model.scene.surroundings.has_surface
@@ -39,3 +42,13 @@ def make_engine(name: str, model: Model) -> Engine:
     from galileo_jax.rollout.engine_c import EngineC
 
     return EngineC(model)
+
+
+def _free(name: str, model: Model) -> Engine:
+    if name not in ("auto", "c"):
+        raise InputError(
+            f"engine: {name!r} moves objects in a plane; --motion free is of c or auto"
+        )
+    from galileo_jax.rollout.engine_c_free import EngineCFree
+
+    return EngineCFree(model)

@@ -28,12 +28,14 @@ class Model:
       duration_s: how long rollouts last.
       effects: physical effects that are part of the hypothesis (none is the base model).
       nuisances: always there, after the scenario's own laws.
+      motion: "planar", or "free": from the first hit on bodies turn and tip.
     """
 
     scene: Scene
     duration_s: float
     effects: tuple[Effect, ...] = ()
     nuisances: tuple[Effect, ...] = field(default=LAWS + NUISANCES)
+    motion: str = "planar"
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:

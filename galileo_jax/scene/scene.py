@@ -36,11 +36,14 @@ class Scene:
       spec: the MjSpec the model was compiled from (for pictures and the viewer).
       model: the compiled model, its masses and frictions still the file's.
       surroundings: names, geometry and start, as effects see them.
+      z_m: `[object]`, how far each centre is from the plane of the motion, towards the camera;
+        the planar scene has no use for it.
     """
 
     spec: mujoco.MjSpec
     model: mujoco.MjModel
     surroundings: Surroundings
+    z_m: tuple[float, ...]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -241,7 +244,12 @@ def compile_scene(
             if "table" in (pair.geomname1, pair.geomname2):
                 spec.delete(pair)
         spec.delete(spec.geom("table"))
-    return Scene(spec=spec, model=spec.compile(), surroundings=surroundings)
+    return Scene(
+        spec=spec,
+        model=spec.compile(),
+        surroundings=surroundings,
+        z_m=tuple(each.z_m for each in declared[:count]),
+    )
 
 
 def _add_object(spec: mujoco.MjSpec, i: int) -> None:

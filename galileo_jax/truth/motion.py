@@ -1,6 +1,6 @@
 """How the objects of a truth move."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,8 +11,8 @@ from galileo_jax.rollout.motion import pitch, to_plane
 from galileo_jax.truth import solver as fine
 from galileo_jax.truth.truth import Truth
 
-Solver = Literal["rigid", "fine"]
-SOLVERS: tuple[Solver, ...] = ("rigid", "fine")
+Solver = Literal["rigid", "fine", "free"]
+SOLVERS: tuple[Solver, ...] = ("rigid", "fine")  # of motion in a plane
 LONGEST_S = 5.0
 # Between two records the motion is drawn straight: 0.05 mm off at most, in a hard impact.
 RECORD_S = fine.STEP_S * fine.STEPS_PER_RECORD
@@ -26,12 +26,17 @@ class Motion:
       times_s: `[time]`.
       position_m, velocity_m_s: `[object, 2, time]`.
       pitch_rad: `[object, time]`, counter-clockwise positive.
+      z_m: `[object, time]`, towards the camera; None in a plane.
+      quaternion: `[object, 4, time]`, how each is turned from flat and level, as
+        `engine_c_free.Poses`; None in a plane.
     """
 
     times_s: np.ndarray
     position_m: np.ndarray
     velocity_m_s: np.ndarray
     pitch_rad: np.ndarray
+    z_m: np.ndarray | None = None
+    quaternion: np.ndarray | None = None
 
     @property
     def rest_s(self) -> float:
@@ -58,6 +63,8 @@ class Motion:
             between(self.position_m),
             between(self.velocity_m_s),
             between(self.pitch_rad),
+            None if self.z_m is None else between(self.z_m),
+            None if self.quaternion is None else _unit(between(self.quaternion)),
         )
 
     def events_s(self, truth: Truth) -> dict[str, float | None]:
@@ -89,13 +96,16 @@ def roll_out(truth: Truth, solver: Solver = "rigid", seconds: float = LONGEST_S)
     Args:
       truth: its `motion_effects` act.
       solver: "rigid": the engine that also fits; "fine": small steps that share no event
-        logic with it (`solver.py`), for data that are to examine the fit.
+        logic with it (`solver.py`), for data that are to examine the fit; "free": from the first
+        hit on MuJoCo's bodies, which turn and tip.
       seconds: s.
 
     Raises:
       InputError: the simulation failed at these values.
     """
     scene = truth.surroundings
+    if solver == "free":
+        return _checked(truth, _roll_out_free(truth, seconds))
     if solver == "fine":
         path, speed, law = fine.solve(truth.motion_effects, scene, truth.theta, seconds)
         slopes = law.ramp_rad[None], law.table_rad[None]
@@ -103,14 +113,44 @@ def roll_out(truth: Truth, solver: Solver = "rigid", seconds: float = LONGEST_S)
         position, velocity = (np.moveaxis(values, 0, -1) for values in moved)
     else:
         position, velocity = _roll_out_rigid(truth, scene, seconds)
-    if not np.isfinite(position).all():
+    times = RECORD_S * np.arange(position.shape[-1])
+    turned = pitch(np.moveaxis(position, -1, 0), scene).T
+    return _checked(truth, Motion(times, position, velocity, turned))
+
+
+def _checked(truth: Truth, motion: Motion) -> Motion:
+    if not np.isfinite(motion.position_m).all():
         raise InputError(
             f"the simulation fails at masses {truth.mass_kg}, k {truth.friction}, "
             f"{dict(truth.effect_values)}"
         )
-    times = RECORD_S * np.arange(position.shape[-1])
-    turned = pitch(np.moveaxis(position, -1, 0), scene).T
-    return Motion(times, position, velocity, turned)
+    return motion
+
+
+def _unit(quaternion: np.ndarray) -> np.ndarray:
+    return quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+
+
+def _roll_out_free(truth: Truth, seconds: float) -> Motion:
+    import jax
+
+    from galileo_jax.rollout.engine_c_free import EngineCFree
+    from galileo_jax.rollout.model import SUBSTEPS, Model
+    from galileo_jax.scene.scene import compile_scene
+
+    shapes = [each.shape for each in truth.objects]
+    scene = compile_scene(truth.surroundings, shapes, truth.objects)
+    scene.spec.option.timestep = RECORD_S / SUBSTEPS
+    scene = replace(scene, model=scene.spec.compile())
+    model = Model(scene, seconds, truth.motion_effects, nuisances=(), motion="free")
+    with jax.enable_x64(True):
+        poses = EngineCFree(model).poses(np.array([[truth.theta[name] for name in model.names]]))
+    place, speed, turned = (values[0] for values in poses)
+    w, x, y, z = np.moveaxis(turned, 1, 0)
+    tipped = np.arcsin(np.clip(2 * (x * z - w * y), -1.0, 1.0))
+    planar = pitch(np.moveaxis(place[:, :2], -1, 0), scene.surroundings).T
+    times = RECORD_S * np.arange(place.shape[-1])
+    return Motion(times, place[:, :2], speed[:, :2], planar + tipped, place[:, 2], turned)
 
 
 def _roll_out_rigid(

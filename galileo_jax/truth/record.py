@@ -48,6 +48,7 @@ def truth_record(
             name: None if time is None else round(time + declared.release_s, 4)
             for name, time in events.items()
         },
+        **_off_the_plane(truth, motion),
         "trajectory": {"t": _rounded(frames.times_s + declared.release_s)}
         | {each.name: _trajectory(frames, i) for i, each in enumerate(truth.objects)},
         "frames": len(frames.times_s),
@@ -56,15 +57,31 @@ def truth_record(
     }
 
 
-def _trajectory(frames: Motion, index: int) -> Mapping[str, list[float]]:
+def _trajectory(frames: Motion, index: int) -> Mapping[str, list[Any]]:
     return {
         "y": _rounded(frames.position_m[index, 0]),
         "z": _rounded(frames.position_m[index, 1]),
         "pitch": _rounded(frames.pitch_rad[index]),
         "vy": _rounded(frames.velocity_m_s[index, 0]),
         "vz": _rounded(frames.velocity_m_s[index, 1]),
+    } | _turned(frames, index)
+
+
+def _off_the_plane(truth: Truth, motion: Motion) -> Mapping[str, Any]:
+    """Of free motion: that it is, and where the objects stand across the travel."""
+    if motion.z_m is None:
+        return {}
+    return {"motion": "free", "z_m": {each.name: each.z_m for each in truth.objects}}
+
+
+def _turned(frames: Motion, index: int) -> dict[str, list[Any]]:
+    if frames.z_m is None or frames.quaternion is None:
+        return {}
+    return {
+        "across": _rounded(frames.z_m[index]),
+        "quaternion": _rounded(frames.quaternion[index].T),
     }
 
 
-def _rounded(values: np.ndarray) -> list[float]:
+def _rounded(values: np.ndarray) -> list[Any]:
     return np.round(values, 6).tolist()

@@ -40,7 +40,7 @@ def draw_series(
 
     Args:
       ramp_angle_deg: as declared.
-      given: masses and frictions (m1, k1, ...) that are not to be drawn.
+      given: masses and frictions (m1, k1, ...) that are not to be drawn; z2, see `draw_truth`.
       hidden: what is hidden; of the parameters drawn, those of a trial differ between clips.
       count: how many clips.
       solver: see `roll_out`.

@@ -128,7 +128,7 @@ def draw_truth(
     Args:
       rng: of everything drawn.
       ramp_angle_deg: of the ramp.
-      given: masses and frictions.
+      given: masses and frictions; places across the travel (z2), which are 0 otherwise.
       scenario: ramp, multi or incline.
       shapes: of the objects, in the order of the travel; what is round rolls.
     """
@@ -163,6 +163,7 @@ def _draw(
             shape=shape,
             size_m=_size(shape, sizes[i]),
             rolls=True if shape in ("cylinder", "torus") else None,
+            z_m=float(given.get(f"z{i + 1}", 0.0)),
         )
         for i, shape in enumerate(shapes)
     )

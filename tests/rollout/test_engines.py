@@ -13,7 +13,6 @@ from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, make_fields
-from galileo_jax.scene.scene import Scene
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT, SMOOTH, make_model, make_theta
 from tests.reference_ramp import solve
@@ -243,7 +242,7 @@ def test_halving_the_steps(friction):
     model = make_model(experiment, 1.4)
     spec = model.scene.spec.copy()
     spec.option.timestep /= 2
-    fine = Model(Scene(spec, spec.compile(), model.scene.surroundings), 1.4)
+    fine = Model(replace(model.scene, model=spec.compile()), 1.4)
     theta = make_theta(model, experiment)[None]
     coarse = EngineC(model).simulate(theta)[1][0]
     halved = EngineC(fine).simulate(theta)[1][0][..., ::2]

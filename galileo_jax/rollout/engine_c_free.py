@@ -1,0 +1,308 @@
+"""The C engine with bodies that move freely: they turn, tip and leave the line of travel.
+
+Until two objects meet nothing makes them leave the plane: so far the rigid engine moves them,
+through the foot and with all its effects. From the instant of the first hit on they are MuJoCo's,
+with free joints and their true shapes, flat on the table: its steps begin with the hit, so that
+the motion does not depend on where in a step that falls. Effects act at the centres, along the
+travel, and through the friction coefficients, as in `engine_c`; faces are smooth. A clip shows a
+centre's x and y; how the bodies turn stands in `Poses`.
+"""
+
+# mujoco's classes live in a compiled module without stubs.
+# pyright: reportAttributeAccessIssue=false
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from galileo_jax.errors import InputError
+from galileo_jax.rollout.engine_c import LOOK_EVERY, is_at_rest
+from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.model import Model
+from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
+from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, Loads, make_loads, sliding_object
+from galileo_jax.scene.free_scene import free_model
+
+# Box contacts and the faces' damping are stable at it; halving it changes hardly anything.
+STEP_S = 1 / 3840
+CLEAR_M = 0.01  # starts are known within a few mm
+SETTLE_S = 0.5
+ALONG, ACROSS, UP = 0, 1, 2  # MuJoCo's axes; ACROSS points away from the camera
+# Coefficient of restitution against the faces' stiffness (1/s^2) and damping (1/s), measured on
+# two cubes that meet squarely: at 0.2 and 1.7 m/s, which differ by 0.03 at most.
+RESTITUTION = np.array(
+    [0.0, 0.008, 0.030, 0.065, 0.104, 0.181, 0.316, 0.440, 0.645, 0.797, 0.891, 0.954]
+)
+STIFFNESS = np.array([300.0, 1e5, *[4e5] * 10])
+DAMPING = np.array([*[3e3] * 3, 2e3, 1.5e3, 1e3, 600.0, 400.0, 200.0, 100.0, 50.0, 20.0])
+
+
+class Poses(NamedTuple):
+    """Where bodies are and how they are turned.
+
+    Attributes:
+      position_m, velocity_m_s: `[batch, object, 3, record]`: x along the travel, y up, z towards
+        the camera.
+      quaternion: `[batch, object, 4, record]`, how each is turned from flat and level, in
+        MuJoCo's axes (x, -z, y); 1 until MuJoCo takes over.
+    """
+
+    position_m: np.ndarray
+    velocity_m_s: np.ndarray
+    quaternion: np.ndarray
+
+
+class EngineCFree:
+    """Simulates batches of parameter vectors; as `EngineC`, with six coordinates per body."""
+
+    name = "c"
+
+    def __init__(self, model: Model):
+        """Compiles the scene.
+
+        Raises:
+          InputError: no two objects can meet on the table, or they meet at the foot.
+        """
+        _check(model)
+        self.model = model
+        self._planar = EngineRigid(model)
+        self.substeps = max(1, round(model.record_dt_s / STEP_S))
+        self.compiled = free_model(model.scene, model.record_dt_s / self.substeps)
+        self._sunk_m = _sunk_m(self.compiled)
+        self._batch = lru_cache(maxsize=4)(self._new_batch)
+
+    def _new_batch(self, size: int) -> Batch:
+        return Batch(self.compiled, nsim=size)
+
+    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
+        poses = self.poses(theta)
+        return poses.position_m[:, :, :2], poses.velocity_m_s[:, :, :2]
+
+    def poses(self, theta: np.ndarray) -> Poses:
+        """Where parameters `[batch, parameter]` take the objects, and how they turn them.
+
+        Entries of a rollout with non-finite parameters, one that MuJoCo gave up or one whose
+        objects meet while the first still crosses the foot are NaN.
+        """
+        theta = np.asarray(theta, float)
+        is_good = np.all(np.isfinite(theta), axis=1)
+        usable = np.where(is_good[:, None], theta, 0.5)
+        model, scene = self.model, self.model.scene.surroundings
+        effects, named = model.effects + model.nuisances, model.by_name(usable)
+        law = dynamics(effects, scene, named, np)
+        poses = self._planar_poses(usable)
+        begin = self._begin(poses)
+        if begin.min() < poses.position_m.shape[-1]:
+            law = law._replace(foot=np.ones_like(law.foot))  # what it did is done
+            is_good &= self._is_flat(poses, begin)
+            is_good &= self._go_on(poses, begin, law, make_loads(effects, scene, named, law))
+        for values in poses:
+            values[~is_good] = np.nan
+        return poses
+
+    def _planar_poses(self, theta: np.ndarray) -> Poses:
+        place, speed = (np.asarray(values, float) for values in self._planar.simulate(theta))
+        size, count, _, length = place.shape
+        across = np.tile(np.asarray(self.model.scene.z_m)[:, None, None], (size, 1, 1, length))
+        level = np.tile(np.array([1.0, 0.0, 0.0, 0.0])[:, None], (size, count, 1, length))
+        return Poses(
+            np.concatenate([place, across], axis=2),
+            np.concatenate([speed, np.zeros_like(across)], axis=2),
+            level,
+        )
+
+    def _begin(self, poses: Poses) -> np.ndarray:
+        """The last record before any faces meet, `[batch]`; the number of records if none do."""
+        half = np.asarray(self.model.scene.surroundings.half_length_m)
+        x, v = poses.position_m[:, :, 0], poses.velocity_m_s[:, :, 0]
+        gap = x[:, 1:] - x[:, :-1] - (half[1:] + half[:-1])[:, None]
+        closing = v[:, :-1] - v[:, 1:]
+        near = (closing > 0) & (gap < 1.5 * closing * self.model.record_dt_s)
+        meets: np.ndarray = np.any(near, axis=1)
+        return np.where(np.any(meets, axis=1), meets.argmax(axis=1), meets.shape[1])
+
+    def _is_flat(self, poses: Poses, begin: np.ndarray) -> np.ndarray:
+        """Whether all of object 1 is on the table when MuJoCo takes over, `[batch]`."""
+        last = np.minimum(begin, poses.position_m.shape[-1] - 1)
+        x = poses.position_m[np.arange(len(begin)), 0, 0, last]
+        return (begin > last) | (x >= _past_the_foot_m(self.model))
+
+    def _go_on(self, poses: Poses, begin: np.ndarray, law: Dynamics, loads: Loads) -> np.ndarray:
+        """Writes the motion from the hits on into `poses`; returns which rollouts were kept.
+
+        Rollouts are stepped side by side; one that has not come so far is held at its hit, and
+        each is `late` by a time of its own, until it is put back on the records' clock. (Forces
+        that depend on the time are early by that: a record and a half at most.)
+        """
+        model, scene = self.model, self.model.scene.surroundings
+        size, count, _, num_records = poses.position_m.shape
+        batch = self._batch(size)
+        self._write(batch, law)
+        places = batch.bind("qpos").reshape(size, count, 7)
+        speeds = batch.bind("qvel").reshape(size, count, 6)
+        forces = batch.bind("qfrc_applied").reshape(size, count, 6)
+        *first, late_s = self._first(poses, np.minimum(begin, num_records - 1), law)
+        after = Poses(*(values.copy() for values in poses))
+        dt, corner = float(self.compiled.opt.timestep), np.asarray(scene.corner_m)
+        before = np.full_like(speeds, np.inf)
+        for record in range(int(begin.min()), num_records):
+            waits = begin >= record
+            places[waits], speeds[waits] = first[0][waits], first[1][waits]
+            # Semi-implicit Euler is second order in x - dt v / 2 (leapfrog), first order in x.
+            centre = places[..., :3] - 0.5 * dt * speeds[..., :3]
+            self._record(after, record, centre, speeds[..., :3], law)
+            after.quaternion[..., record] = places[..., 3:]
+            if record == num_records - 1:
+                break
+            is_look = loads.is_steady and record % LOOK_EVERY == 0
+            if is_look and not waits.any() and is_at_rest(np.stack([before, speeds])):
+                for values in after:
+                    values[..., record + 1 :] = values[..., record, None]
+                after.velocity_m_s[..., record + 1 :] = 0.0
+                break
+            before = speeds.copy()
+            path, along = centre[..., ALONG] - corner, np.array(speeds[..., ALONG])
+            time_s = np.asarray(record * model.record_dt_s)
+            state = state_at(np.maximum(path, 0.0), along, time_s, scene)
+            if loads.force is not None:
+                forces[..., [ALONG, UP]] = loads.force(state).reshape(size, count, 2)
+            if loads.friction is not None:
+                self._rub(batch, loads.friction(state))
+            batch.step(nstep=self.substeps)
+        for i in np.flatnonzero(begin < num_records - 1):
+            own, mujocos = ([values[i] for values in some] for some in (poses, after))
+            _join(Poses(*own), Poses(*mujocos), begin[i], late_s[i] / model.record_dt_s, model)
+        return ~batch.warning.reshape(size, -1).any(axis=1)
+
+    def _first(
+        self, poses: Poses, begin: np.ndarray, law: Dynamics
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """MuJoCo's places and speeds at the hit, and how long after the record `begin` it is.
+
+        All are flat, and sunk in as at rest.
+        """
+        rows, (size, count) = np.arange(len(begin)), law.inertia.shape
+        cos = np.cos(law.table_rad)[:, None]
+        corner = np.asarray(self.model.scene.surroundings.corner_m)
+        places = np.tile(self.compiled.qpos0.reshape(count, 7), (size, 1, 1))
+        speeds = np.zeros((size, count, 6))
+        x, v = (values[rows, :, 0, begin] for values in (poses.position_m, poses.velocity_m_s))
+        earlier = poses.velocity_m_s[rows, :, 0, np.maximum(begin - 1, 0)]
+        a = (v - earlier) / self.model.record_dt_s
+        late_s = self._hit_s(x, v, a)[:, None]
+        v_hit = (v + a * late_s) / cos
+        path = (x + v * late_s + 0.5 * a * late_s**2 - corner) / cos
+        speeds[..., ALONG] = v_hit
+        places[..., ALONG] = corner + path + 0.5 * self.compiled.opt.timestep * v_hit
+        places[..., UP] -= self._sunk_m
+        return places, speeds, late_s[:, 0]
+
+    def _hit_s(self, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        """When the first faces meet, from `[batch, object]`; 0 where none are about to."""
+        half = np.asarray(self.model.scene.surroundings.half_length_m)
+        gap = np.diff(x, axis=1) - half[1:] - half[:-1]
+        closing, faster = -np.diff(v, axis=1), -np.diff(a, axis=1)
+        root = np.sqrt(np.maximum(closing**2 + 2 * faster * gap, 0.0))
+        meets = (closing > 0) & (root > 0)
+        times = np.where(meets, 2 * gap / np.where(meets, closing + root, 1.0), np.inf)
+        soonest = np.min(times, axis=1)
+        return np.where(soonest < 2 * self.model.record_dt_s, soonest, 0.0)
+
+    def _record(
+        self,
+        poses: Poses,
+        record: int,
+        centre: np.ndarray,
+        speed: np.ndarray,
+        law: Dynamics,
+    ) -> None:
+        """Writes one record; a table that slopes is tilted about the foot."""
+        corner = np.asarray(self.model.scene.surroundings.corner_m)
+        cos, sin = np.cos(law.table_rad)[:, None], np.sin(law.table_rad)[:, None]
+        path, up = centre[..., ALONG] - corner, centre[..., UP] + self._sunk_m
+        seen = corner + path * cos, up - path * sin, -centre[..., ACROSS]
+        along = speed[..., ALONG]
+        moves = along * cos, speed[..., UP] - along * sin, -speed[..., ACROSS]
+        poses.position_m[..., record] = np.stack(seen, axis=-1)
+        poses.velocity_m_s[..., record] = np.stack(moves, axis=-1)
+
+    def _write(self, batch: Batch, law: Dynamics) -> None:
+        """Writes masses, frictions and faces into the batch."""
+        compiled, inertia = self.compiled, law.inertia[..., None]
+        batch.state[:] = 0.0
+        batch.expand("body_mass")[:, 1:] = law.inertia
+        share = inertia / compiled.body_mass[1:, None]
+        batch.expand("body_inertia")[:, 1:] = compiled.body_inertia[1:] * share
+        faces = batch.expand("pair_solref")
+        for i in range(compiled.npair):
+            if sliding_object(compiled.pair(i).name) is None:
+                faces[:, i] = face_solref(law.restitution)
+        self._rub(batch, law.friction)
+        batch.bind("qpos")[:] = compiled.qpos0
+        batch.set_const()
+        batch.warning[...] = 0
+
+    def _rub(self, batch: Batch, friction: np.ndarray) -> None:
+        """Writes the objects' friction coefficients `[batch, object]` into their contacts."""
+        written = batch.expand("pair_friction")
+        for i in range(written.shape[1]):
+            which = sliding_object(self.compiled.pair(i).name)
+            if which is not None:
+                written[:, i, :2] = friction[:, which, None]
+
+
+def _join(planar: Poses, after: Poses, begin: int, late: float, model: Model) -> None:
+    """Puts one rollout's motion after its hit, which is `late` records, where it belongs."""
+    dt, count = model.record_dt_s, planar.position_m.shape[-1]
+    records = np.arange(begin + int(np.ceil(late)), count)
+    at = records - late
+    i = np.minimum(np.floor(at).astype(int), count - 2)
+    s = at - i
+    x0, x1 = after.position_m[..., i], after.position_m[..., i + 1]
+    v0, v1 = after.velocity_m_s[..., i] * dt, after.velocity_m_s[..., i + 1] * dt
+    a, b = 2 * (x0 - x1) + v0 + v1, 3 * (x1 - x0) - 2 * v0 - v1
+    planar.position_m[..., records] = ((a * s + b) * s + v0) * s + x0
+    planar.velocity_m_s[..., records] = (v0 + (v1 - v0) * s) / dt
+    turned = after.quaternion[..., i] * (1 - s) + after.quaternion[..., i + 1] * s
+    planar.quaternion[..., records] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
+def face_solref(restitution: np.ndarray) -> np.ndarray:
+    """The faces' (-stiffness, -damping) `[..., 2]` for a coefficient of restitution."""
+    stiffness = np.exp(np.interp(restitution, RESTITUTION, np.log(STIFFNESS)))
+    return np.stack([-stiffness, -np.interp(restitution, RESTITUTION, DAMPING)], axis=-1)
+
+
+def _past_the_foot_m(model: Model) -> float:
+    """Where object 1's centre (x) is when all of it is on the table, beyond the foot's zone."""
+    scene = model.scene.surroundings
+    return max(scene.half_length_m[0], scene.corner_m[0] + FOOT_ZONE_M)
+
+
+def _check(model: Model) -> None:
+    scene = model.scene.surroundings
+    if not scene.has_table or len(scene.names) < 2:
+        raise InputError("motion: free: two objects that meet on a table expected, or planar")
+    if any(scene.rolls):
+        raise InputError("motion: free: nothing may roll; objects that slide expected, or planar")
+    face = scene.start_m[1][0] - scene.half_length_m[1]
+    needed = _past_the_foot_m(model) + scene.half_length_m[0] + CLEAR_M
+    if face < needed:
+        raise InputError(
+            f"motion: free: {scene.names[1]}'s face is {face:.3f} m past the foot, where it is hit "
+            f"by what still crosses the foot; {needed:.3f} m or more expected, or planar"
+        )
+
+
+def _sunk_m(compiled: mujoco.MjModel) -> np.ndarray:
+    """How far the contacts give way under each object at rest, `[object]`, whatever its mass."""
+    data = mujoco.MjData(compiled)
+    apart = data.qpos.reshape(-1, 7)
+    apart[:, ALONG] = 10.0 + 10.0 * np.arange(len(apart))  # off the ramp and off each other
+    for _ in range(round(SETTLE_S / compiled.opt.timestep)):
+        mujoco.mj_step(compiled, data)
+    return compiled.qpos0.reshape(-1, 7)[:, UP] - data.qpos.reshape(-1, 7)[:, UP]
