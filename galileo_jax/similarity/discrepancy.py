@@ -20,6 +20,9 @@ KEYSTONE_SD = 0.006  # 1/m; half a degree of yaw or tilt, 1.5 m away
 CAMERA_M = 1.5  # a longer fall is seen from further away, at least its own length
 ROLL_SD_RAD = 0.002
 THROW_SD_RAD = 0.05  # nobody throws square to the camera: what comes nearer grows
+# Consumer lenses bend straight lines by about a hundredth at the picture's edge, about a centre
+# which is not quite the motion's; what is thrown is filmed to fill the picture.
+LENS_SD, LENS_CENTRE_SD = 0.01, 0.3
 READ_OFF = 10.0  # times an angle's sd: so wide that the direction tells nothing more
 SCALE_SD = 0.001
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
@@ -92,7 +95,7 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
 def _camera(
     position: np.ndarray, observation: Observation, scene: Surroundings
 ) -> list[np.ndarray]:
-    """Keystone about either axis and scale, common to all objects."""
+    """Keystone about either axis, the lens and scale, common to all objects."""
     found = []
     x, y = position[:, 0], position[:, 1]
     if scene.has_surface:
@@ -107,9 +110,33 @@ def _camera(
         yaw_sd = math.hypot(KEYSTONE_SD, THROW_SD_RAD / away_m)
         for axis, sd in enumerate((yaw_sd, KEYSTONE_SD)):
             found.append(sd * aside * aside[:, axis : axis + 1])
+        found.extend(_lens(aside, seen))
     else:
         found.append(_bent_scale(y, observation))
     found.append(SCALE_SD * position)
+    return found
+
+
+def _lens(aside: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
+    """A lens that magnifies what is further out more (or less): r (1 + k r^2).
+
+    About a centre c that is not the middle of the motion, to first order in c:
+    k (r^2 r - r^2 c - 2 (r.c) r); r is 1 at the furthest point seen.
+
+    Args:
+      aside: `[object, 2, frame]`, m, places about the middle of the motion.
+      seen: the same shape, where they were measured.
+    """
+    edge_m = np.abs(np.where(seen, aside, 0.0)).max()
+    if not edge_m:
+        return []
+    place = aside / edge_m
+    square = (place**2).sum(axis=1, keepdims=True)
+    found = [LENS_SD * edge_m * square * place]
+    for axis in range(2):
+        shift = 2.0 * place * place[:, axis : axis + 1]
+        shift[:, axis] += square[:, 0]
+        found.append(LENS_SD * LENS_CENTRE_SD * edge_m * shift)
     return found
 
 

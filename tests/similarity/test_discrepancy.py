@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.similarity.discrepancy import WOBBLE_SD_M, modes
+from galileo_jax.observation import Observation
+from galileo_jax.similarity.discrepancy import LENS_SD, WOBBLE_SD_M, modes
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
@@ -75,3 +77,41 @@ def test_without_a_camera_only_the_bodies_are_left(hit):
     assert len(bodies) == kept.sum() < len(both) - 4
     is_everywhere = (both[~kept][..., 0] != 0).any(axis=(1, 2))
     assert is_everywhere.sum() == 4, "two keystones, roll, scale; the others begin at the hit"
+
+
+def thrown(bend_m: np.ndarray | float = 0.0) -> Observation:
+    """A throw of 1 m, seen to 0.2 mm, `bend_m` `[2, frame]` off its parabola."""
+    times = np.linspace(0.0, 0.7, 15)
+    place = np.stack([1.5 * times, 3.0 * times - 9.81 * times**2 / 2]) + bend_m
+    error = 2e-4**2 * np.eye(2)[None, :, :, None]
+    seen = np.ones((1, len(times)), bool)
+    covariance = np.broadcast_to(error, (1, 2, 2, len(times)))
+    return Observation(("object1",), times, place[None], covariance, seen)
+
+
+def cost(bend_m: np.ndarray) -> float:
+    """chi2 of a throw `bend_m` off, of its modes alone."""
+    alone = replace(HIT, object2_x_m=None)
+    flight = replace(
+        make_surroundings(alone),
+        has_table=False,
+        has_surface=False,
+        comes_down=(False,),
+        moves_in_plane=True,
+        angle_rad=0.0,
+    )
+    data = GaussianLikelihood.prepare(thrown(bend_m), flight)
+    difference = data.observed_m - thrown().position_m
+    return float(np.sum(GaussianLikelihood.whiten_batch(difference, 1.0, data) ** 2))
+
+
+def test_a_lens_that_bends_a_flight_is_no_misfit():
+    """A barrel about a point off the middle, and a bend as large that no lens makes."""
+    place = thrown().position_m[0]
+    aside = place - np.array([[0.65], [0.2]])
+    edge = np.abs(aside).max()
+    barrel = -LENS_SD * aside * (aside**2).sum(axis=0) / edge**2
+    ripple = np.abs(barrel).max() * np.array([[1.0], [0.0]]) * np.sin(12 * place[0])
+    assert np.abs(barrel).max() > 10 * 2e-4, "it shows"
+    assert cost(barrel) < 4
+    assert cost(ripple) > 100
