@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax import command
+from galileo_jax.arrest import until_arrest
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
@@ -114,7 +115,10 @@ def measure(clip: Clip) -> Measured:
     if doubt is not None:
         _warn(doubt)
     doubts = () if doubt is None else (doubt,)
-    return replace(measured, inferred={**found, **measured.inferred}, doubts=doubts)
+    measured = replace(
+        measured, observation=_before_arrest(measured.clip, measured.observation), doubts=doubts
+    )
+    return replace(measured, inferred={**found, **measured.inferred})
 
 
 def _with_foot(clip: Clip) -> Clip:
@@ -193,3 +197,14 @@ def _observed(clip: Clip) -> Observation:
 
     with command.progress() as bar:
         return observe(clip, track_clip(clip, progress=bar))
+
+
+def _before_arrest(clip: Clip, observation: Observation) -> Observation:
+    """What is seen until something that is not in the scene stops the object."""
+    observation, end_s = until_arrest(clip, observation)
+    if end_s is not None:
+        _warn(
+            f"{clip.path}: {observation.names[0]} is stopped by something after {end_s:.3f} s; "
+            "what follows is left out"
+        )
+    return observation
