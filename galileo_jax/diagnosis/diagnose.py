@@ -162,6 +162,7 @@ def _candidates(
     found = fit_candidates(fitter, start, sets, seed)
     scores = score_tests(trials, start, sets)
     evidence = np.array([h.fit.log_evidence for h in found]) - base.fit.log_evidence
+    evidence += np.log([_odds(trials, hypothesis) for hypothesis in found])
     weight = np.append(evidence + np.log((1 - PRIOR_NONE) / len(found)), np.log(PRIOR_NONE))
     weight = np.exp(weight - weight.max())
     probability = weight / weight.sum()
@@ -181,6 +182,16 @@ def _candidates(
             )
         )
     return tuple(made)
+
+
+def _odds(trials: Trials, hypothesis: Hypothesis) -> float:
+    """Of a set of effects, as far as the clip leads to expect them: of the likeliest."""
+    problem = trials.problems[0]
+    theta = trials.of_clip(trials.theta(hypothesis.fit.z, hypothesis.fit.free), 0)
+    named = dict(zip(problem.model.names, theta, strict=True))
+    scene = problem.model.scene.surroundings
+    effects = [e for e in problem.model.effects if e.name in hypothesis.effects]
+    return max(effect.odds(named, scene) for effect in effects)
 
 
 def _compared(

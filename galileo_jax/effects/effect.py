@@ -54,6 +54,8 @@ class Bounce(NamedTuple):
     grip: Array
 
 
+FALL_LENGTH = "fall_length"  # in `Surroundings.expected`, of a high fall
+
 Force = Callable[[State], Array]
 Friction = Callable[[State, Array], Array]
 
@@ -184,6 +186,13 @@ class Effect:
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The unknowns it brings, the strength first; empty where it has no place."""
         raise NotImplementedError
+
+    def odds(self, theta: Theta, scene: Surroundings) -> float:
+        """How many times as likely as its prior says it is to be there, at these values.
+
+        1 but where what is known of the clip leads to expect it.
+        """
+        return 1.0
 
     def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """Moves the centres at the release along the path: `[..., object]` to the same."""

@@ -11,6 +11,9 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.effects.air import expected_drags
+from galileo_jax.effects.effect import FALL_LENGTH
+from galileo_jax.effects.nuisances.perspective import Perspective
 from galileo_jax.observation import Observation
 
 START_FRAMES = 6  # the start's velocity is read off so many
@@ -20,6 +23,8 @@ FLOOR_SD_M = 0.005  # as a declared height is known
 UNKNOWN_RADIUS_M = 0.05  # half the height of an object whose size nobody declared
 DENSITY_RATIO = (0.5, 0.8)  # steel in water 0.13, a bubble 800
 WEIGHED_RATIO_SD = 0.03  # where density, mass and size are declared
+EYE_M = 1.6  # as high as a camera is held
+DISTANCE = 1.5  # of the camera from a high fall, in its lengths: it fills half of the picture
 UNKNOWN_M_S, UNKNOWN_M = 10.0, 3.0  # widths where nobody knows how long a metre is
 
 
@@ -51,7 +56,31 @@ def expected(
         "period": (_period_s(times_s, down_m), PERIOD_SD),
         "density_ratio": _density_ratio(clip),
         "floor_height": _floor_height(clip, place_m[1], half_height_m),
+        **(_high_fall(clip, float(down_m.max())) if clip.scenario == "fall" and known else {}),
     }
+
+
+def _high_fall(clip: Clip, length_m: float) -> dict[str, tuple[float, float]]:
+    """How a high fall is seen, and what the air does there; nothing where it is low."""
+    found, declared = pitched(length_m), clip.objects[0]
+    if found and declared.shape == "sphere" and declared.size_m is not None:
+        found |= expected_drags(declared.size_m[0], length_m, clip.gravity)
+    return found
+
+
+def pitched(length_m: float) -> dict[str, tuple[float, float]]:
+    """What a camera that is held at eye height and aimed at the middle of a fall makes of it.
+
+    Nothing where the fall is so low that its middle can be at eye height. Else the camera looks
+    up (or, from where the fall begins, down) by atan t, and the scale changes along the fall by
+    p = t / (DISTANCE (1 + t^2)).
+    """
+    above_m = length_m / 2 - EYE_M
+    if above_m <= 0:
+        return {}
+    slope = above_m / (DISTANCE * length_m)
+    change = slope / (DISTANCE * (1 + slope**2))
+    return {Perspective.name: (0.0, change), FALL_LENGTH: (length_m, 0.0)}
 
 
 def _start_velocity(times_s: np.ndarray, place_m: np.ndarray) -> tuple[float, float]:

@@ -12,6 +12,7 @@ friction k where they hardly change.
 
 from typing import ClassVar
 
+from galileo_jax.effects.air import expected_odds
 from galileo_jax.effects.effect import Effect, Force, State, Surroundings, Theta
 from galileo_jax.effects.registry import register
 from galileo_jax.parameters import LogNormal, Parameter
@@ -31,6 +32,10 @@ class AirDrag(Effect):
         """The drag constant c."""
         prior = PRIOR if scene.has_surface else FALL_PRIOR
         return (Parameter("air_drag", "kg/m", prior, 0.0, "effect", 0.1),)
+
+    def odds(self, theta: Theta, scene: Surroundings) -> float:
+        """High where the drag of the air on a ball of known size is found in a high fall."""
+        return expected_odds(self.name, theta, scene, FALL_PRIOR)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The force -c v |v|."""

@@ -11,6 +11,7 @@ Confused with: air_drag where speeds span little; magnetic_brake where its zone 
 
 from typing import ClassVar
 
+from galileo_jax.effects.air import expected_odds
 from galileo_jax.effects.effect import Effect, Force, State, Surroundings, Theta
 from galileo_jax.effects.registry import register
 from galileo_jax.parameters import LogNormal, Parameter
@@ -30,6 +31,10 @@ class ViscousDrag(Effect):
         """The drag constant b."""
         prior = PRIOR if scene.has_surface else FALL_PRIOR
         return (Parameter("viscous_drag", "kg/s", prior, 0.0, "effect", 0.1),)
+
+    def odds(self, theta: Theta, scene: Surroundings) -> float:
+        """High where the drag of the air on a ball of known size is found in a high fall."""
+        return expected_odds(self.name, theta, scene, FALL_PRIOR)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The force -b v."""

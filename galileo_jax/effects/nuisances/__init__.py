@@ -7,6 +7,7 @@ from galileo_jax.effects.effect import Effect
 from galileo_jax.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.effects.nuisances.impact_restitution import ImpactRestitution
+from galileo_jax.effects.nuisances.perspective import Perspective
 from galileo_jax.effects.nuisances.pixel_scale import PixelScale
 from galileo_jax.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.effects.nuisances.start_offset import StartOffset
@@ -18,4 +19,5 @@ NUISANCES: tuple[Effect, ...] = (
     ImpactRestitution(),
     ReleaseInstant(),
     PixelScale(),
+    Perspective(),
 )
