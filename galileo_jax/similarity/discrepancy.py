@@ -20,9 +20,9 @@ KEYSTONE_SD = 0.006  # 1/m; half a degree of yaw or tilt, 1.5 m away
 CAMERA_M = 1.5  # a longer fall is seen from further away, at least its own length
 ROLL_SD_RAD = 0.002
 THROW_SD_RAD = 0.05  # nobody throws square to the camera: what comes nearer grows
-# Consumer lenses bend straight lines by about a hundredth at the picture's edge, about a centre
-# which is not quite the motion's; what is thrown is filmed to fill the picture.
-LENS_SD, LENS_CENTRE_SD = 0.01, 0.3
+# Lenses of phones and camcorders magnify the picture's edge by up to a hundredth more, about a
+# centre which is not quite the motion's; what is thrown is filmed to fill the picture.
+LENS_SD, LENS_CENTRE_SD = 0.005, 0.3
 READ_OFF = 10.0  # times an angle's sd: so wide that the direction tells nothing more
 SCALE_SD = 0.001
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
