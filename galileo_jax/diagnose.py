@@ -266,6 +266,8 @@ def _told(
             f"missing acceleration of {name}: {entry['formula']}"
             for name, entry in record["missing_force"]["objects"].items()
         ]
+    if "each_clip" in record:
+        lines += findings.each_clip(record["each_clip"])
     for row in record.get("left_one_out", []):
         lines.append(
             f"{row['clip']} predicted from the others: {row['rmse_before']:.4f} m/s, with what was "

@@ -22,6 +22,7 @@ from galileo_jax.comparison.compare import ADEQUATE_P, Comparison, compare
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
+from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.left_out import left_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.effects.forms import FORM_NAMES
@@ -133,7 +134,11 @@ def diagnose(
         before = left_out_rmse(trials, rounds[0].hypothesis)
         after = left_out_rmse(trials, rounds[-1].hypothesis)
         left_out = tuple(zip((p.name for p in trials.problems), before, after, strict=True))
-    return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out)
+    each: tuple[EachClip, ...] = ()
+    if len(trials.problems) > 1:
+        on_stage("looking at each clip by itself")
+        each = each_clip(trials, base.fit, first.comparison, seed)
+    return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each)
 
 
 def fitter_of(trials: Trials) -> GradientFitter:

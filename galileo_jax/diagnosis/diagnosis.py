@@ -7,6 +7,7 @@ import numpy as np
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.each_clip import EachClip
 from galileo_jax.effects.forms import FORM_NAMES
 
 Status = Literal["none", "named", "ambiguous", "unknown"]
@@ -104,6 +105,8 @@ class Diagnosis:
       candidates: of the first round, the most probable first.
       verdict: what is missing.
       missing: the missing force, where the verdict is unknown.
+      each_clip: of a series that no model without effects fits, each clip against the model of
+        all and by itself; else empty.
       left_one_out: per clip of a series, the rmse (m/s) predicted from the others, before and
         after; empty for one clip.
     """
@@ -113,6 +116,7 @@ class Diagnosis:
     verdict: Verdict
     missing: MissingForce | None = None
     left_one_out: tuple[tuple[str, float, float], ...] = ()
+    each_clip: tuple[EachClip, ...] = ()
 
     @property
     def base(self) -> Comparison:

@@ -7,6 +7,7 @@ import numpy as np
 
 from galileo_jax.comparison.document import comparison_document
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
+from galileo_jax.diagnosis.each_clip import kind_of
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.per_mass import SUFFIX
@@ -45,6 +46,22 @@ def diagnosis_document(trials: Trials, diagnosis: Diagnosis, seed: int) -> dict[
             {"clip": clip, "rmse_before": before, "rmse_after": after}
             for clip, before, after in diagnosis.left_one_out
         ]
+    if diagnosis.each_clip:
+        document["each_clip"] = {
+            "kind": kind_of(diagnosis.each_clip),
+            "clips": [
+                {
+                    "clip": one.clip,
+                    "chi2_together": one.chi2_together,
+                    "chi2_alone": one.chi2_alone,
+                    "p_alone": one.p_alone,
+                    "way_m": one.way_m.tolist(),
+                    "extra_acceleration_m_s2": one.extra_m_s2.tolist(),
+                    "sd_m_s2": one.sd_m_s2.tolist(),
+                }
+                for one in diagnosis.each_clip
+            ],
+        }
     return document
 
 

@@ -73,6 +73,7 @@ def write_diagnosis_page(path: Path, title: str, trials: Trials, told: Told) -> 
         *(_added(name, charts) for name, charts in added),
         _missing(told, trials.problems[0].observation.names),
         cells(diagnosis.base, several=len(trials.problems) > 1),
+        _each_clip(told.record.get("each_clip")),
         _left_one_out(told.record.get("left_one_out", [])),
         provenance(
             told.command,
@@ -197,6 +198,12 @@ def _missing(told: Told, names: Sequence[str]) -> str:
         f"simplest formula that fits: {'; '.join(said)}.",
         pictures,
     )
+
+
+def _each_clip(record: Mapping[str, Any] | None) -> str:
+    if record is None:
+        return ""
+    return f"<h2>Each clip by itself</h2>\n{items(findings.each_clip(record))}"
 
 
 def _left_one_out(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -79,6 +79,31 @@ def verdict(diagnosis: Diagnosis) -> str:
     return f"Something I do not know: no effect that I know explains the data{where}."
 
 
+CLIPS_KINDS = {
+    "shared": "each clip fits by itself: what they share is not the same in all of them",
+    "some": "some clips fit by themselves, others do not",
+    "alike": "no clip fits by itself, and all miss the same along the way: it belongs to the place",
+    "different": "no clip fits by itself, and each misses something else along the way: "
+    "it does not belong to the place",
+}
+
+
+def each_clip(record: Mapping[str, Any]) -> list[str]:
+    """How clips that are not explained together differ: `each_clip` of diagnosis.json."""
+    found = [f"clips: {CLIPS_KINDS[record['kind']]}"]
+    for one in record["clips"]:
+        parts = ", ".join(
+            f"{extra:+.3f} +- {sd:.3f}"
+            for extra, sd in zip(one["extra_acceleration_m_s2"], one["sd_m_s2"], strict=True)
+        )
+        found.append(
+            f"{one['clip']}: chi2 {one['chi2_together']:.2f} per value, by itself "
+            f"{one['chi2_alone']:.2f} ({p_equals(one['p_alone'])}); accelerates more than the "
+            f"model of all by {parts} m/s^2 in the quarters of its way"
+        )
+    return found
+
+
 def how_to_go_on(
     diagnosis: Diagnosis, clips: Sequence[str], effects_from: Sequence[str] = ()
 ) -> str:
