@@ -137,7 +137,7 @@ def diagnose(
     each: tuple[EachClip, ...] = ()
     if len(trials.problems) > 1:
         on_stage("looking at each clip by itself")
-        each = each_clip(trials, base.fit, first.comparison, seed)
+        each = each_clip(trials, base.fit, first.comparison)
     return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each)
 
 

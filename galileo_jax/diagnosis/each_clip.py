@@ -5,7 +5,9 @@ the way that object 1 goes in it; its start (the instant of the release) is its 
 
     observed - predicted = sum_j a_j d_j(t) + tau v(t),    d_j'' = 1 in part j, 0 elsewhere
 
-by least squares in the whitened residuals.
+by least squares, with the tracker's errors alone: what a camera's pitch may take up shows. What is
+left is smooth, so that standard deviations are widened by its size and by sqrt((1 + r) / (1 - r)),
+r: the correlation of neighbours.
 """
 
 from dataclasses import dataclass
@@ -15,12 +17,15 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
-from galileo_jax.comparison.compare import ADEQUATE_P, NOISE_SCALE_RANGE, Comparison, compare
+from galileo_jax.comparison.bootstrap import whitened
+from galileo_jax.comparison.compare import ADEQUATE_P, NOISE_SCALE_RANGE, Comparison
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.trials import Trials
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NUM_PARTS = 4  # quarters, as they are called
 ALIKE_P = 0.01
+MOST_ALIKE = 0.99  # of neighbours
 FINE = 20  # steps from frame to frame in which accelerations are summed up
 
 Kind = Literal["shared", "some", "alike", "different"]
@@ -34,7 +39,8 @@ class EachClip:
       clip: its name.
       chi2_together, chi2_alone: per number measured, under the model of all clips and refitted
         by itself.
-      p_alone: of the model being adequate for it by itself.
+      p_alone: of a chi2 as large as that by itself. (Replicates say little here: what several
+        clips determine, one alone may not.)
       way_m: `[part + 1]`, how far object 1 has gone at the edges of the parts.
       extra_m_s2, sd_m_s2: `[part]`, how much more it accelerates than the model of all clips.
     """
@@ -48,18 +54,15 @@ class EachClip:
     sd_m_s2: np.ndarray
 
 
-def each_clip(
-    trials: Trials, fit: GradientFit, comparison: Comparison, seed: int
-) -> tuple[EachClip, ...]:
+def each_clip(trials: Trials, fit: GradientFit, comparison: Comparison) -> tuple[EachClip, ...]:
     """Every clip against the model of all and by itself.
 
     Args:
       trials: several clips.
       fit: of all together, without effects.
       comparison: of that fit with the data.
-      seed: of the replicates.
     """
-    return tuple(_one(trials, fit, comparison, clip, seed) for clip in range(len(trials.problems)))
+    return tuple(_one(trials, fit, comparison, clip) for clip in range(len(trials.problems)))
 
 
 def kind_of(found: tuple[EachClip, ...]) -> Kind:
@@ -81,36 +84,32 @@ def kind_of(found: tuple[EachClip, ...]) -> Kind:
     return "alike" if is_alike else "different"
 
 
-def _one(
-    trials: Trials, fit: GradientFit, comparison: Comparison, clip: int, seed: int
-) -> EachClip:
+def _one(trials: Trials, fit: GradientFit, comparison: Comparison, clip: int) -> EachClip:
     alone, columns = trials.alone(clip), trials.columns[clip]
     start, free = fit.z[columns], fit.free[columns]
     found = GradientFitter(alone).fit_from(start[None], free[None], np.zeros(1, int))[0]
-    compared = compare(alone, found, seed)
-    way, extra, sd = _parts(trials, fit, comparison.white[clip], clip)
+    theta = alone.theta(found.z, found.free)
+    scale = np.clip([alone.noise_scale(theta, 0)], *NOISE_SCALE_RANGE)
+    left = float(np.sum(whitened(alone, theta[None], scale)[0] ** 2))
+    values = float(trials.problems[clip].data.num_values)
+    way, extra, sd = _parts(trials, fit, clip)
     return EachClip(
         clip=trials.problems[clip].name,
-        chi2_together=_chi2(trials, comparison.white[clip], clip),
-        chi2_alone=_chi2(trials, compared.white[0], clip),
-        p_alone=compared.p_value,
+        chi2_together=float(np.sum(comparison.white[clip] ** 2)) / values,
+        chi2_alone=left / values,
+        p_alone=float(stats.chi2.sf(left, values)),
         way_m=way,
         extra_m_s2=extra,
         sd_m_s2=sd,
     )
 
 
-def _chi2(trials: Trials, white: np.ndarray, clip: int) -> float:
-    return float(np.sum(white**2) / trials.problems[clip].data.num_values)
-
-
 def _parts(
-    trials: Trials, fit: GradientFit, white: np.ndarray, clip: int
+    trials: Trials, fit: GradientFit, clip: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Edges of the parts, extra accelerations and their standard deviations."""
     problem = trials.problems[clip]
-    shared = trials.theta(fit.z, fit.free)
-    theta = trials.of_clip(shared, clip)
+    theta = trials.of_clip(trials.theta(fit.z, fit.free), clip)
     predicted = problem.simulate(theta)
     seen = np.flatnonzero(problem.observation.mask[0])
     times_s = problem.observation.times_s[seen[0] : seen[-1] + 1]
@@ -127,15 +126,16 @@ def _parts(
         inside = (fine > low) & (fine <= high)
         far = np.cumsum(np.cumsum(inside)) * step_s**2
         shapes.append(way * np.interp(times_s, fine_s, far))
-    changed = np.tile(predicted, (len(shapes), 1, 1, 1))
-    for one, shape in zip(changed, shapes, strict=True):
-        one[0][:, seen[0] : seen[-1] + 1] -= shape
-    # As the comparison judges residuals.
-    scale = float(np.clip(trials.noise_scale(shared, clip), *NOISE_SCALE_RANGE))
-    design = problem.whiten(changed, scale) - problem.whiten(predicted, scale)
-    left = white.reshape(-1)
+    moved = np.zeros((len(shapes), *predicted.shape))
+    moved[:, 0, :, seen[0] : seen[-1] + 1] = shapes
+    scene = problem.model.scene.surroundings
+    data = GaussianLikelihood.prepare(problem.observation, scene, "tracker")
+    left = GaussianLikelihood.whiten_batch(data.observed_m - predicted, 1.0, data)
+    design = GaussianLikelihood.whiten_batch(moved, 1.0, data)
     inverse = np.linalg.pinv(design @ design.T)
     found = inverse @ (design @ left)
-    rest = np.sum((left - found @ design) ** 2) / max(problem.data.num_values - len(found), 1)
-    sd = np.sqrt(np.diagonal(inverse) * max(1.0, float(rest)))
-    return edges, found[1:], sd[1:]
+    left = np.asarray(left - found @ design).reshape(predicted.shape)[0][:, seen]
+    rest = np.sum(left**2) / max(data.num_values - len(found), 1)
+    alike = np.clip(np.sum(left[:, 1:] * left[:, :-1]) / np.sum(left**2), 0.0, MOST_ALIKE)
+    widened = max(1.0, float(rest)) * (1 + alike) / (1 - alike)
+    return edges, found[1:], np.sqrt(np.diagonal(inverse) * widened)[1:]

@@ -82,7 +82,7 @@ def verdict(diagnosis: Diagnosis) -> str:
 CLIPS_KINDS = {
     "shared": "each clip fits by itself: what they share is not the same in all of them",
     "some": "some clips fit by themselves, others do not",
-    "alike": "no clip fits by itself, and all miss the same along the way: it belongs to the place",
+    "alike": "no clip fits by itself; what they miss along the way is the same within its errors",
     "different": "no clip fits by itself, and each misses something else along the way: "
     "it does not belong to the place",
 }

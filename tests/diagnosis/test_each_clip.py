@@ -75,7 +75,7 @@ def test_the_clip_that_differs_is_told_and_how(tmp_path):
     fit = GradientFitter(trials, Settings(num_exact=0)).fit(0, effects=())
     comparison = compare(trials, fit, 0)
     assert not comparison.is_adequate
-    found = each_clip(trials, fit, comparison, 0)
+    found = each_clip(trials, fit, comparison)
     assert kind_of(found) == "some"
     assert found[0].p_alone > 0.01 > 1e-6 > found[1].p_alone
     # Against the model of both: what changes half way is known whatever that model is.
