@@ -14,7 +14,8 @@ from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.gradient import DAMPINGS
 from galileo_jax.inference.trials import NOISE_SD, Trials
 
-MAX_STEPS, ENOUGH = 25, 0.1
+# What friction takes up of a constant force is a soft direction: it must be followed to its end.
+MAX_STEPS, ENOUGH = 60, 0.005
 SMALL_STEP = 0.02  # of differences, as a share of a parameter's coarse step
 
 

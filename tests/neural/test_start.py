@@ -59,4 +59,4 @@ def test_only_chains_can_start_from_it(capsys):
     from galileo_jax import command, fit
 
     assert command.run(fit.main, ["clip.yaml", "--init", "cnn"]) == 2
-    assert "--init cnn: it starts the chains of --method mh" in capsys.readouterr().err
+    assert "--init: of --method mh, not of grad" in capsys.readouterr().err
