@@ -130,6 +130,8 @@ def tracked(path: Path, cache: Path) -> Path:
         write_observation_csv(kept.with_suffix(".csv"), observe(clip, track_clip(clip)))
         content = yaml.safe_load(path.read_text())
         del content["video"]
+        for item in content["objects"]:
+            item.pop("point_px", None)  # it is where the track begins
         content["track"] = f"{kept.stem}.csv"
         write_text(kept, yaml.safe_dump(content, sort_keys=False))
     return kept

@@ -9,7 +9,8 @@ the data rule out.
 Where an effect is (its place, moment, wavelength) is a question with many wrong answers near
 the right one. Two kinds of starts answer it: scattered ones; and matched ones, the shapes whose
 slopes at no strength take most of the misfit away (a matched filter: the score test over all
-shapes). The best of either kind is refined.
+shapes). The best of either kind is refined. Then all start once more, matched to what the best
+candidate explains, with all else where that one has it.
 """
 
 from collections.abc import Sequence
@@ -29,7 +30,7 @@ NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best 
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1
 SMALL_QUANTILE_Z = -2.0
-NUM_REFITTED = 3
+NUM_REFITTED, OUT_OF_THE_RACE = 3, 100.0  # candidates, unless so many nats behind the best
 NUM_SHAPES, NUM_MATCHED = 96, 3  # tried per candidate whose effect has a shape; kept as starts
 SHOWS = 1e-9  # a slope below does not
 MOST_Z = 2.5  # of a matched strength's prior
@@ -74,7 +75,9 @@ def fit_candidates(
     fits = _seconded(fitter, base.fit, candidates, fits, seed)
     # The winners are looked at once more: their order must not hang on a side valley.
     # The search's coarse noise cannot say which of a candidate's starts ends best, either.
-    winners = np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]
+    evidence = np.array([fit.log_evidence for fit in fits])
+    winners = np.argsort(-evidence)[:NUM_REFITTED]
+    winners = winners[evidence[winners] > evidence.max() - OUT_OF_THE_RACE]
     rows = np.flatnonzero(np.isin(of, winners))
     again = fitter.fit_from(z[rows], free[of[rows]], np.arange(len(rows)))
     for i in winners:
