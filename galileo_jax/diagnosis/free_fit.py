@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from galileo_jax.comparison.bootstrap import whitened
-from galileo_jax.inference.fits.gradient import DAMPINGS
+from galileo_jax.inference.fits.steps import DAMPINGS
 from galileo_jax.inference.trials import NOISE_SD, Trials
 
 # What friction takes up of a constant force is a soft direction: it must be followed to its end.

@@ -19,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.problem import Problem
+from galileo_jax.kept import kept
 from galileo_jax.parameters import LogNormal, Parameter, PriorTable
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
@@ -138,7 +139,7 @@ class Trials:
 
     def theta(self, z: np.ndarray, free: np.ndarray | None = None) -> np.ndarray:
         """Parameters in their units, `[..., parameter]`, noise scales last."""
-        theta = np.asarray(_forward(self.priors, jnp.asarray(z)))
+        theta = np.asarray(in_units(self.priors, jnp.asarray(z)))
         return theta if free is None else np.where(free, theta, self.absent)
 
     def of_clip(self, theta: np.ndarray, clip: int) -> np.ndarray:
@@ -177,4 +178,7 @@ class Trials:
         return jnp.where(jnp.isfinite(total), total, -jnp.inf)
 
 
-_forward = jax.jit(lambda priors, z: priors.forward(z))
+@kept(num_static=0)
+def in_units(priors: PriorTable, z: jax.Array) -> jax.Array:
+    """`PriorTable.forward`, compiled."""
+    return priors.forward(z)

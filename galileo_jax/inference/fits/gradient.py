@@ -35,7 +35,7 @@ from scipy.special import ndtri
 from galileo_jax.effects.effect import Surroundings
 from galileo_jax.inference.fits.steps import DAMPINGS, Damped, Edges, normal_matrices
 from galileo_jax.inference.problem import Problem, seen
-from galileo_jax.inference.trials import NOISE_SD, Trials
+from galileo_jax.inference.trials import NOISE_SD, Trials, in_units
 from galileo_jax.kept import kept
 from galileo_jax.parameters import PriorTable, inverse
 from galileo_jax.rollout.chunks import (
@@ -632,7 +632,7 @@ class _Clip:
     def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """`[point, joint parameter]` to this clip's parameters in their units."""
         own, is_free = z[:, self.column], free[:, self.column]
-        theta = in_chunks(MOTIONS, lambda rows: _forward(self.priors, rows), own)
+        theta = in_chunks(MOTIONS, lambda rows: in_units(self.priors, rows), own)
         return np.where(is_free, theta, self.absent)
 
     def search_noise(self, settings: Settings) -> float:
@@ -715,11 +715,6 @@ def _solve(kinds, dampings, size, z, free, noise, index, motions, clips):
 
     for_dampings = jax.vmap(one, (0, *[None] * 6))
     return jax.vmap(for_dampings, (None, *[0] * 6))(dampings, size, z, free, noise, index, motions)
-
-
-@kept(num_static=0)
-def _forward(priors, z):
-    return priors.forward(z)
 
 
 POINTS = (4, 16)  # sizes of compiled batches of hypotheses
