@@ -12,6 +12,8 @@ import numpy as np
 FRAMES, RECORDS = 64, 512
 SPARE_MODES = 128  # beside one per object and frame
 MOTIONS = (16, 64)  # of batches of rollouts
+# Three parts a quarter as large, side by side, are done sooner than a large one a quarter empty.
+FILLED = 0.75
 
 
 def rounded_up(size: int, multiple: int) -> int:
@@ -59,11 +61,11 @@ def _num_cores() -> int:
 
 
 def _cuts(count: int, sizes: Sequence[int]) -> Iterator[tuple[int, int, int]]:
-    """Begin, end and padded size of each part."""
+    """Begin, end and padded size of each part: of the largest size that is filled so far."""
     begin = 0
     while begin < count:
         left = count - begin
-        size = next((size for size in sizes if size >= left), sizes[-1])
+        size = next((size for size in reversed(sizes) if left > FILLED * size), sizes[0])
         end = begin + min(size, left)
         yield begin, end, size
         begin = end
