@@ -132,11 +132,12 @@ def infer(
     acceptance: Acceptance = Acceptance.COIN,
     selection: Selection = Selection.BEST,
     num_chains: int = NUM_CHAINS,
+    num_steps: int = NUM_STEPS,
     on_block: Callable[[Progress], None] | None = None,
 ) -> ThesisResult:
     """Runs 16 chains of 75 steps from uniform starts and selects an answer.
 
-    Costs 16 x 76 = 1216 evaluations, whatever happens.
+    Costs 16 x 76 = 1216 evaluations, whatever happens, where nothing else is asked for.
 
     Arguments:
       key: same key, same answer.
@@ -145,7 +146,8 @@ def infer(
       acceptance: the thesis's coin, or a true Metropolis-Hastings step.
       selection: how the answer is taken from the chains.
       num_chains: the thesis has 16.
-      on_block: called three times.
+      num_steps: of each, a multiple of 25; the thesis has 75.
+      on_block: called after every 25 steps.
     """
     start_key, key = jax.random.split(key)
     posterior = sample(
@@ -154,7 +156,7 @@ def infer(
         log_similarity,
         jax.random.uniform(start_key, (num_chains, len(names)), minval=1e-6),
         names,
-        settings=Settings(warmup_steps=0, block_steps=25, max_steps=NUM_STEPS, stops_early=False),
+        settings=Settings(warmup_steps=0, block_steps=25, max_steps=num_steps, stops_early=False),
         on_block=on_block,
     )
     return ThesisResult(estimate=select(posterior, selection), posterior=posterior)
