@@ -7,7 +7,7 @@ ignorance the data have taken away.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, Protocol
 
 import jax
@@ -136,6 +136,14 @@ class Parameter:
     role: Role = "main"
     step: float | None = 0.02
     per_clip: bool = False
+
+
+def joined(one: Parameter, other: Parameter) -> Parameter:
+    """`one`, with room for what `other` allows: two scenes may show different parts of a way."""
+    a, b = one.prior, other.prior
+    if isinstance(a, Uniform) and isinstance(b, Uniform):
+        return replace(one, prior=Uniform(min(a.low, b.low), max(a.high, b.high)))
+    return one
 
 
 class PriorTable(NamedTuple):

@@ -23,7 +23,7 @@ from galileo_jax.effects.registry import load_file, load_library, make_effects
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json, write_text
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.problem import Problem, with_shared_parameters
 from galileo_jax.inference.trials import Trials
 from galileo_jax.observation import Observation
 from galileo_jax.rollout.engines import make_engine
@@ -103,12 +103,11 @@ def make_trials(
     motion: str = "planar",
 ) -> Trials:
     """Clips of the same objects with the same model."""
-    return Trials(
-        tuple(
-            make_problem(clip, observation, engine, effects, noise, motion)
-            for clip, observation in zip(clips, observations, strict=True)
-        )
-    )
+    problems = [
+        make_problem(clip, observation, engine, effects, noise, motion)
+        for clip, observation in zip(clips, observations, strict=True)
+    ]
+    return Trials(with_shared_parameters(problems))
 
 
 def save_run(

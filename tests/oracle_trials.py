@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from galileo_jax.effects.effect import Effect
-from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.problem import Problem, with_shared_parameters
 from galileo_jax.inference.trials import Trials
 from galileo_jax.observation import Observation
 from galileo_jax.rollout.engine_rigid import EngineRigid
@@ -40,4 +40,4 @@ def make_trials(
         model = replace(make_model(experiment, CLIP_S), effects=effects)
         seen = observe(experiment, seed + 1000 * clip)
         problems.append(Problem(seen, model, EngineRigid(model), f"clip{clip + 1}"))
-    return Trials(tuple(problems))
+    return Trials(with_shared_parameters(problems))

@@ -1,7 +1,7 @@
 """The inverse problem of one clip: its data, and a model of it."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import jax
@@ -11,8 +11,9 @@ import numpy as np
 from galileo_jax.effects.effect import Effect, Surroundings
 from galileo_jax.kept import kept
 from galileo_jax.observation import Observation
-from galileo_jax.parameters import Parameter
+from galileo_jax.parameters import Parameter, joined
 from galileo_jax.rollout.chunks import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
+from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
@@ -90,6 +91,26 @@ class Problem:
         """
         difference = self.data.observed_m - predicted_m
         return GaussianLikelihood.whiten_batch(difference, noise_scale, self.data)
+
+
+def with_shared_parameters(problems: Sequence[Problem]) -> tuple[Problem, ...]:
+    """The problems of several clips, with one prior for each of the parameters they share."""
+    found: dict[str, Parameter] = {}
+    for problem in problems:
+        for parameter in problem.parameters:
+            if parameter.role != "nuisance" and not parameter.per_clip:
+                found[parameter.name] = joined(found.get(parameter.name, parameter), parameter)
+    return tuple(_sharing(problem, found) for problem in problems)
+
+
+def _sharing(problem: Problem, found: Mapping[str, Parameter]) -> Problem:
+    shared = tuple(
+        found[p.name] for p in problem.parameters if p.name in found and p != found[p.name]
+    )
+    if not shared:
+        return problem
+    model = replace(problem.model, shared=shared)
+    return replace(problem, model=model, engine=make_engine(problem.engine.name, model))
 
 
 def seen(

@@ -32,7 +32,11 @@ class Trials:
     """Clips of the same objects.
 
     Attributes:
-      problems: one per clip, all with the same effects.
+      problems: one per clip, all with the same effects and, as `with_shared_parameters` leaves
+        them, the same priors of what they share.
+
+    Raises:
+      ValueError: by the first use of its parameters; what clips share has several priors.
     """
 
     problems: tuple[Problem, ...]
@@ -51,6 +55,11 @@ class Trials:
                 if name not in where:
                     where[name] = len(parameters)
                     parameters.append(replace(parameter, name=name))
+                elif parameters[where[name]].prior != parameter.prior:
+                    raise ValueError(
+                        f"{problem.name}: {name} has another prior than in an earlier clip, "
+                        "so that one z would be two values; see problem.with_shared_parameters"
+                    )
                 column.append(where[name])
             columns.append(np.array(column))
         return tuple(parameters), tuple(columns)

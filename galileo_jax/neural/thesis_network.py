@@ -74,6 +74,12 @@ def count_parameters(network: nnx.Module) -> int:
     return sum(leaf.size for leaf in jax.tree.leaves(nnx.state(network, nnx.Param)))
 
 
-def mean_absolute_error(network: ThesisNetwork, batch: dict[str, jax.Array]) -> jax.Array:
-    """The thesis's loss, each number in units of its range: frictions count like masses."""
-    return jnp.mean(jnp.abs(network(batch["profile"]) - batch["target"]) / jnp.asarray(RANGES))
+def log_mean_absolute_errors(network: ThesisNetwork, batch: dict[str, jax.Array]) -> jax.Array:
+    """The thesis's loss, each of the four mean absolute errors in units of itself.
+
+    That is the mean of their logarithms: the likelihood of Laplace's law with a width of its own
+    for each number (Kendall, Gal and Cipolla 2018, arXiv 1705.07115). A plain sum would be that of
+    the masses, of which a profile shows no more than the ratio, and frictions would hardly count.
+    """
+    error = jnp.abs(network(batch["profile"]) - batch["target"])
+    return jnp.mean(jnp.log(jnp.mean(error, axis=0)))

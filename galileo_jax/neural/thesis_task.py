@@ -11,7 +11,7 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.effects.effect import Surroundings
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Arrays
-from galileo_jax.neural.thesis_network import RANGES, ThesisNetwork, mean_absolute_error
+from galileo_jax.neural.thesis_network import RANGES, ThesisNetwork, log_mean_absolute_errors
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine
@@ -29,7 +29,7 @@ CM = 100.0
 class ThesisTask:
     """Data, network and loss of preset `thesis`."""
 
-    loss = staticmethod(mean_absolute_error)
+    loss = staticmethod(log_mean_absolute_errors)
     shard_size = 2000
 
     def __init__(self, config: TrainConfig):

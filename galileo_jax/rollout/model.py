@@ -29,6 +29,8 @@ class Model:
       effects: physical effects that are part of the hypothesis (none is the base model).
       nuisances: always there, after the scenario's own laws.
       motion: "planar", or "free": from the first hit on bodies turn and tip.
+      shared: parameters that stand in place of this scene's own of the same name: one prior for
+        the clips of a series, however far each of them sees.
     """
 
     scene: Scene
@@ -36,6 +38,7 @@ class Model:
     effects: tuple[Effect, ...] = ()
     nuisances: tuple[Effect, ...] = field(default=LAWS + NUISANCES)
     motion: str = "planar"
+    shared: tuple[Parameter, ...] = ()
 
     @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -50,7 +53,8 @@ class Model:
                 found.append(Parameter(f"k{i + 1}", "1", FRICTION_PRIOR, 0.0, "main", 0.02))
         for effect in self.effects + self.nuisances:
             found.extend(effect.parameters(scene))
-        return tuple(found)
+        shared = {parameter.name: parameter for parameter in self.shared}
+        return tuple(shared.get(parameter.name, parameter) for parameter in found)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

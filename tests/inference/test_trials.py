@@ -7,8 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.effects.registry import make_effects
-from galileo_jax.inference.trials import NOISE_SD
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.trials import NOISE_SD, Trials
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -131,3 +133,33 @@ def test_all_effects_pinned_is_the_base_model(base, library):
     moved = float(library.log_density(jnp.asarray(z), free))
     assert moved - pinned == pytest.approx(-0.5 * np.sum(~free), rel=1e-6)
     assert float(library.log_density(jnp.asarray(z))) != pytest.approx(moved, abs=1.0)
+
+
+def test_a_place_is_the_same_in_all_clips():
+    """Each clip sees another part of the way, and its own prior would put a z elsewhere."""
+    trials = make_trials([HIT, STEEPER], effects=make_effects(("friction_patch",)))
+    where = trials.names.index("friction_patch_start")
+    priors = [
+        next(p.prior for p in problem.parameters if p.name == "friction_patch_start")
+        for problem in trials.problems
+    ]
+    assert priors[0] == priors[1]
+    assert priors[0].low == pytest.approx(-max(HIT.release_m, STEEPER.release_m), abs=0.05)
+    z = draw(trials)
+    z[trials.names.index("friction_patch")] = 1.0
+    z[where] = 0.4
+    count = len(trials.model_parameters)
+    fitter = GradientFitter(trials)
+    points = fitter._batch(z[None, :count], np.ones((1, count), bool))
+    found = fitter._whites(points._replace(noise=np.ones((1, 2))))
+    expected = whitened(trials, trials.theta(z)[None], np.ones(2))
+    for own, joint in zip(found, expected, strict=True):
+        assert np.sum(own**2) == pytest.approx(np.sum(joint**2), rel=BETWEEN_PROGRAMS)
+
+
+def test_clips_that_disagree_about_a_prior_are_refused():
+    trials = make_trials([HIT, STEEPER], effects=make_effects(("friction_patch",)))
+    parted = [replace(p, model=replace(p.model, shared=())) for p in trials.problems]
+    own = Trials(tuple(parted))
+    with pytest.raises(ValueError, match="friction_patch_start has another prior"):
+        own.names  # noqa: B018
