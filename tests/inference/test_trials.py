@@ -11,6 +11,7 @@ from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.effects.registry import make_effects
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.trials import NOISE_SD, Trials
+from galileo_jax.parameters import Uniform
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -144,6 +145,7 @@ def test_a_place_is_the_same_in_all_clips():
         for problem in trials.problems
     ]
     assert priors[0] == priors[1]
+    assert isinstance(priors[0], Uniform)
     assert priors[0].low == pytest.approx(-max(HIT.release_m, STEEPER.release_m), abs=0.05)
     z = draw(trials)
     z[trials.names.index("friction_patch")] = 1.0
