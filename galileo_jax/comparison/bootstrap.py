@@ -61,8 +61,9 @@ def replicates(
     base = np.concatenate(_at(trials, fit, fit.z[None], noise_scale), axis=1)
 
     moved = np.zeros((count, len(free)))
-    residual, cost = noise, np.full(count, np.inf)
-    best = noise
+    # Where the Jacobian does not hold no step may help: then the truth itself is the fit.
+    residual = best = noise
+    cost = np.sum(noise**2, axis=1) + np.sum(centre**2, axis=1)
     for _ in range(NUM_STEPS):
         moved = moved - (residual @ jacobian + (moved - centre)) @ gain
         z = np.tile(fit.z, (count, 1))
