@@ -34,6 +34,7 @@ NUM_REFITTED, OUT_OF_THE_RACE = 3, 100.0  # candidates, unless so many nats behi
 NUM_SHAPES, NUM_MATCHED = 96, 3  # tried per candidate whose effect has a shape; kept as starts
 SHOWS = 1e-9  # a slope below does not
 MOST_Z = 2.5  # of a matched strength's prior
+NUM_STRENGTHS, NUM_ZOOMS = 15, 4  # a grid over all strengths, then between neighbours of the best
 SPREAD_Z = 0.7  # of starts round the fit without the candidate
 
 
@@ -65,7 +66,7 @@ def fit_candidates(
     count = len(trials.model_parameters)
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
     chosen = _scattered(fitter, base.fit, free, seed)
-    matched = [_matched(trials, base.fit, effects, seed) for effects in candidates]
+    matched = _matched(fitter, base.fit, candidates, seed)
     z = np.concatenate([np.concatenate([a, b]) for a, b in zip(chosen, matched, strict=True)])
     sizes = [(len(a), len(b)) for a, b in zip(chosen, matched, strict=True)]
     of = np.repeat(np.arange(len(sizes)), [a + b for a, b in sizes])
@@ -102,7 +103,7 @@ def _seconded(
     count = len(trials.model_parameters)
     without = replace(base, z=np.where(base.free, fits[best].z, 0.0), jacobian=fits[best].jacobian)
     others = [i for i in range(len(candidates)) if i != best]
-    starts = [_matched(trials, without, candidates[i], seed)[:1] for i in others]
+    starts = [own[:1] for own in _matched(fitter, without, [candidates[i] for i in others], seed)]
     of = np.arange(len(others))
     free = np.stack([trials.free(candidates[i])[:count] for i in others])
     found = fitter.fit_from(np.concatenate(starts), free[of], of) if others else []
@@ -161,7 +162,49 @@ def _scattered(
     return chosen
 
 
-def _matched(trials: Trials, base: GradientFit, effects: Sequence[str], seed: int) -> np.ndarray:
+def _matched(
+    fitter: GradientFitter, base: GradientFit, candidates: Sequence[tuple[str, ...]], seed: int
+) -> list[np.ndarray]:
+    """For each candidate starts that match the base fit's residuals, `[start, z]`, best first.
+
+    Those whose effect has a strength and no shape get one more: the best of all its strengths. As
+    far as the slope goes is too far where a little more of an effect changes everything, as
+    friction does that nearly holds.
+    """
+    trials, count = fitter.trials, len(fitter.trials.model_parameters)
+    starts = [_matched_shapes(trials, base, effects, seed) for effects in candidates]
+    plain = [i for i, own in enumerate(starts) if len(own) == 1]
+    if not plain:
+        return starts
+    free = np.stack([trials.free(candidates[i])[:count] for i in plain])
+    where = [_strength(trials, candidates[i][-1])[0] for i in plain]
+    found = _best_strengths(fitter, np.concatenate([starts[i] for i in plain]), free, where)
+    for i, best in zip(plain, found, strict=True):
+        starts[i] = np.stack([best, starts[i][0]])
+    return starts
+
+
+def _best_strengths(
+    fitter: GradientFitter, z: np.ndarray, free: np.ndarray, where: Sequence[np.ndarray]
+) -> np.ndarray:
+    """`z` `[candidate, z]` with the strength of least cost, all else as it is: ever finer grids."""
+    middle, reach = np.zeros(len(z)), MOST_Z
+    for _ in range(NUM_ZOOMS):
+        tried = np.repeat(z[:, None], NUM_STRENGTHS, axis=1)
+        steps = np.linspace(-reach, reach, NUM_STRENGTHS)
+        for own, columns, centre in zip(tried, where, middle, strict=True):
+            own[:, columns] = (centre + steps)[:, None]
+        of = np.repeat(np.arange(len(z)), NUM_STRENGTHS)
+        costs = fitter.search_costs(tried.reshape(len(of), -1), free[of]).reshape(len(z), -1)
+        best = np.argmin(costs, axis=1)
+        middle = middle + steps[best]
+        reach = steps[1] - steps[0]
+    return tried[np.arange(len(z)), best]
+
+
+def _matched_shapes(
+    trials: Trials, base: GradientFit, effects: Sequence[str], seed: int
+) -> np.ndarray:
     """The shapes of the last effect that match the base fit's residuals best, `[start, z]`.
 
     For each shape the strength is the one that its slope at no strength asks for.
