@@ -1,6 +1,7 @@
 """What every command shares: one-line errors, exit codes, progress."""
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
@@ -90,7 +91,8 @@ def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None 
     """Runs `main(argv)` and returns the exit code.
 
     0: done. 2: the input or the call is wrong (one line on stderr, no traceback).
-    130: stopped with Ctrl-C. Any other exception is a bug: traceback, exit code 1.
+    130: stopped with Ctrl-C. 141: nobody reads on (`| head`), so that it stopped, as a shell
+    counts it. Any other exception is a bug: traceback, exit code 1.
     """
     try:
         return main(sys.argv[1:] if argv is None else argv) or 0
@@ -100,3 +102,7 @@ def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None 
     except KeyboardInterrupt:
         print("stopped; what was finished is kept", file=sys.stderr)
         return 130
+    except BrokenPipeError:
+        # What is still in the buffer has nowhere to go, either: no second complaint at the exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
