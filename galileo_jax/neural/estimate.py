@@ -129,6 +129,7 @@ def _estimate(network: PosteriorNetwork, seen: Seen, summary: Summary, seed: int
         "centre": summary.centre[None],
         "scale": summary.scale[None],
         "is_hit": np.asarray(summary.is_hit)[None],
+        "is_ideal": np.asarray(seen.is_ideal)[None],
     }
     k1, ratio, k2 = (values[0] for values in estimate(network, single, seed, NUM_DRAWS))
     if not bool(summary.moves):

@@ -20,7 +20,7 @@ from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.neural.summary import NUM_CHANNELS, NUM_FEATURES, summarise
 from galileo_jax.neural.task import Arrays
 from galileo_jax.neural.thesis_task import FPS, ThesisTask
-from galileo_jax.neural.world import Truth, draw, targets
+from galileo_jax.neural.world import IDEAL_FRICTION, Truth, draw, targets
 from galileo_jax.parameters import Uniform
 from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
 
@@ -204,9 +204,10 @@ def estimate(
     centre, scale = (jnp.asarray(sample[name])[:, None] for name in ("centre", "scale"))
     t = np.array(from_u(jnp.asarray(u, float), centre, scale))
     generator = np.random.default_rng([seed, 5])
-    t[~np.asarray(sample["is_hit"]), :, 1:] = generator.standard_normal(
-        (int(np.sum(~np.asarray(sample["is_hit"]))), count, 2)
-    )
+    untold = ~np.asarray(sample["is_hit"])
+    t[untold, :, 1:] = generator.standard_normal((int(untold.sum()), count, 2))
+    untold &= np.asarray(sample["is_ideal"], bool)
+    t[untold, :, 1:] = _of_ideal_prior(generator, (int(untold.sum()), count))
     friction = Uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high)
     ratio = np.exp(np.sqrt(2) * MASS_PRIOR.sd * t[..., 1])
     return Estimates(
@@ -214,6 +215,13 @@ def estimate(
         ratio,
         np.asarray(friction.forward(jnp.asarray(t[..., 2]))),
     )
+
+
+def _of_ideal_prior(generator: np.random.Generator, shape: tuple[int, int]) -> np.ndarray:
+    """The mass ratio's and k2's targets in the ideal world, `[*shape, 2]`."""
+    m1, m2 = generator.uniform(1e-9, 1.0, (2, *shape))
+    friction = jnp.asarray(generator.uniform(*IDEAL_FRICTION, shape))
+    return np.asarray(targets(Truth(friction, friction, jnp.asarray(m1 / m2))))[..., 1:]
 
 
 def _score(network: PosteriorNetwork, data: Arrays, seed: int, label: str) -> dict[str, float]:

@@ -26,6 +26,7 @@ from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.similarity import discrepancy
 
 IDEAL_SHARE = 0.3
+IDEAL_FRICTION = (0.0, 0.3)
 RECORD_DT_S, NUM_RECORDS = 1 / 120, 512  # constant forces: exact at any step
 ANGLE_DEG = (8.0, 35.0)
 RELEASE_M, OBJECT2_M = (0.2, 1.0), (0.12, 0.5)
@@ -74,7 +75,8 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     m1, m2 = jnp.where(is_ideal, uniform(0, 1, (2,)), MASS_PRIOR.forward(normal((2,))))
     k1, k2 = jnp.where(
         is_ideal,
-        uniform(0, 0.3, (2,)) * jnp.stack([jnp.minimum(1, steepest / 0.3), 1.0]),
+        uniform(*IDEAL_FRICTION, (2,))
+        * jnp.stack([jnp.minimum(1, steepest / IDEAL_FRICTION[1]), 1.0]),
         uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high, (2,)) * jnp.stack([steepest, 1.0]),
     )
     fps = jnp.where(uniform(0, 1) < 0.4, 30.0, log_uniform(*FPS))

@@ -6,13 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.errors import InputError
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.trials import Trials
+from galileo_jax.neural import galileo_task
 from galileo_jax.neural.estimate import TRAINED, cnn_posterior, trained_network
+from galileo_jax.neural.world import IDEAL_FRICTION
 from galileo_jax.observation import Observation
+from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.run import make_trials
 from tests.ramp_model import HIT
 from tests.reference_ramp import Experiment, solve
@@ -168,3 +172,11 @@ def test_shared_clips_k1(shared_data, tmp_path):
             abs(result["parameters"]["k1"]["mean"] - json.loads(truth_path.read_text())["k1"])
         )
     assert np.median(errors) < 0.01
+
+
+def test_where_nothing_tells_the_ideal_world_answers_with_its_own_prior():
+    t = galileo_task._of_ideal_prior(np.random.default_rng(0), (1, 4000))
+    k2 = FRICTION_PRIOR.low + (FRICTION_PRIOR.high - FRICTION_PRIOR.low) * stats.norm.cdf(t[..., 1])
+    assert stats.kstest(k2.ravel(), stats.uniform(*IDEAL_FRICTION).cdf).pvalue > 0.01
+    ratio = np.exp(np.sqrt(2) * MASS_PRIOR.sd * t[..., 0])
+    assert np.mean(ratio < 0.5) == pytest.approx(0.25, abs=0.03)  # of two uniform masses
