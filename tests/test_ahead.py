@@ -6,7 +6,7 @@ import jax
 import numpy as np
 
 from galileo_jax import ahead
-from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.run import make_trials
 from tests.oracle_run import HIT, make_run
 
@@ -21,7 +21,7 @@ def test_a_likely_clip_is_compiled_as_the_tracked_one(tmp_path):
     clip = run.clip.model_copy(update={"frame_count": len(run.problem.observation.times_s)})
     likely = ahead._likely(clip)
     one, other = (
-        GradientFitter(make_trials([clip], [seen]))._clips[0]
+        Residuals(make_trials([clip], [seen])).clips[0]
         for seen in (likely, run.problem.observation)
     )
     assert one.kind == other.kind

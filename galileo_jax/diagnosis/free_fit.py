@@ -8,14 +8,16 @@ linear, and rollouts are all it costs.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from galileo_jax.comparison.bootstrap import whitened
-from galileo_jax.inference.fits.steps import DAMPINGS
+from galileo_jax.inference.fits.residuals import cost
+from galileo_jax.inference.fits.steps import DAMPINGS, Damped
 from galileo_jax.inference.trials import NOISE_SD, Trials
 
 # What friction takes up of a constant force is a soft direction: it must be followed to its end.
 MAX_STEPS, ENOUGH = 60, 0.005
+ALL_DAMPINGS = np.arange(len(DAMPINGS))[None]
+NO_EDGES = (np.array(-np.inf), np.array(np.inf))  # accelerations have none
 SMALL_STEP = 0.02  # of differences, as a share of a parameter's coarse step
 
 
@@ -50,19 +52,16 @@ def free_fit(trials: Trials, start: np.ndarray, free: np.ndarray) -> FreeFit:
     scale = 1.0
     for _ in range(MAX_STEPS):
         jacobian, residual = _slopes(trials, z, free, scale)
-        normal = jacobian[:, own].T @ jacobian[:, own]
-        pull = jacobian[:, own].T @ residual + z[own]
-        cost = _cost(residual, z[own])
-        tried = np.tile(z, (len(DAMPINGS), 1))
-        for row, damping in zip(tried, DAMPINGS, strict=True):
-            damped = normal + np.eye(len(own)) + damping * np.diag(np.diag(normal) + 1)
-            row[own] -= cho_solve(cho_factor(damped), pull)
+        damped = Damped.of(free[None, :-1], [jacobian[None]])
+        steps = damped.steps(z[None, None, :-1], [residual[None, None]], NO_EDGES, ALL_DAMPINGS)[0]
+        tried = z + np.pad(steps, [(0, 0), (0, 1)])
         white = _white(trials, tried, free, scale)
-        costs = _cost(white, tried[:, own])
+        costs = cost([white], tried[:, own])
         best = int(np.nanargmin(costs))
-        gain = cost - costs[best]
+        gain = cost([residual], z[own]) - costs[best]
         if gain > 0:
             z = tried[best]
+        normal = jacobian[:, own].T @ jacobian[:, own]
         new_scale = _scale(white[best] * scale, int(trials.num_values), normal)
         settled = abs(new_scale / scale - 1) < 0.05
         scale = new_scale
@@ -95,10 +94,6 @@ def _slopes(
 
 def _white(trials: Trials, z: np.ndarray, free: np.ndarray, scale: float) -> np.ndarray:
     return whitened(trials, trials.theta(z, free), np.array([scale]))[0]
-
-
-def _cost(residual: np.ndarray, z: np.ndarray) -> np.ndarray:
-    return 0.5 * (np.sum(residual**2, axis=-1) + np.sum(z**2, axis=-1))
 
 
 def _scale(residual: np.ndarray, num_values: int, normal: np.ndarray) -> float:

@@ -9,7 +9,7 @@ import pytest
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.effects.registry import make_effects
-from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.trials import NOISE_SD, Trials
 from galileo_jax.parameters import Uniform
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -151,9 +151,8 @@ def test_a_place_is_the_same_in_all_clips():
     z[trials.names.index("friction_patch")] = 1.0
     z[where] = 0.4
     count = len(trials.model_parameters)
-    fitter = GradientFitter(trials)
-    points = fitter._batch(z[None, :count], np.ones((1, count), bool))
-    found = fitter._whites(points._replace(noise=np.ones((1, 2))))
+    points = Batch(z[None, :count], np.ones((1, count), bool), np.ones((1, 2)))
+    found = Residuals(trials).whites(points)
     expected = whitened(trials, trials.theta(z)[None], np.ones(2))
     for own, joint in zip(found, expected, strict=True):
         assert np.sum(own**2) == pytest.approx(np.sum(joint**2), rel=BETWEEN_PROGRAMS)

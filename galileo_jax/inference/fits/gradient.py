@@ -13,10 +13,10 @@
        or two steps more.
     4. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace.
 
-Compiled code never holds a rollout: JAX's cache keeps it between runs, whichever the engine,
-and clips share it: all that differs between them is data. A single far start ends in a side
-valley in most cases (the time of the collision decides which frames compare with which); the
-scattered starts cost one batch.
+Compiled code (`programs.py`) never holds a rollout: JAX's cache keeps it between runs, whichever
+the engine, and clips share it: all that differs between them is data. A single far start ends in
+a side valley in most cases (the time of the collision decides which frames compare with which);
+the scattered starts cost one batch.
 
 Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983.
 """
@@ -24,30 +24,17 @@ Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from scipy.special import ndtri
 
-from galileo_jax.effects.effect import Surroundings
+from galileo_jax.inference.fits.programs import FAILED
+from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost
 from galileo_jax.inference.fits.steps import DAMPINGS, Damped, Edges, normal_matrices
-from galileo_jax.inference.problem import Problem, seen
-from galileo_jax.inference.trials import NOISE_SD, Trials, in_units
-from galileo_jax.kept import kept
-from galileo_jax.parameters import PriorTable, inverse
-from galileo_jax.rollout.chunks import (
-    FRAMES,
-    MOTIONS,
-    SPARE_MODES,
-    in_chunks,
-    padded_motion,
-    rounded_up,
-)
-from galileo_jax.rollout.trajectory import Trajectory
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
+from galileo_jax.inference.trials import NOISE_SD, Trials
+from galileo_jax.parameters import inverse
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 # Of a parameter's coarse step: below the smallest MuJoCo's contacts are rough, and the rigid
 # engine rounds; above the largest a step may leave a plateau (nothing moves) over its edge, and
@@ -60,7 +47,6 @@ VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 BEHIND, CATCHES_UP = 100.0, 0.1
 # Starts of one hypothesis, in nats of the search's coarse noise, and after how many steps.
 BEHIND_IN_SEARCH, STEPS_BEFORE_GIVING_UP = 20.0, 3
-FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
 
 
 @dataclass(frozen=True)
@@ -137,34 +123,15 @@ class GradientFit:
         return float(np.sum(self.free[:count]) - np.trace(self.covariance[:count, :count]))
 
 
-class Batch(NamedTuple):
-    """Points of several hypotheses.
-
-    Attributes:
-      z: `[point, model parameter]`, 0 where pinned.
-      free: `[point, model parameter]`.
-      noise: `[point, clip]`, noise scales.
-    """
-
-    z: np.ndarray
-    free: np.ndarray
-    noise: np.ndarray
-
-    def take(self, index: Any) -> "Batch":
-        """The points of an index array."""
-        return Batch(*(leaf[index] for leaf in self))
-
-
 class GradientFitter:
     """Fits trials; `fit` may be called for many seeds and hypotheses."""
 
     def __init__(self, trials: Trials, settings: Settings = Settings()):
         self.trials, self.settings = trials, settings
-        self._clips = tuple(_Clip.of(trials, c) for c in range(len(trials.problems)))
+        self._residuals = Residuals(trials)
         self._count = len(trials.model_parameters)
         self._num_values = np.array([p.data.num_values for p in trials.problems], float)
         parameters = trials.model_parameters
-        self._is_simulated = np.array([p.step is not None for p in parameters])
         is_smooth = trials.problems[0].engine.name == "rigid"
         self._smallest_step = SMALLEST_STEP if is_smooth else SMALLEST_ROUGH_STEP
         self._is_nuisance = np.array([p.role == "nuisance" for p in parameters])
@@ -172,14 +139,13 @@ class GradientFitter:
         self._rest = np.clip(zero, -1.0, 1.0)
         self._is_positive_nuisance = self._is_nuisance & ~np.isfinite(zero)
         self._edges = Edges.of(parameters)
-        self._num_rollouts = 0
 
     def compile(self) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
         free = self.trials.free(self.trials.all_effects)[: self._count]
         points = self._batch(np.zeros((1, self._count)), free)
         self._step(points, self.trials.coarse_steps[None], np.full(1, np.inf), False)
-        self._costs(self._batch(np.zeros((self.settings.num_starts, self._count)), free))
+        self._residuals.costs(self._batch(np.zeros((self.settings.num_starts, self._count)), free))
 
     def fit(
         self,
@@ -194,19 +160,19 @@ class GradientFitter:
           on_stage: told what is being done.
           effects: names of the effects that are there; default: all of the models'.
         """
-        self._num_rollouts = 0
+        self._residuals.num_rollouts = 0
         effects = self.trials.all_effects if effects is None else effects
         free = self.trials.free(effects)[: self._count]
         on_stage("searching")
         starts = self._batch(self._starts(seed, free), free)
-        best = np.argsort(self._costs(starts))[: self.settings.num_refined]
+        best = np.argsort(self._residuals.costs(starts))[: self.settings.num_refined]
         found, costs, num_steps = self._search(starts.take(best))
         on_stage("refining")
         return self._best_variant(found.z[np.argmin(costs)], free, num_steps)
 
     def refit(self, fit: GradientFit) -> GradientFit:
         """Fits again from a fit, with its positive nuisances moved: the better of both."""
-        self._num_rollouts = 0
+        self._residuals.num_rollouts = 0
         count = self._count
         return self._best_variant(fit.z[:count], fit.free[:count], 0)
 
@@ -223,7 +189,7 @@ class GradientFitter:
         Returns:
           One fit per hypothesis, of its best start.
         """
-        self._num_rollouts = 0
+        self._residuals.num_rollouts = 0
         found, costs, num_steps = self._search(self._batch(starts, free), owner)
         best = []
         for hypothesis in range(int(owner.max()) + 1):
@@ -233,7 +199,7 @@ class GradientFitter:
 
     def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
-        return self._costs(self._batch(z, free))
+        return self._residuals.costs(self._batch(z, free))
 
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
         """Polishes z and variants of it; the most evident fit.
@@ -250,7 +216,10 @@ class GradientFitter:
 
     def _batch(self, z: np.ndarray, free: np.ndarray) -> Batch:
         free = np.broadcast_to(free, z.shape)
-        noise = np.tile([clip.search_noise(self.settings) for clip in self._clips], (len(z), 1))
+        noise = np.tile(
+            [clip.search_noise(self.settings.search_sd_m) for clip in self._residuals.clips],
+            (len(z), 1),
+        )
         return Batch(np.where(free, z, 0.0), free, noise)
 
     def _search(
@@ -262,7 +231,7 @@ class GradientFitter:
         """
         owner = np.arange(len(points.z)) if owner is None else owner
         z, num_steps = points.z.copy(), 0
-        costs = self._costs(points)
+        costs = self._residuals.costs(points)
         active = np.arange(len(z))
         for _ in range(self.settings.max_steps):
             here = Batch(z, points.free, points.noise).take(active)
@@ -291,22 +260,23 @@ class GradientFitter:
         active = np.arange(count)
         for _ in range(settings.max_polish_steps):
             here = Batch(z, points.free, noise).take(active)
-            motions, jacobian, white = self._slopes(here, steps[active], is_central=True)
-            covariance = _covariances(jacobian, here.free)
+            slopes = self._residuals.slopes(here, steps[active], is_central=True)
+            covariance = _covariances(slopes.jacobian, here.free)
             before = here.noise
-            scales = self._noise_scales(white, before, covariance, here.free)
-            steps[active] = self._half_sd(jacobian)
+            scales = self._noise_scales(slopes.white, before, covariance, here.free)
+            steps[active] = self._half_sd(slopes.jacobian)
             noise[active] = scales
             here = here._replace(noise=scales)
             scaled = [
-                w * (b / s)[:, None] for w, b, s in zip(white, before.T, scales.T, strict=True)
+                w * (b / s)[:, None]
+                for w, b, s in zip(slopes.white, before.T, scales.T, strict=True)
             ]
-            cost = _cost(scaled, here.z)
-            moved, after = self._try(here, motions, jacobian, scaled, cost)
+            costs = cost(scaled, here.z)
+            moved, after = self._try(here, slopes._replace(white=scaled), costs)
             z[active] = moved
             num_steps += 1
             drifts = np.abs(scales / before - 1).max(axis=1) > 0.1
-            done = (cost - after < settings.settled) & ~drifts
+            done = (costs - after < settings.settled) & ~drifts
             if done.any():
                 # No damping helps. In a narrow, rough valley that is no proof: look along it.
                 chosen = np.flatnonzero(done)
@@ -317,7 +287,7 @@ class GradientFitter:
                 z[active[chosen[~settled]]] = best[~settled]
             misfit[active] = after + np.log(scales) @ self._num_values
             behind = misfit[active] - misfit.min()
-            gives_up = (behind > BEHIND) & (cost - after < CATCHES_UP * behind)
+            gives_up = (behind > BEHIND) & (costs - after < CATCHES_UP * behind)
             active = active[~is_settled[active] & ~gives_up]
             if not active.size:
                 break
@@ -326,7 +296,7 @@ class GradientFitter:
     def _finish(
         self, points: Batch, steps: np.ndarray, is_settled: np.ndarray, num_steps: int
     ) -> list[GradientFit]:
-        _, jacobian, white = self._slopes(points, steps, is_central=True)
+        _, jacobian, white = self._residuals.slopes(points, steps, is_central=True)
         covariance = _covariances(jacobian, points.free)
         fits = []
         for i in range(len(points.z)):
@@ -335,14 +305,17 @@ class GradientFitter:
             free = np.append(points.free[i], np.ones(len(scale), bool))
             whole = np.zeros((len(free),) * 2)
             whole[: self._count, : self._count] = covariance[i]
-            for c, clip in enumerate(self._clips):
+            for c, clip in enumerate(self._residuals.clips):
                 at = self._count + c
                 count = float(GaussianLikelihood.degrees(scale[c], clip.data.whitening))
                 whole[at, at] = 1 / (1 + 2 * count * NOISE_SD**2)
             failed = max(float(np.abs(w[i]).max()) for w in white) >= FAILED
             code = Code.CONVERGED if is_settled[i] else Code.STEP_LIMIT
             at_unit = np.concatenate(
-                [clip.unpadded(j[i]) for clip, j in zip(self._clips, jacobian, strict=True)]
+                [
+                    clip.unpadded(j[i])
+                    for clip, j in zip(self._residuals.clips, jacobian, strict=True)
+                ]
             )
             fits.append(
                 GradientFit(
@@ -355,7 +328,7 @@ class GradientFitter:
                     steps=steps[i],
                     jacobian=at_unit,
                     code=Code.FAILED if failed else code,
-                    stats={"num_steps": num_steps, "num_rollouts": self._num_rollouts},
+                    stats={"num_steps": num_steps, "num_rollouts": self._residuals.num_rollouts},
                     pull=float(np.sum(points.z[i][self._is_nuisance] ** 2)),
                 )
             )
@@ -364,9 +337,9 @@ class GradientFitter:
     def _log_evidence(self, i: int, points: Batch, white: list, covariance: np.ndarray) -> float:
         """Laplace: the density at the mode times the posterior's volume over the prior's."""
         scale = points.noise[i]
-        total = -_cost([w[i : i + 1] for w in white], points.z[i : i + 1])[0]
+        total = -cost([w[i : i + 1] for w in white], points.z[i : i + 1])[0]
         total -= 0.5 * float(np.sum((np.log(scale) / NOISE_SD) ** 2))
-        for clip, s in zip(self._clips, scale, strict=True):
+        for clip, s in zip(self._residuals.clips, scale, strict=True):
             data = clip.data.whitening
             total -= 0.5 * float(GaussianLikelihood.log_determinant(s, data))
         free = np.append(points.free[i], np.ones(len(scale), bool))
@@ -380,7 +353,7 @@ class GradientFitter:
             for z, c, free in zip(points.z, covariance, points.free, strict=True)
         ]
         owner = np.concatenate([np.full(len(walk), i) for i, walk in enumerate(walks)])
-        costs = self._costs(points.take(owner)._replace(z=np.concatenate(walks)))
+        costs = self._residuals.costs(points.take(owner)._replace(z=np.concatenate(walks)))
         for i, walk in enumerate(walks):
             own = costs[owner == i]
             best[i], lowest[i] = walk[np.argmin(own)], own.min()
@@ -391,25 +364,25 @@ class GradientFitter:
     ) -> tuple[np.ndarray, np.ndarray]:
         """One Levenberg-Marquardt step of every point: the best of all dampings, or none."""
         steps = np.broadcast_to(steps, points.z.shape)
-        motions, jacobian, white = self._slopes(points, steps, is_central)
-        return self._try(points, motions, jacobian, white, costs)
+        slopes = self._residuals.slopes(points, steps, is_central)
+        return self._try(points, slopes, costs)
 
     def _try(
-        self, points: Batch, motions: tuple, jacobian: list, white: list, costs: np.ndarray
+        self, points: Batch, slopes: Slopes, costs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """The best of all dampings' proposals, or the point itself."""
         here = points.z[:, None]
         if len(points.z) <= self.settings.num_exact:
-            found = self._propose_near(points, motions, jacobian)
+            found = self._residuals.solved(points, slopes, DAMPINGS)
             tried = self._edges.curve(here, np.where(np.isfinite(found), found - here, 0.0))
-            after = self._costs_of(tried, points)
+            after = self._residuals.costs_of(tried, points)
         else:
-            damped, edges = Damped.of(points.free, jacobian), self._edges
+            damped, edges = Damped.of(points.free, slopes.jacobian), self._edges
             which = np.tile(np.arange(len(DAMPINGS)), (len(here), 1))
-            step = damped.steps(here, [w[:, None] for w in white], edges.reach(here), which)
+            step = damped.steps(here, [w[:, None] for w in slopes.white], edges.reach(here), which)
             tried = edges.curve(here, step)
-            there = self._whites_of(tried, points)
-            after = _cost(there, tried)
+            there = self._residuals.whites_of(tried, points)
+            after = cost(there, tried)
             # Once more from where the best end, with the slopes of where they began: a valley's
             # bend is followed at the price of a rollout.
             which = np.argsort(after, axis=1)[:, :NUM_FOLLOWED, None]
@@ -417,7 +390,7 @@ class GradientFitter:
             there = [np.take_along_axis(w, which, axis=1) for w in there]
             step = damped.steps(bent, there, edges.reach(bent), which[..., 0])
             again = edges.curve(bent, step)
-            after = np.concatenate([after, self._costs_of(again, points)], axis=1)
+            after = np.concatenate([after, self._residuals.costs_of(again, points)], axis=1)
             tried = np.concatenate([tried, again], axis=1)
         best = np.argmin(after, axis=1)
         rows = np.arange(len(points.z))
@@ -426,98 +399,6 @@ class GradientFitter:
         z = np.where(improves[:, None], tried[rows, best], points.z)
         return z, np.where(improves, lowest, costs)
 
-    def _propose_near(self, points: Batch, motions: tuple, jacobian: list) -> np.ndarray:
-        """Of few points: the damped problems with clock and camera exact, by optimistix."""
-        size = np.sqrt(1 + sum(np.sum(j**2, axis=1) for j in jacobian))
-        index = _free_index(points.free)
-        size = np.take_along_axis(np.pad(size, [(0, 0), (0, 1)]), index, axis=1)
-        kinds = tuple(clip.kind for clip in self._clips)
-        arrays = tuple(clip.arrays for clip in self._clips)
-        return in_chunks(
-            POINTS[:1],
-            lambda *rows: _solve(kinds, DAMPINGS, *rows, arrays),
-            *(size, points.z, points.free, points.noise, index, motions),
-        )
-
-    def _simulate(self, clip: "_Clip", z: np.ndarray, free: np.ndarray, noise: np.ndarray):
-        """`[point, ...]`: parameters in their units, centres and velocities."""
-        self._num_rollouts += len(z)
-        theta = clip.theta(z, free)
-        position, velocity = clip.problem.engine.simulate(theta)
-        return theta, *padded_motion(position, velocity)
-
-    def _costs(self, points: Batch) -> np.ndarray:
-        """chi2 / 2 and the prior's part, `[point]`."""
-        return _cost(self._whites(points), points.z)
-
-    def _costs_of(self, z: np.ndarray, points: Batch) -> np.ndarray:
-        """`_costs` of several z of each point, `[point, z, model parameter]`: `[point, z]`."""
-        return _cost(self._whites_of(z, points), z)
-
-    def _whites_of(self, z: np.ndarray, points: Batch) -> list[np.ndarray]:
-        """Residuals of several z of each point, `[point, z, value]`, clip by clip."""
-        owner = np.repeat(np.arange(len(z)), z.shape[1])
-        whites = self._whites(points.take(owner)._replace(z=z.reshape(len(owner), -1)))
-        return [white.reshape(*z.shape[:2], -1) for white in whites]
-
-    def _whites(self, points: Batch) -> list[np.ndarray]:
-        """Whitened residuals, `[point, value]`, clip by clip."""
-        white = []
-        for c, clip in enumerate(self._clips):
-            theta, position, velocity = self._simulate(clip, *points)
-            white.append(
-                in_chunks(
-                    MOTIONS,
-                    lambda *rows, clip=clip: _white_batch(clip.kind, *rows, clip.data, clip.scene),
-                    *(theta, position, velocity, points.noise[:, c]),
-                )
-            )
-        return white
-
-    def _slopes(self, points: Batch, steps: np.ndarray, is_central: bool):
-        """Motions with their slopes, Jacobians and residuals, clip by clip.
-
-        Returns:
-          For each clip: (position, velocity, slope of position, slope of velocity), the slopes
-          `[point, free parameter, object, 2, record]`; `[point, value, model parameter]`; and
-          `[point, value]`.
-        """
-        index = _free_index(points.free)
-        padded = np.pad(self._is_simulated, (0, 1))
-        signs = (1.0, -1.0) if is_central else (1.0,)
-        motions, jacobians, whites = [], [], []
-        for c, clip in enumerate(self._clips):
-            own = np.pad(np.isin(np.arange(self._count), clip.column), (0, 1))
-            point, slot = np.nonzero(padded[index] & own[index])
-            which = index[point, slot]
-            h = steps[point, which]
-            offsets = np.zeros((len(point), self._count))
-            offsets[np.arange(len(point)), which] = h
-            owner = np.concatenate([np.arange(len(points.z)), *([point] * len(signs))])
-            moved = points.z[owner]
-            moved[len(points.z) :] += np.concatenate([s * offsets for s in signs])
-            _, *out = self._simulate(clip, moved, points.free[owner], points.noise[owner])
-            slopes = []
-            for values in out:
-                base, rest = values[: len(points.z)], values[len(points.z) :]
-                low = rest[len(point) :] if is_central else base[point]
-                width = (2 * h if is_central else h)[:, None, None, None]
-                slope = np.zeros((*index.shape, *values.shape[1:]))
-                slope[point, slot] = (rest[: len(point)] - low) / width
-                slopes.append(slope)
-            motion = (out[0][: len(points.z)], out[1][: len(points.z)], *slopes)
-            white, jacobian = in_chunks(
-                POINTS,
-                lambda *rows, clip=clip: _jacobian_batch(clip.kind, *rows, clip.arrays),
-                *(points.z, points.free, points.noise[:, c], index, *motion),
-            )
-            whites.append(white)
-            full = np.zeros((len(points.z), white.shape[1], self._count + 1))
-            np.put_along_axis(full, index[:, None], jacobian, axis=2)
-            jacobians.append(full[..., :-1])
-            motions.append(motion)
-        return tuple(motions), jacobians, whites
-
     def _noise_scales(
         self, white: list, noise: np.ndarray, covariance: np.ndarray, free: np.ndarray
     ) -> np.ndarray:
@@ -525,7 +406,7 @@ class GradientFitter:
         used = free.sum(axis=1) - np.trace(covariance, axis1=1, axis2=2)
         wide = 1 / (2 * NOISE_SD**2)  # the prior, at 1, is worth this many values
         scales = np.empty_like(noise)
-        for c, clip in enumerate(self._clips):
+        for c, clip in enumerate(self._residuals.clips):
             data = clip.data.whitening
             share = used * float(data.num_values) / self.trials.num_values
             total = np.sum((white[c] * noise[:, c : c + 1]) ** 2, axis=1)
@@ -562,194 +443,6 @@ class GradientFitter:
                 u = u * min(np.tan(angle) if parameters[i].name == "k1" else 0.5, 0.98) + 0.01
             starts[:, i] = ndtri(np.clip(u, 0.01, 0.99))
         return starts
-
-
-class Kind(NamedTuple):
-    """What programs are compiled for: hashable, the same for many clips."""
-
-    effects: tuple
-    names: tuple[str, ...]
-    record_dt_s: float
-
-
-class Padded(NamedTuple):
-    """A clip's data in shapes that many clips share, so that they share compiled code.
-
-    Attributes:
-      times_s: `[frame]`.
-      whitening: with masked frames and idle modes added.
-    """
-
-    times_s: np.ndarray
-    whitening: Whitening
-
-
-class ClipArrays(NamedTuple):
-    """What compiled code needs of a clip, traced."""
-
-    data: Padded
-    scene: Surroundings
-    priors: PriorTable
-    absent: np.ndarray
-    column: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Clip:
-    """One clip of the trials, ready for compiled code."""
-
-    problem: Problem
-    column: np.ndarray
-    priors: PriorTable
-    absent: np.ndarray
-    data: Padded
-
-    @classmethod
-    def of(cls, trials: Trials, index: int) -> "_Clip":
-        problem, column = trials.problems[index], trials.columns[index]
-        parameters = problem.parameters
-        return cls(
-            problem=problem,
-            column=column,
-            priors=PriorTable.of(parameters),
-            absent=np.array([p.absent for p in parameters]),
-            data=_padded(problem),
-        )
-
-    @property
-    def kind(self) -> Kind:
-        model = self.problem.model
-        return Kind(model.effects + model.nuisances, model.names, model.record_dt_s)
-
-    @property
-    def scene(self) -> Surroundings:
-        return self.problem.model.scene.surroundings
-
-    @property
-    def arrays(self) -> ClipArrays:
-        return ClipArrays(self.data, self.scene, self.priors, self.absent, self.column)
-
-    def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """`[point, joint parameter]` to this clip's parameters in their units."""
-        own, is_free = z[:, self.column], free[:, self.column]
-        theta = in_chunks(MOTIONS, lambda rows: in_units(self.priors, rows), own)
-        return np.where(is_free, theta, self.absent)
-
-    def search_noise(self, settings: Settings) -> float:
-        """The noise scale at which the tracker's median error is `search_sd_m`."""
-        observation = self.problem.observation
-        variance = np.trace(observation.covariance_m2, axis1=1, axis2=2)[observation.mask] / 2
-        if not variance.size:
-            return 1.0
-        return max(1.0, settings.search_sd_m / float(np.sqrt(np.median(variance))))
-
-    def unpadded(self, jacobian: np.ndarray) -> np.ndarray:
-        """Rows of real frames only."""
-        shape = self.data.whitening.observed_m.shape
-        frames = len(self.problem.observation.times_s)
-        rows = jacobian.reshape(*shape, -1)[:, :, :frames]
-        return rows.reshape(-1, jacobian.shape[1])
-
-
-def _white(kind: Kind, theta, position, velocity, noise, data: Any, scene):
-    """Whitened residuals of one motion, `[value]`."""
-    times = jnp.arange(position.shape[-1]) * kind.record_dt_s
-    # The drawn pitch is no measurement, so that none is made up here.
-    motion = Trajectory(times, position, velocity, position[:, 0])
-    predicted = seen(kind.effects, kind.names, theta, motion, data.times_s, scene)
-    difference = data.whitening.observed_m - predicted
-    white = GaussianLikelihood.whiten(difference, noise, data.whitening).reshape(-1)
-    return jnp.where(jnp.isfinite(white), white, FAILED)
-
-
-@kept(num_static=1)
-def _white_batch(kind: Kind, theta, position, velocity, noise, data, scene):
-    return jax.vmap(lambda t, p, v, n: _white(kind, t, p, v, n, data, scene))(
-        theta, position, velocity, noise
-    )
-
-
-def _white_near(kind: Kind, u, z, free, index, noise, motion, clip: ClipArrays):
-    """Residuals at z + u, with the motion linear in u `[free parameter]`; z of all clips."""
-    moved = z.at[index].add(u, mode="drop")
-    own = moved[clip.column]
-    theta = jnp.where(free[clip.column], clip.priors.forward(own), clip.absent)
-    position, velocity, position_slope, velocity_slope = motion
-    position = position + jnp.tensordot(u, position_slope, axes=1)
-    velocity = velocity + jnp.tensordot(u, velocity_slope, axes=1)
-    return _white(kind, theta, position, velocity, noise, clip.data, clip.scene)
-
-
-@kept(num_static=1)
-def _jacobian_batch(kind: Kind, z, free, noise, index, p, v, dp, dv, clip):
-    def one(z, free, noise, index, *motion):
-        def residuals(u):
-            return _white_near(kind, u, z, free, index, noise, motion, clip)
-
-        zero = jnp.zeros(index.shape[0])
-        jacobian = jax.jacfwd(residuals)(zero)
-        # A dummy entry of the index moves nothing; its column must not look like one that does.
-        return residuals(zero), jnp.where(index < z.shape[0], jacobian, 0.0)
-
-    return jax.vmap(one)(z, free, noise, index, p, v, dp, dv)
-
-
-@kept(num_static=1)
-def _solve(kinds, dampings, size, z, free, noise, index, motions, clips):
-    """The damped problems' solutions, `[point, damping, model parameter]`."""
-    solver = optx.GaussNewton(rtol=1e-3, atol=1e-3)
-
-    def one(damping, size, z, free, noise, index, motions):
-        here = jnp.where(index < z.shape[0], z.at[index].get(mode="fill", fill_value=0.0), 0.0)
-
-        def objective(u, _):
-            white = [
-                _white_near(kind, u, z, free, index, noise[c], motion, clip)
-                for c, (kind, motion, clip) in enumerate(zip(kinds, motions, clips, strict=True))
-            ]
-            return jnp.concatenate([*white, here + u, jnp.sqrt(damping) * size * u])
-
-        start = jnp.zeros(index.shape[0])
-        found = optx.least_squares(objective, solver, start, max_steps=8, throw=False).value
-        return z.at[index].add(found, mode="drop")
-
-    for_dampings = jax.vmap(one, (0, *[None] * 6))
-    return jax.vmap(for_dampings, (None, *[0] * 6))(dampings, size, z, free, noise, index, motions)
-
-
-POINTS = (4, 16)  # sizes of compiled batches of hypotheses
-FREE = 4  # numbers of free parameters are rounded up to multiples
-
-
-def _free_index(free: np.ndarray) -> np.ndarray:
-    """Where each point's free parameters stand, `[point, free]`; the count of all = none."""
-    width = rounded_up(int(free.sum(axis=1).max()), FREE)
-    index = np.full((len(free), width), free.shape[1])
-    for row, own in zip(index, free, strict=True):
-        found = np.flatnonzero(own)
-        row[: len(found)] = found
-    return index
-
-
-def _padded(problem: Problem) -> Padded:
-    """Pads with frames that count for nothing and modes without gain."""
-    times, data = problem.observation.times_s, problem.data
-    frames = rounded_up(len(times), FRAMES) - len(times)
-    # A wobble has as many modes as frames; the others are fewer than those to spare.
-    usual = len(data.observed_m) * (len(times) + frames) + SPARE_MODES
-    modes = max(rounded_up(len(data.gain), FRAMES), usual) - len(data.gain)
-    whitening = Whitening(
-        np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),
-        np.pad(data.inverse_root, [(0, 0), (0, 0), (0, 0), (0, frames)]),
-        np.pad(data.basis, [(0, modes), (0, 0), (0, 0), (0, frames)]),
-        np.pad(data.gain, (0, modes)),
-        data.num_values,
-    )
-    return Padded(np.pad(times, (0, frames), mode="edge"), whitening)
-
-
-def _cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
-    return 0.5 * (sum(np.sum(w**2, axis=-1) for w in white) + np.sum(z**2, axis=-1))
 
 
 def _covariances(jacobian: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:

@@ -1,0 +1,277 @@
+"""Whitened residuals of many hypotheses' points, and their slopes, by batches of rollouts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from galileo_jax.effects.effect import Surroundings
+from galileo_jax.inference.fits.programs import (
+    ClipArrays,
+    Kind,
+    Padded,
+    jacobian_batch,
+    solve,
+    white_batch,
+)
+from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.trials import Trials, in_units
+from galileo_jax.parameters import PriorTable
+from galileo_jax.rollout.chunks import (
+    FRAMES,
+    MOTIONS,
+    SPARE_MODES,
+    in_chunks,
+    padded_motion,
+    rounded_up,
+)
+from galileo_jax.similarity.gaussian_likelihood import Whitening
+
+POINTS = (4, 16)  # sizes of compiled batches of hypotheses
+FREE = 4  # numbers of free parameters are rounded up to multiples
+
+
+class Batch(NamedTuple):
+    """Points of several hypotheses.
+
+    Attributes:
+      z: `[point, model parameter]`, 0 where pinned.
+      free: `[point, model parameter]`.
+      noise: `[point, clip]`, noise scales.
+    """
+
+    z: np.ndarray
+    free: np.ndarray
+    noise: np.ndarray
+
+    def take(self, index: Any) -> "Batch":
+        """The points of an index array."""
+        return Batch(*(leaf[index] for leaf in self))
+
+
+class Slopes(NamedTuple):
+    """Residuals of points and how they change.
+
+    Attributes:
+      motions: for each clip (position, velocity, slope of position, slope of velocity), the slopes
+        `[point, free parameter, object, 2, record]`.
+      jacobian: for each clip `[point, value, model parameter]`; 0 where pinned.
+      white: for each clip `[point, value]`.
+    """
+
+    motions: tuple[tuple[np.ndarray, ...], ...]
+    jacobian: list[np.ndarray]
+    white: list[np.ndarray]
+
+
+@dataclass(frozen=True)
+class FittedClip:
+    """One clip of the trials, ready for compiled code.
+
+    Attributes:
+      problem: of the clip.
+      column: `[own parameter]`, where its model's parameters stand among those of all clips.
+      priors: of its parameters.
+      absent: `[own parameter]`, values in their units where pinned.
+      data: padded.
+    """
+
+    problem: Problem
+    column: np.ndarray
+    priors: PriorTable
+    absent: np.ndarray
+    data: Padded
+
+    @classmethod
+    def of(cls, trials: Trials, index: int) -> "FittedClip":
+        """The clip of that index."""
+        problem, column = trials.problems[index], trials.columns[index]
+        parameters = problem.parameters
+        return cls(
+            problem=problem,
+            column=column,
+            priors=PriorTable.of(parameters),
+            absent=np.array([p.absent for p in parameters]),
+            data=_padded(problem),
+        )
+
+    @property
+    def kind(self) -> Kind:
+        """What its programs are compiled for."""
+        model = self.problem.model
+        return Kind(model.effects + model.nuisances, model.names, model.record_dt_s)
+
+    @property
+    def scene(self) -> Surroundings:
+        """As its model's."""
+        return self.problem.model.scene.surroundings
+
+    @property
+    def arrays(self) -> ClipArrays:
+        """All that its programs need."""
+        return ClipArrays(self.data, self.scene, self.priors, self.absent, self.column)
+
+    def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """`[point, joint parameter]` to this clip's parameters in their units."""
+        own, is_free = z[:, self.column], free[:, self.column]
+        theta = in_chunks(MOTIONS, lambda rows: in_units(self.priors, rows), own)
+        return np.where(is_free, theta, self.absent)
+
+    def search_noise(self, search_sd_m: float) -> float:
+        """The noise scale at which the tracker's median error is that."""
+        observation = self.problem.observation
+        variance = np.trace(observation.covariance_m2, axis1=1, axis2=2)[observation.mask] / 2
+        if not variance.size:
+            return 1.0
+        return max(1.0, search_sd_m / float(np.sqrt(np.median(variance))))
+
+    def unpadded(self, jacobian: np.ndarray) -> np.ndarray:
+        """Rows of real frames only."""
+        shape = self.data.whitening.observed_m.shape
+        frames = len(self.problem.observation.times_s)
+        rows = jacobian.reshape(*shape, -1)[:, :, :frames]
+        return rows.reshape(-1, jacobian.shape[1])
+
+
+class Residuals:
+    """Of all clips of the trials; values of a clip as in `Problem.whiten`, in padded frames.
+
+    Attributes:
+      clips: ready for compiled code.
+      num_rollouts: made so far.
+    """
+
+    def __init__(self, trials: Trials):
+        self.clips = tuple(FittedClip.of(trials, c) for c in range(len(trials.problems)))
+        self.num_rollouts = 0
+        self._count = len(trials.model_parameters)
+        self._is_simulated = np.array([p.step is not None for p in trials.model_parameters])
+
+    def costs(self, points: Batch) -> np.ndarray:
+        """chi2 / 2 and the prior's part, `[point]`."""
+        return cost(self.whites(points), points.z)
+
+    def costs_of(self, z: np.ndarray, points: Batch) -> np.ndarray:
+        """`costs` of several z of each point, `[point, z, model parameter]`: `[point, z]`."""
+        return cost(self.whites_of(z, points), z)
+
+    def whites(self, points: Batch) -> list[np.ndarray]:
+        """Whitened residuals, `[point, value]`, clip by clip."""
+        white = []
+        for c, clip in enumerate(self.clips):
+            theta, position, velocity = self._simulate(clip, *points)
+            white.append(
+                in_chunks(
+                    MOTIONS,
+                    lambda *rows, clip=clip: white_batch(clip.kind, *rows, clip.data, clip.scene),
+                    *(theta, position, velocity, points.noise[:, c]),
+                )
+            )
+        return white
+
+    def whites_of(self, z: np.ndarray, points: Batch) -> list[np.ndarray]:
+        """Residuals of several z of each point, `[point, z, value]`, clip by clip."""
+        owner = np.repeat(np.arange(len(z)), z.shape[1])
+        whites = self.whites(points.take(owner)._replace(z=z.reshape(len(owner), -1)))
+        return [white.reshape(*z.shape[:2], -1) for white in whites]
+
+    def slopes(self, points: Batch, steps: np.ndarray, is_central: bool) -> Slopes:
+        """By differences: of motions by rollouts, of clock and camera by JAX.
+
+        Args:
+          points: where.
+          steps: `[point, model parameter]`, in z.
+          is_central: differences to both sides, not forward ones.
+        """
+        index = _free_index(points.free)
+        padded = np.pad(self._is_simulated, (0, 1))
+        signs = (1.0, -1.0) if is_central else (1.0,)
+        motions, jacobians, whites = [], [], []
+        for c, clip in enumerate(self.clips):
+            own = np.pad(np.isin(np.arange(self._count), clip.column), (0, 1))
+            point, slot = np.nonzero(padded[index] & own[index])
+            which = index[point, slot]
+            h = steps[point, which]
+            offsets = np.zeros((len(point), self._count))
+            offsets[np.arange(len(point)), which] = h
+            owner = np.concatenate([np.arange(len(points.z)), *([point] * len(signs))])
+            moved = points.z[owner]
+            moved[len(points.z) :] += np.concatenate([s * offsets for s in signs])
+            _, *out = self._simulate(clip, moved, points.free[owner], points.noise[owner])
+            slopes = []
+            for values in out:
+                base, rest = values[: len(points.z)], values[len(points.z) :]
+                low = rest[len(point) :] if is_central else base[point]
+                width = (2 * h if is_central else h)[:, None, None, None]
+                slope = np.zeros((*index.shape, *values.shape[1:]))
+                slope[point, slot] = (rest[: len(point)] - low) / width
+                slopes.append(slope)
+            motion = (out[0][: len(points.z)], out[1][: len(points.z)], *slopes)
+            white, jacobian = in_chunks(
+                POINTS,
+                lambda *rows, clip=clip: jacobian_batch(clip.kind, *rows, clip.arrays),
+                *(points.z, points.free, points.noise[:, c], index, *motion),
+            )
+            whites.append(white)
+            full = np.zeros((len(points.z), white.shape[1], self._count + 1))
+            np.put_along_axis(full, index[:, None], jacobian, axis=2)
+            jacobians.append(full[..., :-1])
+            motions.append(motion)
+        return Slopes(tuple(motions), jacobians, whites)
+
+    def solved(self, points: Batch, slopes: Slopes, dampings: np.ndarray) -> np.ndarray:
+        """The damped problems with motion linear, clock and camera exact: for few points.
+
+        Returns:
+          `[point, damping, model parameter]`, z.
+        """
+        size = np.sqrt(1 + sum(np.sum(j**2, axis=1) for j in slopes.jacobian))
+        index = _free_index(points.free)
+        size = np.take_along_axis(np.pad(size, [(0, 0), (0, 1)]), index, axis=1)
+        kinds = tuple(clip.kind for clip in self.clips)
+        arrays = tuple(clip.arrays for clip in self.clips)
+        return in_chunks(
+            POINTS[:1],
+            lambda *rows: solve(kinds, dampings, *rows, arrays),
+            *(size, points.z, points.free, points.noise, index, slopes.motions),
+        )
+
+    def _simulate(self, clip: FittedClip, z: np.ndarray, free: np.ndarray, noise: np.ndarray):
+        """`[point, ...]`: parameters in their units, centres and velocities."""
+        self.num_rollouts += len(z)
+        theta = clip.theta(z, free)
+        position, velocity = clip.problem.engine.simulate(theta)
+        return theta, *padded_motion(position, velocity)
+
+
+def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
+    """chi2 / 2 of residuals of several clips and the prior's part, over the last axis."""
+    return 0.5 * (sum(np.sum(w**2, axis=-1) for w in white) + np.sum(z**2, axis=-1))
+
+
+def _free_index(free: np.ndarray) -> np.ndarray:
+    """Where each point's free parameters stand, `[point, free]`; the count of all = none."""
+    width = rounded_up(int(free.sum(axis=1).max()), FREE)
+    index = np.full((len(free), width), free.shape[1])
+    for row, own in zip(index, free, strict=True):
+        found = np.flatnonzero(own)
+        row[: len(found)] = found
+    return index
+
+
+def _padded(problem: Problem) -> Padded:
+    """Pads with frames that count for nothing and modes without gain."""
+    times, data = problem.observation.times_s, problem.data
+    frames = rounded_up(len(times), FRAMES) - len(times)
+    # A wobble has as many modes as frames; the others are fewer than those to spare.
+    usual = len(data.observed_m) * (len(times) + frames) + SPARE_MODES
+    modes = max(rounded_up(len(data.gain), FRAMES), usual) - len(data.gain)
+    whitening = Whitening(
+        np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),
+        np.pad(data.inverse_root, [(0, 0), (0, 0), (0, 0), (0, frames)]),
+        np.pad(data.basis, [(0, modes), (0, 0), (0, 0), (0, frames)]),
+        np.pad(data.gain, (0, modes)),
+        data.num_values,
+    )
+    return Padded(np.pad(times, (0, frames), mode="edge"), whitening)
