@@ -133,28 +133,30 @@ def test_wrong_track_names_the_place(old: str, new: str, message: str, tmp_path:
         read_observation_csv(path)
 
 
-def test_times_in_milliseconds_are_named(tmp_path: Path) -> None:
-    path = tmp_path / "track.csv"
-    path.write_text("time_s,a_x_m,a_y_m,a_sd_m\n" + "".join(f"{33 * i},0,0,1\n" for i in range(9)))
-    with pytest.raises(InputError, match="33 s apart; seconds expected"):
-        read_observation_csv(path)
-
-
-@pytest.mark.parametrize("step_s", [1.0, 2.0])
-def test_frame_numbers_are_no_seconds(step_s: float, tmp_path: Path) -> None:
-    path = tmp_path / "track.csv"
+def write_still(path: Path, step_s: float) -> Path:
+    """Nine rows of an object that rests, so far apart."""
     rows = "".join(f"{step_s * i},0,0,1\n" for i in range(9))
     path.write_text("time_s,a_x_m,a_y_m,a_sd_m\n" + rows)
-    with pytest.raises(InputError, match=f"{step_s:g} s apart; .*frame numbers"):
-        read_observation_csv(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("step_s", "message"),
+    [
+        (33.0, "33 s apart; seconds expected"),
+        (1.0, "1 s apart; .*frame numbers"),
+        (2.0, "2 s apart; .*frame numbers"),
+    ],
+)
+def test_what_are_no_seconds_is_named(step_s: float, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=message):
+        read_observation_csv(write_still(tmp_path / "track.csv", step_s))
 
 
 @pytest.mark.parametrize("fps", [1.5, 15.0])
 def test_slow_cameras_are_read(fps: float, tmp_path: Path) -> None:
-    path = tmp_path / "track.csv"
-    rows = "".join(f"{i / fps},0,0,1\n" for i in range(9))
-    path.write_text("time_s,a_x_m,a_y_m,a_sd_m\n" + rows)
-    assert len(read_observation_csv(path).times_s) == 9
+    found = read_observation_csv(write_still(tmp_path / "track.csv", 1 / fps))
+    assert len(found.times_s) == 9
 
 
 def test_too_few_rows_to_estimate_the_error(tmp_path: Path) -> None:
