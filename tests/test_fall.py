@@ -169,7 +169,8 @@ def test_fit_and_diagnose_find_the_drag(tmp_path, capsys):
     assert "k1" not in alone["parameters"]
     assert command.run(diagnose.main, [path, "--out", str(out)]) == 0
     document = json.loads((out / "diagnosis.json").read_text())
-    assert document["verdict"] == {"status": "named", "effects": ["air_drag"], "advice": []}
+    verdict = document["verdict"]
+    assert (verdict["status"], verdict["effects"]) == ("named", ["air_drag"])
     first = document["candidates"][0]["parameters"]["air_drag"]
     assert first["q025"] < drag < first["q975"]
     assert document["history"][-1]["chi2_per_dof"] < 1.5

@@ -60,7 +60,7 @@ def _white(kind: Kind, theta, position, velocity, noise, data: Any, scene):
     predicted = seen(kind.effects, kind.names, theta, motion, data.times_s, scene)
     difference = data.whitening.observed_m - predicted
     white = GaussianLikelihood.whiten(difference, noise, data.whitening).reshape(-1)
-    return jnp.where(jnp.isfinite(white), white, FAILED)
+    return jnp.where(jnp.abs(white) < FAILED, white, FAILED)
 
 
 @kept(num_static=1)
