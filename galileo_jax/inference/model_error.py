@@ -14,6 +14,8 @@ import numpy as np
 IMPULSE_SD = 0.003
 FRICTION_AFTER_HIT_SD = 0.006
 FRICTION_SD = 1e-4
+# Of a mass's logarithm: a hit that hardly slows object 1 says nothing of how heavy it is.
+MOST_OF_A_MASS = 1.0
 
 
 def add_model_error(draws: np.ndarray, names: tuple[str, ...], seed: int) -> np.ndarray:
@@ -33,7 +35,7 @@ def add_model_error(draws: np.ndarray, names: tuple[str, ...], seed: int) -> np.
     for number, (one, other) in enumerate(pairwise(masses), 2):
         ratio = draws[..., one] / draws[..., other]
         normal = generator.standard_normal((2, *draws.shape[:-1]))
-        factor = np.exp(0.5 * IMPULSE_SD * (1 + ratio) * normal[0])
+        factor = np.exp(np.minimum(0.5 * IMPULSE_SD * (1 + ratio), MOST_OF_A_MASS) * normal[0])
         # Only this ratio changes: those on either side of it keep theirs.
         for mass in masses:
             widened[..., mass] *= factor if mass <= one else 1 / factor
