@@ -103,10 +103,12 @@ def _seconded(
     count = len(trials.model_parameters)
     without = replace(base, z=np.where(base.free, fits[best].z, 0.0), jacobian=fits[best].jacobian)
     others = [i for i in range(len(candidates)) if i != best]
+    if not others:
+        return fits
     starts = [own[:1] for own in _matched(fitter, without, [candidates[i] for i in others], seed)]
     of = np.arange(len(others))
     free = np.stack([trials.free(candidates[i])[:count] for i in others])
-    found = fitter.fit_from(np.concatenate(starts), free[of], of) if others else []
+    found = fitter.fit_from(np.concatenate(starts), free[of], of)
     for i, fit in zip(others, found, strict=True):
         fits[i] = max(fits[i], fit, key=_evidence)
     return fits

@@ -11,12 +11,12 @@ import numpy as np
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.residuals import cost
-from galileo_jax.inference.fits.steps import DAMPINGS, Damped
+from galileo_jax.inference.fits.steps import TRIED_SHARE, Damped
 from galileo_jax.inference.trials import NOISE_SD, Trials
 
 # What friction takes up of a constant force is a soft direction: it must be followed to its end.
 MAX_STEPS, ENOUGH = 60, 0.005
-ALL_DAMPINGS = np.arange(len(DAMPINGS))[None]
+ALL = np.arange(len(TRIED_SHARE))[None]
 NO_EDGES = (np.array(-np.inf), np.array(np.inf))  # accelerations have none
 SMALL_STEP = 0.02  # of differences, as a share of a parameter's coarse step
 
@@ -53,7 +53,7 @@ def free_fit(trials: Trials, start: np.ndarray, free: np.ndarray) -> FreeFit:
     for _ in range(MAX_STEPS):
         jacobian, residual = _slopes(trials, z, free, scale)
         damped = Damped.of(free[None, :-1], [jacobian[None]])
-        steps = damped.steps(z[None, None, :-1], [residual[None, None]], NO_EDGES, ALL_DAMPINGS)[0]
+        steps = damped.steps(z[None, None, :-1], [residual[None, None]], NO_EDGES, ALL)[0]
         tried = z + np.pad(steps, [(0, 0), (0, 1)])
         white = _white(trials, tried, free, scale)
         costs = cost([white], tried[:, own])

@@ -10,6 +10,7 @@ import pytest
 from galileo_jax.effects import effect_names
 from galileo_jax.effects.effect import State
 from galileo_jax.effects.forms import FORM_NAMES, FORMS
+from galileo_jax.effects.registry import make_effects
 from galileo_jax.rollout.motion import dynamics
 from tests.effects.motion import INCLINE, PAIR
 
@@ -87,6 +88,23 @@ def test_force_at_a_time():
         force_at_a_time_duration=0.1,
     )
     assert force(STATE) == pytest.approx(np.array([0.5 * 2.0 * np.exp(-1.0), 0.0]))
+
+
+@pytest.mark.parametrize(("power", "law"), [(1.0, "viscous_drag"), (2.0, "air_drag")])
+def test_drags_of_the_library_are_of_a_power(power, law):
+    named = next(effect for effect in make_effects([law]))
+    expected = named.force({law: np.asarray(0.4)}, PAIR)
+    assert expected is not None
+    found = push("drag_of_a_power", drag_of_a_power=0.4, drag_of_a_power_power=power)
+    for speed in (np.array([0.5, 2.0]), np.array([-1.0, 0.0])):
+        state = STATE._replace(speed_m_s=speed)
+        assert found(state) == pytest.approx(expected(state), rel=1e-3)
+
+
+def test_a_root_drag():
+    force = push("drag_of_a_power", drag_of_a_power=0.4, drag_of_a_power_power=0.5)
+    state = STATE._replace(speed_m_s=np.array([0.25, -1.0]))
+    assert force(state) == pytest.approx(np.array([-0.2, 0.4]), rel=1e-3)
 
 
 @pytest.mark.parametrize("scene", [PAIR, INCLINE], ids=["pair", "incline"])

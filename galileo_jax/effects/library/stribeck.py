@@ -32,7 +32,7 @@ class Stribeck(Effect):
             return ()
         usual = SPEED_PRIOR.median  # means nothing while the strength is absent
         return (
-            Parameter("stribeck", "1", PRIOR, 0.0, "effect", 0.1),
+            Parameter("stribeck", "1", PRIOR, 0.0, "effect", 0.1, multiplies="k1"),
             Parameter("stribeck_speed", "m/s", SPEED_PRIOR, usual, "effect", 0.1),
         )
 

@@ -31,7 +31,7 @@ from scipy.special import ndtri
 
 from galileo_jax.inference.fits.programs import FAILED
 from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost
-from galileo_jax.inference.fits.steps import DAMPINGS, Damped, Edges, normal_matrices
+from galileo_jax.inference.fits.steps import DAMPINGS, TRIED_SHARE, Damped, Edges, normal_matrices
 from galileo_jax.inference.trials import NOISE_SD, Trials
 from galileo_jax.parameters import inverse
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -144,7 +144,8 @@ class GradientFitter:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
         free = self.trials.free(self.trials.all_effects)[: self._count]
         points = self._batch(np.zeros((1, self._count)), free)
-        self._step(points, self.trials.coarse_steps[None], np.full(1, np.inf), False)
+        slopes = self._residuals.slopes(points, self.trials.coarse_steps[None], is_central=False)
+        self._try(points, slopes, np.full(1, np.inf))
         self._residuals.costs(self._batch(np.zeros((self.settings.num_starts, self._count)), free))
 
     def fit(
@@ -225,18 +226,23 @@ class GradientFitter:
     def _search(
         self, points: Batch, owner: np.ndarray | None = None
     ) -> tuple[Batch, np.ndarray, int]:
-        """Levenberg-Marquardt with coarse slopes from every point.
+        """Levenberg-Marquardt from every point.
 
-        Of points with the same `owner` (default: each has its own), those far behind are given up.
+        Slopes are coarse at first and then at the scale that the search's noise leaves open:
+        across a narrow valley a coarser one points out of it. Of points with the same `owner`
+        (default: each has its own), those far behind are given up.
         """
         owner = np.arange(len(points.z)) if owner is None else owner
         z, num_steps = points.z.copy(), 0
+        coarse = self.trials.coarse_steps
+        steps = np.tile(coarse, (len(z), 1))
         costs = self._residuals.costs(points)
         active = np.arange(len(z))
         for _ in range(self.settings.max_steps):
             here = Batch(z, points.free, points.noise).take(active)
-            coarse = self.trials.coarse_steps[None]
-            moved, after = self._step(here, coarse, costs[active], False)[:2]
+            slopes = self._residuals.slopes(here, steps[active], is_central=False)
+            steps[active] = np.minimum(self._half_sd(slopes.jacobian), coarse)
+            moved, after = self._try(here, slopes, costs[active])
             gain = costs[active] - after
             z[active], costs[active] = moved, after
             num_steps += 1
@@ -359,14 +365,6 @@ class GradientFitter:
             best[i], lowest[i] = walk[np.argmin(own)], own.min()
         return best, lowest
 
-    def _step(
-        self, points: Batch, steps: np.ndarray, costs: np.ndarray, is_central: bool
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """One Levenberg-Marquardt step of every point: the best of all dampings, or none."""
-        steps = np.broadcast_to(steps, points.z.shape)
-        slopes = self._residuals.slopes(points, steps, is_central)
-        return self._try(points, slopes, costs)
-
     def _try(
         self, points: Batch, slopes: Slopes, costs: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -378,7 +376,7 @@ class GradientFitter:
             after = self._residuals.costs_of(tried, points)
         else:
             damped, edges = Damped.of(points.free, slopes.jacobian), self._edges
-            which = np.tile(np.arange(len(DAMPINGS)), (len(here), 1))
+            which = np.tile(np.arange(len(TRIED_SHARE)), (len(here), 1))
             step = damped.steps(here, [w[:, None] for w in slopes.white], edges.reach(here), which)
             tried = edges.curve(here, step)
             there = self._residuals.whites_of(tried, points)

@@ -3,8 +3,9 @@
 Accelerations are linear in coefficients of friction and in strengths of effects. In z, in which
 every prior is N(0, 1), these hardly move at the edge of a prior: a step that is straight in z
 would leap over all that matters or not come back. So steps are straight in the units that motion
-is linear in, and none goes further than most of the way to an edge; a parameter that would is
-held there, and the others are solved for again (an active set).
+is linear in (a strength that multiplies friction: in their product), and none goes further than
+most of the way to an edge; a parameter that would is held there, and the others are solved for
+again (an active set).
 
 Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); Nocedal and Wright (2006), ch. 16.
 """
@@ -21,6 +22,11 @@ from galileo_jax.parameters import Parameter, PriorTable
 # Against the columns' sizes. Valleys are narrow (masses against friction): most of the range is
 # needed below 1e-2, where steps along them differ.
 DAMPINGS = np.array([0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e1])
+# What is tried: a damping, and a share of its step. Damping holds back most what the data tell
+# least, which in a narrow, bent valley is the way along it: there a part of the whole step is
+# better.
+TRIED_DAMPING = np.append(DAMPINGS, [0.0, 0.0, 1e-4])
+TRIED_SHARE = np.append(np.ones(len(DAMPINGS)), [0.3, 0.1, 0.3])
 LEFT_OF_WAY = 0.1  # to the edge of a prior, by the longest step
 FURTHEST_Z = 7.0  # beyond, a bounded parameter is at its edge to twelve digits
 LOG_NORMAL, UNIFORM = 1, 2  # `PriorTable.kind`
@@ -35,18 +41,24 @@ class Edges:
       is_strength: `[parameter]`, of an effect, positive. Masses are not: motion knows their
         ratio.
       log_sd: `[parameter]`, of a strength's logarithm.
+      multiplied: `[parameter]`, index of the coefficient of friction that it multiplies; its own
+        where there is none.
     """
 
     is_bounded: np.ndarray
     is_strength: np.ndarray
     log_sd: np.ndarray
+    multiplied: np.ndarray
 
     @classmethod
     def of(cls, parameters: Sequence[Parameter]) -> "Edges":
         """The edges of these parameters' priors."""
         table = PriorTable.of(parameters)
         is_strength = (table.kind == LOG_NORMAL) & [p.role == "effect" for p in parameters]
-        return cls(table.kind == UNIFORM, is_strength, np.where(is_strength, table.b, 1.0))
+        where = {p.name: i for i, p in enumerate(parameters)}
+        multiplied = [where.get(p.multiplies or p.name, i) for i, p in enumerate(parameters)]
+        log_sd = np.where(is_strength, table.b, 1.0)
+        return cls(table.kind == UNIFORM, is_strength, log_sd, np.array(multiplied))
 
     def reach(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The shortest and the longest step from z `[..., parameter]`: most of the way."""
@@ -57,13 +69,21 @@ class Edges:
         return low, np.where(self.is_bounded, most * (1 - share) / slope, np.inf)
 
     def curve(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Where a step from z ends that is as straight as can be; to first order z + step."""
-        step = np.clip(step, *self.reach(z))
+        """Where a step from z ends that is as straight as can be; to first order z + step.
+
+        What multiplies a coefficient k is straight in the product: with s k + k ds + s dk for
+        the product's end, s moves by ds k / (k + dk).
+        """
+        low, high = self.reach(z)
+        step = np.clip(step, low, high)
         share, slope = _share(z)
-        bounded = ndtri(share + slope * step)
+        there = share + slope * step
+        shrunk = np.where(self.is_bounded, share / there, 1.0)[..., self.multiplied]
+        alone = self.multiplied == np.arange(len(self.multiplied))
+        step = np.maximum(np.where(alone, step, step * shrunk), low)
         grown = np.where(self.is_strength, self.log_sd * step, 0.0)
         straight = np.where(self.is_strength, z + np.log1p(grown) / self.log_sd, z + step)
-        return np.where(step == 0, z, np.where(self.is_bounded, bounded, straight))
+        return np.where(step == 0, z, np.where(self.is_bounded, ndtri(there), straight))
 
 
 def _share(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -73,12 +93,12 @@ def _share(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Damped(NamedTuple):
-    """Of many points: the linear problems with all dampings.
+    """Of many points: the linear problems with all dampings that are tried.
 
     Attributes:
       jacobian: for each clip `[point, value, parameter]`.
       free: `[point, parameter]`.
-      matrix: for each point `[damping, free parameter, free parameter]`.
+      matrix: for each point `[tried, free parameter, free parameter]`.
     """
 
     jacobian: Sequence[np.ndarray]
@@ -91,7 +111,7 @@ class Damped(NamedTuple):
         matrices = []
         for normal, own in zip(normal_matrices(jacobian), free, strict=True):
             block = normal[np.ix_(own, own)] + np.eye(int(own.sum()))
-            matrices.append(block + DAMPINGS[:, None, None] * np.diag(np.diag(block)))
+            matrices.append(block + TRIED_DAMPING[:, None, None] * np.diag(np.diag(block)))
         return cls(jacobian, free, matrices)
 
     def steps(
@@ -107,7 +127,7 @@ class Damped(NamedTuple):
           z: `[point, 1 or step, parameter]`, where they begin.
           white: residuals there, `[point, 1 or step, value]`, clip by clip.
           reach: the shortest and the longest step, as `z`.
-          which: `[point, step]`, index of each one's damping.
+          which: `[point, step]`, index of each one's damping and share.
 
         Returns:
           `[point, step, parameter]`.
@@ -126,7 +146,7 @@ class Damped(NamedTuple):
                     matrix[d], slope[i, d, own], found[d], sides[0][d], sides[1][d]
                 )
             steps[i][:, own] = found
-        return np.where(np.isfinite(steps), steps, 0.0)
+        return TRIED_SHARE[which][..., None] * np.where(np.isfinite(steps), steps, 0.0)
 
 
 def _held_back(
