@@ -8,7 +8,14 @@ from scipy.optimize import lsq_linear
 from scipy.special import ndtr
 
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
-from galileo_jax.inference.fits.steps import DAMPINGS, Damped, Edges
+from galileo_jax.inference.fits.steps import (
+    DAMPINGS,
+    LEFT_OF_WAY,
+    TRIED_DAMPING,
+    TRIED_SHARE,
+    Damped,
+    Edges,
+)
 from galileo_jax.parameters import LogNormal, Normal, Parameter, Uniform
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -36,6 +43,36 @@ def test_steps_are_straight_in_the_units_of_the_motion(at, step):
     slope = np.array([np.exp(-0.5 * z[0] ** 2) / np.sqrt(2 * np.pi), 1.2 * theta(z)[1], 1, 1])
     expected = theta(z) + slope * step
     np.testing.assert_allclose(theta(EDGES.curve(z, step)), expected, rtol=1e-6, atol=1e-14)
+
+
+PRODUCT = (
+    Parameter("k", "1", Uniform(0.0, 1.0), 0.0),
+    Parameter("s", "1", LogNormal(1.0, 0.8), 0.0, "effect", multiplies="k"),
+)
+
+
+@given(st.tuples(Z, st.floats(-2, 2)), st.tuples(Z, Z))
+def test_what_multiplies_friction_is_straight_in_their_product(at, step):
+    edges, z = Edges.of(PRODUCT), np.array(at)
+    step = np.clip(np.array(step), *edges.reach(z))
+    k, s = ndtr(z[0]), np.exp(0.8 * z[1])
+    dk, ds = np.exp(-0.5 * z[0] ** 2) / np.sqrt(2 * np.pi) * step[0], 0.8 * s * step[1]
+    found = edges.curve(z, step)
+    there = ndtr(found[0]) * np.exp(0.8 * found[1])
+    least = (k + dk) * LEFT_OF_WAY * s
+    np.testing.assert_allclose(there, max(k * s + k * ds + s * dk, least), rtol=1e-6, atol=1e-14)
+
+
+def test_shares_are_of_the_steps_of_their_damping():
+    jacobian = np.random.default_rng(0).normal(size=(1, 9, 3))
+    endless = np.full((1, 1, 3), np.inf)
+    damped = Damped.of(np.ones((1, 3), bool), [jacobian])
+    every = np.arange(len(TRIED_SHARE))[None]
+    steps = damped.steps(np.ones((1, 1, 3)), [np.ones((1, 1, 9))], (-endless, endless), every)[0]
+    for step, damping, share in zip(steps, TRIED_DAMPING, TRIED_SHARE, strict=True):
+        whole = steps[np.flatnonzero(damping == DAMPINGS)[0]]
+        np.testing.assert_allclose(step, share * whole, rtol=1e-12)
+    assert set(TRIED_SHARE) != {1.0}
 
 
 @given(st.tuples(*[st.floats(-8, 8)] * 4), st.tuples(*[st.floats(-1e9, 1e9)] * 4))

@@ -1,0 +1,53 @@
+"""A narrow, bent valley: friction nearly holds object 1, and all hangs on by how much."""
+
+import json
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from galileo_jax import command, simulate
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
+from galileo_jax.diagnosis.diagnose import DECISIVE, fitter_of
+from galileo_jax.effects.forms import FORMS
+from galileo_jax.effects.registry import make_effects
+from galileo_jax.run import make_trials
+from tests.precision import in_64_bit
+
+# tan 10 = 0.176; k (1 + a) = 0.062 * 2.7 = 0.166.
+CALL = ["--seed", "157334244", "--angle", "10", "--effect", "stribeck", "--strength", "0.7"]
+CALL += ["--solver", "fine", "--faults", "--track-only", "--track-noise", "3.3e-4", "--fps", "30"]
+
+
+@pytest.fixture
+def slowly_released(tmp_path):
+    """Trials of a clip, and the truth's parameters."""
+    path = tmp_path / "clip.csv"
+    assert command.run(simulate.main, [*CALL, "--out", str(path)]) == 0
+    forms = tuple(form for form in FORMS if form.name == "force_at_a_time")
+    effects = (*make_effects(["stribeck"]), *forms)
+    clip = load_clip(path.with_suffix(".yaml"))
+    trials = make_trials([clip], [read_observation_csv(path)], effects=effects)
+    truth = json.loads(path.with_suffix(".truth.json").read_text())
+    return trials, truth | truth["effect_parameters"]
+
+
+def test_the_search_arrives_where_a_start_at_the_truth_does(slowly_released):
+    trials, truth = slowly_released
+    with in_64_bit():
+        fitter = fitter_of(trials)
+        base = Hypothesis((), fitter.fit(0, effects=()))
+        parameters = trials.model_parameters
+        count = len(parameters)
+        start = base.fit.z[:count].copy()
+        for i, parameter in enumerate(parameters):
+            if parameter.name in truth:
+                start[i] = parameter.prior.inverse(jnp.asarray(truth[parameter.name]))
+        free = trials.free(("stribeck",))[:count]
+        (from_truth,) = fitter.fit_from(start[None], free[None], np.zeros(1, int))
+        searched = fit_candidates(fitter, base, [("stribeck",), ("force_at_a_time",)], seed=0)
+    named, form = (one.fit.log_evidence for one in searched)
+    assert named > from_truth.log_evidence - 1.0
+    assert named > form + DECISIVE
