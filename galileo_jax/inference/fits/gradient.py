@@ -228,9 +228,9 @@ class GradientFitter:
     ) -> tuple[Batch, np.ndarray, int]:
         """Levenberg-Marquardt from every point.
 
-        Slopes are coarse at first and then at the scale that the search's noise leaves open:
-        across a narrow valley a coarser one points out of it. Of points with the same `owner`
-        (default: each has its own), those far behind are given up.
+        Slopes are by turns coarse, which see past small dips, and as fine as the search's noise
+        lets one tell: across a narrow valley a coarse one points out of it. Of points with the
+        same `owner` (default: each has its own), those far behind are given up.
         """
         owner = np.arange(len(points.z)) if owner is None else owner
         z, num_steps = points.z.copy(), 0
@@ -238,15 +238,19 @@ class GradientFitter:
         steps = np.tile(coarse, (len(z), 1))
         costs = self._residuals.costs(points)
         active = np.arange(len(z))
-        for _ in range(self.settings.max_steps):
+        last_gain = np.full(len(z), np.inf)
+        for turn in range(self.settings.max_steps):
             here = Batch(z, points.free, points.noise).take(active)
-            slopes = self._residuals.slopes(here, steps[active], is_central=False)
+            widths = np.broadcast_to(coarse, here.z.shape) if turn % 2 == 0 else steps[active]
+            slopes = self._residuals.slopes(here, widths, is_central=False)
             steps[active] = np.minimum(self._half_sd(slopes.jacobian), coarse)
             moved, after = self._try(here, slopes, costs[active])
             gain = costs[active] - after
             z[active], costs[active] = moved, after
             num_steps += 1
-            active = active[gain >= self.settings.enough]
+            stays = np.maximum(gain, last_gain[active]) >= self.settings.enough
+            last_gain[active] = gain
+            active = active[stays]
             if num_steps >= STEPS_BEFORE_GIVING_UP:
                 lowest = np.full(owner.max() + 1, np.inf)
                 np.minimum.at(lowest, owner, costs)
