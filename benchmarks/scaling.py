@@ -124,6 +124,8 @@ def cost_of_clips(paths: Sequence[Path]) -> dict[str, Any]:
             heavy = sum(total[name] for name in HEAVY)
             small = sum(total.values()) - heavy
             tables.row(str(i), (float(np.mean(seconds)), len(shapes), heavy, small))
+    if missing := [name for name in HEAVY if not total[name]]:
+        raise RuntimeError(f"JAX logs no compilation of {missing}: HEAVY has other names")
     later = ~np.array(is_first)
     marginal = float(np.mean(np.array(seconds)[later]))
     surplus = int(np.array(compiled)[later].sum())

@@ -84,7 +84,13 @@ class Kept:
         path = (
             folder / f"{self._function.__name__}-{hashlib.sha256(wanted.encode()).hexdigest()[:32]}"
         )
-        return jax.jit(_read(path) or _write(path, flat, shapes))
+        program = _read(path) or _write(path, flat, shapes)
+
+        def call(leaves: list[Any]) -> Any:
+            return program(leaves)
+
+        call.__name__ = self._function.__name__  # for JAX's logs and profiles
+        return jax.jit(call)
 
 
 def _folder() -> Path | None:
