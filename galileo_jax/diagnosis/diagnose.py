@@ -6,8 +6,8 @@
    prior, for how many were tried. Compare the best with the data, too.
 3. Candidates that are adequate and whose evidence is within a factor of the best's cannot
    be told from it: one is named, several are ambiguous.
-   The forms without a name (`effects/forms`) are candidates, too: what they explain better is
-   not named, and what they alone explain is unknown.
+   The forms without a name (`effects/forms`) are candidates, too: what they explain as well is
+   not named, and what they alone explain is unknown. They are twenty times less likely ahead.
 4. Where no single effect is adequate, the best is joined by those whose slopes stand out most.
 5. Where no pair is adequate either, the verdict is unknown, and the missing force is
    inferred without a form (`missing_force`).
@@ -253,8 +253,7 @@ def _verdict(candidates: Sequence[Candidate], base: GradientFit, decisive: float
     if not names or best - top > decisive:
         return None
     equal = [c.name for c in names if top - c.log_evidence < decisive]
-    # A law that is known is likelier ahead than some law that looks like it.
-    alike = [c.name for c in forms if c.log_evidence > top]
+    alike = [c.name for c in forms if abs(top - c.log_evidence) < decisive]
     if len(equal) == 1 and not alike:
         return Verdict("named", next(c.effects for c in names if c.name == equal[0]))
     return Verdict("ambiguous", (*equal, *alike[:1]))

@@ -190,7 +190,7 @@ class Effect:
     def odds(self, theta: Theta, scene: Surroundings) -> float:
         """How many times as likely as its prior says it is to be there, at these values.
 
-        1 but where what is known of the clip leads to expect it.
+        1 but where what is known of the clip leads to expect it, and of laws without a name.
         """
         return 1.0
 

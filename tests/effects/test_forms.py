@@ -1,5 +1,6 @@
 """Forms without a name: in no list of names, nothing at absent, and what they do when present."""
 
+import math
 from dataclasses import replace
 
 import jax
@@ -7,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from galileo_jax.diagnosis.diagnose import DECISIVE
 from galileo_jax.effects import effect_names
 from galileo_jax.effects.effect import State
 from galileo_jax.effects.forms import FORM_NAMES, FORMS
@@ -42,6 +44,11 @@ def push(form, **given):
 
 def test_they_have_no_place_among_the_names():
     assert not set(FORM_NAMES) & set(effect_names())
+
+
+@pytest.mark.parametrize("form", FORMS, ids=FORM_NAMES)
+def test_a_law_with_a_name_wins_a_draw(form):
+    assert -math.log(form.odds(theta(), PAIR)) == pytest.approx(DECISIVE, abs=0.01)
 
 
 @pytest.mark.parametrize("form", FORMS, ids=FORM_NAMES)
