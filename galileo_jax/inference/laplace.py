@@ -17,7 +17,7 @@ def laplace_posterior(trials: Trials, fit: GradientFit, seed: int) -> Posterior:
     second mode: compare with `--method mh` where that matters.
     """
     generator = np.random.default_rng(seed)
-    root = np.linalg.cholesky(fit.covariance[np.ix_(fit.free, fit.free)])
+    root = root_of(fit.covariance[np.ix_(fit.free, fit.free)])
     normal = generator.standard_normal((NUM_DRAWS, len(root)))
     z = np.tile(fit.z, (NUM_DRAWS, 1))
     z[:, fit.free] += normal @ root.T
@@ -29,3 +29,15 @@ def laplace_posterior(trials: Trials, fit: GradientFit, seed: int) -> Posterior:
         stats=fit.stats,
         provenance={"method": "grad", "seed": seed, "code": fit.code.name},
     )
+
+
+def root_of(covariance: np.ndarray) -> np.ndarray:
+    """R with R R^T the covariance; of one that rounding left indefinite, the nearest that is not.
+
+    Where a hypothesis is absurd its slopes are, too, and eigenvalues span more than sixteen digits.
+    """
+    try:
+        return np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        variance, vectors = np.linalg.eigh(covariance)
+        return vectors * np.sqrt(np.maximum(variance, 0.0))
