@@ -64,7 +64,9 @@ class Settings:
       num_exact: up to so many points at once, optimistix solves the steps with clock and camera
         exact; its program takes some seconds to build, so that 0 is quicker for a library.
       settled: converged where neither a step with slopes at the posterior's scale nor a walk of
-        one or three sd along the softest directions lowers chi2 / 2 by more.
+        one or three sd along the softest directions lowers chi2 / 2 by more. Two starts then
+        agree within some hundredths of an sd.
+      settled_if_rough: the same with MuJoCo's contacts, whose chi2 is no smoother than that.
     """
 
     num_starts: int = 64
@@ -74,7 +76,8 @@ class Settings:
     max_steps: int = 15
     enough: float = 0.5
     num_exact: int = 4
-    settled: float = 0.5
+    settled: float = 0.05
+    settled_if_rough: float = 0.5
 
 
 class Code(StrEnum):
@@ -134,6 +137,7 @@ class GradientFitter:
         parameters = trials.model_parameters
         is_smooth = trials.problems[0].engine.name == "rigid"
         self._smallest_step = SMALLEST_STEP if is_smooth else SMALLEST_ROUGH_STEP
+        self._settled = settings.settled if is_smooth else settings.settled_if_rough
         self._is_nuisance = np.array([p.role == "nuisance" for p in parameters])
         zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
         self._rest = np.clip(zero, -1.0, 1.0)
@@ -286,13 +290,13 @@ class GradientFitter:
             z[active] = moved
             num_steps += 1
             drifts = np.abs(scales / before - 1).max(axis=1) > 0.1
-            done = (costs - after < settings.settled) & ~drifts
+            done = (costs - after < self._settled) & ~drifts
             if done.any():
                 # No damping helps. In a narrow, rough valley that is no proof: look along it.
                 chosen = np.flatnonzero(done)
                 there = here._replace(z=moved).take(chosen)
                 best, lowest = self._walk(there, covariance[chosen])
-                settled = after[chosen] - lowest < settings.settled
+                settled = after[chosen] - lowest < self._settled
                 is_settled[active[chosen[settled]]] = True
                 z[active[chosen[~settled]]] = best[~settled]
             misfit[active] = after + np.log(scales) @ self._num_values
