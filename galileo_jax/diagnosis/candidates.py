@@ -30,7 +30,7 @@ NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best 
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1
 SMALL_QUANTILE_Z = -2.0
-NUM_REFITTED, OUT_OF_THE_RACE = 3, 100.0  # candidates, unless so many nats behind the best
+NUM_REFITTED, OUT_OF_THE_RACE = 6, 100.0  # candidates, unless so many nats behind the best
 NUM_SHAPES, NUM_MATCHED = 96, 3  # tried per candidate whose effect has a shape; kept as starts
 SHOWS = 1e-9  # a slope below does not
 MOST_Z = 2.5  # of a matched strength's prior
