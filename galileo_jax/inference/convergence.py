@@ -38,15 +38,25 @@ def arviz() -> ModuleType:
 
 def convergence(draws: np.ndarray) -> Convergence:
     """R-hat and effective sample sizes of `draws` `[chain, draw]`."""
-    az = arviz()
     draws = np.asarray(draws, np.float64)
-    if np.ptp(draws) == 0 or not np.all(np.isfinite(draws)) or draws.shape[1] < 4:
+    if not _can_tell(draws):
         return Convergence(np.nan, np.nan, np.nan)
+    az = arviz()
     return Convergence(
         rhat=float(az.rhat(draws)),
-        ess_bulk=float(az.ess(draws, method="bulk")),
+        ess_bulk=effective(draws),
         ess_tail=float(az.ess(draws, method="tail")),
     )
+
+
+def effective(draws: np.ndarray) -> float:
+    """The bulk effective sample size alone of `[chain, draw]`; NaN where nothing moved."""
+    draws = np.asarray(draws, np.float64)
+    return float(arviz().ess(draws, method="bulk")) if _can_tell(draws) else np.nan
+
+
+def _can_tell(draws: np.ndarray) -> bool:
+    return bool(np.ptp(draws) > 0 and np.all(np.isfinite(draws)) and draws.shape[1] >= 4)
 
 
 def convergences(quantities: Mapping[str, np.ndarray]) -> dict[str, Convergence]:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,11 +10,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.fits.residuals import Residuals
+from galileo_jax.inference.fits.valley import along, scattered, valley_round
 from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import IDENTIFIED_SD_Z
-from galileo_jax.inference.samplers import dispersed_starts, sample, sampler_class
+from galileo_jax.inference.samplers import sample, sampler_class
 from galileo_jax.inference.samplers.driver import Progress, Settings
 from galileo_jax.inference.trials import Trials
 
@@ -37,14 +41,17 @@ def metropolis_posterior(
 ) -> Posterior:
     """Samples the trials' posterior, started from and tuned by a gradient fit.
 
+    Chains run in coordinates in which the fit's valley is straight (`fits/valley.py`).
+
     Args:
       trials: the target is `trials.log_density`, noise scales included.
-      fit: its covariance is the first proposal; chains start dispersed round it.
+      fit: its covariance is the first proposal; chains start dispersed along its valley.
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
       settings: how long.
       num_chains: how many.
-      starts: `[chain, parameter]`, where they begin, in z; default: dispersed round the fit.
+      starts: `[chain, parameter]`, where they begin, in z, led along the valley as proposals
+        are; default: dispersed in it.
       checkpoint: file that interrupted chains go on from; see `samplers.sample`.
       identity: of what is sampled; a checkpoint of anything else is refused.
       on_block: called with the progress.
@@ -53,10 +60,12 @@ def metropolis_posterior(
       Draws in the parameters' units. Converged when the main parameters that the fit found
       identified, and the mass ratio, have R-hat and ESS as asked for.
     """
-    start_key, key = jax.random.split(jax.random.key(seed))
-    mode, covariance = jnp.asarray(fit.z), jnp.asarray(fit.covariance)
+    residuals = Residuals(trials)
+    valley = valley_round(fit, residuals)
     if starts is None:
-        starts = np.asarray(dispersed_starts(start_key, mode, covariance, num_chains))
+        begin = scattered(valley, fit, residuals, seed, num_chains)
+    else:
+        begin = valley.straight(starts)
     sd = np.sqrt(np.diag(fit.covariance))
     watched = [
         (i, parameter.name)
@@ -64,18 +73,20 @@ def metropolis_posterior(
         if parameter.role != "nuisance" and sd[i] < IDENTIFIED_SD_Z
     ]
 
-    def monitor(draws: np.ndarray) -> dict[str, np.ndarray]:
+    def monitor(u: np.ndarray) -> dict[str, np.ndarray]:
+        draws = valley(u)
         found = {name: draws[..., i] for i, name in watched}
         masses = [i for i, name in enumerate(trials.names) if re.fullmatch(r"m\d+", name)]
         for i, (one, other) in enumerate(pairwise(masses), 1):
             found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]
         return found or {"log_noise": draws[..., -1]}
 
+    dim = len(trials.names)
     posterior = sample(
-        key,
-        sampler_class(sampler).from_gaussian(mode, covariance),  # pyright: ignore
-        trials.log_density,
-        jnp.asarray(starts),
+        jax.random.key(seed),
+        sampler_class(sampler).from_gaussian(jnp.zeros(dim), jnp.eye(dim)),  # pyright: ignore
+        along(density_of(trials), valley),
+        jnp.asarray(begin),
         trials.names,
         settings=settings,
         monitor=monitor,
@@ -83,6 +94,8 @@ def metropolis_posterior(
         checkpoint=checkpoint,
         identity=identity,
     )
+    count = posterior.stats["num_evaluations"] + residuals.num_rollouts
+    posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
     return posterior.mapped(
-        lambda z: add_model_error(trials.theta(z), trials.names, seed), trials.names
+        lambda u: add_model_error(trials.theta(valley(u)), trials.names, seed), trials.names
     )

@@ -52,7 +52,7 @@ class ClipArrays(NamedTuple):
     column: np.ndarray
 
 
-def _white(kind: Kind, theta, position, velocity, noise, data: Any, scene):
+def white_of(kind: Kind, theta, position, velocity, noise, data: Any, scene):
     """Whitened residuals of one motion, `[value]`."""
     times = jnp.arange(position.shape[-1]) * kind.record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
@@ -66,7 +66,7 @@ def _white(kind: Kind, theta, position, velocity, noise, data: Any, scene):
 @kept(num_static=1)
 def white_batch(kind: Kind, theta, position, velocity, noise, data, scene):
     """Whitened residuals of many motions, `[point, value]`."""
-    return jax.vmap(lambda t, p, v, n: _white(kind, t, p, v, n, data, scene))(
+    return jax.vmap(lambda t, p, v, n: white_of(kind, t, p, v, n, data, scene))(
         theta, position, velocity, noise
     )
 
@@ -79,7 +79,7 @@ def _white_near(kind: Kind, u, z, free, index, noise, motion, clip: ClipArrays):
     position, velocity, position_slope, velocity_slope = motion
     position = position + jnp.tensordot(u, position_slope, axes=1)
     velocity = velocity + jnp.tensordot(u, velocity_slope, axes=1)
-    return _white(kind, theta, position, velocity, noise, clip.data, clip.scene)
+    return white_of(kind, theta, position, velocity, noise, clip.data, clip.scene)
 
 
 @kept(num_static=1)

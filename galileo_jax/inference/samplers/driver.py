@@ -14,10 +14,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.inference.convergence import Convergence, convergence, convergences
+from galileo_jax.inference.convergence import Convergence, convergences, effective
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.inference.samplers import checkpoint as checkpoints
 from galileo_jax.inference.samplers.checkpoint import History
+from galileo_jax.inference.samplers.program import compiled
 from galileo_jax.inference.samplers.sampler import (
     AbstractSampler,
     AbstractTunedSampler,
@@ -39,7 +40,7 @@ class Settings:
       warmup_steps: per chain, discarded; the sampler is tuned after each block of them.
         200 with eight chains mend a covariance that is wrong by a factor of four.
       block_steps: per chain, between two looks at convergence, two checkpoints and two
-        reports; a Ctrl-C takes effect at the end of a block.
+        reports, whole turns of the sampler; a Ctrl-C takes effect at the end of a block.
       max_steps: per chain, after the warm-up, where convergence does not come before.
       thin: every `thin`-th draw is kept.
       max_rhat: stop when R-hat of every monitored quantity is below.
@@ -126,7 +127,7 @@ def sample(
     Arguments:
       key: the only source of randomness; the same key gives the same draws.
       sampler: tuned in the warm-up where it is an `AbstractTunedSampler`.
-      log_density: `[dim] -> []`, vmapped over the chains (one call per step for all).
+      log_density: `[dim] -> []`, vmapped over the chains (one call per turn for all).
       start: `[chain, dim]`; see `dispersed_starts`.
       names: of the `dim` coordinates.
       settings: how long; immutable, so the default is safe.
@@ -148,6 +149,11 @@ def sample(
     start = jnp.asarray(start)
     if start.ndim != 2 or start.shape[1] != len(names):
         raise ValueError(f"start {start.shape} is not [chain, {len(names)}]")
+    if settings.block_steps % sampler.steps_per_turn:
+        raise ValueError(
+            f"block_steps is {settings.block_steps}; {sampler.name} makes "
+            f"{sampler.steps_per_turn} steps at a time"
+        )
     monitor = monitor or (lambda draws: dict(zip(names, np.moveaxis(draws, -1, 0), strict=True)))
     digest = checkpoints.fingerprint(
         [
@@ -163,7 +169,7 @@ def sample(
 
     if checkpoint is not None and Path(checkpoint).exists():
         # What the file must look like follows from shapes alone, without an evaluation.
-        shapes = eqx.filter_eval_shape(_initial_states, sampler, log_density, start)
+        shapes = _states_like(sampler, start)
         (states, sampler), history = checkpoints.load(checkpoint, digest, (shapes, sampler))
     else:
         states = _initial_states(sampler, log_density, start)
@@ -175,13 +181,17 @@ def sample(
     while history.num_steps < total and not _is_enough(state, settings):
         with _interrupt_deferred():
             is_warmup = history.num_steps < settings.warmup_steps
-            states, sampler, record = _run_block(
-                key,
-                sampler,
+            end = history.num_steps + settings.block_steps
+            turns = jnp.arange(history.num_steps, end, sampler.steps_per_turn)
+            states, sampler, record = compiled(
+                _run_block,
+                (states, sampler, (0, 0, 0)),
                 log_density,
+                sampler,
+                jax.random.key_data(key),
                 states,
-                jnp.arange(history.num_steps, history.num_steps + settings.block_steps),
-                _gains(settings.block_steps) * (1.0 if is_warmup else 0.0),
+                turns,
+                _gains(len(turns)) * (1.0 if is_warmup else 0.0),
             )
             block = History(*(np.asarray(leaf) for leaf in record))
             history = history.extended(block)
@@ -204,18 +214,25 @@ def sample(
     return _posterior(key, sampler, history, names, settings, state)
 
 
-@eqx.filter_jit
 def _initial_states(sampler: AbstractSampler, log_density: LogDensity, start: jax.Array) -> Any:
+    return compiled(_states_at, _states_like(sampler, start), log_density, sampler, start)
+
+
+def _states_like(sampler: AbstractSampler, start: jax.Array) -> Any:
+    """Shapes of the chains' states, without an evaluation."""
+    return eqx.filter_eval_shape(_states_at, jnp.sum, sampler, start)
+
+
+def _states_at(log_density: LogDensity, sampler: AbstractSampler, start: jax.Array) -> Any:
     return jax.vmap(lambda position: sampler.init(position, log_density))(start)
 
 
-@eqx.filter_jit
 def _run_block(
-    key: jax.Array,
-    sampler: AbstractSampler,
     log_density: LogDensity,
+    sampler: AbstractSampler,
+    key_data: jax.Array,
     states: Any,
-    steps: jax.Array,
+    turns: jax.Array,
     gains: jax.Array,
 ) -> tuple[Any, AbstractSampler, tuple[jax.Array, ...]]:
     """One block of all chains, compiled once: in the sampling phase the gains are zero.
@@ -223,19 +240,26 @@ def _run_block(
     Returns the states, the sampler and the leaves of the block's `History`.
     """
     num_chains = states.log_density.shape[0]
+    key = jax.random.wrap_key_data(key_data)
 
-    def body(carry, step_and_gain):
+    def body(carry, turn_and_gain):
         states, sampler = carry
-        step, gain = step_and_gain
+        first_step, gain = turn_and_gain
         # Keys follow from the step's number, so that a resumed run needs no stored key.
-        keys = jax.random.split(jax.random.fold_in(key, step), num_chains)
-        states, info = jax.vmap(lambda k, s: sampler.step(k, s, log_density))(keys, states)
+        keys = jax.random.split(jax.random.fold_in(key, first_step), num_chains)
+        states, (trace, info) = jax.vmap(lambda k, s: sampler.turn(k, s, log_density))(keys, states)
         if isinstance(sampler, AbstractTunedSampler):
             sampler = sampler.rescaled(info, gain)
-        return (states, sampler), (states.position, states.log_density, info.is_accepted)
+        return (states, sampler), (trace.position, trace.log_density, info.is_accepted)
 
-    (states, sampler), record = jax.lax.scan(body, (states, sampler), (steps, gains))
-    return states, sampler, tuple(jnp.moveaxis(leaf, 0, 1) for leaf in record)
+    (states, sampler), record = jax.lax.scan(body, (states, sampler), (turns, gains))
+    return states, sampler, tuple(_of_chains(leaf) for leaf in record)
+
+
+def _of_chains(leaf: jax.Array) -> jax.Array:
+    """`[turn, chain, step of the turn, ...]` to `[chain, step, ...]`."""
+    leaf = jnp.moveaxis(leaf, 0, 1)
+    return leaf.reshape(leaf.shape[0], -1, *leaf.shape[3:])
 
 
 def _gains(num_steps: int) -> jax.Array:
@@ -268,13 +292,13 @@ def _refitted(sampler: AbstractTunedSampler, history: History) -> AbstractTunedS
     """
     window = history.position[:, history.num_steps // 2 :].astype(np.float64)
     dim = window.shape[-1]
-    effective = min(convergence(window[..., i]).ess_bulk for i in range(dim))
-    if not np.isfinite(effective):
+    count = min(effective(window[..., i]) for i in range(dim))
+    if not np.isfinite(count):
         return sampler
     flat = window.reshape(-1, dim)
     prior = PRIOR_DRAWS_PER_DIMENSION * dim
     before = np.asarray(sampler.covariance, np.float64)
-    covariance = (prior * before + effective * np.cov(flat, rowvar=False)) / (prior + effective)
+    covariance = (prior * before + count * np.cov(flat, rowvar=False)) / (prior + count)
     return sampler.fitted(jnp.asarray(flat.mean(axis=0)), jnp.asarray(covariance))
 
 

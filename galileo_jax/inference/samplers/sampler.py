@@ -1,4 +1,4 @@
-"""What a sampler is: a kernel with `init` and `step`, and what the driver may tune in it.
+"""What a sampler is: a kernel with `init` and `turn`, and what the driver may tune in it.
 
 A sampler is an immutable pytree, so that what the warm-up learns (scale, covariance) is a
 traced value and never compiles anything anew. It owns no loop, no key and no output.
@@ -10,6 +10,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 
 LogDensity = Callable[[jax.Array], jax.Array]
 """`[dim] -> []`, up to a constant. -inf and NaN are never accepted."""
@@ -30,20 +31,25 @@ class Info(NamedTuple):
 
 
 class AbstractSampler(eqx.Module):
-    """A Markov kernel as two pure functions; each `step` costs exactly one log density.
+    """A Markov kernel as two pure functions; each step costs exactly one log density.
 
-    A sampler may carry more in its state and info than `State` and `Info` do, but not less.
+    Steps come in turns, whose log densities are evaluated together: a batch of rollouts costs
+    little more than one. A sampler may carry more in its state and info than `State` and `Info`
+    do, but not less.
     """
 
     name: ClassVar[str]
+    steps_per_turn: ClassVar[int] = 1
 
     def init(self, position: jax.Array, log_density: LogDensity) -> Any:
         """The state at `position` `[dim]`; one evaluation."""
         return State(position, log_density(position))
 
     @abstractmethod
-    def step(self, key: jax.Array, state: Any, log_density: LogDensity) -> tuple[Any, Any]:
-        """One step of one chain: `(state, info)`; one evaluation, at the proposal."""
+    def turn(
+        self, key: jax.Array, state: Any, log_density: LogDensity
+    ) -> tuple[Any, tuple[Any, Any]]:
+        """`steps_per_turn` steps of one chain: the last state; states and infos `[step, ...]`."""
 
 
 class AbstractTunedSampler(AbstractSampler):
@@ -68,6 +74,11 @@ class AbstractTunedSampler(AbstractSampler):
         """One Robbins-Monro step of the scale: log s += gain (acceptance - target).
 
         Arguments:
-          info: of one step of all chains (leading axis `chain`).
+          info: of a turn of all chains, `[chain, step]`.
           gain: 0 leaves the sampler exactly as it is.
         """
+
+
+def turn_of_one(state: Any, info: Any) -> tuple[Any, tuple[Any, Any]]:
+    """What a step gave, as a turn."""
+    return state, jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (state, info))

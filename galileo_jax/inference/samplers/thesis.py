@@ -14,7 +14,13 @@ from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
 from galileo_jax.inference.samplers.driver import Progress, Settings, sample
 from galileo_jax.inference.samplers.registry import register
-from galileo_jax.inference.samplers.sampler import AbstractSampler, Info, LogDensity, State
+from galileo_jax.inference.samplers.sampler import (
+    AbstractSampler,
+    Info,
+    LogDensity,
+    State,
+    turn_of_one,
+)
 
 NUM_CHAINS = 16
 NUM_STEPS = 75
@@ -71,6 +77,10 @@ class Thesis(AbstractSampler):
     def init(self, position: jax.Array, log_density: LogDensity) -> ThesisState:
         """The state at `position`, which must lie in (0, 1)."""
         return ThesisState(position, log_density(position), jnp.zeros((), jnp.int32))
+
+    def turn(self, key: jax.Array, state: ThesisState, log_density: LogDensity):
+        """One step."""
+        return turn_of_one(*self.step(key, state, log_density))
 
     def step(
         self, key: jax.Array, state: ThesisState, log_density: LogDensity

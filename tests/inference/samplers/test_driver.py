@@ -1,5 +1,6 @@
 """The driver: evaluations, determinism, resuming, stopping, and what it refuses."""
 
+import functools
 import os
 import signal
 
@@ -12,6 +13,7 @@ from galileo_jax.errors import InputError
 from galileo_jax.inference.posterior import Status
 from galileo_jax.inference.samplers import Settings, dispersed_starts, sample
 from galileo_jax.inference.samplers.library.mixture import Mixture
+from galileo_jax.inference.samplers.program import Program
 from tests.inference.samplers.targets import gaussian
 
 TARGET = gaussian(3)
@@ -43,7 +45,7 @@ def test_same_key_same_draws_and_another_key_others():
     assert not np.array_equal(first.draws, other.draws)
 
 
-def test_every_evaluation_is_counted_and_chains_go_together():
+def test_every_evaluation_is_counted_and_a_turn_of_all_chains_goes_together():
     batches = []
 
     def engine(z):
@@ -55,8 +57,7 @@ def test_every_evaluation_is_counted_and_chains_go_together():
         return jax.pure_callback(engine, shape, z, vmap_method="expand_dims")
 
     posterior = run(log_density=log_density)
-    assert set(batches) == {(4, 3)}
-    assert len(batches) == 1 + 150
+    assert batches == [(4, 3)] + 30 * [(4, 5, 3)]
     assert posterior.stats["num_evaluations"] == 4 * (1 + 150)
 
 
@@ -69,6 +70,29 @@ def test_log_density_belongs_to_the_draws():
 def test_thinning_keeps_every_third_draw():
     thinned = run(settings=Settings(50, 25, 100, thin=3, stops_early=False))
     np.testing.assert_array_equal(thinned.draws, run().draws[:, 2::3])
+
+
+def gaussian_code(data, z):
+    return -0.5 * jnp.sum(((z - data["mean"]) / data["sd"]) ** 2)
+
+
+def test_a_program_is_a_density_and_is_compiled_once_for_all_data():
+    traces = []
+
+    def counted(data, z):
+        traces.append(1)
+        return gaussian_code(data, z)
+
+    def data(mean):
+        return {"mean": jnp.asarray(mean), "sd": jnp.asarray([1.0, 2.0, 3.0])}
+
+    first = run(log_density=Program((counted,), data([0.0, 0.0, 0.0])))
+    closure = run(log_density=functools.partial(gaussian_code, data([0.0, 0.0, 0.0])))
+    np.testing.assert_allclose(first.draws, closure.draws, rtol=1e-4, atol=1e-5)
+    so_far = len(traces)
+    other = run(log_density=Program((counted,), data([5.0, 5.0, 5.0])))
+    assert len(traces) == so_far > 0
+    assert other.draws.mean() > first.draws.mean() + 2
 
 
 class StopError(Exception):
@@ -233,3 +257,5 @@ def test_wrong_shapes_and_settings_are_refused():
         Settings(max_steps=110)
     with pytest.raises(ValueError, match="thin is 0; it must be at least 1"):
         Settings(thin=0)
+    with pytest.raises(ValueError, match="block_steps is 12; mixture makes 5 steps at a time"):
+        run(settings=Settings(warmup_steps=0, block_steps=12, max_steps=24))

@@ -130,7 +130,7 @@ def test_invariance_of_the_kernels(name):
 
     def one(key, start):
         def body(state, key):
-            state, info = sampler.step(key, state, log_density)
+            state, (_, info) = sampler.turn(key, state, log_density)
             return state, info.is_accepted
 
         state = sampler.init(start, log_density)
@@ -143,6 +143,23 @@ def test_invariance_of_the_kernels(name):
     assert stats.kstest(np.asarray(draws), stats.gumbel_r.cdf).pvalue > 1e-3
 
 
+def test_a_turn_is_its_steps():
+    """What it says of every step: where the chain went, and that each move was one it accepted."""
+    target = gaussian(3)
+    sampler = tuned("mixture", target.mean, target.covariance)
+    state = sampler.init(jnp.asarray(target.mean), target.log_density)
+    keys = jax.random.split(jax.random.key(1), 50)
+    last, (states, info) = jax.vmap(lambda key: sampler.turn(key, state, target.log_density))(keys)
+    assert states.position.shape == (50, sampler.steps_per_turn, 3)
+    np.testing.assert_array_equal(states.position[:, -1], last.position)
+    start = jnp.broadcast_to(state.position, (50, 1, 3))
+    moved = np.any(np.diff(states.position, axis=1, prepend=start) != 0, axis=-1)
+    np.testing.assert_array_equal(moved, info.is_accepted)
+    densities = jax.vmap(jax.vmap(target.log_density))(states.position)
+    np.testing.assert_allclose(states.log_density, densities, atol=1e-4)
+    assert info.is_independent[0].tolist() == [False, True, True, True, True]
+
+
 def simulated_ranks(num_runs: int, draws_per_run: int) -> np.ndarray:
     """Ranks of the truth among posterior draws, conjugate Gaussian: `[run, parameter]`.
 
@@ -151,7 +168,7 @@ def simulated_ranks(num_runs: int, draws_per_run: int) -> np.ndarray:
     rng = np.random.default_rng(11)
     design = rng.normal(size=(6, 2)).astype(np.float32)
     sampler = tuned("mixture", np.zeros(2, np.float32), np.eye(2, dtype=np.float32) / 10)
-    thin = 20
+    turns = 4  # from a draw to the next
 
     def one(key):
         theta_key, noise_key, start_key, key = jax.random.split(key, 4)
@@ -162,13 +179,13 @@ def simulated_ranks(num_runs: int, draws_per_run: int) -> np.ndarray:
             return -0.5 * z @ z - 0.5 * jnp.sum((y - design @ z) ** 2) / 0.25
 
         def body(state, key):
-            state, _ = sampler.step(key, state, log_density)
+            state, _ = sampler.turn(key, state, log_density)
             return state, state.position
 
         state = sampler.init(jax.random.normal(start_key, (2,)), log_density)
-        keys = jax.random.split(key, thin * (draws_per_run + 20))
+        keys = jax.random.split(key, turns * (draws_per_run + 20))
         _, positions = jax.lax.scan(body, state, keys)
-        kept = positions[20 * thin :: thin]
+        kept = positions[20 * turns :: turns]
         return jnp.sum(kept < theta, axis=0)
 
     return np.asarray(jax.jit(jax.vmap(one))(jax.random.split(jax.random.key(3), num_runs)))

@@ -24,15 +24,16 @@ class MixtureInfo(NamedTuple):
 
 @register
 class Mixture(AbstractTunedSampler):
-    """Per step one of two Metropolis-Hastings kernels, chosen by a coin of fixed bias.
+    """Turns of five Metropolis-Hastings steps: one of a random walk, four independent ones.
 
-        with probability 0.8:  y ~ t_10(mean, L L^T), accepted with
-                               min(1, p(y) t(x) / (p(x) t(y)))
-        otherwise:             y ~ N(x, s^2 L L^T), accepted with min(1, p(y) / p(x))
+        the first:   y ~ N(x, s^2 L L^T), accepted with min(1, p(y) / p(x))
+        the others:  y ~ t_10(mean, L L^T), accepted with min(1, p(y) t(x) / (p(x) t(y)))
 
-    Both leave the density invariant, so their mixture does. Where a Laplace fit is good the
-    first makes nearly independent draws; where it is not, the second is the random walk
-    that always works. The tail, heavier than the Gaussian's, lets chains leave where p's is.
+    All leave the density invariant, so a turn does. No proposal depends on whether an earlier
+    one of the turn was accepted, so that all are evaluated in one batch, which costs a
+    fraction of five. Where a Laplace fit is good the independent ones make nearly independent
+    draws; where it is not, the first is the random walk that always works. The tail, heavier
+    than the Gaussian's, lets chains leave where p's is.
 
     Measured in eight dimensions (Gaussian, banana, log-scale, cut-off Gaussian) after the
     warm-up: 0.22 to 0.33 effective draws of the worst coordinate per evaluation, the random
@@ -40,11 +41,13 @@ class Mixture(AbstractTunedSampler):
     evaluations against 33,000 to 44,000.
 
     Source: Tierney, Markov chains for exploring posterior distributions, Ann. Statist. 22
-    (1994), sections 2.3 and 2.4, 10.1214/aos/1176325750.
+    (1994), sections 2.3 and 2.4, 10.1214/aos/1176325750. Proposals ahead of time: A. E. Brockwell,
+    Parallel Markov chain Monte Carlo simulation by pre-fetching, J. Comput. Graph. Statist. 15
+    (2006), 10.1198/106186006X100579.
     """
 
     name: ClassVar[str] = "mixture"
-    independent_share: ClassVar[float] = 0.8
+    steps_per_turn: ClassVar[int] = 5
     degrees_of_freedom: ClassVar[float] = 10.0
 
     mean: jax.Array  # [dim]
@@ -73,37 +76,47 @@ class Mixture(AbstractTunedSampler):
     def rescaled(self, info: MixtureInfo, gain) -> Self:
         """Robbins-Monro from the random walk's steps only."""
         excess = jnp.where(info.is_independent, 0.0, info.acceptance_rate - TARGET_ACCEPTANCE)
-        change = gain * jnp.mean(excess) / (1.0 - self.independent_share)
+        change = gain * self.steps_per_turn * jnp.mean(excess)
         scale = self.log_scale + change.astype(self.log_scale.dtype)
         return type(self)(mean=self.mean, cholesky=self.cholesky, log_scale=scale)
 
-    def step(
+    def turn(
         self, key: jax.Array, state: State, log_density: LogDensity
-    ) -> tuple[State, MixtureInfo]:
-        """One Metropolis-Hastings step of the kernel that the coin chose."""
-        coin_key, key = jax.random.split(key)
-        is_independent = jax.random.bernoulli(coin_key, self.independent_share)
+    ) -> tuple[State, tuple[State, MixtureInfo]]:
+        """A step of the random walk and four independent ones."""
+        proposal_key, step_key = jax.random.split(key)
+        proposals = self._proposals(proposal_key, state.position)
+        values = jax.vmap(log_density)(proposals)
+        is_independent = jnp.arange(self.steps_per_turn) > 0
 
-        def propose(key, position):
-            normal_key, chi_key = jax.random.split(key)
-            noise = self.cholesky @ jax.random.normal(normal_key, position.shape, position.dtype)
-            df = self.degrees_of_freedom
-            # Chi squared with an even df; jax.random.chisquare doubles the compile time.
-            waits = jax.random.exponential(chi_key, (int(df) // 2,), position.dtype)
-            chi_squared = 2.0 * jnp.sum(waits)
-            return jnp.where(
-                is_independent,
-                self.mean + noise * jnp.sqrt(df / chi_squared),
-                position + jnp.exp(self.log_scale) * noise,
+        def step(state: State, ahead):
+            key, proposal, value, is_independent = ahead
+
+            def proposal_log_density(x, y):
+                # The random walk's is symmetric and cancels out of the ratio.
+                del x
+                return jnp.where(is_independent, self._log_student_t(y), 0.0)
+
+            state, info = metropolis_hastings(
+                key, state, lambda _: value, lambda key, x: proposal, proposal_log_density
             )
+            info = MixtureInfo(info.acceptance_rate, info.is_accepted, is_independent)
+            return state, (state, info)
 
-        def proposal_log_density(x, y):
-            # The random walk's is symmetric and cancels out of the ratio.
-            del x
-            return jnp.where(is_independent, self._log_student_t(y), 0.0)
+        keys = jax.random.split(step_key, self.steps_per_turn)
+        return jax.lax.scan(step, state, (keys, proposals, values, is_independent))
 
-        state, info = metropolis_hastings(key, state, log_density, propose, proposal_log_density)
-        return state, MixtureInfo(info.acceptance_rate, info.is_accepted, is_independent)
+    def _proposals(self, key: jax.Array, position: jax.Array) -> jax.Array:
+        """`[step, dim]`, the random walk's first."""
+        shape, dtype = (self.steps_per_turn, position.shape[0]), position.dtype
+        normal_key, chi_key = jax.random.split(key)
+        noise = jax.random.normal(normal_key, shape, dtype) @ self.cholesky.T
+        df = self.degrees_of_freedom
+        # Chi squared with an even df; jax.random.chisquare doubles the compile time.
+        waits = jax.random.exponential(chi_key, (self.steps_per_turn - 1, int(df) // 2), dtype)
+        chi_squared = 2.0 * jnp.sum(waits, axis=1, keepdims=True)
+        walk = position + jnp.exp(self.log_scale) * noise[:1]
+        return jnp.concatenate([walk, self.mean + noise[1:] * jnp.sqrt(df / chi_squared)])
 
     def _log_student_t(self, position: jax.Array) -> jax.Array:
         """Log density of the t up to its constant, which cancels out of the ratio."""

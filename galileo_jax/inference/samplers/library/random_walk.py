@@ -14,6 +14,7 @@ from galileo_jax.inference.samplers.sampler import (
     Info,
     LogDensity,
     State,
+    turn_of_one,
 )
 
 TARGET_ACCEPTANCE = 0.234
@@ -62,6 +63,10 @@ class RandomWalk(AbstractTunedSampler):
         change = gain * (jnp.mean(info.acceptance_rate) - TARGET_ACCEPTANCE)
         scale = self.log_scale + change.astype(self.log_scale.dtype)
         return type(self)(cholesky=self.cholesky, log_scale=scale)
+
+    def turn(self, key: jax.Array, state: State, log_density: LogDensity):
+        """One step."""
+        return turn_of_one(*self.step(key, state, log_density))
 
     def step(self, key: jax.Array, state: State, log_density: LogDensity) -> tuple[State, Info]:
         """One Metropolis step."""

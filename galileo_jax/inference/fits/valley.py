@@ -1,0 +1,137 @@
+"""Coordinates in which a bent valley of the posterior is straight.
+
+    z = mode + R (u + B u^2 + C u^3)        R R^T the covariance; B, C strictly lower triangular
+
+Columns of R are the covariance's eigenvectors, the softest first. Along a soft direction the data
+leave so much room that the others, told a hundred times better, are led aside: by several of their
+standard deviations, where object 2 hardly slides. There a normal proposal, whatever its
+covariance, is hardly ever accepted. B and C lead it along. A direction bends stiffer ones only, so
+that the map has an inverse everywhere and a constant determinant: densities of u and z are the
+same but for a factor.
+
+How far a direction must be moved follows from the misfit's slopes G (in u, with the mode's
+Jacobian) where another, j, is moved by h = 2 standard deviations, two rollouts each:
+
+    B_ij = -(G_i(h e_j) + G_i(-h e_j) - 2 G_i(0)) / 2 h^2
+    C_ij = -(G_i(h e_j) - G_i(-h e_j)) / 2 h^3
+
+B is the geodesic acceleration of M. K. Transtrum, J. P. Sethna, Improvements to the
+Levenberg-Marquardt algorithm, arXiv 1201.5885, over a finite step. Chains in such coordinates:
+M. D. Parno, Y. M. Marzouk, Transport map accelerated Markov chain Monte Carlo, SIAM/ASA J.
+Uncertain. Quantif. 6 (2018), 10.1137/17M1134640.
+"""
+
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.fits.programs import FAILED
+from galileo_jax.inference.fits.residuals import Batch, Residuals
+from galileo_jax.inference.samplers.program import Program
+from galileo_jax.inference.samplers.sampler import LogDensity
+from galileo_jax.inference.trials import NOISE_SD
+
+REACH = 2.0  # standard deviations: what proposals mostly keep within
+NUM_SCATTERED = 64  # that starts are chosen from
+
+
+class Valley(eqx.Module):
+    """The map from `u`, in which the posterior is about N(0, 1), to `z`.
+
+    Attributes:
+      mode: `[parameter]`, z at u = 0.
+      root: `[parameter, direction]`, R.
+      quadratic: `[direction, direction]`, B.
+      cubic: `[direction, direction]`, C.
+    """
+
+    mode: Any
+    root: Any
+    quadratic: Any
+    cubic: Any
+
+    def __call__(self, u: Any) -> Any:
+        """From u to z, `[..., parameter]`; in NumPy or JAX, whichever u is of."""
+        return self.mode + (u + u**2 @ self.quadratic.T + u**3 @ self.cubic.T) @ self.root.T
+
+    def straight(self, z: np.ndarray) -> np.ndarray:
+        """(z - mode) in standard deviations along the directions: u, if there were no bend."""
+        return np.linalg.solve(self.root, (z - self.mode).T).T
+
+
+def along(log_density: LogDensity, valley: Valley) -> LogDensity:
+    """A log density of z as one of u."""
+    if isinstance(log_density, Program):
+        arrays = (jax.tree.map(jnp.asarray, valley), log_density.arrays)
+        return Program((_program_along, log_density.code), arrays)
+    return lambda u: log_density(valley(u))
+
+
+def _program_along(code: tuple, arrays: tuple[Valley, Any], u: jax.Array) -> jax.Array:
+    valley, rest = arrays
+    return Program(code, rest)(valley(u))
+
+
+def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
+    """The coordinates round a fit: their bends take two rollouts per parameter.
+
+    Args:
+      fit: the mode, with slopes at `fit.steps`.
+      residuals: of the trials that were fitted.
+    """
+    count = len(fit.steps)
+    root, quadratic, cubic = (np.zeros_like(fit.covariance) for _ in range(3))
+    variance, vectors = np.linalg.eigh(fit.covariance[:count, :count])
+    own = (vectors * np.sqrt(np.maximum(variance, 0.0)))[:, ::-1]
+    root[:count, :count] = own
+    # Noise scales, behind the others, hardly depend on these.
+    root[count:, count:] = np.diag(np.sqrt(np.diag(fit.covariance)[count:]))
+    slopes = residuals.slopes(_near(fit, fit.z[None]), fit.steps[None], is_central=True)
+    jacobian = np.concatenate([clip[0] for clip in slopes.jacobian])
+    step = REACH * np.eye(count)
+    z = np.tile(fit.z, (1 + 2 * count, 1))
+    z[:, :count] += np.concatenate([np.zeros((1, count)), step, -step]) @ own.T
+    white = np.concatenate(residuals.whites(_near(fit, z)), axis=1)
+    white[np.abs(white).max(axis=1) >= FAILED] = np.nan
+    gradient = white @ (jacobian @ own) + z[:, :count] @ own
+    ahead, behind = gradient[1:].reshape(2, count, count) - gradient[0]
+    quadratic[:count, :count] = _stiffer(-(ahead + behind) / (2 * REACH**2))
+    cubic[:count, :count] = _stiffer(-(ahead - behind) / (2 * REACH**3))
+    return Valley(fit.z, root, quadratic, cubic)
+
+
+def scattered(
+    valley: Valley, fit: GradientFit, residuals: Residuals, seed: int, num: int
+) -> np.ndarray:
+    """Starts for chains, `[chain, parameter]`, in u; wider than the posterior, as R-hat asks.
+
+    Drawn from the density to the power 1/2, by importance from N(0, 2): where the map leads
+    astray, far off, none is left.
+    """
+    count = len(fit.steps)
+    generator = np.random.default_rng([seed, 10])
+    u = np.sqrt(2) * generator.standard_normal((max(NUM_SCATTERED, num), len(fit.z)))
+    points = _near(fit, valley(u))
+    surplus = 0.25 * np.sum(u[:, :count] ** 2, axis=1) - 0.5 * residuals.costs(points)
+    # The largest of log-weights with Gumbel noise: a draw without replacement.
+    return u[np.argsort(-(surplus + generator.gumbel(size=len(u))))[:num]]
+
+
+def _stiffer(moved: np.ndarray) -> np.ndarray:
+    """`[direction that bends, direction bent]` transposed, of those that bend stiffer ones.
+
+    None is led where a rollout fails.
+    """
+    return np.tril(np.where(np.isfinite(moved.T), moved.T, 0.0), -1)
+
+
+def _near(fit: GradientFit, z: np.ndarray) -> Batch:
+    """Points with the fit's noise."""
+    count = len(fit.steps)
+    noise = np.exp(NOISE_SD * fit.z[count:])
+    free = np.broadcast_to(fit.free[:count], (len(z), count))
+    return Batch(z[:, :count], free, np.tile(noise, (len(z), 1)))

@@ -1,0 +1,63 @@
+"""The density as a program is the density by hand, for clips of other lengths and scenes, too."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from galileo_jax.inference.density import density_of, likelihood_of
+from galileo_jax.inference.samplers.program import Program
+from galileo_jax.inference.trials import Trials
+from galileo_jax.rollout.engines import make_engine
+from tests.inference.test_trials import BETWEEN_PROGRAMS, STEEPER, draw
+from tests.oracle_trials import make_trials
+from tests.precision import in_64_bit
+from tests.ramp_model import HIT
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
+@pytest.mark.parametrize("experiments", [[HIT], [HIT, STEEPER]], ids=["one clip", "two"])
+def test_it_is_the_density_of_the_trials(experiments):
+    trials = make_trials(experiments)
+    program = density_of(trials)
+    assert isinstance(program, Program)
+    for seed in range(3):
+        z = draw(trials, seed)
+        expected = float(jax.jit(trials.log_density)(jnp.asarray(z)))
+        assert float(program(jnp.asarray(z))) == pytest.approx(expected, rel=BETWEEN_PROGRAMS)
+        likelihood = float(likelihood_of(trials)(jnp.asarray(z)))
+        assert likelihood - 0.5 * z @ z == pytest.approx(expected, rel=BETWEEN_PROGRAMS)
+
+
+def test_clips_of_one_kind_share_the_code():
+    """And so all that is compiled for it; their arrays have the same shapes."""
+    one, other = (density_of(make_trials([experiment])) for experiment in (HIT, STEEPER))
+    assert one.code == other.code
+    assert hash(one.code) == hash(other.code)
+    shapes = [jax.tree.map(jnp.shape, program.arrays) for program in (one, other)]
+    assert shapes[0] == shapes[1]
+    z = jnp.asarray(draw(make_trials([HIT])))
+    assert float(one(z)) != pytest.approx(float(other(z)), abs=1.0)
+
+
+def test_an_engine_that_is_called_back_keeps_its_own():
+    (problem,) = make_trials([HIT]).problems
+    trials = Trials((replace(problem, engine=make_engine("c", problem.model)),))
+    z = jnp.asarray(draw(trials))
+    density, likelihood = density_of(trials), likelihood_of(trials)
+    assert not isinstance(density, Program)
+    assert float(density(z)) == float(trials.log_density(z))
+    assert float(likelihood(z)) - 0.5 * float(z @ z) == pytest.approx(float(density(z)))
+
+
+def test_where_no_rollout_succeeds_it_is_minus_infinity():
+    trials = make_trials([HIT])
+    program = density_of(trials)
+    assert np.isneginf(float(program(jnp.full(len(trials.names), jnp.nan))))
