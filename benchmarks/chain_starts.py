@@ -24,6 +24,7 @@ import tables
 
 from galileo_jax import command, jax_cache
 from galileo_jax.clip.load import load_clip
+from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
 from galileo_jax.inference.posterior import Posterior
@@ -100,7 +101,7 @@ def _run(name: str, trials: Trials, seed: int) -> tuple[float, Posterior]:
     posterior = sample(
         jax.random.key(seed),
         sampler,
-        trials.log_density,
+        density_of(trials),
         jnp.asarray(z[generator.choice(len(z), NUM_CHAINS)]),
         trials.names,
         settings=TO_RHAT,

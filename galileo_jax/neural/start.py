@@ -1,6 +1,6 @@
 """Metropolis-Hastings from the network, in place of a search: `fit --method mh --init cnn`.
 
-    1. Levenberg-Marquardt from the middle of the network's posterior alone: no scattered starts.
+    1. Levenberg-Marquardt from the middle of the network's posterior: no scattered starts.
     2. Every chain starts at a draw of the network's posterior of masses and frictions, and of the
        nuisances given these, by the normal approximation at the fit.
 
@@ -11,7 +11,7 @@ Source: J. Wu et al., Galileo: perceiving physical object properties by integrat
 engine with deep learning, NIPS 2015, section 5.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import jax.numpy as jnp
@@ -48,6 +48,11 @@ def start_from_network(trials: Trials, seed: int, num_chains: int) -> Start:
     free = trials.free(())[: len(trials.model_parameters)]
     fitter = GradientFitter(trials)
     (fit,) = fitter.fit_from(middle[None, : len(free)], free[None], np.zeros(1, int))
+    spent = fit.stats["num_rollouts"]
+    # A small coefficient of restitution has a valley on either side; the network knows of neither.
+    fit = fitter.refit(fit)
+    stats = {**fit.stats, "num_rollouts": fit.stats["num_rollouts"] + spent}
+    fit = replace(fit, stats=stats)
     generator = np.random.default_rng([seed, 8])
     drawn = posterior.flat()[generator.choice(posterior.draws.shape[1], num_chains)]
     told = np.array([parameter.role == "main" for parameter in trials.parameters])

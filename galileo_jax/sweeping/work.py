@@ -125,8 +125,10 @@ def _by_thesis(settings: Thesis, trials: "Trials") -> Found:
 def _by_chains(settings: Mh, trials: "Trials", fit: "GradientFit") -> Found:
     import jax
 
+    from galileo_jax.inference.density import density_of
     from galileo_jax.inference.metropolis import metropolis_posterior
     from galileo_jax.inference.samplers.driver import Settings as Steps
+    from galileo_jax.inference.samplers.program import Program
 
     posterior = metropolis_posterior(
         trials,
@@ -136,7 +138,8 @@ def _by_chains(settings: Mh, trials: "Trials", fit: "GradientFit") -> Found:
         settings=Steps(max_steps=settings.max_steps),
         num_chains=settings.chains,
     )
-    jax.clear_caches()  # as above
+    if not isinstance(density_of(trials), Program):
+        jax.clear_caches()  # as above; programs serve the next clip
     sampling = {"sampler": settings.sampler, "sampling": dict(posterior.stats)}
     return posterior, fit.z, {"status": posterior.status.value} | sampling
 

@@ -64,7 +64,7 @@ def test_ready_configs_run(name, tracks, tmp_path):
 def plan(tracks, tmp_path):
     path = tmp_path / "plan.yaml"
     path.write_text(f"clips: ['{tracks}/*.csv']\ncommon: {{method: cnn}}\n"
-                    "grid: {seed: [0, 1, 2, 3, 4, 5, 6, 7]}")  # fmt: skip
+                    f"grid: {{seed: {list(range(24))}}}")  # fmt: skip
     return path
 
 
