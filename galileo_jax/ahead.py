@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from galileo_jax import jax_cache
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.jax_setup import set_up
 from galileo_jax.observation import Observation
 
 if TYPE_CHECKING:
@@ -34,10 +34,7 @@ def work_ahead(clips: Sequence[Clip], build: Build | None) -> threading.Thread:
     """
 
     def work() -> None:
-        import jax
-
-        jax.config.update("jax_enable_x64", True)
-        jax_cache.enable()
+        set_up()
         for name in ("galileo_jax.inference.fits.gradient", "galileo_jax.run"):
             import_module(name)
         # What is wrong is told when it is done in earnest.

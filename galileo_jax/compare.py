@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from galileo_jax import __version__, command, jax_cache
+from galileo_jax import __version__, command
 from galileo_jax.ahead import work_ahead
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.fit import built, chosen_effects, fitter_of, out_folder
+from galileo_jax.jax_setup import set_up
 from galileo_jax.leftovers import TRACKS, digest
 from galileo_jax.measured import add_clip_options, load_clips, measure
 
@@ -121,10 +122,7 @@ def _of_run(folder: Path, call: argparse.Namespace) -> Compared:
 
 
 def _prepare_jax() -> None:
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    set_up()
 
 
 def _told(trials: "Trials", comparison: "Comparison") -> list[str]:

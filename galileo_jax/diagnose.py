@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from galileo_jax import __version__, command, jax_cache
+from galileo_jax import __version__, command
 from galileo_jax.ahead import work_ahead
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.fit import out_folder, write_fit
+from galileo_jax.jax_setup import set_up
 from galileo_jax.leftovers import TRACKS, digest
 from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
 
@@ -104,10 +105,7 @@ def _diagnose(
     measured: Sequence[Measured], call: argparse.Namespace
 ) -> tuple["Diagnosis", "Trials", dict[str, Any]]:
     """The diagnosis, its trials, and diagnosis.json; prints each round when it is done."""
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    set_up()
     from galileo_jax.diagnosis.diagnose import diagnose
     from galileo_jax.diagnosis.document import diagnosis_document, history_row
     from galileo_jax.inference.fits.gradient import Code

@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from galileo_jax import __version__, command, jax_cache
+from galileo_jax import __version__, command
 from galileo_jax.ahead import Build, work_ahead
 from galileo_jax.clip.schema import Clip
 from galileo_jax.errors import InputError
 from galileo_jax.files import write_json
 from galileo_jax.inference.mass_ratios import mass_ratios
+from galileo_jax.jax_setup import set_up
 from galileo_jax.leftovers import PREDICTION, outdated
 from galileo_jax.measured import Measured, add_clip_options, inferred, load_clips, measure
 from galileo_jax.registry import entry_names
@@ -158,10 +159,7 @@ def fit_clips(
 
     Of several clips each has a run of its own below `out`, with the joint posterior.
     """
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    set_up()
     observations = [m.observation for m in measured]
     trials = built([m.clip for m in measured], observations, call, call.motion)
     if call.method == "cnn":

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from galileo_jax import __version__, jax_cache
+from galileo_jax import __version__
 from galileo_jax.errors import InputError
+from galileo_jax.jax_setup import set_up
 from galileo_jax.measured import Measured, inferred, load_clips, measure
 from galileo_jax.sweeping.clip_files import Packed
 from galileo_jax.sweeping.settings import Cnn, Diagnose, Mh, Settings, Thesis
@@ -44,10 +45,7 @@ def run_cell(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]
     Raises:
       InputError: the clips do not go with each other or with the method.
     """
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    set_up()
     began = time.perf_counter()
     if isinstance(settings, Diagnose):
         result = _diagnosis(settings, measured)

@@ -1,5 +1,9 @@
 """Bodies that move freely: as in the plane where they meet squarely, by closed forms elsewhere."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -192,3 +196,36 @@ def test_what_it_cannot_do_is_said():
         make_engine("auto", model_of(cubes(), beyond_m=[0.08]))
     with pytest.raises(InputError, match="'mjx' moves objects in a plane; --motion free is of c"):
         make_engine("mjx", model_of(cubes()))
+
+
+ON_ONE_CORE = """
+import os
+os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+from galileo_jax.jax_setup import set_up
+set_up()
+import jax
+import jax.numpy as jnp
+from galileo_jax.inference.samplers import Settings, sample, sampler_class
+from galileo_jax.rollout.engine_c_free import EngineCFree
+from galileo_jax.rollout.rollout import in_jax
+from tests.rollout.objects import theta_of
+from tests.rollout.test_engine_c_free import FRICTION, MASS_KG, cubes, model_of
+model = model_of(cubes())
+theta = jnp.asarray(theta_of(model, MASS_KG, FRICTION))
+
+def log_density(z):
+    position, _ = in_jax(EngineCFree(model))((theta + 1e-3 * z)[None])
+    return -0.5 * jnp.sum(z**2) - 0.5 * jnp.sum((position[0, :, 0, -1] - 0.3) ** 2)
+
+dim = len(theta)
+sampler = sampler_class("mixture").from_gaussian(jnp.zeros(dim), jnp.eye(dim))
+steps = Settings(warmup_steps=0, block_steps=5, max_steps=5, stops_early=False)
+names = [f"z{i}" for i in range(dim)]
+sample(jax.random.key(0), sampler, log_density, jnp.zeros((4, dim)), names, settings=steps)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="cores cannot be chosen")
+def test_called_back_on_one_core_it_ends():
+    """It runs JAX in a callback of JAX: one would wait for the thread of the other."""
+    subprocess.run([sys.executable, "-c", ON_ONE_CORE], check=True, timeout=120)

@@ -1,0 +1,27 @@
+"""How JAX runs in the commands: in 64 bit, programs kept, and never on one thread alone."""
+
+import os
+
+from galileo_jax import jax_cache
+
+LEAST_THREADS = 2
+
+
+def set_up() -> None:
+    """Sets it, before JAX computes anything."""
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+    # Compiled chains call MuJoCo's engines back, and these run JAX themselves: with one thread,
+    # as many as cores, it would wait for ever for the thread that waits for it. XLA reads NPROC.
+    if num_threads() < LEAST_THREADS:
+        os.environ["NPROC"] = str(LEAST_THREADS)
+    jax_cache.enable()
+
+
+def num_threads() -> int:
+    """How many threads XLA would take: a core each, or what NPROC says."""
+    told = os.environ.get("NPROC", "")
+    if told.isdigit():
+        return int(told)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
