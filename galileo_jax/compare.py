@@ -97,7 +97,7 @@ def _of_clips(call: argparse.Namespace) -> Compared:
     measured = [measure(clip) for clip in clips]
     ahead.join()
     clips = [one.clip for one in measured]
-    _prepare_jax()
+    set_up()
     trials = built(clips, [one.observation for one in measured], call)
     out = out if call.out else out / "compare"
     return Compared(trials, tuple(clips), list(call.clips), out)
@@ -107,7 +107,7 @@ def _of_run(folder: Path, call: argparse.Namespace) -> Compared:
     """A finished fit: its observations and its effects; of several clips the runs below it."""
     if call.effects or call.effects_from or call.pixels_per_metre:
         raise InputError(f"{folder}: a run has its own effects and scale; give its clip to change")
-    _prepare_jax()
+    set_up()
     from galileo_jax.inference.trials import Trials
     from galileo_jax.run import CLIP, RESULT, load_run
 
@@ -119,10 +119,6 @@ def _of_run(folder: Path, call: argparse.Namespace) -> Compared:
     clips = [clip for run in runs for clip in run.result["clips"]]
     trials = Trials(tuple(run.problem for run in runs))
     return Compared(trials, tuple(run.clip for run in runs), clips, out)
-
-
-def _prepare_jax() -> None:
-    set_up()
 
 
 def _told(trials: "Trials", comparison: "Comparison") -> list[str]:

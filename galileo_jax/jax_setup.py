@@ -11,17 +11,12 @@ def set_up() -> None:
     """Sets it, before JAX computes anything."""
     import jax
 
+    from galileo_jax.rollout.chunks import num_cores
+
     jax.config.update("jax_enable_x64", True)
     # Compiled chains call MuJoCo's engines back, and these run JAX themselves: with one thread,
     # as many as cores, it would wait for ever for the thread that waits for it. XLA reads NPROC.
-    if num_threads() < LEAST_THREADS:
+    told = os.environ.get("NPROC", "")
+    if (int(told) if told.isdigit() else num_cores()) < LEAST_THREADS:
         os.environ["NPROC"] = str(LEAST_THREADS)
     jax_cache.enable()
-
-
-def num_threads() -> int:
-    """How many threads XLA would take: a core each, or what NPROC says."""
-    told = os.environ.get("NPROC", "")
-    if told.isdigit():
-        return int(told)
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

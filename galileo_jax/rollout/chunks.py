@@ -50,12 +50,12 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
             return jax.tree.map(lambda leaf: np.asarray(leaf)[: end - begin], out)
 
     # XLA runs small operations, one after the other, on a single core.
-    with ThreadPoolExecutor(_num_cores()) as pool:
+    with ThreadPoolExecutor(num_cores()) as pool:
         parts = list(pool.map(lambda cut: part(*cut), _cuts(count, sizes)))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)
 
 
-def _num_cores() -> int:
+def num_cores() -> int:
     """Of those that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -136,8 +136,8 @@ def _by_chains(settings: Mh, trials: "Trials", fit: "GradientFit") -> Found:
         settings=Steps(max_steps=settings.max_steps),
         num_chains=settings.chains,
     )
-    if not isinstance(density_of(trials), Program):
-        jax.clear_caches()  # as above; programs serve the next clip
+    if not isinstance(density_of(trials), Program):  # those serve the next clip
+        jax.clear_caches()
     sampling = {"sampler": settings.sampler, "sampling": dict(posterior.stats)}
     return posterior, fit.z, {"status": posterior.status.value} | sampling
 
