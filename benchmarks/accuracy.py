@@ -19,14 +19,15 @@ import numpy as np
 import scoring
 import tables
 
-from galileo_jax import command, fit
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
-from galileo_jax.errors import InputError
-from galileo_jax.measured import Measured
-from galileo_jax.observation import Observation, observe
+from galileo_jax.commands import command, fit
+from galileo_jax.measurement.measure import Measurement
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking import track_clip
+from galileo_jax.tracking.to_metres import observe
 
 BARS = {
     "k1": {"median": 0.003, "worst": 0.01},
@@ -100,7 +101,7 @@ def _fit(path: Path, call: argparse.Namespace) -> dict[str, Any]:
     options = [str(path), "--method", call.method, "--seed", str(call.seed)]
     with tempfile.TemporaryDirectory() as folder:
         return fit.fit_clips(
-            [Measured(clip, _observe(clip, call.tracks))],
+            [Measurement(clip, _observe(clip, call.tracks))],
             fit._parser().parse_args(options),
             Path(folder),
             timings,

@@ -22,21 +22,22 @@ import jax.numpy as jnp
 import numpy as np
 import tables
 
-from galileo_jax import command, jax_cache
 from galileo_jax.clip.load import load_clip
+from galileo_jax.commands import command
+from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers import sample
 from galileo_jax.inference.samplers.driver import Settings
 from galileo_jax.inference.samplers.library.mixture import Mixture
-from galileo_jax.inference.trials import Trials
-from galileo_jax.measured import measure
+from galileo_jax.measurement.measure import measure
+from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.estimate import cnn_posterior
 from galileo_jax.neural.start import start_from_network
-from galileo_jax.parameters import inverse
-from galileo_jax.run import make_trials
+from galileo_jax.runtime import compilation_cache
 
 STARTS = ("grad", "cnn", "network", "prior")
 TO_RHAT = Settings(max_steps=1500, min_ess=0.0)
@@ -45,12 +46,12 @@ TO_RHAT = Settings(max_steps=1500, min_ess=0.0)
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    compilation_cache.enable()
     tables.row("clip, start", ("before", "chains", "all", "converged", "acceptance"))
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in STARTS}
     for path in call.clips:
         clip = load_clip(path)
-        trials = make_trials([clip], [measure(clip).observation])
+        trials = make_joint_problem([clip], [measure(clip).observation])
         for name in call.starts.split(","):
             before, posterior = _run(name, trials, call.seed)
             chains = posterior.stats["num_evaluations"]
@@ -78,7 +79,7 @@ def main(argv: Sequence[str]) -> int | None:
     return None
 
 
-def _run(name: str, trials: Trials, seed: int) -> tuple[float, Posterior]:
+def _run(name: str, trials: JointProblem, seed: int) -> tuple[float, Posterior]:
     """Rollouts before the chains, and the chains."""
     if name == "grad":
         fit = GradientFitter(trials).fit(seed)
@@ -110,7 +111,9 @@ def _run(name: str, trials: Trials, seed: int) -> tuple[float, Posterior]:
     return 0, posterior
 
 
-def _from(trials: Trials, fit: GradientFit, starts: np.ndarray | None, seed: int) -> Posterior:
+def _from(
+    trials: JointProblem, fit: GradientFit, starts: np.ndarray | None, seed: int
+) -> Posterior:
     return metropolis_posterior(trials, fit, seed, settings=TO_RHAT, starts=starts)
 
 

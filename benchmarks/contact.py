@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from galileo_jax.data_files import scene_path
+from galileo_jax.files.package_data import scene_path
 
 ANGLE_DEG = 20.0
 GRAVITY = 9.81

@@ -20,7 +20,7 @@ from typing import Any
 
 import tables
 
-from galileo_jax import command, simulate
+from galileo_jax.commands import command, simulate
 
 SHOWN = ("k1", "k2", "mass_ratio")
 COLUMNS = (*(f"d {name}" for name in SHOWN), *(f"sd {name}" for name in SHOWN), "fit s", "cpu s")

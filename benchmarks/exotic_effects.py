@@ -12,9 +12,17 @@ naming it so is right.
 import math
 from typing import ClassVar
 
-from galileo_jax.effects.effect import Array, Effect, Force, Friction, State, Surroundings, Theta
-from galileo_jax.effects.registry import register
-from galileo_jax.parameters import LogNormal, Normal, Parameter, Prior, Uniform
+from galileo_jax.model.effects.effect import (
+    Array,
+    Effect,
+    Force,
+    Friction,
+    State,
+    Surroundings,
+    Theta,
+)
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import LogNormal, Normal, Parameter, Prior, Uniform
 
 
 def unknown(name: str, unit: str, prior: Prior, usual: float = 0.0) -> Parameter:

@@ -21,11 +21,12 @@ import numpy as np
 import synthetic_tracks
 import tables
 
-from galileo_jax import command, jax_cache
+from galileo_jax.commands import command
 from galileo_jax.inference.problem import Problem, seen
-from galileo_jax.parameters import forward, inverse
+from galileo_jax.model.parameters import forward, inverse
 from galileo_jax.rollout.engine_mjx import EngineMJX
 from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.runtime import compilation_cache
 
 NOISE_M = 0.3 / 900
 PARAMETERS = ("k1", "k2", "m1", "m2")
@@ -38,7 +39,7 @@ Predict = Callable[[jax.Array], jax.Array]
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    compilation_cache.enable()
     used, exact = [], []
     tables.row("set", [f"{name} {scale:g}sd" for name in PARAMETERS for scale in SCALES_SD])
     for seed in range(call.seed, call.seed + call.num):

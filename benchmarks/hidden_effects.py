@@ -29,10 +29,10 @@ import tables
 import verdicts
 from hidden_cases import Case
 
-from galileo_jax import command
-from galileo_jax.effects.registry import effect_names
-from galileo_jax.errors import InputError
-from galileo_jax.files import write_text
+from galileo_jax.commands import command
+from galileo_jax.files.atomic_write import write_text
+from galileo_jax.model.effects.registry import effect_names
+from galileo_jax.runtime.errors import InputError
 
 PIXELS_PER_METRE = 900.0
 COLUMNS = ("right", "covered", "size", "before", "after", "seconds")
@@ -87,7 +87,7 @@ def main(argv: Sequence[str]) -> int | None:
 
 def run_diagnosis(yamls: Sequence[Path], out: Path, seed: int) -> dict[str, Any]:
     """What `galileo diagnose --add auto` writes about clips; its printing is kept in `out`."""
-    from galileo_jax import diagnose
+    from galileo_jax.commands import diagnose
 
     said = io.StringIO()
     options = ["--add", "auto", "--seed", str(seed), "--out", str(out)]

@@ -23,18 +23,19 @@ import scoring
 import tables
 from scipy import stats
 
-from galileo_jax import command, jax_cache
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
+from galileo_jax.commands import command
+from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.result import make_result
-from galileo_jax.measured import measure
+from galileo_jax.measurement.measure import measure
 from galileo_jax.neural.config import load_config
 from galileo_jax.neural.dataset import make_samples
 from galileo_jax.neural.estimate import TRAINED, cnn_posterior, trained_network
 from galileo_jax.neural.galileo_task import GalileoTask, estimate, thesis_clips
 from galileo_jax.neural.posterior_network import PosteriorNetwork
 from galileo_jax.neural.task import Arrays
-from galileo_jax.run import make_trials
+from galileo_jax.runtime import compilation_cache
 
 NUM_THESIS, NUM_CLIPS, NUM_DRAWS = 1000, 2000, 1000
 NOISES_M = (0.0, 2.2e-5, 2e-4, 1e-3)
@@ -45,7 +46,7 @@ SHARD = 2**30 + 1
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    compilation_cache.enable()
     network = trained_network(call.network)
     columns = ("quantity", "count", "MAE", "median", "closed form", "in 90%", "KS p")
     tables.row("setting", columns)
@@ -121,7 +122,7 @@ def _real(call: argparse.Namespace, network: PosteriorNetwork) -> dict[str, Any]
             observation = measure(clip).observation
             if kept:
                 write_observation_csv(kept, observation)
-        trials = make_trials([clip], [observation])
+        trials = make_joint_problem([clip], [observation])
         cnn_posterior(trials, call.seed, network)
         began = time.perf_counter()
         posterior, z, notes = cnn_posterior(trials, call.seed, network)

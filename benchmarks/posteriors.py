@@ -42,12 +42,13 @@ import numpy as np
 import tables
 from scipy import stats
 
-from galileo_jax import command, jax_cache
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.errors import InputError
+from galileo_jax.commands import command
+from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.convergence import convergence
 from galileo_jax.inference.density import density_of, likelihood_of
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
 from galileo_jax.inference.model_error import add_model_error
@@ -56,14 +57,14 @@ from galileo_jax.inference.samplers.driver import Settings
 from galileo_jax.inference.samplers.library.random_walk import RandomWalk
 from galileo_jax.inference.samplers.thesis import NARROW, NUM_STEPS, Acceptance, infer
 from galileo_jax.inference.tempering import temper
-from galileo_jax.inference.trials import Trials
 from galileo_jax.neural.estimate import cnn_posterior
 from galileo_jax.neural.start import start_from_network
-from galileo_jax.observation import Observation
-from galileo_jax.run import make_trials
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 from galileo_jax.similarity.similarity import AbstractSimilarity, similarity_class
-from galileo_jax.truth import Truth
+from galileo_jax.simulation import Truth
 
 FPS, NUM_FRAMES, RAMP_ANGLE_DEG = 30.0, 61, 20.0
 NOISE_M = 0.01 / (FPS * math.sqrt(2))
@@ -87,7 +88,7 @@ class Track:
       theta: `[parameter]`, of everything.
     """
 
-    trials: Trials
+    trials: JointProblem
     truth: np.ndarray
     theta: np.ndarray
 
@@ -147,13 +148,13 @@ class MainLikelihood(eqx.Module):
 class Same:
     """The trials that compiled code is made of: compared by identity."""
 
-    trials: Trials
+    trials: JointProblem
 
 
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    compilation_cache.enable()
     methods = call.methods.split(",")
     if unknown := set(methods) - set(METHODS):
         raise InputError(f"--methods: unknown {sorted(unknown)}; known: {', '.join(METHODS)}")
@@ -212,8 +213,10 @@ def make_tracks(seed: int, count: int, noise: str) -> list[Track]:
             mask=np.ones((2, NUM_FRAMES), bool),
         )
 
-    (problem,) = make_trials([clip], [seen(np.tile(start, NUM_FRAMES))], noise=noise).problems  # pyright: ignore
-    trials = Trials((problem,))
+    (problem,) = make_joint_problem(
+        [clip], [seen(np.tile(start, NUM_FRAMES))], noise=noise
+    ).problems  # pyright: ignore
+    trials = JointProblem((problem,))
     generator = np.random.default_rng([seed, 9])
     tracks: list[Track] = []
     while len(tracks) < count:
@@ -223,12 +226,12 @@ def make_tracks(seed: int, count: int, noise: str) -> list[Track]:
         driven = np.ptp(predicted[:, 1, 0], axis=-1) > DRIVEN_M
         for row, clean in zip(theta[driven], predicted[driven], strict=True):
             error = row[-1] * NOISE_M * generator.standard_normal(clean.shape)
-            own = Trials((replace(problem, observation=seen(clean + error)),))
+            own = JointProblem((replace(problem, observation=seen(clean + error)),))
             tracks.append(Track(own, quantities(trials, row), row))
     return tracks[:count]
 
 
-def quantities(trials: Trials, theta: np.ndarray) -> np.ndarray:
+def quantities(trials: JointProblem, theta: np.ndarray) -> np.ndarray:
     """k1, k2 and log m1/m2 of `[..., parameter]`, the quantity in front."""
     m1, k1, m2, k2 = (theta[..., trials.names.index(name)] for name in MAIN)
     return np.stack([k1, k2, np.log(m1 / m2)])

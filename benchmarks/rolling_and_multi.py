@@ -20,14 +20,15 @@ import jax
 import numpy as np
 import tables
 
-from galileo_jax import jax_cache, simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.fit import read_truth
+from galileo_jax.commands import simulate
+from galileo_jax.commands.fit import read_truth
+from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
-from galileo_jax.measured import measure
-from galileo_jax.run import make_trials
+from galileo_jax.measurement.measure import measure
+from galileo_jax.runtime import compilation_cache
 
 CASES = {
     "rolling incline": ("--scenario", "incline", "--shapes", "sphere"),
@@ -45,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--case", action="append", choices=list(CASES))
     call = parser.parse_args(argv)
     jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    compilation_cache.enable()
     figures: dict[str, Any] = {}
     for case in call.case or CASES:
         began = time.perf_counter()
@@ -73,7 +74,7 @@ def _fit(options: Sequence[str], seed: int) -> tuple[Mapping[str, float], dict[s
             simulate.main([*options, *given])
         clip = load_clip(track)
         measured, truth = measure(clip), read_truth(clip)
-    trials = make_trials([measured.clip], [measured.observation])
+    trials = make_joint_problem([measured.clip], [measured.observation])
     fit = GradientFitter(trials).fit(seed)
     posterior = laplace_posterior(trials, fit, seed)
     result = make_result(

@@ -20,13 +20,14 @@ import jax
 import numpy as np
 import tables
 
-from galileo_jax import command, jax_cache
-from galileo_jax.parameters import absent
+from galileo_jax.commands import command
+from galileo_jax.model.model import SUBSTEPS, Model
+from galileo_jax.model.parameters import absent
+from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.model import SUBSTEPS, Model
 from galileo_jax.rollout.rollout import Engine
-from galileo_jax.scene.scene import compile_scene
-from galileo_jax.truth import Truth, draw_truth
+from galileo_jax.runtime import compilation_cache
+from galileo_jax.simulation import Truth, draw_truth
 
 DURATION_S = 1.2
 SIZES = (1, 8, 64, 256)
@@ -38,7 +39,7 @@ def main(argv: Sequence[str]) -> int | None:
     jax.config.update("jax_enable_x64", True)
     if call.time_compile:
         return _print_first_seconds(call.time_compile)
-    jax_cache.enable()
+    compilation_cache.enable()
     truth = _truth()
     model = _model(truth)
     tables.row("engine, batch", ("steps/s", "sim s/s", "ms/rollout"))
@@ -116,7 +117,7 @@ def _first_seconds(name: str) -> dict[str, float]:
     """The first batch in new processes: compiled without a cache, then from the cache."""
     found = {}
     with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, jax_cache.SWITCH: folder}
+        environment = {**os.environ, compilation_cache.SWITCH: folder}
         environment.pop("JAX_COMPILATION_CACHE_DIR", None)
         for what in ("cold", "cached"):
             done = subprocess.run(
@@ -132,7 +133,7 @@ def _first_seconds(name: str) -> dict[str, float]:
 
 
 def _print_first_seconds(name: str) -> None:
-    jax_cache.enable()
+    compilation_cache.enable()
     simulate = _simulation(make_engine(name, _model(_truth())), 8)
     began = time.perf_counter()
     simulate()

@@ -34,10 +34,11 @@ import scoring
 import synthetic_tracks
 import tables
 
-from galileo_jax import command, jax_cache
-from galileo_jax.errors import InputError
-from galileo_jax.inference.trials import Trials
+from galileo_jax.commands import command
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime.errors import InputError
 
 NOISE_M_S = 0.01
 STUCK = 1.5
@@ -73,7 +74,7 @@ class Answer:
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    compilation_cache.enable()
     methods = call.methods.split(",")
     if unknown := set(methods) - set(METHODS):
         raise InputError(f"--methods: unknown {sorted(unknown)}; known: {', '.join(METHODS)}")
@@ -182,7 +183,7 @@ METHODS: dict[str, Callable[[synthetic_tracks.Case, int], Answer]] = {
 }
 
 
-def _warm_fit(trials: Trials, seed: int):
+def _warm_fit(trials: JointProblem, seed: int):
     """The gradient fit, and when it began, compiled."""
     from galileo_jax.inference.fits.gradient import GradientFitter
 
@@ -192,7 +193,7 @@ def _warm_fit(trials: Trials, seed: int):
     return fitter.fit(seed), began
 
 
-def _of_draws(trials: Trials, fit, posterior, seconds: float, rollouts: float) -> Answer:
+def _of_draws(trials: JointProblem, fit, posterior, seconds: float, rollouts: float) -> Answer:
     from galileo_jax.inference.convergence import convergence
     from galileo_jax.inference.result import make_result
 
@@ -216,13 +217,13 @@ def _of_draws(trials: Trials, fit, posterior, seconds: float, rollouts: float) -
     )
 
 
-def _of_peer(trials: Trials, found: peers.Estimate, seconds: float) -> Answer:
+def _of_peer(trials: JointProblem, found: peers.Estimate, seconds: float) -> Answer:
     chi2 = _velocity_chi2(trials, found.centres_m, len(found.values))
     count = found.num_rollouts
     return Answer(found.entries, chi2, seconds, count, math.nan, found.is_converged)
 
 
-def _velocity_chi2(trials: Trials, predicted_m: np.ndarray, num_free: int) -> float:
+def _velocity_chi2(trials: JointProblem, predicted_m: np.ndarray, num_free: int) -> float:
     """Squared velocity residuals of predicted centres per degree of freedom."""
     velocity = np.diff(predicted_m, axis=-1) * synthetic_tracks.FPS
     white = (velocity - trials.problems[0].observation.velocity_m_s) / NOISE_M_S

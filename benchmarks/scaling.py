@@ -32,10 +32,10 @@ from typing import Any
 import numpy as np
 import tables
 
-from galileo_jax import command, simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.errors import InputError
-from galileo_jax.measured import measure
+from galileo_jax.commands import command, simulate
+from galileo_jax.measurement.measure import measure
+from galileo_jax.runtime.errors import InputError
 
 CLIPS = (1, 2, 4, 8, 16, 32, 64)
 CELLS = (100, 1000)
@@ -143,9 +143,9 @@ def cost_of_clips(paths: Sequence[Path]) -> dict[str, Any]:
 
 def shape_of(measured: Any) -> tuple[int, ...]:
     """What programs are compiled for: objects, frames, recorded instants."""
-    from galileo_jax.rollout.chunks import FRAMES, rounded_up
+    from galileo_jax.inference.build_problem import make_problem
     from galileo_jax.rollout.engine_jax import RECORDS
-    from galileo_jax.run import make_problem
+    from galileo_jax.runtime.batching import FRAMES, rounded_up
 
     problem = make_problem(measured.clip, measured.observation)
     count, _, frames = measured.observation.position_m.shape
@@ -201,7 +201,7 @@ def speed_of_rollouts(largest: int) -> dict[str, float]:
 
     problem = synthetic_tracks.make_case(0, "engine", 1e-4).problem
     engine, prior = problem.engine, problem.parameters
-    from galileo_jax.parameters import forward
+    from galileo_jax.model.parameters import forward
 
     found: dict[str, float] = {}
     tables.row(f"batch on {jax.default_backend()}", ("rollouts/s",))
@@ -246,7 +246,8 @@ def memory_of_cells(folder: Path, method: str, cells: Sequence[int]) -> dict[str
 PEAKS = """
 import json, os, sys, threading, time
 from pathlib import Path
-from galileo_jax import command, sweep
+from galileo_jax.commands import command
+from galileo_jax.commands import sweep
 
 def peak_mb(process):
     lines = Path(f"/proc/{process}/status").read_text().splitlines()

@@ -19,15 +19,15 @@ import jax
 import numpy as np
 import tables
 
-from galileo_jax import jax_cache
 from galileo_jax.clip.schema import Clip
+from galileo_jax.commands.simulate_free import clip_content, noisy, seen_motion
+from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
-from galileo_jax.observation import NOMINAL_SCALE_PX_PER_M, Observation
-from galileo_jax.run import make_trials
-from galileo_jax.simulate_free import clip_content, noisy, seen_motion
-from galileo_jax.truth.free import FreeTruth, draw_free, solve_free
+from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.runtime import compilation_cache
+from galileo_jax.simulation.free import FreeTruth, draw_free, solve_free
 
 FPS, NOISE_M = 60.0, 0.001
 SCALES_PX_PER_M = (250.0, 900.0)
@@ -61,7 +61,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--case", action="append", choices=list(CASES))
     call = parser.parse_args(argv)
     jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    compilation_cache.enable()
     figures = {}
     for name in call.case or CASES:
         began = time.perf_counter()
@@ -94,7 +94,7 @@ def one_fit(case: Case, seed: int) -> dict:
         observation = _in_pixels(observation, scale)
         true["pixels_per_metre"] = scale
     clip = _clip(truth, len(frames.times_s), case.is_scaled)
-    trials = make_trials([clip], [observation])
+    trials = make_joint_problem([clip], [observation])
     fit = GradientFitter(trials).fit(seed)
     posterior = laplace_posterior(trials, fit, seed)
     result = make_result(

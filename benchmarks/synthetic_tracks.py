@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
+from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.trials import Trials
-from galileo_jax.observation import Observation
-from galileo_jax.run import make_trials
-from galileo_jax.truth import Truth, draw_truth, roll_out
+from galileo_jax.observation.observation import Observation
+from galileo_jax.simulation import Truth, draw_truth, roll_out
 
 # The oracle shares nothing with the package and lives beside the tests that it serves.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -32,7 +32,7 @@ class Case:
     """
 
     truth: Truth
-    trials: Trials
+    trials: JointProblem
     clean_m: np.ndarray
 
     @property
@@ -78,7 +78,7 @@ def make_case(seed: int, source: str, noise_m: float, engine: str = "auto") -> C
         objects=truth.objects,
         frame_count=NUM_FRAMES,
     )
-    return Case(truth, make_trials([clip], [observation], engine), centres)
+    return Case(truth, make_joint_problem([clip], [observation], engine), centres)
 
 
 def _solve_exactly(truth: Truth, times_s: np.ndarray):

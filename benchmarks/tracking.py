@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax import command
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
-from galileo_jax.errors import InputError
+from galileo_jax.commands import command
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking import track_clip
 from galileo_jax.tracking.track import Track
 

@@ -23,9 +23,9 @@ import numpy as np
 import yaml
 from scipy.optimize import minimize_scalar
 
-from galileo_jax import command, diagnose, fit
-from galileo_jax.errors import InputError
-from galileo_jax.run import Run, load_run
+from galileo_jax.commands import command, diagnose, fit
+from galileo_jax.results.run import Run, load_run
+from galileo_jax.runtime.errors import InputError
 
 AIR_KG_M3, G_M_S2 = 1.2, 9.81
 SMOOTH_DEGREE = 5  # of a polynomial in time: gravity's 2, what drag adds, and the release

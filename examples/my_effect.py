@@ -1,6 +1,6 @@
 """Cubic drag, F = -c v^3: an effect of one's own, for `--effects-from examples/my_effect.py`."""
 
-from galileo_jax.effects import Effect, LogNormal, Parameter, register
+from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
 
 
 @register

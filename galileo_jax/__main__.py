@@ -4,8 +4,10 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from galileo_jax import __version__, command
-from galileo_jax.errors import InputError
+import galileo_jax
+from galileo_jax import __version__
+from galileo_jax.commands import command
+from galileo_jax.runtime.errors import InputError
 
 VERBS = (
     ("fit", "estimate masses and friction from clips"),
@@ -40,7 +42,7 @@ def main(argv: Sequence[str]) -> int | None:
         return 0
     if verb not in dict(VERBS):
         raise InputError(f"unknown verb {verb!r}; {_known()}")
-    return import_module(f"galileo_jax.{verb}").main(rest)
+    return import_module(f"galileo_jax.commands.{verb}").main(rest)
 
 
 def _known() -> str:
@@ -51,6 +53,16 @@ def _help() -> str:
     width = max(len(verb) for verb, _ in VERBS)
     lines = [f"  {verb:<{width}}  {summary}" for verb, summary in VERBS]
     return "\n".join([USAGE, "", *lines])
+
+
+def run_verb(name: str, verb: str) -> None:
+    """What a verb's module at the package's root does: `python -m galileo_jax.fit` and the like.
+
+    Imported, it gives the public function of the same name, which must not be hidden by a module.
+    """
+    if name == "__main__":
+        sys.exit(command.run(lambda words: main([verb, *words])))
+    sys.modules[name] = getattr(galileo_jax, verb)
 
 
 def cli() -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from galileo_jax.jax_cache import cache_folder
+from galileo_jax.runtime.compilation_cache import cache_folder
 
 # Before anything imports jax; the commands' own subprocesses inherit it.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")

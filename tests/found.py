@@ -9,11 +9,11 @@ from galileo_jax.comparison.compare import Comparison, Place, Pull
 from galileo_jax.comparison.phases import PHASES
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round, Verdict
-from galileo_jax.effects.registry import make_effects
+from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.fits.gradient import Code, GradientFit
-from galileo_jax.inference.trials import Trials
-from galileo_jax.parameters import inverse
-from galileo_jax.run import make_problem
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.model.parameters import inverse
 from tests.oracle_run import HIT, make_run
 
 LIBRARY = ("air_drag", "release_delay", "viscous_drag")
@@ -22,14 +22,14 @@ TRUTH = {"m1": 0.5, "m2": 0.3, "k1": 0.1, "k2": 0.2, "air_drag": 0.1, "viscous_d
 ERROR = {"rmse": 0.02, "noise": 0.01, "l1": 0.015, "l2": 0.3, "chi2_per_dof": 4.0}
 
 
-def make_trials(folder: Path) -> Trials:
+def make_trials(folder: Path) -> JointProblem:
     """One clip; its model has three effects."""
     run = make_run(folder, HIT, 1.6)
     effects = make_effects(LIBRARY)
-    return Trials((make_problem(run.clip, run.problem.observation, "rigid", effects),))
+    return JointProblem((make_problem(run.clip, run.problem.observation, "rigid", effects),))
 
 
-def fit_of(trials: Trials, effects: tuple[str, ...]) -> GradientFit:
+def fit_of(trials: JointProblem, effects: tuple[str, ...]) -> GradientFit:
     """The truth as if it had been fitted."""
     free = trials.free(effects)
     theta = np.array([TRUTH.get(p.name, p.absent) for p in trials.parameters])
@@ -50,7 +50,7 @@ def fit_of(trials: Trials, effects: tuple[str, ...]) -> GradientFit:
     )
 
 
-def comparison_of(trials: Trials, p_value: float) -> Comparison:
+def comparison_of(trials: JointProblem, p_value: float) -> Comparison:
     """White residuals with a bump on the ramp, as large as `p_value` is small."""
     observation = trials.problems[0].observation
     count, frames = len(observation.names), len(observation.times_s)
@@ -70,7 +70,7 @@ def comparison_of(trials: Trials, p_value: float) -> Comparison:
     return Comparison(p_value, places, pulls, ERROR, (label,), (white,))
 
 
-def candidate_of(trials: Trials, name: str, probability: float, rivals: tuple[str, ...] = ()):
+def candidate_of(trials: JointProblem, name: str, probability: float, rivals: tuple[str, ...] = ()):
     """One effect in the race."""
     return Candidate(
         effects=(name,),
@@ -84,7 +84,7 @@ def candidate_of(trials: Trials, name: str, probability: float, rivals: tuple[st
     )
 
 
-def diagnosis_of(trials: Trials, status: str) -> Diagnosis:
+def diagnosis_of(trials: JointProblem, status: str) -> Diagnosis:
     """A diagnosis of each kind."""
     first = Round(
         Hypothesis((), fit_of(trials, ())), comparison_of(trials, 0.5 if status == "none" else 1e-9)

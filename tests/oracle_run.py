@@ -9,12 +9,13 @@ import yaml
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
+from galileo_jax.inference.build_problem import make_problem
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.inference.result import make_result
-from galileo_jax.inference.trials import Trials
-from galileo_jax.observation import Observation
-from galileo_jax.parameters import inverse
-from galileo_jax.run import Run, make_problem, save_run
+from galileo_jax.model.parameters import inverse
+from galileo_jax.observation.observation import Observation
+from galileo_jax.results.run import Run, save_run
 from tests.reference_ramp import Experiment, solve
 
 SIZES = ((0.06, 0.05), (0.07, 0.06))
@@ -60,7 +61,7 @@ def make_run(folder: Path, experiment: Experiment, clip_s: float) -> Run:
     (folder / "oracle.yaml").write_text(yaml.safe_dump({**declared, "objects": objects}))
     clip = load_clip(folder / "oracle.yaml")
     problem = make_problem(clip, observation, "rigid")
-    trials = Trials((problem,))
+    trials = JointProblem((problem,))
     truth = {"m1": experiment.mass_kg[0], "m2": experiment.mass_kg[1]}
     truth |= {"k1": experiment.friction[0], "k2": experiment.friction[1]}
     best = np.array([truth.get(p.name, p.absent) for p in trials.parameters])

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.effects.effect import Effect
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem, with_shared_parameters
-from galileo_jax.inference.trials import Trials
-from galileo_jax.observation import Observation
+from galileo_jax.model.effects.effect import Effect
+from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from tests.ramp_model import make_model
 from tests.reference_ramp import Experiment, solve
@@ -33,11 +33,11 @@ def observe(experiment: Experiment, seed: int, noise_m: float = NOISE_M) -> Obse
 
 def make_trials(
     experiments: Sequence[Experiment], seed: int = 0, effects: tuple[Effect, ...] = ()
-) -> Trials:
+) -> JointProblem:
     """One clip of each experiment, with the same effects in all models."""
     problems = []
     for clip, experiment in enumerate(experiments):
         model = replace(make_model(experiment, CLIP_S), effects=effects)
         seen = observe(experiment, seed + 1000 * clip)
         problems.append(Problem(seen, model, EngineRigid(model), f"clip{clip + 1}"))
-    return Trials(with_shared_parameters(problems))
+    return JointProblem(with_shared_parameters(problems))

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.effects.effect import Surroundings
-from galileo_jax.parameters import absent
-from galileo_jax.rollout.model import Model
-from galileo_jax.scene.scene import compile_scene, start_paths
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.model import Model
+from galileo_jax.model.parameters import absent
+from galileo_jax.model.scene.scene import compile_scene, start_paths
 from tests.reference_ramp import Experiment
 
 HIT = Experiment(

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from galileo_jax import command, diagnose, fit
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.effects import effect_names, make_effects
-from galileo_jax.errors import InputError
-from galileo_jax.measured import load_clips
-from galileo_jax.parameters import LogNormal, absent
+from galileo_jax.commands import command, diagnose, fit
+from galileo_jax.commands.clip_options import load_clips
+from galileo_jax.inference.build_problem import make_joint_problem, make_problem
+from galileo_jax.model.effects import effect_names, make_effects
+from galileo_jax.model.model import MASS_PRIOR
+from galileo_jax.model.parameters import LogNormal, absent
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.model import MASS_PRIOR
-from galileo_jax.run import make_problem, make_trials
+from galileo_jax.runtime.errors import InputError
 from tests.precision import in_64_bit
 
 G, MASS_KG, RELEASE_S, TOP_M = 9.81, 0.05, 0.1, 3.0
@@ -154,7 +154,7 @@ def test_fits_together_share_the_drag(tmp_path):
     paths = [write_fall(tmp_path, name) for name in ("first", "second")]
     clips = [load_clip(path) for path in paths]
     seen = [read_observation_csv(path) for path in paths]
-    trials = make_trials(clips, seen, effects=make_effects(["air_drag"]))
+    trials = make_joint_problem(clips, seen, effects=make_effects(["air_drag"]))
     assert [name for name in trials.names if name.startswith(("m", "air"))] == ["m1", "air_drag"]
 
 

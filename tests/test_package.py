@@ -7,8 +7,11 @@ from pathlib import Path
 import pytest
 
 import galileo_jax
-from galileo_jax import __main__, command, data_files, jax_cache
-from galileo_jax.errors import InputError
+from galileo_jax import __main__
+from galileo_jax.commands import command
+from galileo_jax.files import package_data
+from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[1]
 EVERY_FILE = {
@@ -52,20 +55,20 @@ def test_help_does_not_import_jax():
         "import sys; from galileo_jax.__main__ import main; main(['--help']); print(*sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "galileo_jax.command" in done.stdout.split()
+    assert "galileo_jax.commands.command" in done.stdout.split()
     assert not {"jax", "mujoco", "cv2"} & set(done.stdout.split())
 
 
 def test_data_files_are_found_in_the_checkout():
     for name in EVERY_FILE:
         folder, file = name.split("/")
-        find = data_files.scene_path if folder == "scenes" else data_files.config_path
+        find = package_data.scene_path if folder == "scenes" else package_data.config_path
         assert find(file) == ROOT / name
 
 
 def test_unknown_scene_names_the_known_ones():
     with pytest.raises(InputError, match=r"no file 'rmap.xml' in scenes; known: .*ramp\.xml"):
-        data_files.scene_path("rmap.xml")
+        package_data.scene_path("rmap.xml")
 
 
 @pytest.mark.slow
@@ -83,7 +86,7 @@ def test_wheel_carries_scenes_and_configs_and_works_outside_the_checkout(tmp_pat
     }
     assert packaged == EVERY_FILE
     code = (
-        "import galileo_jax, galileo_jax.data_files as d; "
+        "import galileo_jax, galileo_jax.files.package_data as d; "
         "print(galileo_jax.__file__); print(d.config_path('README.md'))"
     )
     environment = os.environ | {"PYTHONPATH": str(installed)}
@@ -100,22 +103,22 @@ def test_wheel_carries_scenes_and_configs_and_works_outside_the_checkout(tmp_pat
 
 def test_cache_is_in_the_users_cache_folder_and_can_be_switched_off(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.delenv(jax_cache.SWITCH, raising=False)
-    default = jax_cache.cache_folder()
+    monkeypatch.delenv(compilation_cache.SWITCH, raising=False)
+    default = compilation_cache.cache_folder()
     assert default is not None
     assert default.parts[-2:] == ("galileo_jax", "jax")
-    monkeypatch.setenv(jax_cache.SWITCH, str(tmp_path / "elsewhere"))
-    assert jax_cache.cache_folder() == tmp_path / "elsewhere"
-    monkeypatch.setenv(jax_cache.SWITCH, "off")
-    assert jax_cache.cache_folder() is None
+    monkeypatch.setenv(compilation_cache.SWITCH, str(tmp_path / "elsewhere"))
+    assert compilation_cache.cache_folder() == tmp_path / "elsewhere"
+    monkeypatch.setenv(compilation_cache.SWITCH, "off")
+    assert compilation_cache.cache_folder() is None
 
 
 @pytest.mark.parametrize(("setting", "is_filled"), [("on", True), ("off", False)])
 def test_compiled_programs_are_kept_unless_switched_off(setting, is_filled, tmp_path):
     environment = {key: value for key, value in os.environ.items() if "CACHE" not in key}
-    environment[jax_cache.SWITCH] = "off" if setting == "off" else str(tmp_path)
+    environment[compilation_cache.SWITCH] = "off" if setting == "off" else str(tmp_path)
     code = (
-        "import jax; from galileo_jax import jax_cache; jax_cache.enable(); "
+        "import jax; from galileo_jax import jax_cache; compilation_cache.enable(); "
         "jax.config.update('jax_persistent_cache_min_compile_time_secs', 0.0); "
         "jax.jit(lambda x: x * 2 + 1)(1.0)"
     )

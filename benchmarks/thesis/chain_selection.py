@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 import setting
 
-from galileo_jax import command
+from galileo_jax.commands import command
 from galileo_jax.inference.samplers.thesis import Acceptance, Selection, select
 
 

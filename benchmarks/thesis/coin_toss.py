@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import setting
 
-from galileo_jax import command
+from galileo_jax.commands import command
 from galileo_jax.inference.samplers.thesis import NARROW, NUM_CHAINS, NUM_STEPS, WIDE, WIDE_EVERY
 from galileo_jax.neural.thesis_task import NAMES
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import setting
 
-from galileo_jax import command
+from galileo_jax.commands import command
 from galileo_jax.neural.checkpoint import load_network
 from galileo_jax.neural.thesis_task import CM
 

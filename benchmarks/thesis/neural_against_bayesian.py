@@ -14,7 +14,7 @@ import jax
 import numpy as np
 import setting
 
-from galileo_jax import command
+from galileo_jax.commands import command
 from galileo_jax.neural.checkpoint import load_network
 from galileo_jax.neural.estimate import trained_network
 from galileo_jax.neural.galileo_task import estimate, to_clips

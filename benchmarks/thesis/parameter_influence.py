@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import setting
 
-from galileo_jax import command
+from galileo_jax.commands import command
 from galileo_jax.neural.thesis_task import FPS, NAMES
 
 MIDDLE = np.array([0.5, 0.12, 0.5, 0.15])

@@ -14,7 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 import setting
 
-from galileo_jax import command
+from galileo_jax.commands import command
+from galileo_jax.commands.train import TEST_SHARD
 from galileo_jax.neural.checkpoint import NETWORK, load_network
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.dataset import make_samples
@@ -22,7 +23,6 @@ from galileo_jax.neural.task import Arrays
 from galileo_jax.neural.thesis_network import RANGES, ThesisNetwork
 from galileo_jax.neural.thesis_task import ThesisTask
 from galileo_jax.neural.training import train
-from galileo_jax.train import TEST_SHARD
 
 EPOCHS = 80
 SCALES = (2.0, RANGES[1], 2.0, RANGES[3])

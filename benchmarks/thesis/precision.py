@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import setting
 
-from galileo_jax import command
+from galileo_jax.commands import command
 
 
 def main(argv: Sequence[str]) -> int | None:

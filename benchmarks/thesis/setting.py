@@ -22,14 +22,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from benchmarks import tables
-from galileo_jax import command, jax_cache
-from galileo_jax.files import replacing
+from galileo_jax.commands import command
+from galileo_jax.files.atomic_write import replacing
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.driver import Settings, sample
 from galileo_jax.inference.samplers.thesis import NUM_CHAINS, NUM_STEPS, Acceptance, Thesis, select
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.thesis_task import FPS, NAMES, ThesisTask
 from galileo_jax.report.figure import style
+from galileo_jax.runtime import compilation_cache
 from galileo_jax.similarity.similarity import AbstractSimilarity, similarity_class
 
 NOISE_M_S = 0.01
@@ -167,7 +168,7 @@ def start(argv: Sequence[str], doc: str | None, num: int, frames: int = 60) -> a
     parser.add_argument("--out", type=Path, default=Path("runs/thesis"), help="figures' folder")
     call = parser.parse_args(argv)
     jax.config.update("jax_enable_x64", True)
-    jax_cache.enable()
+    compilation_cache.enable()
     return call
 
 

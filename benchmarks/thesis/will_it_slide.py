@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import setting
 
-from galileo_jax import command
+from galileo_jax.commands import command
 
 ANGLES_DEG = np.arange(2.0, 17.0, 2.0)
 

@@ -14,8 +14,8 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import SIZE_MEANING, Clip, ClipFile, ClipObject, short
 from galileo_jax.clip.track_files.read import FileTrack, is_track, read_track
 from galileo_jax.clip.yaml_file import read_mapping
-from galileo_jax.errors import InputError
-from galileo_jax.observation import Observation
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 
 YAML_SUFFIXES = (".yaml", ".yml")

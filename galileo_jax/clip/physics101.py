@@ -24,7 +24,7 @@ from typing import Any
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import short
 from galileo_jax.clip.yaml_file import read_mapping
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 
 LABELS = "labels.yaml"

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.errors import InputError
-from galileo_jax.files import write_text
-from galileo_jax.observation import Observation
+from galileo_jax.files.atomic_write import write_text
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
 
 TIME = "time_s"
 MIN_ROWS = 4

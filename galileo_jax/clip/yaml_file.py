@@ -5,7 +5,7 @@ from typing import Any
 
 import yaml
 
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 MAX_BYTES = 1_000_000
 """A clip yaml has under 2 kB; a file this large is something else, often the video."""

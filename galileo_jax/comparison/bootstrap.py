@@ -11,12 +11,12 @@ Rollouts of all replicates are one batch.
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.trials import Trials
+from galileo_jax.inference.joint_problem import JointProblem
 
 NUM_STEPS = 2
 
 
-def whitened(trials: Trials, theta: np.ndarray, noise_scale: np.ndarray) -> list[np.ndarray]:
+def whitened(trials: JointProblem, theta: np.ndarray, noise_scale: np.ndarray) -> list[np.ndarray]:
     """Whitened residuals of each clip, `[point, value]`.
 
     Args:
@@ -32,7 +32,7 @@ def whitened(trials: Trials, theta: np.ndarray, noise_scale: np.ndarray) -> list
 
 
 def replicates(
-    trials: Trials, fit: GradientFit, noise_scale: np.ndarray, count: int, seed: int
+    trials: JointProblem, fit: GradientFit, noise_scale: np.ndarray, count: int, seed: int
 ) -> list[np.ndarray]:
     """Whitened residuals of refitted replicates, of each clip `[replicate, value]`.
 
@@ -77,6 +77,6 @@ def replicates(
 
 
 def _at(
-    trials: Trials, fit: GradientFit, z: np.ndarray, noise_scale: np.ndarray
+    trials: JointProblem, fit: GradientFit, z: np.ndarray, noise_scale: np.ndarray
 ) -> list[np.ndarray]:
     return whitened(trials, trials.theta(z, fit.free), noise_scale)

@@ -20,8 +20,8 @@ from galileo_jax.comparison.bootstrap import replicates, whitened
 from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import NOISE_SCALE_RANGE, error_of, told_scale
-from galileo_jax.inference.trials import Trials
 
 NUM_REPLICATES = 200
 ADEQUATE_P = 0.01
@@ -88,7 +88,7 @@ class Comparison:
         return self.p_value >= ADEQUATE_P
 
 
-def compare(trials: Trials, fit: GradientFit, seed: int) -> Comparison:
+def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     """Compares a fitted hypothesis with the data; the same seed gives the same result."""
     theta = trials.theta(fit.z, fit.free)
     scales = np.array([trials.noise_scale(theta, c) for c in range(len(trials.problems))])
@@ -146,7 +146,7 @@ def _tail(value: float, drawn: np.ndarray) -> float:
     return float(stats.gumbel_r.sf(value, drawn.mean() - np.euler_gamma * scale, scale))
 
 
-def _pulls(trials: Trials, fit: GradientFit, theta: np.ndarray) -> list[Pull]:
+def _pulls(trials: JointProblem, fit: GradientFit, theta: np.ndarray) -> list[Pull]:
     """All nuisances but the noise scale, which residuals judge."""
     count = len(trials.model_parameters)
     return [
@@ -157,7 +157,7 @@ def _pulls(trials: Trials, fit: GradientFit, theta: np.ndarray) -> list[Pull]:
 
 
 def _place(
-    trials: Trials,
+    trials: JointProblem,
     theta: np.ndarray,
     measured: list[np.ndarray],
     cell: Cell,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from galileo_jax.effects.effect import Surroundings
 from galileo_jax.inference.problem import Problem
+from galileo_jax.model.effects.effect import Surroundings
 
 PHASES = ("held", "ramp", "foot", "table", "collision", "after", "at rest", "fall")
 FREE = {"spring": "swing", "liquid": "liquid"}  # by the law that makes it

@@ -2,8 +2,8 @@
 
 from galileo_jax.comparison.phases import free_phase
 from galileo_jax.diagnosis.diagnosis import Verdict
-from galileo_jax.effects.effect import Surroundings
-from galileo_jax.effects.forms import FORM_MEANINGS
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.effects.forms import FORM_MEANINGS
 
 # How another run gets other speeds and places, by how the objects move.
 ANOTHER_RUN = {

@@ -22,8 +22,8 @@ from scipy.special import ndtri
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
-from galileo_jax.inference.trials import Trials
-from galileo_jax.parameters import inverse
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.parameters import inverse
 
 STARTS_PER_PARAMETER, MOST_STARTS = 32, 96
 NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
@@ -115,7 +115,7 @@ def _seconded(
 
 
 def score_tests(
-    trials: Trials, base: Hypothesis, candidates: Sequence[tuple[str, ...]]
+    trials: JointProblem, base: Hypothesis, candidates: Sequence[tuple[str, ...]]
 ) -> np.ndarray:
     """How many standard deviations each candidate's slope stands out, at zero strength.
 
@@ -134,7 +134,7 @@ def score_tests(
     return np.abs(slopes @ residual) / np.where(length > SHOWS, length, np.inf)
 
 
-def _strength(trials: Trials, effect: str) -> tuple[np.ndarray, float]:
+def _strength(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:
     """Where an effect's strengths stand (one per clip, or one), and a small one."""
     names = [p.name for p in trials.model_parameters]
     where = [i for i, n in enumerate(names) if n == effect or n.startswith(f"{effect}_")]
@@ -205,7 +205,7 @@ def _best_strengths(
 
 
 def _matched_shapes(
-    trials: Trials, base: GradientFit, effects: Sequence[str], seed: int
+    trials: JointProblem, base: GradientFit, effects: Sequence[str], seed: int
 ) -> np.ndarray:
     """The shapes of the last effect that match the base fit's residuals best, `[start, z]`.
 
@@ -237,7 +237,9 @@ def _matched_shapes(
     return np.where(free, z[best, :count], 0.0)
 
 
-def _beside(trials: Trials, base: GradientFit, probes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _beside(
+    trials: JointProblem, base: GradientFit, probes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """The base fit's whitened residuals, and how they change to each of `probes`.
 
     Both without what the parameters that are there can take up. The priors' residuals count
@@ -261,7 +263,7 @@ def _latin(generator: np.random.Generator, size: int, num: int) -> np.ndarray:
     return (ranks + generator.random(ranks.shape)) / size
 
 
-def _starts(trials: Trials, base: GradientFit, free: np.ndarray, seed: int) -> np.ndarray:
+def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int) -> np.ndarray:
     """Starts in z: new parameters over their priors, the others in one of three ways."""
     count = len(trials.model_parameters)
     generator = np.random.default_rng([seed, 41])

@@ -25,10 +25,10 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.left_out import left_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
-from galileo_jax.effects.forms import FORM_NAMES
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter, Settings
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
-from galileo_jax.inference.trials import Trials
+from galileo_jax.model.effects.forms import FORM_NAMES
 
 # Evidence of one candidate over another, in nats, at which the other is given up: one in twenty.
 DECISIVE = 3.0
@@ -47,7 +47,7 @@ NUM_JOINED = 8  # of the other effects, to the best: those with the largest scor
 
 
 def diagnose(
-    trials: Trials,
+    trials: JointProblem,
     *,
     seed: int = 0,
     add: str = "auto",
@@ -141,13 +141,13 @@ def diagnose(
     return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each)
 
 
-def fitter_of(trials: Trials) -> GradientFitter:
+def fitter_of(trials: JointProblem) -> GradientFitter:
     """What fits all hypotheses: with linear steps, many at once."""
     return GradientFitter(trials, Settings(num_exact=0))
 
 
 def _round(
-    trials: Trials, hypothesis: Hypothesis, seed: int, on_round: Callable[[Round], None]
+    trials: JointProblem, hypothesis: Hypothesis, seed: int, on_round: Callable[[Round], None]
 ) -> Round:
     extra = Round(hypothesis, compare(trials, hypothesis.fit, seed))
     on_round(extra)
@@ -189,7 +189,7 @@ def _candidates(
     return tuple(made)
 
 
-def _odds(trials: Trials, hypothesis: Hypothesis) -> float:
+def _odds(trials: JointProblem, hypothesis: Hypothesis) -> float:
     """Of a set of effects, as far as the clip leads to expect them: of the likeliest."""
     problem = trials.problems[0]
     theta = trials.of_clip(trials.theta(hypothesis.fit.z, hypothesis.fit.free), 0)
@@ -200,7 +200,7 @@ def _odds(trials: Trials, hypothesis: Hypothesis) -> float:
 
 
 def _compared(
-    trials: Trials, candidates: tuple[Candidate, ...], seed: int
+    trials: JointProblem, candidates: tuple[Candidate, ...], seed: int
 ) -> tuple[tuple[Candidate, ...], dict[tuple[str, ...], Comparison]]:
     """The best candidates with their p-values and with whom they are confounded."""
     compared, done = {}, []
@@ -218,7 +218,7 @@ def _compared(
     return tuple(replace(c, confounded_with=names[c.effects]) for c in done), compared
 
 
-def _pairs(trials: Trials, best: Candidate, others: Sequence[str]) -> list[tuple[str, ...]]:
+def _pairs(trials: JointProblem, best: Candidate, others: Sequence[str]) -> list[tuple[str, ...]]:
     """The best with each of those others whose score stands out most."""
     pairs = [(*best.effects, name) for name in others]
     order = np.argsort(-score_tests(trials, best.hypothesis, pairs))

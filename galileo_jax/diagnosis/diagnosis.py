@@ -8,7 +8,7 @@ import numpy as np
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.each_clip import EachClip
-from galileo_jax.effects.forms import FORM_NAMES
+from galileo_jax.model.effects.forms import FORM_NAMES
 
 Status = Literal["none", "named", "ambiguous", "unknown"]
 

@@ -9,6 +9,7 @@ from galileo_jax.comparison.document import comparison_document
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.diagnosis.each_clip import kind_of
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.inference.result import (
@@ -17,10 +18,9 @@ from galileo_jax.inference.result import (
     summarise,
     undetermined_by_mass,
 )
-from galileo_jax.inference.trials import Trials
 
 
-def diagnosis_document(trials: Trials, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
+def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
     """The contract's dictionary.
 
     Args:
@@ -65,7 +65,7 @@ def diagnosis_document(trials: Trials, diagnosis: Diagnosis, seed: int) -> dict[
     return document
 
 
-def history_row(trials: Trials, one: Round, seed: int) -> dict[str, Any]:
+def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:
     """One round: effects, errors, p and what is said of the friction coefficients with them."""
     error = one.comparison.error
     entries = parameter_entries(trials, one.hypothesis.fit, seed)
@@ -79,13 +79,15 @@ def history_row(trials: Trials, one: Round, seed: int) -> dict[str, Any]:
     }
 
 
-def parameter_entries(trials: Trials, fit: GradientFit, seed: int) -> dict[str, dict[str, Any]]:
+def parameter_entries(
+    trials: JointProblem, fit: GradientFit, seed: int
+) -> dict[str, dict[str, Any]]:
     """Entries as in result.json of all that the hypothesis leaves free, nuisances left out."""
     return _entries(trials, fit, seed)[0]
 
 
 def _entries(
-    trials: Trials, fit: GradientFit, seed: int
+    trials: JointProblem, fit: GradientFit, seed: int
 ) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Those of the parameters, and those of the force constants per mass."""
     posterior = laplace_posterior(trials, fit, seed)
@@ -109,7 +111,7 @@ def _entries(
     return entries, forces
 
 
-def _candidate(trials: Trials, candidate: Candidate, seed: int) -> dict[str, Any]:
+def _candidate(trials: JointProblem, candidate: Candidate, seed: int) -> dict[str, Any]:
     parameters, derived = _entries(trials, candidate.hypothesis.fit, seed)
     return {
         "effect": candidate.name,

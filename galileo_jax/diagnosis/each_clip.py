@@ -20,7 +20,7 @@ from scipy import stats
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.comparison.compare import ADEQUATE_P, NOISE_SCALE_RANGE, Comparison
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
-from galileo_jax.inference.trials import Trials
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NUM_PARTS = 4  # quarters, as they are called
@@ -54,7 +54,9 @@ class EachClip:
     sd_m_s2: np.ndarray
 
 
-def each_clip(trials: Trials, fit: GradientFit, comparison: Comparison) -> tuple[EachClip, ...]:
+def each_clip(
+    trials: JointProblem, fit: GradientFit, comparison: Comparison
+) -> tuple[EachClip, ...]:
     """Every clip against the model of all and by itself.
 
     Args:
@@ -84,7 +86,7 @@ def kind_of(found: tuple[EachClip, ...]) -> Kind:
     return "alike" if is_alike else "different"
 
 
-def _one(trials: Trials, fit: GradientFit, comparison: Comparison, clip: int) -> EachClip:
+def _one(trials: JointProblem, fit: GradientFit, comparison: Comparison, clip: int) -> EachClip:
     alone, columns = trials.alone(clip), trials.columns[clip]
     start, free = fit.z[columns], fit.free[columns]
     found = GradientFitter(alone).fit_from(start[None], free[None], np.zeros(1, int))[0]
@@ -105,7 +107,7 @@ def _one(trials: Trials, fit: GradientFit, comparison: Comparison, clip: int) ->
 
 
 def _parts(
-    trials: Trials, fit: GradientFit, clip: int
+    trials: JointProblem, fit: GradientFit, clip: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Edges of the parts, extra accelerations and their standard deviations."""
     problem = trials.problems[clip]

@@ -15,8 +15,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from galileo_jax.effects.effect import Effect, Force, State, Surroundings, Theta
-from galileo_jax.parameters import Normal, Parameter
+from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
+from galileo_jax.model.parameters import Normal, Parameter
 
 NUM_KNOTS, NUM_KNOTS_AFTER = 14, 8  # of object 1 at first, and of all else
 SD_M_S2 = 2.0

@@ -12,7 +12,7 @@ import numpy as np
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.residuals import cost
 from galileo_jax.inference.fits.steps import TRIED_SHARE, Damped
-from galileo_jax.inference.trials import NOISE_SD, Trials
+from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 
 # What friction takes up of a constant force is a soft direction: it must be followed to its end.
 MAX_STEPS, ENOUGH = 60, 0.005
@@ -39,7 +39,7 @@ class FreeFit(NamedTuple):
     residual: np.ndarray
 
 
-def free_fit(trials: Trials, start: np.ndarray, free: np.ndarray) -> FreeFit:
+def free_fit(trials: JointProblem, start: np.ndarray, free: np.ndarray) -> FreeFit:
     """Fits one clip.
 
     Args:
@@ -74,7 +74,7 @@ def free_fit(trials: Trials, start: np.ndarray, free: np.ndarray) -> FreeFit:
 
 
 def _slopes(
-    trials: Trials, z: np.ndarray, free: np.ndarray, scale: float
+    trials: JointProblem, z: np.ndarray, free: np.ndarray, scale: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian `[value, model parameter]` by central differences, and residuals `[value]`.
 
@@ -92,7 +92,7 @@ def _slopes(
     return jacobian, white[0]
 
 
-def _white(trials: Trials, z: np.ndarray, free: np.ndarray, scale: float) -> np.ndarray:
+def _white(trials: JointProblem, z: np.ndarray, free: np.ndarray, scale: float) -> np.ndarray:
     return whitened(trials, trials.theta(z, free), np.array([scale]))[0]
 
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.trials import Trials
+from galileo_jax.inference.joint_problem import JointProblem
 
 
-def by_itself(fit: GradientFit, whole: Trials, part: Trials) -> GradientFit:
+def by_itself(fit: GradientFit, whole: JointProblem, part: JointProblem) -> GradientFit:
     """The same fit in the parameters of fewer effects; those left out are pinned in it.
 
     Args:

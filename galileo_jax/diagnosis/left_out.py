@@ -11,19 +11,19 @@ import numpy as np
 
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import velocity_error
-from galileo_jax.inference.trials import Trials
-from galileo_jax.parameters import Parameter
+from galileo_jax.model.parameters import Parameter
 
 
-def left_out_rmse(trials: Trials, hypothesis: Hypothesis) -> tuple[float, ...]:
+def left_out_rmse(trials: JointProblem, hypothesis: Hypothesis) -> tuple[float, ...]:
     """Per clip, the rmse (m/s) of its velocities as the other clips predict them."""
     return tuple(_one(trials, hypothesis, clip) for clip in range(len(trials.problems)))
 
 
-def _one(trials: Trials, hypothesis: Hypothesis, clip: int) -> float:
+def _one(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> float:
     problem = trials.problems[clip]
-    others = Trials(tuple(p for i, p in enumerate(trials.problems) if i != clip))
+    others = JointProblem(tuple(p for i, p in enumerate(trials.problems) if i != clip))
     kept = [i for i in range(len(trials.problems)) if i != clip]
     # Names count clips, so that they change where one is left out: places do not.
     start = np.zeros(len(others.model_parameters))

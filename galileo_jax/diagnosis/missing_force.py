@@ -24,10 +24,10 @@ from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.diagnosis.formula import NOT_SIMPLE, Formula, Sight, find_formula
 from galileo_jax.diagnosis.free_acceleration import FreeAcceleration, Span
 from galileo_jax.diagnosis.free_fit import FreeFit, free_fit
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.trials import Trials
+from galileo_jax.model.model import Model
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import dynamics, state_at
 
 NUM_TIMES, NUM_DRAWS = 200, 400
@@ -37,7 +37,7 @@ SHORTEST_S = 0.05  # of a piece
 NUM_SPANS = 2  # pieces by the hypothesis, then by the fit with the acceleration
 
 
-def infer_missing_force(trials: Trials, hypothesis: Hypothesis, seed: int) -> MissingForce:
+def infer_missing_force(trials: JointProblem, hypothesis: Hypothesis, seed: int) -> MissingForce:
     """Infers the acceleration along the path that a hypothesis lacks, and a formula for it.
 
     Args:
@@ -82,7 +82,7 @@ class _View:
       moves: `[object, time]`, whether it is seen to move.
     """
 
-    trials: Trials
+    trials: JointProblem
     before: np.ndarray
     fit: FreeFit
     effect: FreeAcceleration
@@ -124,20 +124,20 @@ class _View:
         return -self.fit.jacobian[:, self.knots(index)] @ weights
 
 
-def _view(trials: Trials, hypothesis: Hypothesis, clip: int) -> _View:
+def _view(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> _View:
     """Fits one clip with a free acceleration."""
     # A formula is judged in a linear model, some way from the truth: what a camera may bend is
     # allowed for, whoever measured, so that a bend of the model is not taken for a force.
     problem = replace(trials.problems[clip], noise="camera")
     column = trials.columns_of(clip)
     z, free = hypothesis.fit.z[column], hypothesis.fit.free[column]
-    alone = Trials((problem,))
+    alone = JointProblem((problem,))
     spans = _spans(problem, alone.theta(z, free)[:-1])
     for _ in range(NUM_SPANS):
         effect = FreeAcceleration(spans)
         model = replace(problem.model, effects=(*problem.model.effects, effect))
         engine = make_engine(problem.engine.name, model)
-        extended = Trials((replace(problem, model=model, engine=engine),))
+        extended = JointProblem((replace(problem, model=model, engine=engine),))
         where = np.array([extended.names.index(name) for name in alone.names])
         before = np.zeros(len(extended.names))
         is_free = np.zeros(len(extended.names), bool)

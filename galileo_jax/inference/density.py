@@ -1,6 +1,6 @@
 """The posterior density of trials as a program that clips share: data and scene are its arguments.
 
-`Trials.log_density` with the shapes that the gradient fit's programs have (`fits/residuals.py`).
+`JointProblem.log_density` with the shapes of the gradient fit's programs (`fits/residuals.py`).
 """
 
 from collections.abc import Callable
@@ -12,11 +12,11 @@ import numpy as np
 
 from galileo_jax.inference.fits.programs import FAILED, ClipArrays, Kind, white_of
 from galileo_jax.inference.fits.residuals import FittedClip
+from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.samplers.program import Program
 from galileo_jax.inference.samplers.sampler import LogDensity
-from galileo_jax.inference.trials import NOISE_SD, Trials
-from galileo_jax.rollout.chunks import rounded_up
 from galileo_jax.rollout.engine_jax import RECORDS
+from galileo_jax.runtime.batching import rounded_up
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 
@@ -41,12 +41,12 @@ class Part(NamedTuple):
     last_record: np.ndarray
 
 
-def density_of(trials: Trials) -> LogDensity:
+def density_of(trials: JointProblem) -> LogDensity:
     """`trials.log_density`: as a `Program` where the engine is written in JAX."""
     return _program_of(trials, log_density) or trials.log_density
 
 
-def likelihood_of(trials: Trials) -> LogDensity:
+def likelihood_of(trials: JointProblem) -> LogDensity:
     """The same without the prior, `[parameter] -> []`."""
 
     def without_prior(z: jax.Array) -> jax.Array:
@@ -84,7 +84,7 @@ def _of_clip(part: Rolled, data: Part, z: jax.Array, noise: jax.Array) -> jax.Ar
     return jnp.where(has_failed, -jnp.inf, -0.5 * (jnp.sum(white**2) + log_determinant))
 
 
-def _program_of(trials: Trials, function: Callable[..., jax.Array]) -> Program | None:
+def _program_of(trials: JointProblem, function: Callable[..., jax.Array]) -> Program | None:
     parts, data = [], []
     for index, problem in enumerate(trials.problems):
         roll_out = getattr(problem.engine, "roll_out", None)

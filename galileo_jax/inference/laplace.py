@@ -3,14 +3,14 @@
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import Code, GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior, Status
-from galileo_jax.inference.trials import Trials
 
 NUM_DRAWS = 4000
 
 
-def laplace_posterior(trials: Trials, fit: GradientFit, seed: int) -> Posterior:
+def laplace_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterior:
     """Draws of N(mode, (J^T J + 1)^-1) in z, mapped to the parameters' units.
 
     Symmetric in z, hence inside the parameters' bounds. It knows nothing of skewness or of a

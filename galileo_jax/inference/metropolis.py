@@ -14,12 +14,12 @@ from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.valley import along, scattered, valley_round
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import IDENTIFIED_SD_Z
 from galileo_jax.inference.samplers import sample, sampler_class
 from galileo_jax.inference.samplers.driver import Progress, Settings
-from galileo_jax.inference.trials import Trials
 
 # R-hat < 1.01 needs about 50 effective draws for each half chain, so that fewer chains would be
 # cheaper; but four learn too poor a proposal (measured: acceptance 0.14 against 0.41).
@@ -27,7 +27,7 @@ NUM_CHAINS = 8
 
 
 def metropolis_posterior(
-    trials: Trials,
+    trials: JointProblem,
     fit: GradientFit,
     seed: int,
     *,

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from galileo_jax.inference.trials import Trials
-from galileo_jax.rollout.model import MASS_PRIOR
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.model import MASS_PRIOR
 
 # Of the prior's spread of a mass nobody weighed: below it the mass is known.
 KNOWN_SHARE = 0.5
@@ -32,7 +32,7 @@ def per_mass_unit(unit: str) -> str | None:
     return f"{unit}/kg" if unit.partition("/")[0].split(" ")[0] in ("kg", "N", "J", "W") else None
 
 
-def force_constants(trials: Trials) -> dict[str, str]:
+def force_constants(trials: JointProblem) -> dict[str, str]:
     """Names of the parameters that are constants of forces, and their units per mass."""
     found = {}
     for parameter in trials.model_parameters:
@@ -43,7 +43,7 @@ def force_constants(trials: Trials) -> dict[str, str]:
     return found
 
 
-def is_any_weighed(trials: Trials) -> bool:
+def is_any_weighed(trials: JointProblem) -> bool:
     """Whether a mass was declared, so that masses and forces can be told at all."""
     return any(
         mass is not None
@@ -52,13 +52,13 @@ def is_any_weighed(trials: Trials) -> bool:
     )
 
 
-def is_mass_known(trials: Trials, draws: np.ndarray) -> bool:
+def is_mass_known(trials: JointProblem, draws: np.ndarray) -> bool:
     """Whether draws `[draw, parameter]` tell the first object's mass: weighed, or against one."""
     mass = draws[:, trials.names.index("m1")]
     return is_any_weighed(trials) and bool(np.log(mass).std() < KNOWN_SHARE * MASS_PRIOR.sd)
 
 
-def per_mass(trials: Trials, draws: np.ndarray) -> Mapping[str, tuple[np.ndarray, str]]:
+def per_mass(trials: JointProblem, draws: np.ndarray) -> Mapping[str, tuple[np.ndarray, str]]:
     """By name, the force constants over the mass of object 1, and their units.
 
     Args:

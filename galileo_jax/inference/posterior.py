@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from galileo_jax.errors import InputError
-from galileo_jax.files import replacing
+from galileo_jax.files.atomic_write import replacing
 from galileo_jax.inference.convergence import arviz, convergence
+from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
     from arviz import InferenceData

@@ -8,15 +8,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.effects.effect import Effect, Surroundings
-from galileo_jax.kept import kept
-from galileo_jax.observation import Observation
-from galileo_jax.parameters import Parameter, joined
-from galileo_jax.rollout.chunks import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
+from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.model import Model
+from galileo_jax.model.parameters import Parameter, joined
+from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.runtime.batching import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
+from galileo_jax.runtime.trace_cache import kept
 from galileo_jax.similarity.gaussian_likelihood import (
     GaussianLikelihood,
     NoiseModel,

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax import __version__
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.inference.per_mass import (
     SUFFIX,
@@ -18,8 +19,7 @@ from galileo_jax.inference.per_mass import (
 )
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.trials import Trials
-from galileo_jax.parameters import inverse
+from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 # In z every prior is a standard normal: above this the data told less than half.
@@ -86,13 +86,13 @@ def velocity_error(
     }
 
 
-def told_scale(trials: Trials, theta: np.ndarray, clip: int) -> float:
+def told_scale(trials: JointProblem, theta: np.ndarray, clip: int) -> float:
     """The fitted noise scale of a clip, as far as noise explains it."""
     return float(np.clip(trials.noise_scale(theta, clip), *NOISE_SCALE_RANGE))
 
 
 def error_of(
-    trials: Trials, theta: np.ndarray, num_used: float, pull: float = 0.0
+    trials: JointProblem, theta: np.ndarray, num_used: float, pull: float = 0.0
 ) -> dict[str, float]:
     """`velocity_error` and chi2 per degree of freedom at parameters `theta` `[parameter]`.
 
@@ -121,7 +121,7 @@ def error_of(
 NUM_PRIOR_DRAWS = 2000
 
 
-def per_mass_entries(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, Any]]:
+def per_mass_entries(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[str, Any]]:
     """Entries of the force constants over m1, by name; empty where the mass is known.
 
     Args:
@@ -142,7 +142,7 @@ def per_mass_entries(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, A
     }
 
 
-def undetermined_by_mass(trials: Trials, forces: Mapping[str, Any]) -> set[str]:
+def undetermined_by_mass(trials: JointProblem, forces: Mapping[str, Any]) -> set[str]:
     """Masses that nothing told of, and the force constants that are known per mass only.
 
     Several masses tied by their ratios share what the prior says, which looks like knowledge.
@@ -162,7 +162,7 @@ def _width(values: np.ndarray) -> float:
     return float(np.diff(np.quantile(values, [0.16, 0.84]))[0])
 
 
-def _derived_by_laws(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, Any]]:
+def _derived_by_laws(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[str, Any]]:
     """What the models' laws derive from draws `[draw, parameter]` of one clip's parameters."""
     if len(trials.problems) != 1:
         return {}
@@ -188,7 +188,7 @@ def _derived_by_laws(trials: Trials, draws: np.ndarray) -> dict[str, dict[str, A
 
 
 def make_result(
-    trials: Trials,
+    trials: JointProblem,
     posterior: Posterior,
     z_best: np.ndarray,
     *,

@@ -4,18 +4,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.errors import InputError
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers import thesis
 from galileo_jax.inference.samplers.thesis import NUM_CHAINS
-from galileo_jax.inference.trials import Trials
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.similarity.similarity import similarity_class
 
 SEARCHED = ("m1", "k1", "m2", "k2")
 
 
 def thesis_posterior(
-    trials: Trials,
+    trials: JointProblem,
     seed: int,
     similarity: str,
     acceptance: str,

@@ -13,9 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 from flax import nnx
 
-from galileo_jax.errors import InputError
-from galileo_jax.files import replacing
+from galileo_jax.files.atomic_write import replacing
 from galileo_jax.neural.config import TrainConfig
+from galileo_jax.runtime.errors import InputError
 
 CHECKPOINTS, NETWORK = "checkpoints", "network.npz"
 KEPT = 2

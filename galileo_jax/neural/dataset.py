@@ -9,10 +9,10 @@ from typing import Any
 import jax
 import numpy as np
 
-from galileo_jax.errors import InputError
-from galileo_jax.files import replacing, write_json
+from galileo_jax.files.atomic_write import replacing, write_json
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Arrays, Trainable
+from galileo_jax.runtime.errors import InputError
 
 INDEX = "data.json"
 DATA_KEYS = ("preset", "seed", "engine", "frames")  # what the samples depend on

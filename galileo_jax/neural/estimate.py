@@ -10,16 +10,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.errors import InputError
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
-from galileo_jax.inference.trials import Trials
+from galileo_jax.model.model import MASS_PRIOR
+from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.checkpoint import load_network
 from galileo_jax.neural.galileo_task import Estimates, estimate
 from galileo_jax.neural.posterior_network import PosteriorNetwork
 from galileo_jax.neural.seen import Seen, see
 from galileo_jax.neural.summary import DECLARED, Summary, summarise
-from galileo_jax.parameters import inverse
-from galileo_jax.rollout.model import MASS_PRIOR
+from galileo_jax.runtime.errors import InputError
 
 TRAINED = Path(__file__).parent / "trained" / "galileo.npz"
 NUM_DRAWS = 4000
@@ -40,7 +40,7 @@ def trained_network(path: Path = TRAINED) -> PosteriorNetwork:
 
 
 def cnn_posterior(
-    trials: Trials, seed: int, network: PosteriorNetwork | None = None
+    trials: JointProblem, seed: int, network: PosteriorNetwork | None = None
 ) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
     """Draws of the posterior of k1, k2 and the mass ratio; of all else, of the prior.
 
@@ -139,7 +139,7 @@ def _estimate(network: PosteriorNetwork, seen: Seen, summary: Summary, seed: int
     return Estimates(k1, ratio, k2)
 
 
-def _complete(trials: Trials, found: Estimates, seed: int) -> np.ndarray:
+def _complete(trials: JointProblem, found: Estimates, seed: int) -> np.ndarray:
     """Draws of all parameters `[draw, parameter]`, in their units."""
     generator = np.random.default_rng([seed, 7])
     count = len(found.k1)

@@ -8,7 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from flax import nnx
 
-from galileo_jax.effects.effect import Surroundings
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
+from galileo_jax.model.parameters import Uniform
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.posterior_network import (
     PosteriorNetwork,
@@ -21,8 +23,6 @@ from galileo_jax.neural.summary import NUM_CHANNELS, NUM_FEATURES, summarise
 from galileo_jax.neural.task import Arrays
 from galileo_jax.neural.thesis_task import FPS, ThesisTask
 from galileo_jax.neural.world import IDEAL_FRICTION, Truth, draw, targets
-from galileo_jax.parameters import Uniform
-from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
 
 QUANTITIES = ("k1", "phi", "k2")
 NUM_DRAWS = 1000

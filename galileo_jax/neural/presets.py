@@ -1,8 +1,8 @@
 """The presets by name."""
 
-from galileo_jax.errors import InputError
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Task
+from galileo_jax.runtime.errors import InputError
 
 
 def make_task(config: TrainConfig) -> Task:

@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.effects.effect import Surroundings
-from galileo_jax.errors import InputError
-from galileo_jax.observation import Observation
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
 
 NUM_FRAMES = 128  # longer clips are thinned out evenly
 LEAST_NOISE_M = 5e-6  # of the simulated clips; a more certain tracker is taken for one of these

@@ -18,9 +18,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
-from galileo_jax.inference.trials import Trials
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.estimate import cnn_posterior
-from galileo_jax.parameters import inverse
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Start:
     notes: dict[str, Any]
 
 
-def start_from_network(trials: Trials, seed: int, num_chains: int) -> Start:
+def start_from_network(trials: JointProblem, seed: int, num_chains: int) -> Start:
     """Asks the network, fits from its answer, and draws the starts.
 
     Raises:

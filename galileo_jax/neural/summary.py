@@ -18,9 +18,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
+from galileo_jax.model.parameters import Uniform
 from galileo_jax.neural.seen import Seen
-from galileo_jax.parameters import Uniform
-from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.similarity import discrepancy
 
 AT_FOOT = 1.2  # half lengths either side of the foot where an object stands on two edges

@@ -8,15 +8,15 @@ import numpy as np
 from flax import nnx
 
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.effects.effect import Surroundings
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.model import Model
+from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Arrays
 from galileo_jax.neural.thesis_network import RANGES, ThesisNetwork, log_mean_absolute_errors
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine
-from galileo_jax.scene.scene import compile_scene
-from galileo_jax.truth import Truth
+from galileo_jax.simulation import Truth
 
 # Object 2 stands so close that it is nearly always hit; the thesis does not tell its distances.
 NAMES = ("m1", "k1", "m2", "k2")

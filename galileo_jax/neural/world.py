@@ -16,11 +16,11 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.effects.effect import Surroundings
-from galileo_jax.effects.nuisances import NUISANCES, foot_transition, impact_restitution
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.effects.nuisances import NUISANCES, foot_transition, impact_restitution
+from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.rollout.engine_rigid import roll_out
-from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.rollout.rollout import at_times
 from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.similarity import discrepancy

@@ -9,9 +9,9 @@ from galileo_jax.comparison.compare import Comparison, Place
 from galileo_jax.comparison.local_tests import AXES, WHOLE
 from galileo_jax.comparison.phases import PHASES
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.trials import Trials
 from galileo_jax.report.phase import Phase
 from galileo_jax.report.stretch import strongest
 
@@ -61,7 +61,7 @@ class Along:
 
 
 def along_paths(
-    trials: Trials, fit: GradientFit, comparison: Comparison, seed: int
+    trials: JointProblem, fit: GradientFit, comparison: Comparison, seed: int
 ) -> tuple[Along, ...]:
     """All objects of all clips."""
     drawn = laplace_posterior(trials, fit, seed).flat()

@@ -10,8 +10,8 @@ import numpy as np
 from galileo_jax.clip.schema import Clip
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.comparison.document import pulled
-from galileo_jax.files import write_text
-from galileo_jax.inference.trials import Trials
+from galileo_jax.files.atomic_write import write_text
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import findings
 from galileo_jax.report.along import Along
 from galileo_jax.report.animation import animation
@@ -45,7 +45,7 @@ class Compared:
     """
 
     comparison: Comparison
-    trials: Trials
+    trials: JointProblem
     theta: np.ndarray
     clips: tuple[Clip, ...]
     effects: tuple[str, ...]
@@ -78,7 +78,7 @@ def write_comparison_page(path: Path, title: str, told: Compared) -> None:
     write_text(path, document(f"{title}: comparison", sections))
 
 
-def motion(clips: Sequence[Clip], trials: Trials, theta: Mapping[str, np.ndarray]) -> str:
+def motion(clips: Sequence[Clip], trials: JointProblem, theta: Mapping[str, np.ndarray]) -> str:
     """Every clip with the motion of each of `theta` `[parameter]`, by its name."""
     found = []
     for i, (clip, problem) in enumerate(zip(clips, trials.problems, strict=True)):

@@ -4,9 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from galileo_jax.prediction import Motions, as_measured
+from galileo_jax.prediction.extrapolate import Motions, as_measured
 from galileo_jax.report.figure import COLOURS, INK, style
-from galileo_jax.run import Run
+from galileo_jax.results.run import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,8 +9,8 @@ from typing import Any
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
-from galileo_jax.files import write_text
-from galileo_jax.inference.trials import Trials
+from galileo_jax.files.atomic_write import write_text
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import findings
 from galileo_jax.report.along import Along, along_paths
 from galileo_jax.report.chart import Chart
@@ -53,7 +53,7 @@ class Told:
     seed: int
 
 
-def write_diagnosis_page(path: Path, title: str, trials: Trials, told: Told) -> None:
+def write_diagnosis_page(path: Path, title: str, trials: JointProblem, told: Told) -> None:
     """Writes the page, and what was left before and after an effect as SVG into plots/."""
     diagnosis = told.diagnosis
     shown = [
@@ -84,7 +84,7 @@ def write_diagnosis_page(path: Path, title: str, trials: Trials, told: Told) -> 
     write_text(path, document(f"{title}: diagnosis", [part for part in sections if part]))
 
 
-def _fitted(trials: Trials, diagnosis: Diagnosis) -> dict[str, Any]:
+def _fitted(trials: JointProblem, diagnosis: Diagnosis) -> dict[str, Any]:
     """The parameters of every round, `[parameter]`, by its effects."""
     return {
         _title(one): trials.theta(one.hypothesis.fit.z, one.hypothesis.fit.free)

@@ -7,11 +7,18 @@ import jax
 import numpy as np
 
 from galileo_jax.comparison.phases import free_phase
-from galileo_jax.effects.effect import Surroundings
-from galileo_jax.observation import Observation
-from galileo_jax.prediction import GRID_S, Motions, as_measured, draw_theta, hit_s, roll_out
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.observation.observation import Observation
+from galileo_jax.prediction.extrapolate import (
+    GRID_S,
+    Motions,
+    as_measured,
+    draw_theta,
+    hit_s,
+    roll_out,
+)
 from galileo_jax.report.phase import Phase
-from galileo_jax.run import Run
+from galileo_jax.results.run import Run
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NUM_DRAWS = 100

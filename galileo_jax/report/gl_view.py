@@ -16,9 +16,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from galileo_jax.model.scene.scene import Scene
 from galileo_jax.report.side_view import SLAB_M, Still, View, surfaces
 from galileo_jax.rollout.motion import pitch
-from galileo_jax.scene.scene import Scene
 
 TIMEOUT_S = 60
 DEPTH_M = 0.15  # half of ramp's and table's extent towards the camera

@@ -15,7 +15,7 @@ from galileo_jax.report.provenance import provenance
 from galileo_jax.report.residuals import worst_stretch_of
 from galileo_jax.report.shell import details, document, figure_section, header, legend
 from galileo_jax.report.statements import meaning, number
-from galileo_jax.run import Run
+from galileo_jax.results.run import Run
 
 HEADLINES = re.compile(r"k\d+|mass_ratio(_\d+_\d+)?")
 

@@ -11,7 +11,7 @@ import yaml
 
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip, ClipFile
-from galileo_jax.data_files import scene_path
+from galileo_jax.files.package_data import scene_path
 from galileo_jax.report.shell import details
 
 PACKAGES = ("jax", "jaxlib", "mujoco", "numpy", "scipy", "opencv-python-headless")

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
-from galileo_jax.observation import NOMINAL_SCALE_PX_PER_M
+from galileo_jax.model.scene.scene import Scene
+from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
 from galileo_jax.report.figure import COLOURS, INK
+from galileo_jax.results.run import Run
 from galileo_jax.rollout.motion import pitch
-from galileo_jax.run import Run
-from galileo_jax.scene.scene import Scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

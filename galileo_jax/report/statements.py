@@ -7,7 +7,7 @@ from typing import Any
 
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fitted import Fitted
-from galileo_jax.run import CLIP, Run
+from galileo_jax.results.run import CLIP, Run
 
 MEANINGS = {
     "mass_ratio": "m1 / m2",

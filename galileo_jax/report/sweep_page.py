@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.files import write_text
+from galileo_jax.files.atomic_write import write_text
 from galileo_jax.report.plotly_chart import figure_element
 from galileo_jax.report.provenance import versions
 from galileo_jax.report.shell import document, figure_section, header, legend, table

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.files import write_text
+from galileo_jax.files.atomic_write import write_text
 from galileo_jax.report.animation import animation
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.draws import pair_figure, trace_figure
@@ -16,7 +16,7 @@ from galileo_jax.report.plotly_chart import chart_element
 from galileo_jax.report.profiles import AXES, position_chart, velocity_chart
 from galileo_jax.report.residuals import residual_chart
 from galileo_jax.report.svg_chart import chart_svg
-from galileo_jax.run import Run
+from galileo_jax.results.run import Run
 
 PAGE, PLOTS = "report.html", "plots"
 OURS = ("velocity_", "position_", "residuals_", "pairs", "trace")  # names of plots begin so

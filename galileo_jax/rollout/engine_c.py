@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from mujoco.batch import Batch
 
-from galileo_jax.rollout.model import SUBSTEPS, Model
+from galileo_jax.model.model import SUBSTEPS, Model
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import (
     Fields,

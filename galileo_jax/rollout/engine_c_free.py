@@ -18,13 +18,13 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from galileo_jax.errors import InputError
+from galileo_jax.model.model import Model
+from galileo_jax.model.scene.free_scene import free_model
 from galileo_jax.rollout.engine_c import LOOK_EVERY, is_at_rest
 from galileo_jax.rollout.engine_rigid import EngineRigid
-from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, Loads, make_loads, sliding_object
-from galileo_jax.scene.free_scene import free_model
+from galileo_jax.runtime.errors import InputError
 
 # Box contacts and the faces' damping are stable at it; halving it changes hardly anything.
 STEP_S = 1 / 3840

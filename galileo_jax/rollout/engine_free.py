@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.effects.effect import Bounce, Effect, Surroundings
+from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 

@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 import jax
 import numpy as np
 
-from galileo_jax.effects.effect import Effect, Surroundings
-from galileo_jax.kept import kept
-from galileo_jax.rollout.chunks import MOTIONS, in_chunks, rounded_up
+from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.model import Model
 from galileo_jax.rollout.devices import over_devices
-from galileo_jax.rollout.model import Model
+from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
+from galileo_jax.runtime.trace_cache import kept
 
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
 

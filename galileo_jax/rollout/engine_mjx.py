@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from galileo_jax.model.model import SUBSTEPS, Model
 from galileo_jax.rollout.mjx_import import mjx
-from galileo_jax.rollout.model import SUBSTEPS, Model
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import (
     Fields,
@@ -53,8 +53,14 @@ class EngineMJX:
         parts = padded.reshape(-1, self.batch, padded.shape[1])
         # XLA runs one small rollout on one core; threads give the others theirs.
         workers = (os.cpu_count() or 1) if self.is_on_cpu else 1
+        compiled, is_64_bit = self._compiled, jax.config.read("jax_enable_x64")
+
+        def run(part: np.ndarray) -> tuple[jax.Array, jax.Array]:
+            with jax.enable_x64(is_64_bit):  # the setting may be the calling thread's own
+                return jax.block_until_ready(compiled(part))
+
         with ThreadPoolExecutor(workers) as pool:
-            done = list(pool.map(lambda part: jax.block_until_ready(self._compiled(part)), parts))
+            done = list(pool.map(run, parts))
         position = np.concatenate([np.asarray(p) for p, _ in done])[: len(theta)]
         velocity = np.concatenate([np.asarray(v) for _, v in done])[: len(theta)]
         position, velocity = position.astype(float), velocity.astype(float)

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
 

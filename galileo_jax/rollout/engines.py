@@ -1,9 +1,9 @@
 """The engines by name, and which one `auto` takes."""
 
-from galileo_jax.errors import InputError
+from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_names import ENGINES
-from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.rollout import Engine
+from galileo_jax.runtime.errors import InputError
 
 
 def make_engine(name: str, model: Model) -> Engine:

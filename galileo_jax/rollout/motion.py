@@ -9,7 +9,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from galileo_jax.effects.effect import Effect, State, Surroundings
+from galileo_jax.model.effects.effect import Effect, State, Surroundings
 
 Array = Any
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from galileo_jax.effects.effect import Effect, State, Surroundings
+from galileo_jax.model.effects.effect import Effect, State, Surroundings
 from galileo_jax.rollout.motion import LEAST_FRICTION, Dynamics, state_at, to_plane
 
 Array = Any

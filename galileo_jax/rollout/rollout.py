@@ -21,8 +21,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.parameters import forward
-from galileo_jax.rollout.model import Model
+from galileo_jax.model.model import Model
+from galileo_jax.model.parameters import forward
 from galileo_jax.rollout.motion import pitch
 from galileo_jax.rollout.trajectory import Trajectory
 
@@ -55,7 +55,9 @@ def in_jax(engine: Engine) -> Callable[[jax.Array], tuple[jax.Array, jax.Array]]
 
     def host(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         theta = np.asarray(theta)
-        position, velocity = engine.simulate(theta.reshape(-1, theta.shape[-1]))
+        # XLA calls back on a thread of its own, which does not have the caller's setting.
+        with jax.enable_x64(theta.dtype == np.float64):
+            position, velocity = engine.simulate(theta.reshape(-1, theta.shape[-1]))
         lead = theta.shape[:-1]
         return position.reshape(*lead, *shape), velocity.reshape(*lead, *shape)
 

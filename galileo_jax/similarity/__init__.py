@@ -1,6 +1,6 @@
 """How alike a predicted and a measured motion are."""
 
-from galileo_jax.registry import load_entries
+from galileo_jax.runtime.registry import load_entries
 from galileo_jax.similarity.similarity import (
     AbstractSimilarity,
     similarity_class,

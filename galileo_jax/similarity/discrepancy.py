@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from galileo_jax.effects.effect import Surroundings
-from galileo_jax.observation import Observation
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.observation.observation import Observation
 
 POINT_SD_M = 0.003  # how far a marked point is from the centre
 OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table

@@ -14,8 +14,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.effects.effect import Surroundings
-from galileo_jax.observation import Observation
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import crossing_sd_m, modes, offsets
 
 NoiseModel = Literal["camera", "bodies", "tracker"]

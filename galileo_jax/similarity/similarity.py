@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
-from galileo_jax.registry import Registry
+from galileo_jax.runtime.registry import Registry
 
 
 class AbstractSimilarity(eqx.Module):

@@ -12,7 +12,7 @@ from pathlib import Path
 from galileo_jax.clip import physics101
 from galileo_jax.clip.load import find_yaml, has_yaml
 from galileo_jax.clip.yaml_file import read_mapping
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 
 @dataclass(frozen=True)

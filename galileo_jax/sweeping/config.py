@@ -20,7 +20,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from galileo_jax.clip.yaml_file import read_mapping
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.settings import Settings, make_settings
 
 ClipName = Annotated[str, Field(strict=True, min_length=1)]

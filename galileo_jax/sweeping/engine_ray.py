@@ -10,7 +10,7 @@ import socket
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.resources import Resources
 from galileo_jax.sweeping.task import MAX_TRIES, Outcome, Task, attempt, died
 

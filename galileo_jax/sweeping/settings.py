@@ -12,8 +12,8 @@ from pydantic import (
 )
 
 from galileo_jax.clip.schema import wrong
-from galileo_jax.errors import InputError
-from galileo_jax.registry import entry_names
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.registry import entry_names
 
 Whole = Annotated[int, Field(strict=True, ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1)]

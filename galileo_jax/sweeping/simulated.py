@@ -5,7 +5,7 @@ import io
 from collections.abc import Iterable
 from pathlib import Path
 
-from galileo_jax import simulate
+from galileo_jax.commands import simulate
 from galileo_jax.sweeping.config import Simulated
 
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip
-from galileo_jax.errors import InputError
-from galileo_jax.files import replacing, write_json
-from galileo_jax.measured import Measured
-from galileo_jax.observation import Observation
+from galileo_jax.files.atomic_write import replacing, write_json
+from galileo_jax.measurement.measure import Measurement
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.task import Failure
 
 RESULT, FAILURE = "result.json", "failure.json"
@@ -97,16 +97,16 @@ class Store:
         """Whether a clip was tracked."""
         return self._clip(digest).is_file()
 
-    def clip(self, digest: str) -> Measured:
+    def clip(self, digest: str) -> Measurement:
         """A tracked clip, to the last digit."""
         with np.load(self._clip(digest)) as file:
             arrays = {name: file[name] for name in ARRAYS}
             names = tuple(str(name) for name in file["names"])
             clip = Clip.model_validate(json.loads(str(file["clip"])))
             inferred = json.loads(str(file["inferred"]))
-        return Measured(clip, Observation(names=names, **arrays), inferred)
+        return Measurement(clip, Observation(names=names, **arrays), inferred)
 
-    def save_clip(self, digest: str, measured: Measured) -> None:
+    def save_clip(self, digest: str, measured: Measurement) -> None:
         """Keeps a tracked clip."""
         seen = measured.observation
         with replacing(self._clip(digest)) as path:

@@ -10,10 +10,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.files.tables import TABLE_WRITERS
 from galileo_jax.sweeping.cell import Cell
 from galileo_jax.sweeping.settings import Diagnose
 from galileo_jax.sweeping.store import Store
-from galileo_jax.table_files import TABLE_WRITERS
 
 QUANTITIES = ("k1", "k2", "mass_ratio")
 NONE = "none"  # no effect: in the model, hidden, or found

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 MAX_TRIES = 3  # of a task whose worker died: the third death is no accident
 

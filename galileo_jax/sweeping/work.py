@@ -9,21 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from galileo_jax import __version__
-from galileo_jax.errors import InputError
-from galileo_jax.jax_setup import set_up
-from galileo_jax.measured import Measured, inferred, load_clips, measure
+from galileo_jax.commands.clip_options import load_clips
+from galileo_jax.measurement.measure import Measurement, inferred, measure
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.jax_setup import set_up
 from galileo_jax.sweeping.clip_files import Packed
 from galileo_jax.sweeping.settings import Cnn, Diagnose, Mh, Settings, Thesis
 
 if TYPE_CHECKING:
     from galileo_jax.inference.fits.gradient import GradientFit
+    from galileo_jax.inference.joint_problem import JointProblem
     from galileo_jax.inference.posterior import Posterior
-    from galileo_jax.inference.trials import Trials
 
 Found = tuple["Posterior", np.ndarray, dict[str, Any]]  # draws, the best z, notes for result.json
 
 
-def measure_files(packed: Packed) -> Measured:
+def measure_files(packed: Packed) -> Measurement:
     """Loads and tracks a clip.
 
     Raises:
@@ -39,7 +40,7 @@ def measure_files(packed: Packed) -> Measured:
     return replace(measured, clip=measured.clip.model_copy(update=came_from))
 
 
-def run_cell(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]:
+def run_cell(settings: Settings, measured: Sequence[Measurement]) -> dict[str, Any]:
     """The result.json of a cell: as `galileo fit` would write it, or a diagnosis.
 
     Raises:
@@ -55,9 +56,9 @@ def run_cell(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]
     return result | {"timings_s": {settings.method: round(time.perf_counter() - began, 3)}}
 
 
-def _fit(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]:
-    from galileo_jax.effects.registry import make_effects
+def _fit(settings: Settings, measured: Sequence[Measurement]) -> dict[str, Any]:
     from galileo_jax.inference.result import make_result
+    from galileo_jax.model.effects.registry import make_effects
 
     effects = make_effects(getattr(settings, "effects", ()))
     trials = _trials(settings, measured, effects)
@@ -75,7 +76,7 @@ def _fit(settings: Settings, measured: Sequence[Measured]) -> dict[str, Any]:
     )
 
 
-def _found(settings: Settings, trials: "Trials") -> Found:
+def _found(settings: Settings, trials: "JointProblem") -> Found:
     """What the settings' method says."""
     if isinstance(settings, Cnn):
         from galileo_jax.neural.estimate import cnn_posterior
@@ -95,13 +96,13 @@ def _found(settings: Settings, trials: "Trials") -> Found:
     return posterior, fit.z, {"status": fit.code.value}
 
 
-def _by_thesis(settings: Thesis, trials: "Trials") -> Found:
+def _by_thesis(settings: Thesis, trials: "JointProblem") -> Found:
     """The thesis's sampler: errors are told at its answer."""
     import jax
     import jax.numpy as jnp
 
     from galileo_jax.inference.thesis_preset import thesis_posterior
-    from galileo_jax.parameters import inverse
+    from galileo_jax.model.parameters import inverse
 
     if len(trials.problems) > 1:
         raise InputError("method thesis: one clip expected")
@@ -120,7 +121,7 @@ def _by_thesis(settings: Thesis, trials: "Trials") -> Found:
     return posterior, z_best, {"status": posterior.status.value, "best": best}
 
 
-def _by_chains(settings: Mh, trials: "Trials", fit: "GradientFit") -> Found:
+def _by_chains(settings: Mh, trials: "JointProblem", fit: "GradientFit") -> Found:
     import jax
 
     from galileo_jax.inference.density import density_of
@@ -142,11 +143,11 @@ def _by_chains(settings: Mh, trials: "Trials", fit: "GradientFit") -> Found:
     return posterior, fit.z, {"status": posterior.status.value} | sampling
 
 
-def _diagnosis(settings: Diagnose, measured: Sequence[Measured]) -> dict[str, Any]:
+def _diagnosis(settings: Diagnose, measured: Sequence[Measurement]) -> dict[str, Any]:
     from galileo_jax.diagnosis.diagnose import diagnose
     from galileo_jax.diagnosis.document import diagnosis_document
-    from galileo_jax.effects.registry import effect_names, make_effects
     from galileo_jax.inference.fits.gradient import Code
+    from galileo_jax.model.effects.registry import effect_names, make_effects
 
     trials = _trials(settings, measured, make_effects(effect_names()))
     scenes = [problem.model.scene.surroundings for problem in trials.problems]
@@ -166,10 +167,10 @@ def _diagnosis(settings: Diagnose, measured: Sequence[Measured]) -> dict[str, An
     }
 
 
-def _trials(settings: Settings, measured: Sequence[Measured], effects: Any) -> "Trials":
-    from galileo_jax.run import make_trials
+def _trials(settings: Settings, measured: Sequence[Measurement], effects: Any) -> "JointProblem":
+    from galileo_jax.inference.build_problem import make_joint_problem
 
-    return make_trials(
+    return make_joint_problem(
         [one.clip for one in measured],
         [one.observation for one in measured],
         settings.engine,

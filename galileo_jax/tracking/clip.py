@@ -1,14 +1,15 @@
 """Tracking a clip: what is declared about the objects becomes outlines in the image."""
 
+import itertools
 import math
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from rich.progress import Progress
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.progress import report
 from galileo_jax.tracking.detect import find_movers, fit_outline
 from galileo_jax.tracking.template import Outline, grey
 from galileo_jax.tracking.track import Track
@@ -19,8 +20,8 @@ UNKNOWN_SPAN_PX = 40.0
 """Features of one object are within this of each other when its size is not known."""
 
 
-def track_clip(clip: Clip, *, progress: Progress | None = None) -> Track:
-    """Follows the clip's objects through its video.
+def track_clip(clip: Clip) -> Track:
+    """Follows the clip's objects through its video; reports its progress frame by frame.
 
     Raises `InputError` if the clip has no video, or if an object without `point_px` cannot be
     found.
@@ -29,11 +30,10 @@ def track_clip(clip: Clip, *, progress: Progress | None = None) -> Track:
     if video is None:
         raise InputError(f"{clip.path}: video: missing; a csv track is tracked already")
     passes = 2 if all(item.point_px is not None for item in clip.objects) else 3
-    task = progress.add_task("tracking", total=passes * clip.frame_count) if progress else None
+    total, done = passes * max(clip.frame_count, 1), itertools.count(1)
 
     def advance() -> None:
-        if progress is not None and task is not None:
-            progress.advance(task)
+        report("tracking", next(done) / total)
 
     def open_frames() -> Iterator[np.ndarray]:
         return decode.frames(video)

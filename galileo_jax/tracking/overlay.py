@@ -7,8 +7,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from galileo_jax.errors import InputError
-from galileo_jax.files import replacing
+from galileo_jax.files.atomic_write import replacing
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 
 COLOURS = ((40, 40, 255), (255, 160, 0), (0, 200, 0), (220, 0, 220))

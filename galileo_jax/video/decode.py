@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 # OpenCV's and FFmpeg's own lines on stderr would bury ours; the variables bring them back.
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # read when the first video is opened

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.verdicts import confusion, judge, missed_bars, summary
-from galileo_jax import command
+from galileo_jax.commands import command
 
 LIBRARY = ("air_drag", "restitution", "stribeck", "viscous_drag")
 

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from galileo_jax import command, label
 from galileo_jax.clip.load import check_clip, load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
 from galileo_jax.clip.yaml_edit import dump
 from galileo_jax.clip.yaml_file import read_mapping
-from galileo_jax.errors import InputError
+from galileo_jax.commands import command, label
+from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import (
     BROKEN_CLIPS,
     GOOD_YAML,

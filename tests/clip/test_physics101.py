@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from galileo_jax import command, label, simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.errors import InputError
-from galileo_jax.measured import load_clips
+from galileo_jax.commands import command, label, simulate
+from galileo_jax.commands.clip_options import load_clips
+from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import good_video
 
 LABELS = {
@@ -148,7 +148,7 @@ def test_simulated_clip_in_the_tree_is_fitted(tmp_path: Path) -> None:
     """The whole way: simulate, folders, label, fit; friction comes back."""
     import json
 
-    from galileo_jax import fit
+    from galileo_jax.commands import fit
 
     made = tmp_path / "clip.mp4"
     options = "--seed 5 --angle 20 --k1 0.2 --k2 0.3 --m1 0.2 --m2 0.2"

@@ -12,8 +12,8 @@ from galileo_jax.clip.track_csv import (
     read_observation_csv,
     write_observation_csv,
 )
-from galileo_jax.errors import InputError
-from galileo_jax.observation import Observation
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import build_good_track
 
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
-from galileo_jax.errors import InputError
-from galileo_jax.measured import measure
-from galileo_jax.observation import Observation
+from galileo_jax.measurement.measure import measure
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
 from tests.clip import track_file_makers as make
 
 YAML = """\

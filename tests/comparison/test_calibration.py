@@ -9,8 +9,8 @@ import pytest
 from galileo_jax.comparison import compare as module
 from galileo_jax.comparison.compare import compare
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
-from galileo_jax.inference.trials import Trials
-from galileo_jax.parameters import inverse
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.discrepancy import crossing_sd_m, modes
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -42,7 +42,7 @@ def disturbed(trials, away_m):
     """The only clip, with its positions moved by `[object, 2, frame]`."""
     (problem,) = trials.problems
     seen = problem.observation
-    return Trials(
+    return JointProblem(
         (replace(problem, observation=replace(seen, position_m=seen.position_m + away_m)),)
     )
 

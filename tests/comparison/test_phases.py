@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.comparison.phases import COLLISION_S, PHASES, phases
-from galileo_jax.effects.registry import make_effects
+from galileo_jax.model.effects.registry import make_effects
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT, make_theta

@@ -7,9 +7,9 @@ import pytest
 
 from galileo_jax.comparison import compare as module
 from galileo_jax.comparison.compare import compare
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
-from galileo_jax.inference.trials import Trials
 from tests.comparison.test_calibration import disturbed, fit_near_truth
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -32,7 +32,7 @@ def cautious_tracker():
     (problem,) = make_trials([HIT]).problems
     seen = problem.observation
     told = replace(seen, covariance_m2=1.6**2 * seen.covariance_m2)
-    return Trials((replace(problem, observation=told),))
+    return JointProblem((replace(problem, observation=told),))
 
 
 @pytest.mark.parametrize("make", [wrong_model, cautious_tracker])

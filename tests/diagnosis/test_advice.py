@@ -6,7 +6,7 @@ import pytest
 
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.diagnosis import Verdict
-from galileo_jax.effects.forms import FORM_NAMES
+from galileo_jax.model.effects.forms import FORM_NAMES
 from tests.ramp_model import HIT, make_surroundings
 
 RAMP = make_surroundings(HIT)

@@ -7,9 +7,9 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.comparison.compare import compare
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip, kind_of
+from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
 from galileo_jax.report.findings import each_clip as told
-from galileo_jax.run import make_trials
 from tests.precision import in_64_bit
 
 G, ANGLE, FPS, NOISE_M = 9.81, np.radians(22.0), 60, 3e-4
@@ -71,7 +71,7 @@ def test_the_clip_that_differs_is_told_and_how(tmp_path):
         write_slide(tmp_path, "smoother", (0.3, 0.2), 1),
     ]
     clips = [load_clip(path) for path in paths]
-    trials = make_trials(clips, [read_observation_csv(path) for path in paths])
+    trials = make_joint_problem(clips, [read_observation_csv(path) for path in paths])
     fit = GradientFitter(trials, Settings(num_exact=0)).fit(0, effects=())
     comparison = compare(trials, fit, 0)
     assert not comparison.is_adequate

@@ -16,9 +16,9 @@ from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.free_acceleration import FreeAcceleration, splines
 from galileo_jax.diagnosis.missing_force import infer_missing_force
-from galileo_jax.effects.effect import State, Surroundings
+from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.run import make_trials
+from galileo_jax.model.effects.effect import State, Surroundings
 from tests.precision import in_64_bit
 
 NOISE_M = 3.3e-4  # 0.3 px at 900 px/m
@@ -45,7 +45,7 @@ def infer(tmp_path_factory):
         subprocess.run(command, check=True, capture_output=True)
         clip = load_clip(folder / "c.yaml")
         assert clip.track is not None
-        trials = make_trials([clip], [read_observation_csv(clip.track)])
+        trials = make_joint_problem([clip], [read_observation_csv(clip.track)])
         fit = GradientFitter(trials).fit(seed=0)
         missing = infer_missing_force(trials, Hypothesis((), fit), seed=0)
         return missing, json.loads((folder / "c.truth.json").read_text())

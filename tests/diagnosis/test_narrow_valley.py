@@ -6,14 +6,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax import command, simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.commands import command, simulate
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
 from galileo_jax.diagnosis.diagnose import DECISIVE, fitter_of
-from galileo_jax.effects.forms import FORMS
-from galileo_jax.effects.registry import make_effects
-from galileo_jax.run import make_trials
+from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.model.effects.forms import FORMS
+from galileo_jax.model.effects.registry import make_effects
 from tests.precision import in_64_bit
 
 # tan 10 = 0.176; k (1 + a) = 0.062 * 2.7 = 0.166.
@@ -29,7 +29,7 @@ def slowly_released(tmp_path):
     forms = tuple(form for form in FORMS if form.name == "force_at_a_time")
     effects = (*make_effects(["stribeck"]), *forms)
     clip = load_clip(path.with_suffix(".yaml"))
-    trials = make_trials([clip], [read_observation_csv(path)], effects=effects)
+    trials = make_joint_problem([clip], [read_observation_csv(path)], effects=effects)
     truth = json.loads(path.with_suffix(".truth.json").read_text())
     return trials, truth | truth["effect_parameters"]
 

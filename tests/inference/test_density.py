@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from galileo_jax.inference.density import density_of, likelihood_of
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.samplers.program import Program
-from galileo_jax.inference.trials import Trials
 from galileo_jax.rollout.engines import make_engine
-from tests.inference.test_trials import BETWEEN_PROGRAMS, STEEPER, draw
+from tests.inference.test_joint_problem import BETWEEN_PROGRAMS, STEEPER, draw
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -49,7 +49,7 @@ def test_clips_of_one_kind_share_the_code():
 
 def test_an_engine_that_is_called_back_keeps_its_own():
     (problem,) = make_trials([HIT]).problems
-    trials = Trials((replace(problem, engine=make_engine("c", problem.model)),))
+    trials = JointProblem((replace(problem, engine=make_engine("c", problem.model)),))
     z = jnp.asarray(draw(trials))
     density, likelihood = density_of(trials), likelihood_of(trials)
     assert not isinstance(density, Program)

@@ -6,9 +6,9 @@ from math import radians
 import numpy as np
 import pytest
 
-from galileo_jax.effects.registry import make_effects
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.laplace import laplace_posterior
+from galileo_jax.model.effects.registry import make_effects
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.effects.registry import make_effects
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.per_mass import force_constants, per_mass_unit
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.inference.result import make_result
-from galileo_jax.inference.trials import Trials
+from galileo_jax.model.effects.registry import make_effects
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -18,16 +18,16 @@ PER_MASS = 1.25  # 1/m
 SD_Z = 0.01
 
 
-def weighed(trials: Trials) -> Trials:
+def weighed(trials: JointProblem) -> JointProblem:
     """The same, both objects on the scales before."""
     (problem,) = trials.problems
     scene = problem.model.scene
     known = replace(scene.surroundings, mass_kg=HIT.mass_kg)
     model = replace(problem.model, scene=replace(scene, surroundings=known))
-    return Trials((replace(problem, model=model),))
+    return JointProblem((replace(problem, model=model),))
 
 
-def result_of(trials: Trials):
+def result_of(trials: JointProblem):
     """Draws that know c / m1 and m1 / m2 to a per cent, and of m1 what the prior says."""
     generator = np.random.default_rng(0)
     names = trials.names

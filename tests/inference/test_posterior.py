@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from galileo_jax.errors import InputError
 from galileo_jax.inference.convergence import arviz, convergence
 from galileo_jax.inference.posterior import Posterior, Status
+from galileo_jax.runtime.errors import InputError
 
 
 @pytest.fixture

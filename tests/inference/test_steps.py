@@ -16,7 +16,7 @@ from galileo_jax.inference.fits.steps import (
     Damped,
     Edges,
 )
-from galileo_jax.parameters import LogNormal, Normal, Parameter, Uniform
+from galileo_jax.model.parameters import LogNormal, Normal, Parameter, Uniform
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT

@@ -9,15 +9,15 @@ import pytest
 from scipy import stats
 
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.errors import InputError
+from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.inference.trials import Trials
+from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.neural import galileo_task
 from galileo_jax.neural.estimate import TRAINED, cnn_posterior, trained_network
 from galileo_jax.neural.world import IDEAL_FRICTION
-from galileo_jax.observation import Observation
-from galileo_jax.rollout.model import FRICTION_PRIOR, MASS_PRIOR
-from galileo_jax.run import make_trials
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
 from tests.ramp_model import HIT
 from tests.reference_ramp import Experiment, solve
 
@@ -25,7 +25,7 @@ NOISE_M = 3e-5
 LARGEST_FILE = 4e6  # bytes
 
 
-def trials_of(experiment: Experiment, fps: float = 30.0, frames: int = 90) -> Trials:
+def trials_of(experiment: Experiment, fps: float = 30.0, frames: int = 90) -> JointProblem:
     times = np.arange(frames) / fps
     exact = solve(experiment, times).position_m
     count = len(exact)
@@ -53,7 +53,7 @@ def trials_of(experiment: Experiment, fps: float = 30.0, frames: int = 90) -> Tr
         objects=objects,
         frame_count=frames,
     )
-    return make_trials([clip], [observation])
+    return make_joint_problem([clip], [observation])
 
 
 def phi(posterior: Posterior) -> np.ndarray:
@@ -138,7 +138,7 @@ def test_a_force_that_grows_on_the_way_is_told(x64):
     position[0] -= np.where(seen.position_m[0, :1] < 0, less, 0.0)
     dragged = dataclasses.replace(seen, position_m=position)
     posterior, _, notes = cnn_posterior(
-        Trials((dataclasses.replace(problem, observation=dragged),)), seed=0
+        JointProblem((dataclasses.replace(problem, observation=dragged),)), seed=0
     )
     assert not posterior.is_converged
     assert "not evenly accelerated" in notes["warnings"][0]
@@ -147,7 +147,7 @@ def test_a_force_that_grows_on_the_way_is_told(x64):
 def test_other_models_are_refused(x64):
     trials = trials_of(HIT)
     with pytest.raises(InputError, match="one clip expected"):
-        cnn_posterior(Trials(trials.problems * 2), seed=0)
+        cnn_posterior(JointProblem(trials.problems * 2), seed=0)
 
 
 def test_the_packages_network_is_small_and_of_the_right_preset():
@@ -158,7 +158,7 @@ def test_the_packages_network_is_small_and_of_the_right_preset():
 @pytest.mark.slow
 @pytest.mark.video
 def test_shared_clips_k1(shared_data, tmp_path):
-    from galileo_jax import command, fit
+    from galileo_jax.commands import command, fit
 
     errors = []
     for truth_path in sorted((shared_data / "ramp").glob("plain_coulomb_none_[0-2].truth.json")):

@@ -56,7 +56,7 @@ def test_what_is_not_told_follows_from_what_is():
 
 
 def test_only_chains_can_start_from_it(capsys):
-    from galileo_jax import command, fit
+    from galileo_jax.commands import command, fit
 
     assert command.run(fit.main, ["clip.yaml", "--init", "cnn"]) == 2
     assert "--init: of --method mh, not of grad" in capsys.readouterr().err

@@ -3,11 +3,11 @@ import json
 import numpy as np
 import pytest
 
-from galileo_jax.errors import InputError
 from galileo_jax.neural.checkpoint import NETWORK, load_network
 from galileo_jax.neural.config import load_config
 from galileo_jax.neural.dataset import load_or_make
 from galileo_jax.neural.training import cosine_rate, train
+from galileo_jax.runtime.errors import InputError
 from tests.neural.test_thesis_network import config
 
 

@@ -17,7 +17,7 @@ from galileo_jax.report.provenance import digest
 from galileo_jax.report.residuals import worst_stretch_of
 from galileo_jax.report.shell import document
 from galileo_jax.report.statements import fit_quality, number, undetermined
-from galileo_jax.run import load_run
+from galileo_jax.results.run import load_run
 from tests.oracle_run import HIT, MISS, PARTS, STILL, make_run
 from tests.reference_ramp import solve
 from tests.report.browser import opened

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.effects.effect import Surroundings
-from galileo_jax.parameters import absent
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.model import Model
+from galileo_jax.model.parameters import absent
+from galileo_jax.model.scene.scene import compile_scene, extents, rolling, start_paths
 from galileo_jax.rollout.engine_rigid import EngineRigid
-from galileo_jax.rollout.model import Model
-from galileo_jax.scene.scene import compile_scene, extents, rolling, start_paths
 
 BOX = ClipObject(name="box", shape="box", size_m=(0.06, 0.06, 0.06))
 BALL = ClipObject(name="ball", shape="sphere", size_m=(0.03,))

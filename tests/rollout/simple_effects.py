@@ -2,8 +2,8 @@
 
 from typing import ClassVar
 
-from galileo_jax.effects.effect import Array, Effect, Force, Friction, Surroundings, Theta
-from galileo_jax.parameters import Normal, Parameter
+from galileo_jax.model.effects.effect import Array, Effect, Force, Friction, Surroundings, Theta
+from galileo_jax.model.parameters import Normal, Parameter
 
 
 class Strength(Effect):

@@ -14,12 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 
 jax.config.update("jax_enable_x64", True)
-from galileo_jax import jax_cache
-from galileo_jax.parameters import forward
+from galileo_jax.runtime import compilation_cache
+from galileo_jax.model.parameters import forward
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from tests.ramp_model import HIT, make_model
 
-jax_cache.enable()
+compilation_cache.enable()
 engine = EngineRigid(make_model(HIT, 1.2))
 z = np.random.default_rng(0).standard_normal((20, len(engine.model.parameters)))
 theta = np.asarray(forward(engine.model.parameters, jnp.asarray(z)))

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.effects.registry import make_effects
-from galileo_jax.errors import InputError
+from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.model.model import Model
+from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.rollout.engine_c_free import EngineCFree
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.model import Model
-from galileo_jax.scene.scene import compile_scene
+from galileo_jax.runtime.errors import InputError
 from tests.rollout.objects import BALL, scene_of, theta_of
 
 SIDE_M = 0.06
@@ -201,7 +201,7 @@ def test_what_it_cannot_do_is_said():
 ON_ONE_CORE = """
 import os
 os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-from galileo_jax.jax_setup import set_up
+from galileo_jax.runtime.jax_setup import set_up
 set_up()
 import jax
 import jax.numpy as jnp

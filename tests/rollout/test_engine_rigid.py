@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.effects.effect import Effect
-from galileo_jax.parameters import forward, inverse
+from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.model import Model
+from galileo_jax.model.parameters import forward, inverse
 from galileo_jax.rollout.engine_rigid import EngineRigid, roll_out
-from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import LEAST_FRICTION
 from galileo_jax.rollout.rollout import JUMP_M_S2, at_times, make_rollout
 from galileo_jax.rollout.trajectory import Trajectory

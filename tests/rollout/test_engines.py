@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.engine_mjx import EngineMJX
 from galileo_jax.rollout.engine_rigid import EngineRigid
-from galileo_jax.rollout.model import Model
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, make_fields
 from tests.precision import in_64_bit

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.effects.registry import effect_names, make_effects
+from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from tests.ramp_model import HIT, make_model, make_theta

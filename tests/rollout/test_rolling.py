@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from galileo_jax.effects.registry import make_effects
-from galileo_jax.errors import InputError
-from galileo_jax.parameters import inverse
+from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.model.parameters import inverse
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import at_times, make_rollout
-from galileo_jax.truth.solver import STEP_S, STEPS_PER_RECORD, solve
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.simulation.solver import STEP_S, STEPS_PER_RECORD, solve
 from tests.rollout.objects import BALL, BOX, ROLLER, WHEEL, model_of, scene_of, speeds, theta_of
 
 G = 9.81

@@ -5,13 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.effects.effect import Theta
-from galileo_jax.errors import InputError
-from galileo_jax.parameters import forward, inverse
+from galileo_jax.model.effects.effect import Theta
+from galileo_jax.model.parameters import forward, inverse
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import at_times, make_rollout
 from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.runtime.errors import InputError
 from tests.ramp_model import HIT, make_model, make_theta
 
 STEP = 0.01  # in z; of the size that a posterior's standard deviation has

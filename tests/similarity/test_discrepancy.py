@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.observation import Observation
+from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import LENS_SD, WOBBLE_SD_M, modes
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import observe

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from galileo_jax.observation import Observation
+from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity import discrepancy, gaussian_likelihood
 from galileo_jax.similarity.discrepancy import crossing_sd_m, modes
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood

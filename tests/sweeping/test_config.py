@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from galileo_jax.data_files import config_path
-from galileo_jax.errors import InputError
+from galileo_jax.files.package_data import config_path
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.config import load_config
 from galileo_jax.sweeping.settings import Grad, Mh
 

@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from galileo_jax import command, simulate, sweep
-from galileo_jax.data_files import config_path
+from galileo_jax.commands import command, simulate, sweep
+from galileo_jax.files.package_data import config_path
 from galileo_jax.sweeping.resources import Resources
 from galileo_jax.sweeping.task import Task
 from tests.precision import in_64_bit

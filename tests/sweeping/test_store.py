@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import yaml
 
-from galileo_jax.errors import InputError
-from galileo_jax.files import write_text
+from galileo_jax.files.atomic_write import write_text
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.cell import Cell, make_cells
 from galileo_jax.sweeping.clip_files import ClipFiles
 from galileo_jax.sweeping.settings import Grad

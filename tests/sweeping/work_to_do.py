@@ -5,7 +5,7 @@ import signal
 import time
 from pathlib import Path
 
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 
 def double(number: int) -> int:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from cv2 import VideoCapture
 
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 from galileo_jax.video.decode import frames, probe
 from tests.video.make_video import with_index_first, with_uneven_frames, write_video

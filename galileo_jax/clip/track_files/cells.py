@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 SEPARATORS = ("\t", ";", ",")
 COMMA_IN_NUMBER = re.compile(r"[-+]?\d+,\d*(e[-+]?\d+)?", re.IGNORECASE)

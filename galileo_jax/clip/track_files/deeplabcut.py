@@ -17,7 +17,7 @@ import numpy as np
 
 from galileo_jax.clip.track_files.cells import first_cells, parse_columns, read_cells
 from galileo_jax.clip.track_files.track_table import TrackReader, TrackTable, register
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 ROWS = ("scorer", "individuals", "bodyparts", "coords")

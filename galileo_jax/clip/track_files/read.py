@@ -28,8 +28,8 @@ from galileo_jax.clip.track_files.track_table import (
     TrackTable,
     readers,
 )
-from galileo_jax.errors import InputError
-from galileo_jax.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.runtime.errors import InputError
 
 HEAD_BYTES = 65_536
 TRACK_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".trk", ".trz", ".h5", ".hdf5")

@@ -16,7 +16,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from galileo_jax.registry import Registry
+from galileo_jax.runtime.registry import Registry
 
 METRES_PER_UNIT: dict[str, float] = {
     "m": 1.0,

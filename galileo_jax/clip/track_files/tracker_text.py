@@ -13,7 +13,7 @@ import numpy as np
 from galileo_jax.clip.track_files.cells import first_cells, parse_columns, read_cells
 from galileo_jax.clip.track_files.titles import title_of
 from galileo_jax.clip.track_files.track_table import TrackReader, TrackTable, register
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 MULTI = "#multi:"
 

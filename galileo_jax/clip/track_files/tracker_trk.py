@@ -27,7 +27,7 @@ from galileo_jax.clip.track_files.track_table import (
     TrackTable,
     register,
 )
-from galileo_jax.errors import InputError
+from galileo_jax.runtime.errors import InputError
 
 OSP = "org.opensourcephysics"
 PANEL = f"{OSP}.cabrillo.tracker.TrackerPanel"

@@ -32,8 +32,8 @@ from scipy.special import ndtri
 from galileo_jax.inference.fits.programs import FAILED
 from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost
 from galileo_jax.inference.fits.steps import DAMPINGS, TRIED_SHARE, Damped, Edges, normal_matrices
-from galileo_jax.inference.trials import NOISE_SD, Trials
-from galileo_jax.parameters import inverse
+from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
+from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 # Of a parameter's coarse step: below the smallest MuJoCo's contacts are rough, and the rigid
@@ -129,7 +129,7 @@ class GradientFit:
 class GradientFitter:
     """Fits trials; `fit` may be called for many seeds and hypotheses."""
 
-    def __init__(self, trials: Trials, settings: Settings = Settings()):
+    def __init__(self, trials: JointProblem, settings: Settings = Settings()):
         self.trials, self.settings = trials, settings
         self._residuals = Residuals(trials)
         self._count = len(trials.model_parameters)
@@ -188,7 +188,7 @@ class GradientFitter:
 
         Args:
           starts: `[start, model parameter]`, z.
-          free: `[start, model parameter]`, see `Trials.free`.
+          free: `[start, model parameter]`, see `JointProblem.free`.
           owner: `[start]`, which hypothesis each belongs to, ascending from 0.
 
         Returns:

@@ -12,11 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from galileo_jax.effects.effect import Surroundings
 from galileo_jax.inference.problem import seen
-from galileo_jax.kept import kept
-from galileo_jax.parameters import PriorTable
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.parameters import PriorTable
 from galileo_jax.rollout.trajectory import Trajectory
+from galileo_jax.runtime.trace_cache import kept
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 
 FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not

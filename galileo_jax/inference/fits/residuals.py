@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from galileo_jax.effects.effect import Surroundings
 from galileo_jax.inference.fits.programs import (
     ClipArrays,
     Kind,
@@ -15,10 +14,11 @@ from galileo_jax.inference.fits.programs import (
     solve,
     white_batch,
 )
+from galileo_jax.inference.joint_problem import JointProblem, in_units
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.trials import Trials, in_units
-from galileo_jax.parameters import PriorTable
-from galileo_jax.rollout.chunks import (
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.parameters import PriorTable
+from galileo_jax.runtime.batching import (
     FRAMES,
     MOTIONS,
     SPARE_MODES,
@@ -84,7 +84,7 @@ class FittedClip:
     data: Padded
 
     @classmethod
-    def of(cls, trials: Trials, index: int) -> "FittedClip":
+    def of(cls, trials: JointProblem, index: int) -> "FittedClip":
         """The clip of that index."""
         problem, column = trials.problems[index], trials.columns[index]
         parameters = problem.parameters
@@ -142,7 +142,7 @@ class Residuals:
       num_rollouts: made so far.
     """
 
-    def __init__(self, trials: Trials):
+    def __init__(self, trials: JointProblem):
         self.clips = tuple(FittedClip.of(trials, c) for c in range(len(trials.problems)))
         self.num_rollouts = 0
         self._count = len(trials.model_parameters)

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from galileo_jax.parameters import Parameter, PriorTable
+from galileo_jax.model.parameters import Parameter, PriorTable
 
 # Against the columns' sizes. Valleys are narrow (masses against friction): most of the range is
 # needed below 1e-2, where steps along them differ.

@@ -31,9 +31,9 @@ import numpy as np
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.fits.programs import FAILED
 from galileo_jax.inference.fits.residuals import Batch, Residuals
+from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.inference.samplers.program import Program
 from galileo_jax.inference.samplers.sampler import LogDensity
-from galileo_jax.inference.trials import NOISE_SD
 
 REACH = 2.0  # standard deviations: what proposals mostly keep within
 NUM_SCATTERED = 64  # that starts are chosen from

@@ -15,7 +15,7 @@ from galileo_jax.inference.samplers.sampler import (
     LogDensity,
     State,
 )
-from galileo_jax.registry import load_entries
+from galileo_jax.runtime.registry import load_entries
 
 load_entries("galileo_jax.inference.samplers.library")
 

@@ -9,8 +9,8 @@ from zipfile import BadZipFile
 import jax
 import numpy as np
 
-from galileo_jax.errors import InputError
-from galileo_jax.files import replacing
+from galileo_jax.files.atomic_write import replacing
+from galileo_jax.runtime.errors import InputError
 
 Carry = TypeVar("Carry")
 

@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from galileo_jax.kept import kept
+from galileo_jax.runtime.trace_cache import kept
 
 
 class Program(eqx.Module):

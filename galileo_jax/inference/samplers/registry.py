@@ -1,7 +1,7 @@
 """The samplers by name."""
 
 from galileo_jax.inference.samplers.sampler import AbstractSampler
-from galileo_jax.registry import Registry
+from galileo_jax.runtime.registry import Registry
 
 _SAMPLERS = Registry(AbstractSampler, "sampler", "samplers")
 

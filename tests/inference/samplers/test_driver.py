@@ -9,11 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.errors import InputError
 from galileo_jax.inference.posterior import Status
 from galileo_jax.inference.samplers import Settings, dispersed_starts, sample
 from galileo_jax.inference.samplers.library.mixture import Mixture
 from galileo_jax.inference.samplers.program import Program
+from galileo_jax.runtime.errors import InputError
 from tests.inference.samplers.targets import gaussian
 
 TARGET = gaussian(3)

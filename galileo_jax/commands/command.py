@@ -1,0 +1,108 @@
+"""What every command shares: one-line errors, exit codes, progress."""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from galileo_jax.runtime.errors import InputError
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line (an `InputError`), without the usage.
+
+    Options are written out: `--effects` must not be taken for `--effects-from`.
+    """
+
+    def __init__(self, **given: Any):
+        super().__init__(allow_abbrev=False, **given)
+
+    def error(self, message: str) -> NoReturn:
+        """Raises the complaint as an `InputError`."""
+        raise InputError(f"{self.prog}: {message}; see --help")
+
+
+def whole_number(least: int, multiple_of: int = 1, most: int | None = None) -> Callable[[str], int]:
+    """Returns a parser of whole numbers for `add_argument(type=...)`."""
+
+    def parse(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if value < least or value % multiple_of or (most is not None and value > most):
+            many = f"multiple of {multiple_of}" if multiple_of > 1 else "whole number"
+            limit = f"{least} or more" if most is None else f"{least} to {most}"
+            raise argparse.ArgumentTypeError(f"{text!r} is no {many}, {limit}")
+        return value
+
+    return parse
+
+
+def refuse_ignored(argv: Sequence[str], options: Sequence[str], why: str) -> None:
+    """Refuses options that this call would ignore.
+
+    Args:
+      argv: of the call.
+      options: as they are written, such as --angle.
+      why: where they belong, or why not here.
+
+    Raises:
+      InputError: one of them is given; names it.
+    """
+    given = {word.partition("=")[0] for word in argv}
+    for option in options:
+        if option in given:
+            raise InputError(f"{option}: {why}")
+
+
+def console() -> Console:
+    """Progress and notes go to stderr; stdout is for results."""
+    return Console(stderr=True, highlight=False)
+
+
+def progress() -> Progress:
+    """A progress bar on stderr; silent when stderr is not a terminal."""
+    shown = console()
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=shown,
+        disable=not shown.is_terminal,
+        transient=True,
+    )
+
+
+def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None = None) -> int:
+    """Runs `main(argv)` and returns the exit code.
+
+    0: done. 2: the input or the call is wrong (one line on stderr, no traceback).
+    130: stopped with Ctrl-C. 141: nobody reads on (`| head`), so that it stopped, as a shell
+    counts it. Any other exception is a bug: traceback, exit code 1.
+    """
+    try:
+        return main(sys.argv[1:] if argv is None else argv) or 0
+    except InputError as error:
+        print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("stopped; what was finished is kept", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # What is still in the buffer has nowhere to go, either: no second complaint at the exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141

@@ -1,0 +1,66 @@
+"""From clips and observations to the inverse problem: scene, effects, engine and noise model."""
+
+from collections.abc import Sequence
+
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.problem import Problem, with_shared_parameters
+from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.model import Model
+from galileo_jax.model.scene.scene import build_scene
+from galileo_jax.observation.observation import Observation
+from galileo_jax.rollout.engines import make_engine
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.similarity.gaussian_likelihood import NoiseModel
+
+LONGER = 1.15  # an effect may run the clock faster: the frame rate's does
+
+
+def noise_of(clip: Clip, scene: Surroundings) -> NoiseModel:
+    """Which imperfections a clip's observation has.
+
+    Positions on a ramp in metres, without any scale in pixels, were measured by no camera that
+    anybody knows of. Those of a fall were read off a picture, whoever told them.
+    """
+    has_pixels = clip.video is not None or clip.pixels_per_metre is not None
+    is_measured = scene.has_surface and scene.is_scale_known and not has_pixels
+    return "bodies" if is_measured else "camera"
+
+
+def make_problem(
+    clip: Clip,
+    observation: Observation,
+    engine: str = "auto",
+    effects: tuple[Effect, ...] = (),
+    noise: NoiseModel | None = None,
+    motion: str = "planar",
+) -> Problem:
+    """A clip with a model of it: the base model, or one with effects; `noise`: its own."""
+    for effect in effects:
+        if effect.name in SCENARIOS[clip.scenario].without:
+            raise InputError(
+                f"{clip.path}: effects: {effect.name} has no place in scenario {clip.scenario}, "
+                "whose own laws do the same"
+            )
+    scene = build_scene(clip, observation)
+    margin = LONGER if effects else 1.0
+    model = Model(scene, margin * float(observation.times_s[-1]), effects, motion=motion)
+    noise = noise or noise_of(clip, scene.surroundings)
+    return Problem(observation, model, make_engine(engine, model), clip.path.stem, noise)
+
+
+def make_joint_problem(
+    clips: Sequence[Clip],
+    observations: Sequence[Observation],
+    engine: str = "auto",
+    effects: tuple[Effect, ...] = (),
+    noise: NoiseModel | None = None,
+    motion: str = "planar",
+) -> JointProblem:
+    """Clips of the same objects with the same model."""
+    problems = [
+        make_problem(clip, observation, engine, effects, noise, motion)
+        for clip, observation in zip(clips, observations, strict=True)
+    ]
+    return JointProblem(with_shared_parameters(problems))

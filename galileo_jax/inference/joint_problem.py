@@ -1,0 +1,193 @@
+"""The joint inverse problem: trials of the same objects, and the density of all parameters.
+
+The unknowns are `z`, in which every prior is standard normal: first the parameters (those of
+the objects once, those of a trial once per clip), then the logarithm of every clip's noise
+scale in units of its prior's width.
+
+    log p(z | data) = sum over clips  log N(observed; predicted(z), C(noise))  -  z.z / 2
+
+A hypothesis says which of the models' effects are there: the parameters of all others are
+held at `absent`, in their units, and have no z.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.inference.problem import Problem
+from galileo_jax.model.parameters import LogNormal, Parameter, PriorTable
+from galileo_jax.runtime.trace_cache import kept
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+
+NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
+NOISE_SCALE = Parameter("noise_scale", "1", LogNormal(1.0, NOISE_SD), 1.0, "nuisance", step=None)
+
+
+@dataclass(frozen=True)
+class JointProblem:
+    """Clips of the same objects.
+
+    Attributes:
+      problems: one per clip, all with the same effects and, as `with_shared_parameters` leaves
+        them, the same priors of what they share.
+
+    Raises:
+      ValueError: by the first use of its parameters; what clips share has several priors.
+    """
+
+    problems: tuple[Problem, ...]
+
+    @cached_property
+    def _layout(self) -> tuple[tuple[Parameter, ...], tuple[np.ndarray, ...]]:
+        parameters: list[Parameter] = []
+        where: dict[str, int] = {}
+        columns = []
+        for clip, problem in enumerate(self.problems):
+            column = []
+            for parameter in problem.parameters:
+                name = parameter.name
+                if parameter.role == "nuisance" or parameter.per_clip:
+                    name = self._own_name(name, clip)
+                if name not in where:
+                    where[name] = len(parameters)
+                    parameters.append(replace(parameter, name=name))
+                elif parameters[where[name]].prior != parameter.prior:
+                    raise ValueError(
+                        f"{problem.name}: {name} has another prior than in an earlier clip, "
+                        "so that one z would be two values; see problem.with_shared_parameters"
+                    )
+                column.append(where[name])
+            columns.append(np.array(column))
+        return tuple(parameters), tuple(columns)
+
+    def _own_name(self, name: str, clip: int) -> str:
+        return name if len(self.problems) == 1 else f"{name}_{clip + 1}"
+
+    @property
+    def model_parameters(self) -> tuple[Parameter, ...]:
+        """All clips' parameters, noise scales not among them."""
+        return self._layout[0]
+
+    @property
+    def columns(self) -> tuple[np.ndarray, ...]:
+        """For each clip, where its model's parameters stand in `model_parameters`."""
+        return self._layout[1]
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The models' parameters and the noise scales."""
+        noise = [
+            replace(NOISE_SCALE, name=self._own_name(NOISE_SCALE.name, clip))
+            for clip in range(len(self.problems))
+        ]
+        return (*self.model_parameters, *noise)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The parameters' names, in order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @cached_property
+    def num_values(self) -> int:
+        """How many numbers were measured."""
+        return int(sum(problem.data.num_values for problem in self.problems))
+
+    @cached_property
+    def coarse_steps(self) -> np.ndarray:
+        """Steps in `z` before the posterior's scale is known, `[model parameter]`."""
+        return np.array([p.step or 1.0 for p in self.model_parameters])
+
+    @cached_property
+    def priors(self) -> PriorTable:
+        """Of `parameters`."""
+        return PriorTable.of(self.parameters)
+
+    @cached_property
+    def absent(self) -> np.ndarray:
+        """The values at which nothing but the scene is there, `[parameter]`."""
+        return np.array([p.absent for p in self.parameters])
+
+    def free(self, effects: Sequence[str]) -> np.ndarray:
+        """Which parameters a hypothesis leaves free, `[parameter]`.
+
+        Args:
+          effects: names of those that are there, of the models' effects.
+
+        Raises:
+          ValueError: the models have no effect of that name.
+        """
+        known: dict[str, set[str]] = {}
+        for problem in self.problems:
+            scene = problem.model.scene.surroundings
+            for effect in problem.model.effects:
+                found = known.setdefault(effect.name, set())
+                found.update(p.name for p in effect.parameters(scene))
+        if unknown := [name for name in effects if name not in known]:
+            raise ValueError(f"effects not in the model: {unknown}; there: {sorted(known)}")
+        absent = set().union(*(known[name] for name in known if name not in effects), set())
+        free = np.ones(len(self.parameters), bool)
+        for problem, column in zip(self.problems, self.columns, strict=True):
+            for parameter, joint in zip(problem.parameters, column, strict=True):
+                free[joint] = parameter.name not in absent
+        return free
+
+    @property
+    def all_effects(self) -> tuple[str, ...]:
+        """Names of the models' effects."""
+        return tuple(effect.name for effect in self.problems[0].model.effects)
+
+    def without_place(self) -> list[str]:
+        """Effects of the models that bring no parameters into any of the clips."""
+        scenes = [problem.model.scene.surroundings for problem in self.problems]
+        effects = self.problems[0].model.effects
+        return [e.name for e in effects if not any(e.parameters(scene) for scene in scenes)]
+
+    def theta(self, z: np.ndarray, free: np.ndarray | None = None) -> np.ndarray:
+        """Parameters in their units, `[..., parameter]`, noise scales last."""
+        theta = np.asarray(in_units(self.priors, jnp.asarray(z)))
+        return theta if free is None else np.where(free, theta, self.absent)
+
+    def of_clip(self, theta: np.ndarray, clip: int) -> np.ndarray:
+        """The parameters of one clip's model, `[..., model parameter]`."""
+        return np.asarray(theta)[..., self.columns[clip]]
+
+    def alone(self, clip: int) -> "JointProblem":
+        """One of the clips."""
+        return JointProblem((self.problems[clip],))
+
+    def columns_of(self, clip: int) -> np.ndarray:
+        """Where the parameters of `alone(clip)`, noise scale last, stand in `parameters`."""
+        return np.append(self.columns[clip], len(self.model_parameters) + clip)
+
+    def noise_scale(self, theta: np.ndarray, clip: int) -> float:
+        """The noise scale of one clip."""
+        return float(theta[len(self.model_parameters) + clip])
+
+    def log_density(self, z: jax.Array, free: np.ndarray | None = None) -> jax.Array:
+        """The unnormalised posterior density at `z` `[parameter]`; -inf where a rollout failed.
+
+        Args:
+          z: pinned parameters' entries count for the prior and nothing else.
+          free: of a hypothesis; default: all.
+        """
+        theta = self.priors.forward(z)
+        if free is not None:
+            theta = jnp.where(jnp.asarray(free), theta, jnp.asarray(self.absent))
+        total = -0.5 * jnp.sum(z**2)
+        first_noise = len(self.model_parameters)
+        for clip, (problem, column) in enumerate(zip(self.problems, self.columns, strict=True)):
+            predicted = problem.predict(theta[column])
+            total += GaussianLikelihood.log_density(
+                predicted, theta[first_noise + clip], problem.data
+            )
+        return jnp.where(jnp.isfinite(total), total, -jnp.inf)
+
+
+@kept(num_static=0)
+def in_units(priors: PriorTable, z: jax.Array) -> jax.Array:
+    """`PriorTable.forward`, compiled."""
+    return priors.forward(z)

@@ -1,0 +1,147 @@
+"""A frame rate that is wrong by a factor, from the gravity that a clip would have.
+
+    gravity by the path = true gravity x (true rate / declared rate)^-2
+
+In a fall or a flight gravity is what the path bends by. On a ramp with a table it is
+(a + d cos A) / sin A, a the acceleration down the ramp, d the deceleration on the table: constant
+friction drops out. Without a table a / sin A, which friction makes smaller: it can only be too
+large. Effects that nobody declared change these by tens of per cent, a wrong clock by its square,
+so that only factors are told of.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.observation.observation import Observation
+
+LEAST_FACTOR = 1.6  # of the frame rate, that is told of; half the friction or rolling gives 1.4
+NEAR = 1.25  # a rate that is so near what gravity says is the likely one
+COMMON_FPS = (24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
+WINDOWS, MIN_POINTS = 5, 5  # of a stretch; points in each, to tell an acceleration
+BEND_M = 0.05  # past the foot on either side, in which an object turns
+LEAST_WAY_M = 0.03  # on the table, to tell how it slows down
+MOVED_M = 0.003  # of the second object: it has been hit
+
+
+@dataclass(frozen=True)
+class ApparentGravity:
+    """What gravity would be by the path, m/s^2.
+
+    Attributes:
+      value: the estimate.
+      is_least: whether it can only be more: friction is not known.
+    """
+
+    value: float
+    is_least: bool = False
+
+
+def clock_doubt(clip: Clip, observation: Observation) -> str | None:
+    """One line where the frame rate is off by a factor, with the likely one; None elsewhere."""
+    found = apparent_gravity(clip, observation)
+    if found is None or found.value <= 0:
+        return None
+    factor = math.sqrt(clip.gravity / found.value)  # of the true rate over the declared one
+    if max(factor, 1 / factor) < LEAST_FACTOR or (found.is_least and factor > 1):
+        return None
+    wanted = clip.fps * factor
+    likely = _likely(wanted, clip.container_fps, found.is_least)
+    name, more = observation.names[0], "at least " if found.is_least else ""
+    told = (
+        f"{clip.path}: fps: {clip.fps:g}, but by {name}'s path gravity would be {more}"
+        f"{found.value:.2g} m/s^2, not {clip.gravity:g}; likely {likely}"
+    )
+    if clip.pixels_per_metre is not None:
+        scale = clip.pixels_per_metre * found.value / clip.gravity
+        told += f" (or pixels_per_metre is off: {scale:.3g} in place of {clip.pixels_per_metre:g})"
+    return told
+
+
+def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | None:
+    """What gravity would be by the first object's path; None where it does not tell."""
+    scenario = SCENARIOS[clip.scenario]
+    if not clip.is_scale_known:
+        return None
+    seen = observation.mask[0]
+    times, (x, y) = observation.times_s[seen], observation.position_m[0][:, seen]
+    if clip.scenario in ("fall", "flight"):
+        found = _largest(_accelerations(times, -y))
+        return None if found is None else ApparentGravity(found)
+    if not scenario.has_ramp or clip.ramp_angle_deg is None or times.size < MIN_POINTS:
+        return None
+    angle = math.radians(clip.ramp_angle_deg)
+    along = x * math.cos(angle) - y * math.sin(angle)
+    on_ramp = x < -BEND_M if scenario.has_table else np.ones(x.shape, bool)
+    down = _largest(_accelerations(times[on_ramp], along[on_ramp]))
+    if down is None:
+        return None
+    slowing = _slowing(observation) if scenario.has_table else None
+    if slowing is None:
+        return ApparentGravity(down / math.sin(angle), is_least=True)
+    return ApparentGravity((down + slowing * math.cos(angle)) / math.sin(angle))
+
+
+def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> str:
+    """The rate that is meant: the container's or a common one, where one is near."""
+
+    def distance(fps: float) -> float:
+        return abs(math.log(fps / wanted_fps))
+
+    # Friction makes the ramp's acceleration, and with it the true rate, smaller than that.
+    near = math.log(NEAR * 2 if is_most else NEAR)
+    if container_fps and distance(container_fps) < near:
+        return f"fps: {container_fps:.4g}, as the container says"
+    best = min(COMMON_FPS, key=distance)
+    if is_most:
+        return f"fps: {best:g} or less"
+    return f"fps: {best:g}" if distance(best) < near else f"fps: about {wanted_fps:.2g}"
+
+
+def _accelerations(times_s: np.ndarray, values_m: np.ndarray) -> np.ndarray:
+    """The accelerations `[window]` of parabolas through overlapping windows; may be none."""
+    size = max(MIN_POINTS, len(times_s) // WINDOWS)
+    found = [
+        2 * np.polyfit(times_s[i : i + size] - times_s[i], values_m[i : i + size], 2)[0]
+        for i in range(0, len(times_s) - size + 1, max(1, size // 2))
+    ]
+    return np.array(found)
+
+
+def _largest(accelerations: np.ndarray) -> float | None:
+    """The usual one while it moves: of those that are not far below the largest, the middle."""
+    if not accelerations.size:
+        return None
+    top = float(np.quantile(accelerations, 0.9))
+    return float(np.median(accelerations[accelerations >= 0.5 * top])) if top > 0 else None
+
+
+def _slowing(observation: Observation) -> float | None:
+    """The first object's deceleration on the table, up to the hit or else after it."""
+    seen, times = observation.mask[0], observation.times_s
+    x = observation.position_m[0, 0]
+    on_table = seen & (np.where(seen, x, -np.inf) > BEND_M)
+    hit = _moved_off(observation)
+    for stretch in (on_table & (times < hit), on_table & (times > hit)):
+        chosen = np.flatnonzero(stretch)
+        speed = np.gradient(x[chosen], times[chosen]) if chosen.size > 1 else np.zeros(0)
+        if speed.size and speed.max() > 0:
+            # What has come to rest slows down no more.
+            chosen = chosen[speed > 0.1 * speed.max()]
+        if chosen.size < MIN_POINTS or np.ptp(x[chosen]) < LEAST_WAY_M:
+            continue
+        return max(0.0, -2 * float(np.polyfit(times[chosen] - times[chosen[0]], x[chosen], 2)[0]))
+    return None
+
+
+def _moved_off(observation: Observation) -> float:
+    """When the second object has been hit, s; inf where it never is."""
+    if len(observation.names) < 2 or not observation.mask[1].any():
+        return math.inf
+    x = np.where(observation.mask[1], observation.position_m[1, 0], np.nan)
+    first = x[np.flatnonzero(observation.mask[1])[0]]
+    moved = np.flatnonzero(np.abs(x - first) > MOVED_M)
+    return float(observation.times_s[max(moved[0] - 1, 0)]) if moved.size else math.inf

@@ -1,0 +1,172 @@
+"""From a clip to what was measured: positions in metres, and what nobody had declared."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_files.read import read_track
+from galileo_jax.measurement.check_frame_rate import clock_doubt
+from galileo_jax.measurement.infer_foot import foot_of_path, needs_foot
+from galileo_jax.measurement.infer_sizes import SIZE_SD_M, needs_sizes, sizes_of_track
+from galileo_jax.measurement.infer_slope import Slope, needs_slope, slope_of_path
+from galileo_jax.measurement.track_cache import track_once
+from galileo_jax.measurement.truncate_at_stop import until_arrest
+from galileo_jax.observation.observation import Observation
+from galileo_jax.tracking.to_metres import observe
+from galileo_jax.tracking.track import Track
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """A clip and where its objects were seen.
+
+    Attributes:
+      clip: with what was inferred filled in.
+      observation: in metres, up to where something that is not in the scene stops an object.
+      whole: in metres, to the clip's end.
+      pixels: the track in pixels; None where the clip is a track already.
+      inferred: key of the clip that was left null to value and sd.
+      doubts: of what is declared, one line each; results repeat them.
+      remarks: what was inferred or left out, one line each.
+    """
+
+    clip: Clip
+    observation: Observation
+    whole: Observation
+    pixels: Track | None = None
+    inferred: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    doubts: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The clip's, without folder and suffix."""
+        return self.clip.path.stem
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Everything a user should read once, in the order in which it was found."""
+        return (*self.clip.warnings, *self.remarks, *self.doubts)
+
+
+def inferred(measured: Sequence[Measurement]) -> dict[str, Any]:
+    """For a result's document: `{"inferred": {clip: {key: {mean, sd}}}}`, or nothing."""
+    found = {
+        one.name: {key: dict(value) for key, value in one.inferred.items()}
+        for one in measured
+        if one.inferred
+    }
+    return {"inferred": found} if found else {}
+
+
+def measure(clip: Clip) -> Measurement:
+    """Tracks a clip's video, or reads its track, and infers what the model needs and is null.
+
+    Raises:
+      InputError: an object cannot be followed, or its path does not tell the ramp's angle or foot.
+    """
+    found: dict[str, Any] = {}
+    remarks: list[str] = []
+    if needs_foot(clip):
+        clip = _with_foot(clip, remarks)
+        found["origin_px"] = {"mean": list(clip.origin_px or ()), "sd": _foot_sd_px(clip)}
+    if needs_slope(clip):
+        measured = _with_slope(clip, remarks)
+    else:
+        whole, pixels = observed(clip)
+        measured = Measurement(clip, whole, whole, pixels)
+    measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
+    doubt = clock_doubt(measured.clip, measured.observation)
+    observation, end_s = until_arrest(measured.clip, measured.observation)
+    if end_s is not None:
+        remarks.append(
+            f"{clip.path}: {observation.names[0]} is stopped by something after {end_s:.3f} s; "
+            "what follows is left out"
+        )
+    return replace(
+        measured,
+        observation=observation,
+        inferred={**found, **measured.inferred},
+        doubts=() if doubt is None else (doubt,),
+        remarks=tuple(remarks),
+    )
+
+
+def observed(clip: Clip) -> tuple[Observation, Track | None]:
+    """The clip's track in metres, and in pixels where it is tracked here.
+
+    Raises:
+      InputError: an object cannot be followed.
+    """
+    if clip.video is None:
+        assert clip.track is not None  # load_clip requires one of the two
+        return read_track(clip.path, clip.track, clip, clip.fps).observation, None
+    pixels = track_once(clip)
+    return observe(clip, pixels), pixels
+
+
+def _with_foot(clip: Clip, remarks: list[str]) -> Clip:
+    """The clip with the foot of its ramp, from a first look at the path."""
+    assert clip.pixels_per_metre is not None  # check_scale requires it of a ramp
+    first_look, _ = observed(_without_sizes(clip, origin_px=(0.0, 0.0)))
+    point = foot_of_path(clip, first_look)
+    sign = 1.0 if clip.direction == "right" else -1.0
+    x, y = (float(value) * clip.pixels_per_metre for value in point)
+    origin = (round(sign * x, 1), round(-y, 1))
+    clip = clip.model_copy(update={"origin_px": origin})
+    remarks.append(
+        f"{clip.path}: origin_px: null; {list(origin)} +- {_foot_sd_px(clip):.1f} is taken, from "
+        f"the bend of {clip.objects[0].name}'s path"
+    )
+    return clip
+
+
+def _foot_sd_px(clip: Clip) -> float:
+    """As good as the point that was followed is the object's centre."""
+    assert clip.pixels_per_metre is not None
+    return round(SIZE_SD_M * clip.pixels_per_metre, 1)
+
+
+def _without_sizes(clip: Clip, **update: Any) -> Clip:
+    """For a first look: outlines are placed by what is not known yet."""
+    unknown = tuple(item.model_copy(update={"size_m": None}) for item in clip.objects)
+    return clip.model_copy(update={"objects": unknown, **update})
+
+
+def _with_slope(clip: Clip, remarks: list[str]) -> Measurement:
+    """A measurement with the ramp's angle from the path."""
+    if clip.video is not None:
+        # The object's outline stands along the ramp: a first look, without it, tells how steep.
+        first_look, _ = observed(_without_sizes(clip))
+        clip = _inclined(clip, slope_of_path(clip, first_look))
+    observation, pixels = observed(clip)
+    slope = slope_of_path(clip, observation)
+    clip = _inclined(clip, slope)
+    remarks.append(
+        f"{clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "
+        f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is taken"
+    )
+    found = {"mean": slope.angle_deg, "sd": slope.sd_deg}
+    return Measurement(clip, observation, observation, pixels, {"ramp_angle_deg": found})
+
+
+def _with_sizes(measured: Measurement, remarks: list[str]) -> Measurement:
+    """The measurement with sizes from the heights of the paths and the distance at the hit."""
+    clip = measured.clip
+    found = sizes_of_track(clip, measured.observation)
+    objects = tuple(
+        item.model_copy(update={"size_m": found.get(item.name, item.size_m)})
+        for item in clip.objects
+    )
+    entries = dict(measured.inferred)
+    for name, size in found.items():
+        remarks.append(f"{clip.path}: {name}: size_m: null; {list(size)} is taken, from its path")
+        entries[f"{name}.size_m"] = {"mean": list(size), "sd": SIZE_SD_M}
+    clip = clip.model_copy(update={"objects": objects})
+    return replace(measured, clip=clip, inferred=entries)
+
+
+def _inclined(clip: Clip, slope: Slope) -> Clip:
+    found = {"ramp_angle_deg": slope.angle_deg, "ramp_angle_sd_deg": slope.sd_deg}
+    return clip.model_copy(update=found)

@@ -1,0 +1,72 @@
+"""What is stopped by something that is not in the scene: where the run ends.
+
+At the end of a board stands a stop, under a drop lies the ground. A model without them must not
+be judged by what is seen after the hit. In a fall without a declared floor and on a board without
+a table, a run ends at step i if the speed the way it went
+
+    v_i < SLOWED v,   and no v_j > SLOWED v after it,   v = median of steps i - 2, i - 3, i - 4
+    v_(i-2) > STEADY v                                  (what brakes slows down step by step)
+    (v - v_i) / n steps > HIT_M_S2                      (and no friction brakes like a wall)
+    v > CLEAR standard deviations of a step
+
+n is 1, or 2 where the hit is smeared over two steps: v_(i-1) < STEADY v.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.observation.observation import Observation
+
+SLOWED, STEADY = 0.6, 0.9
+HIT_M_S2 = 20.0
+"""Two g; friction takes less than one."""
+CLEAR = 5.0
+BEFORE = 3
+SMEARED_FRAMES = 1
+"""Of a video: the hit falls into an exposure, whose frame shows neither."""
+
+
+def can_be_arrested(clip: Clip) -> bool:
+    """Whether the clip has an end that is not in its scene."""
+    scenario = SCENARIOS[clip.scenario]
+    is_board = scenario.has_ramp and not scenario.has_table
+    return is_board or (clip.scenario == "fall" and not clip.has_floor)
+
+
+def until_arrest(clip: Clip, observation: Observation) -> tuple[Observation, float | None]:
+    """The observation without what follows a stop, and when its last frame is, s.
+
+    Returns:
+      The observation itself and None where nothing stops the object.
+    """
+    last = arrest_frame(observation) if can_be_arrested(clip) else None
+    if last is None:
+        return observation, None
+    last -= SMEARED_FRAMES if clip.video is not None else 0
+    mask = observation.mask.copy()
+    mask[0, last + 1 :] = False
+    return replace(observation, mask=mask), float(observation.times_s[last])
+
+
+def arrest_frame(observation: Observation) -> int | None:
+    """The last frame before object 1 is stopped within one step; None where it is not."""
+    seen = np.flatnonzero(observation.mask[0])
+    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
+    step_s = np.diff(times_s)
+    velocity = np.diff(place_m) / step_s
+    along = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
+    speed_sd = np.sqrt(along[1:] + along[:-1]) / step_s
+    for i in range(BEFORE + 1, len(step_s)):
+        way = velocity[:, i - 1 - BEFORE : i - 1].sum(axis=1)
+        going = way @ velocity / max(float(np.hypot(*way)), np.finfo(float).tiny)
+        usual = np.median(going[i - 1 - BEFORE : i - 1])
+        is_clear = usual > CLEAR * np.median(speed_sd[i - 1 - BEFORE : i - 1])
+        is_smeared = going[i - 1] <= STEADY * usual
+        braked_m_s2 = (usual - going[i]) / (step_s[i] * (2 if is_smeared else 1))
+        is_hit = braked_m_s2 > HIT_M_S2 and going[i - 2] > STEADY * usual
+        if is_clear and is_hit and going[i:].max() < SLOWED * usual:
+            return int(seen[i - 1 if is_smeared else i])
+    return None

@@ -1,0 +1,46 @@
+"""The air on a falling ball: how much drag is to be expected before any look.
+
+    c = C_d rho A / 2,    b = c v,   v = sqrt(g h), of the middle of the fall
+
+At the end of a fall of more than some metres it holds a tenth of a light ball's weight or more,
+every time, while scales and frame rates are off by several per cent in few clips. Which form it
+takes is left to the data.
+
+Source: Hoerner, Fluid-Dynamic Drag (1965), chapter 3: spheres have C_d 0.1 (fast and rough) to
+0.5, perforated ones up to 1.
+"""
+
+import math
+
+from galileo_jax.model.effects.effect import Surroundings, Theta
+from galileo_jax.model.parameters import LogNormal
+
+AIR_KG_M3 = 1.2
+DRAG_COEFFICIENT = (0.4, 0.5)  # middle, and the width of its logarithm
+EXPECTED_ODDS = 30.0  # of a drag of this size against any other effect of the library
+
+
+def expected_drags(radius_m: float, length_m: float, gravity: float) -> dict[str, tuple]:
+    """The middle and the width of the logarithm of the drags on a ball, by their names."""
+    middle, width = DRAG_COEFFICIENT
+    quadratic = middle * AIR_KG_M3 * math.pi * radius_m**2 / 2
+    linear = quadratic * math.sqrt(gravity * length_m)
+    return {"air_drag": (quadratic, width), "viscous_drag": (linear, width)}
+
+
+def expected_odds(name: str, theta: Theta, scene: Surroundings, prior: LogNormal) -> float:
+    """1 + EXPECTED_ODDS p(strength | air) / p(strength | prior); 1 where nothing is expected.
+
+    With the evidence under `prior` it makes that under the mixture of both.
+    """
+    strength = float(theta[name])
+    if name not in scene.expected or strength <= 0:
+        return 1.0
+    middle, width = scene.expected[name]
+    log_ratio = _log_normal(strength, middle, width) - _log_normal(strength, prior.median, prior.sd)
+    return 1.0 + EXPECTED_ODDS * math.exp(log_ratio)
+
+
+def _log_normal(value: float, median: float, sd: float) -> float:
+    """The logarithm of the density of log(value), up to a constant."""
+    return -0.5 * (math.log(value / median) / sd) ** 2 - math.log(sd)

@@ -1,0 +1,257 @@
+"""What an effect is: parameters and the few places where it may touch the model.
+
+An effect is written once, in terms of the array standard (`x.__array_namespace__()`), and
+runs in every engine, NumPy or JAX. Every hook's default does nothing; an effect overrides
+those it needs. At its parameters' `absent` values each hook must return exactly what the
+default returns, and have a finite derivative.
+
+Objects move along a path: down the ramp and along the table, straight down, or freely through
+the plane of the picture. Hooks see and return numbers along it, positive downhill and away from
+the ramp; in the plane, along the velocity.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
+
+import jax
+
+from galileo_jax.model.parameters import Parameter
+
+# NumPy or JAX arrays alike; shapes are said in the docstrings.
+Array = Any
+Theta = Mapping[str, Array]
+
+
+class State(NamedTuple):
+    """The objects at one instant; leading axes are the batch's.
+
+    Attributes:
+      path_m: `[..., object]`, how far each centre is past the foot; negative on the ramp.
+        Without a table: how far it has gone; in the plane, along its curve.
+      speed_m_s: `[..., object]`; to a friction law, that at which the surfaces slip.
+      time_s: scalar, since the release.
+      is_on_ramp: `[..., object]`.
+    """
+
+    path_m: Array
+    speed_m_s: Array
+    time_s: Array
+    is_on_ramp: Array
+
+
+class Bounce(NamedTuple):
+    """A level floor; each `[...]`.
+
+    Attributes:
+      height_m: of an object's centre when it touches the floor, y as measured.
+      restitution: share of the speed against the floor with which it leaves.
+      grip: share of the speed along the floor that is lost.
+    """
+
+    height_m: Array
+    restitution: Array
+    grip: Array
+
+
+FALL_LENGTH = "fall_length"  # in `Surroundings.expected`, of a high fall
+
+Force = Callable[[State], Array]
+Friction = Callable[[State, Array], Array]
+
+_ARRAYS = (
+    "angle_rad",
+    "gravity",
+    "half_length_m",
+    "half_height_m",
+    "corner_m",
+    "start_m",
+    "start_path_m",
+    "mass_kg",
+    "roll_inertia",
+    "release_s",
+    "expected",
+)
+_STATIC = (
+    "names",
+    "has_table",
+    "comes_down",
+    "is_scale_known",
+    "has_surface",
+    "angle_sd_rad",
+    "rolls",
+    "moves_in_plane",
+    "laws",
+)
+
+
+@jax.tree_util.register_pytree_with_keys_class
+@dataclass(frozen=True)
+class Surroundings:
+    """What an effect may know of the scene.
+
+    A PyTree, so that one compiled program serves every clip: inside it the numbers are
+    traced. What decides which parameters there are is static.
+
+    Attributes:
+      names: of the objects.
+      angle_rad: the ramp's; of a path straight down pi / 2, in the plane 0.
+      gravity: m/s^2.
+      half_length_m, half_height_m: `[object]`, along the travel and across it.
+      corner_m: `[object]`, x at which each centre's path bends from ramp to table; inf
+        without a table.
+      start_m: `[object, 2]`, the centres at the release.
+      start_path_m: `[object]`, the same along the path, see `State`.
+      has_table: whether the ramp ends on a table.
+      comes_down: `[object]`, whether the object starts on the ramp.
+      release_s: when the release was, after the first frame: expected, and its standard
+        deviation.
+      is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
+      has_surface: whether objects slide on something; not in a fall, in the air, in a liquid.
+      angle_sd_rad: how well the ramp's angle (in the plane: gravity's direction) is known; 0:
+        taken at its word.
+      mass_kg: `[object]`, as weighed, None where not; empty: none is.
+      rolls: `[object]`, whether it is round and may turn; empty: none does.
+      roll_inertia: `[object]`, beta = J / (m r^2) of what rolls; empty: none does.
+      moves_in_plane: whether the path is not given, but bends with the motion.
+      laws: names of the laws that are always there (`effects/laws/`).
+      expected: what a look at the clip suggests of the laws' parameters, by name: the two
+        numbers of a prior that is wide against what the fit will tell.
+    """
+
+    names: tuple[str, ...]
+    angle_rad: float
+    gravity: float
+    half_length_m: tuple[float, ...]
+    half_height_m: tuple[float, ...]
+    corner_m: tuple[float, ...]
+    start_m: tuple[tuple[float, float], ...]
+    start_path_m: tuple[float, ...]
+    has_table: bool
+    comes_down: tuple[bool, ...]
+    release_s: tuple[float, float] = (0.0, 0.01)
+    is_scale_known: bool = True
+    has_surface: bool = True
+    angle_sd_rad: float = 0.0
+    mass_kg: tuple[float | None, ...] = ()
+    rolls: tuple[bool, ...] = ()
+    roll_inertia: tuple[float, ...] = ()
+    moves_in_plane: bool = False
+    laws: tuple[str, ...] = ()
+    expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def starts_moving(self) -> bool:
+        """Whether nothing is let go: the object moves when it is first seen."""
+        return "start_velocity" in self.laws
+
+    def tree_flatten_with_keys(self):
+        """Splits into traced numbers and static facts."""
+        leaves = [(jax.tree_util.GetAttrKey(key), getattr(self, key)) for key in _ARRAYS]
+        return leaves, tuple(getattr(self, key) for key in _STATIC)
+
+    @classmethod
+    def tree_unflatten(cls, facts, leaves):
+        """The inverse."""
+        return cls(
+            **dict(zip(_ARRAYS, leaves, strict=True)), **dict(zip(_STATIC, facts, strict=True))
+        )
+
+    def mass(self, theta: Theta) -> list[Array]:
+        """The objects' masses, kg, each `[...]`."""
+        return [theta[f"m{i + 1}"] for i in range(len(self.names))]
+
+    def only(self, value: Array, *objects: int) -> Array:
+        """`value` `[...]` for the given objects (counted from 0), 0 for others: `[..., object]`."""
+        chosen = [1.0 if i in objects else 0.0 for i in range(len(self.names))]
+        return value[..., None] * value.__array_namespace__().asarray(chosen)
+
+
+class Effect:
+    """One physical (or measurement) effect; subclasses are stateless.
+
+    `theta` maps parameters' names to arrays `[...]`; numbers of objects are `[..., object]`.
+    """
+
+    name: ClassVar[str]
+
+    def __eq__(self, other: object) -> bool:
+        """Effects have no state: two of a class are the same, also to a compiled program."""
+        return type(self) is type(other)
+
+    def __hash__(self) -> int:
+        """Of the class."""
+        return hash(type(self))
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The unknowns it brings, the strength first; empty where it has no place."""
+        raise NotImplementedError
+
+    def odds(self, theta: Theta, scene: Surroundings) -> float:
+        """How many times as likely as its prior says it is to be there, at these values.
+
+        1 but where what is known of the clip leads to expect it, and of laws without a name.
+        """
+        return 1.0
+
+    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
+        """Moves the centres at the release along the path: `[..., object]` to the same."""
+        return path_m
+
+    def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the speed at the release `[..., object]`, m/s, or None."""
+        return None
+
+    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the velocity in the plane at the start `[..., object, 2]`, m/s, or None."""
+        return None
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+        """Returns the force along the path as a function of the state, or None.
+
+        What depends on the parameters alone is computed here, once per rollout; the function
+        returned maps a `State` to `[..., object]`, N.
+        """
+        return None
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+        """Returns what friction coefficients become, or None.
+
+        The function maps a `State` and coefficients `[..., object]` to coefficients.
+        """
+        return None
+
+    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the inertia on top of the mass, as a share of it `[..., object]`, or None."""
+        return None
+
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+        """Returns how much steeper ramp and table are than declared, rad, each `[...]`, or None.
+
+        In the plane: how far gravity points forward of the picture's vertical, and 0.
+        """
+        return None
+
+    def foot(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the factor on the speed kept at the foot `[...]`, or None."""
+        return None
+
+    def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the coefficient of restitution between objects `[...]`, or None."""
+        return None
+
+    def bounce(self, theta: Theta, scene: Surroundings) -> Bounce | None:
+        """Returns the floor, or None where there is none to bounce on."""
+        return None
+
+    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
+        """Returns what follows from the parameters and is worth telling: name to value and unit."""
+        return {}
+
+    def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
+        """Maps the clip's time to the time since the release, s: `[frame]` to `[frame]`."""
+        return time_s
+
+    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
+        """Maps true centres to measured ones, `[object, 2, frame]`, m (scale, camera)."""
+        return position_m

@@ -1,0 +1,45 @@
+"""A resistance that grows with any power of the speed, not that of oil (1) or of air (2).
+
+F = -drag_of_a_power (|v| / V)^power sign(v)    on every object; V = 1 m/s, in a fall 10 m/s
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Force, State, Surroundings, Theta
+from galileo_jax.model.effects.forms.form import Form
+from galileo_jax.model.parameters import LogNormal, Parameter, Uniform
+
+# The sizes that the drags of the library have.
+PRIOR, FALL_PRIOR = LogNormal(median=0.3, sd=1.2), LogNormal(median=0.3, sd=1.5)
+USUAL_M_S, USUAL_FALL_M_S = 1.0, 10.0
+# Below a quarter it is friction.
+POWER_PRIOR, USUAL_POWER = Uniform(0.25, 3.0), 1.0
+SMALL = 0.01  # of the usual speed: there the slope of a root ends
+
+
+class DragOfAPower(Form):
+    """Drag of all objects by a law that has no name."""
+
+    name: ClassVar[str] = "drag_of_a_power"
+    meaning: ClassVar[str] = "a drag that grows with another power of the speed"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The drag at the usual speed, and the power."""
+        prior = PRIOR if scene.has_surface else FALL_PRIOR
+        power = f"{self.name}_power"
+        return (
+            Parameter(self.name, "N", prior, 0.0, "effect", 0.1),
+            Parameter(power, "1", POWER_PRIOR, USUAL_POWER, "effect", 0.1),
+        )
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
+        """The force at the speeds."""
+        size = theta[self.name][..., None]
+        beside_linear = (theta[f"{self.name}_power"][..., None] - 1.0) / 2
+        usual = USUAL_M_S if scene.has_surface else USUAL_FALL_M_S
+
+        def drag(state: State) -> Array:
+            share = state.speed_m_s / usual
+            return -size * share * (share**2 + SMALL**2) ** beside_linear
+
+        return drag

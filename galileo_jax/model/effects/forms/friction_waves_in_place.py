@@ -1,0 +1,49 @@
+"""Friction that waves along the path, as over planks or a thread.
+
+    k(q) = max(0, k + A cos(2 pi q / length) + B sin(2 pi q / length))    for every object
+
+A = friction_waves_in_place, B = friction_waves_in_place_later, q along the path.
+"""
+
+import math
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
+from galileo_jax.model.effects.forms.form import Form
+from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+
+PRIOR = Normal(0.0, 0.1)
+LENGTH_PRIOR = LogNormal(median=0.2, sd=0.7)
+
+
+class FrictionWavesInPlace(Form):
+    """Coefficients of all objects that wave along the path."""
+
+    name: ClassVar[str] = "friction_waves_in_place"
+    meaning: ClassVar[str] = "friction that waves along the path"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Two strengths, a quarter of a wave apart, and its length; none in a fall."""
+        if not scene.has_surface:
+            return ()
+        usual = LENGTH_PRIOR.median
+        return (
+            Parameter(self.name, "1", PRIOR, 0.0, "effect", 0.1),
+            Parameter(f"{self.name}_later", "1", PRIOR, 0.0, "effect", 0.1),
+            Parameter(f"{self.name}_length", "m", LENGTH_PRIOR, usual, "effect", 0.1),
+        )
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+        """The coefficients at the places."""
+        if not scene.has_surface:
+            return None
+        first, later = theta[self.name][..., None], theta[f"{self.name}_later"][..., None]
+        rate = (2 * math.pi / theta[f"{self.name}_length"])[..., None]
+
+        def law(state: State, k: Array) -> Array:
+            xp = k.__array_namespace__()
+            phase = rate * state.path_m
+            wave = first * xp.cos(phase) + later * xp.sin(phase)
+            return xp.maximum(k + wave, xp.zeros_like(k))
+
+        return law

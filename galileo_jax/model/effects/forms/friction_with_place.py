@@ -1,0 +1,36 @@
+"""Friction that grows or falls steadily along the path, as on a surface less and less polished.
+
+k(q) = max(0, k (1 + friction_with_place q))    for every object, q along the path
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Friction, State, Surroundings, Theta
+from galileo_jax.model.effects.forms.form import Form
+from galileo_jax.model.parameters import Normal, Parameter
+
+PRIOR = Normal(0.0, 1.0)
+
+
+class FrictionWithPlace(Form):
+    """Coefficients of all objects that change along the path."""
+
+    name: ClassVar[str] = "friction_with_place"
+    meaning: ClassVar[str] = "friction that grows or falls along the path"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """By which share per metre; none in a fall."""
+        if not scene.has_surface:
+            return ()
+        return (Parameter(self.name, "1/m", PRIOR, 0.0, "effect", 0.1, multiplies="k1"),)
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+        """The coefficients at the places."""
+        if not scene.has_surface:
+            return None
+        share = theta[self.name][..., None]
+
+        def law(state: State, k: Array) -> Array:
+            return k.__array_namespace__().maximum(k * (1.0 + share * state.path_m), 0.0 * k)
+
+        return law

@@ -1,0 +1,44 @@
+"""Floor: what falls on it leaves with a share of its speed.
+
+    v_y+ = -e v_y-,    v_x+ = (1 - grip) v_x-
+
+Impacts slower than 0.02 m/s do not rebound. The grip is that of each impact: a ball that slips
+loses less and less of its speed along the floor, and what rolls nothing.
+
+Source: Newton, Principia, laws of motion, scholium (1687); Cross (2002), Grip-slip behavior of
+a bouncing ball, Am. J. Phys. 70, 1093.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings, Theta
+from galileo_jax.model.parameters import Normal, Parameter, Uniform
+
+MOST_GRIP = 0.6  # a ball that stops slipping keeps 5/7 of its speed or so
+
+
+class Floor(Effect):
+    """A level floor."""
+
+    name: ClassVar[str] = "floor"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Restitution and grip, and how high a centre is at the impact (as measured)."""
+        if self.name not in scene.laws:
+            return ()
+        height = Normal(*scene.expected["floor_height"])
+        found = [
+            Parameter("floor_restitution", "1", Uniform(0.0, 1.0), 0.0, "main", 0.05),
+            Parameter("floor_height", "m", height, 0.0, "main", 0.05, per_clip=True),
+        ]
+        if scene.moves_in_plane:
+            found.append(Parameter("floor_grip", "1", Uniform(0.0, MOST_GRIP), 0.0, "main", 0.05))
+        return tuple(found)
+
+    def bounce(self, theta: Theta, scene: Surroundings) -> Bounce | None:
+        """The floor."""
+        if self.name not in scene.laws:
+            return None
+        restitution = theta["floor_restitution"]
+        grip = theta["floor_grip"] if scene.moves_in_plane else 0.0 * restitution
+        return Bounce(theta["floor_height"], restitution, grip)

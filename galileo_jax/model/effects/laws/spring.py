@@ -1,0 +1,62 @@
+"""Spring: Hooke's law about the place of rest, with damping in proportion to the speed.
+
+    q'' = -w^2 (q - rest) - 2 damping q',    w = 2 pi / period
+
+Gravity only sets where the rest is, so that neither it nor the mass nor the scale shows in the
+period: the stiffness is w^2 m, and known where the mass was weighed.
+
+Closed form: q = rest + exp(-d t) [(q0 - rest) cos(f t) + (v0 + d (q0 - rest)) sin(f t) / f],
+f^2 = w^2 - d^2.
+
+Source: Hooke, De potentia restitutiva (1678); Taylor, Classical Mechanics (2005), chapter 5.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Force, State, Surroundings, Theta
+from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+
+DAMPING_PRIOR = LogNormal(median=0.1, sd=1.5)
+
+
+class Spring(Effect):
+    """A hanging spring."""
+
+    name: ClassVar[str] = "spring"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Period without damping, damping, and where the object would hang at rest."""
+        if self.name not in scene.laws:
+            return ()
+        period, rest = LogNormal(*scene.expected["period"]), Normal(*scene.expected["rest"])
+        return (
+            Parameter("period", "s", period, period.median, "main", 0.02),
+            Parameter("damping", "1/s", DAMPING_PRIOR, 0.0, "main", 0.1),
+            Parameter("rest", "m", rest, 0.0, "main", 0.02, per_clip=True),
+        )
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+        """The pull to the place of rest, gravity's part in it taken out, and the damping."""
+        if self.name not in scene.laws:
+            return None
+        mass = theta["m1"][..., None]
+        stiffness = mass * (2 * math.pi / theta["period"][..., None]) ** 2
+        rubbing = 2 * mass * theta["damping"][..., None]
+        rest, weight = theta["rest"][..., None], mass * scene.gravity
+
+        def pull(state: State):
+            return -stiffness * (state.path_m - rest) - rubbing * state.speed_m_s - weight
+
+        return pull
+
+    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
+        """Stiffness, and how far the weight stretches the spring."""
+        if self.name not in scene.laws:
+            return {}
+        square = (2 * math.pi / theta["period"]) ** 2
+        return {
+            "stiffness": (theta["m1"] * square, "N/m"),
+            "stretch": (scene.gravity / square, "m"),
+        }

@@ -1,0 +1,52 @@
+"""Start velocity: the object moves when it is first seen, nobody lets it go.
+
+    v(0) = (start_velocity_x, start_velocity_y)    in the plane, x along the travel, y up
+    v(0) = start_speed                             on a straight path, downward
+
+A throw, a swing that is under way, a body that was let go before the clip begins.
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.parameters import Normal, Parameter
+
+PLANE = ("start_velocity_x", "start_velocity_y")
+PATH = ("start_speed",)
+
+
+class StartVelocity(Effect):
+    """The velocity in the first frame; each clip has its own."""
+
+    name: ClassVar[str] = "start_velocity"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Its components in the plane, or the speed along the path."""
+        if self.name not in scene.laws:
+            return ()
+        return tuple(
+            Parameter(name, "m/s", Normal(*scene.expected[name]), 0.0, "main", 0.05, per_clip=True)
+            for name in (PLANE if scene.moves_in_plane else PATH)
+        )
+
+    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """In the plane."""
+        if self.name not in scene.laws or not scene.moves_in_plane:
+            return None
+        components = [theta[name] for name in PLANE]
+        return components[0].__array_namespace__().stack(components, axis=-1)[..., None, :]
+
+    def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Along the path."""
+        if self.name not in scene.laws or scene.moves_in_plane:
+            return None
+        return theta[PATH[0]][..., None]
+
+    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
+        """The speed of a throw and its angle over the horizontal."""
+        if self.name not in scene.laws or not scene.moves_in_plane:
+            return {}
+        x, y = (theta[name] for name in PLANE)
+        xp = x.__array_namespace__()
+        return {"start_speed": (xp.hypot(x, y), "m/s"), "start_angle": (xp.atan2(y, x), "rad")}

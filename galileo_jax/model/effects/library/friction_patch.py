@@ -1,0 +1,47 @@
+"""Friction patch: a strip of the path is rougher (or smoother) for object 1.
+
+    k(q) = max(0, k + friction_patch)  for  start < q < start + length
+
+with smooth edges, tanh(q / 5 mm), q along the path, 0 at the foot.
+
+Source: Coulomb, Théorie des machines simples (1785), with a coefficient that depends on the
+place; the smooth edges are ours.
+Confused with: surface_friction where the strip begins at the foot and is long;
+magnetic_brake where the speed hardly changes inside.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Friction, State, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.effects.zone import share_inside, zone_parameters
+from galileo_jax.model.parameters import Normal, Parameter
+
+PRIOR = Normal(0.0, 0.2)
+
+
+@register
+class FrictionPatch(Effect):
+    """Another coefficient of object 1 on a strip."""
+
+    name: ClassVar[str] = "friction_patch"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """How much rougher it is there, where it starts and how long it is; none in a fall."""
+        if not scene.has_surface:
+            return ()
+        strength = Parameter("friction_patch", "1", PRIOR, 0.0, "effect", 0.05)
+        return (strength, *zone_parameters(self.name, scene))
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+        """The coefficients at the places."""
+        if not scene.has_surface:
+            return None
+        rougher = scene.only(theta["friction_patch"], 0)
+
+        def law(state: State, k: Array) -> Array:
+            xp = k.__array_namespace__()
+            inside = share_inside(state.path_m, self.name, theta)
+            return xp.maximum(k + rougher * inside, xp.zeros_like(k))
+
+        return law

@@ -1,0 +1,33 @@
+"""Initial push: object 1 is not let go at rest but with a speed.
+
+    v(0) = initial_push
+
+along the path, downhill. Of a trial, not of the objects.
+
+Source: kinematics; Kleppner and Kolenkow, An Introduction to Mechanics (1973), chapter 1.
+Confused with: a release before the first frame (release_instant), where the first frames
+are missing.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import LogNormal, Parameter
+
+PRIOR = LogNormal(median=0.3, sd=1.0)
+
+
+@register
+class InitialPush(Effect):
+    """A speed at the release."""
+
+    name: ClassVar[str] = "initial_push"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The speed."""
+        return (Parameter("initial_push", "m/s", PRIOR, 0.0, "effect", 0.1, per_clip=True),)
+
+    def start_speed(self, theta: Theta, scene: Surroundings) -> Array:
+        """The speed, of object 1."""
+        return scene.only(theta["initial_push"], 0)

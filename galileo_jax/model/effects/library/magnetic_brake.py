@@ -1,0 +1,46 @@
+"""Magnetic brake: eddy currents brake object 1 within a zone of its path.
+
+    F = -b v  for  start < q < start + length
+
+with smooth edges, tanh(q / 5 mm). The speed lost is the same however fast the object comes:
+dv/dq = -b / m.
+
+Source: Wiederick, Gauthier, Campbell, Rochon (1987), Magnetic braking: simple theory and
+experiment, Am. J. Phys. 55, 500.
+Confused with: friction_patch where the speed hardly changes inside; viscous_drag where the
+zone is the whole path.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.effects.zone import share_inside, zone_parameters
+from galileo_jax.model.parameters import LogNormal, Parameter
+
+PRIOR = LogNormal(median=1.0, sd=1.2)
+
+
+@register
+class MagneticBrake(Effect):
+    """Linear drag of object 1 in a zone."""
+
+    name: ClassVar[str] = "magnetic_brake"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The drag constant b, where the zone starts and how long it is; none in a fall."""
+        if not scene.has_surface:
+            return ()
+        strength = Parameter("magnetic_brake", "kg/s", PRIOR, 0.0, "effect", 0.1)
+        return (strength, *zone_parameters(self.name, scene))
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+        """The force -b v inside."""
+        if not scene.has_surface:
+            return None
+        constant = scene.only(theta["magnetic_brake"], 0)
+
+        def brake(state: State):
+            return -constant * state.speed_m_s * share_inside(state.path_m, self.name, theta)
+
+        return brake

@@ -1,0 +1,33 @@
+"""Restitution: objects bounce off each other.
+
+    v2' - v1' = e (v1 - v2)
+
+e is what this effect adds to the nuisance impact_restitution (about 0.01). Impacts slower
+than 0.02 m/s stay plastic.
+
+Source: Newton, Principia, laws of motion, scholium (1687); Stronge, Impact Mechanics (2000).
+Confused with: the mass ratio, where only object 2 is seen after the hit.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import Parameter, Uniform
+
+
+@register
+class Restitution(Effect):
+    """An impact that is not plastic."""
+
+    name: ClassVar[str] = "restitution"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The coefficient e; none where there is nothing to hit."""
+        if len(scene.names) < 2:
+            return ()
+        return (Parameter("restitution", "1", Uniform(0.0, 1.0), 0.0, "effect", 0.1),)
+
+    def restitution(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """The coefficient."""
+        return theta["restitution"] if self.parameters(scene) else None

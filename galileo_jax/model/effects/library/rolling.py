@@ -1,0 +1,44 @@
+"""Rolling: object 1, declared to slide, rolls, and turning it takes a share of the force.
+
+    m (1 + beta) q'' = F,    beta = J / (m r^2)
+
+beta is 2/5 for a ball, 1/2 for a cylinder, 2/3 for a hollow ball, 1 for a ring; the
+friction k is then the rolling resistance. It is the hypothesis that something turns; where the
+clip declares that it does (`rolls`, or a sphere), the contact decides and the share is known, so
+that the effect has no place.
+
+Source: Crawford (1996), Rolling and slipping down Galileo's inclined plane, Am. J. Phys. 64,
+541; Kleppner and Kolenkow, An Introduction to Mechanics (1973), chapter 6.
+Confused with: scale_error, frame_rate and a larger k on one slope; the table tells k from it,
+the impact the mass.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import LogNormal, Parameter
+
+PRIOR = LogNormal(median=0.45, sd=0.4)
+
+
+@register
+class Rolling(Effect):
+    """Inertia of object 1 beyond its mass."""
+
+    name: ClassVar[str] = "rolling"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The share beta; none in a fall, and none where object 1 is declared to roll."""
+        if not self._has_place(scene):
+            return ()
+        return (Parameter("rolling", "1", PRIOR, 0.0, "effect", 0.1),)
+
+    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """The share, of object 1."""
+        if not self._has_place(scene):
+            return None
+        return scene.only(theta["rolling"], 0)
+
+    def _has_place(self, scene: Surroundings) -> bool:
+        return scene.has_surface and not any(scene.rolls[:1])

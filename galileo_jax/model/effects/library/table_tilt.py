@@ -1,0 +1,39 @@
+"""Table tilt: the table is not level.
+
+    q'' = g (sin b - k cos b)  on the table,    b = table_tilt
+
+positive where it falls away from the ramp.
+
+Source: Galileo, Discorsi, third day (1638).
+Confused with: surface_friction (k1 on the table) where object 2 is not moved; both
+frictions on the table, where both objects move: only the direction in the picture (y) tells.
+"""
+
+import math
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import Normal, Parameter
+
+PRIOR = Normal(0.0, math.radians(1.5))
+
+
+@register
+class TableTilt(Effect):
+    """A table that slopes."""
+
+    name: ClassVar[str] = "table_tilt"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The table's slope; none without a table."""
+        if not scene.has_table:
+            return ()
+        return (Parameter("table_tilt", "rad", PRIOR, 0.0, "effect", 0.05),)
+
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+        """Of the table alone."""
+        if not self.parameters(scene):
+            return None
+        slope = theta["table_tilt"]
+        return 0.0 * slope, slope

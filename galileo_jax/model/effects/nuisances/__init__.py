@@ -1,0 +1,23 @@
+"""Nuisances: always free, with tight priors, never a verdict while inside them.
+
+They are effects like any other; only their parameters' role differs (DESIGN.md 2.6).
+"""
+
+from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
+from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
+from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
+from galileo_jax.model.effects.nuisances.perspective import Perspective
+from galileo_jax.model.effects.nuisances.pixel_scale import PixelScale
+from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
+from galileo_jax.model.effects.nuisances.start_offset import StartOffset
+
+NUISANCES: tuple[Effect, ...] = (
+    StartOffset(),
+    FootTransition(),
+    DeclaredAngle(),
+    ImpactRestitution(),
+    ReleaseInstant(),
+    PixelScale(),
+    Perspective(),
+)

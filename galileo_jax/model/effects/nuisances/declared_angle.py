@@ -1,0 +1,31 @@
+"""Declared angle: read off a picture or a protractor, it is known to so and so many tenths."""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.parameters import Normal, Parameter
+
+
+class DeclaredAngle(Effect):
+    """The ramp is steeper than declared by some `ramp_angle_sd_deg`, in each clip on its own.
+
+    Clips at several angles tell friction and scale by the differences of the angles, and no
+    better than these are known. In a flight it is gravity that points so far forward of the
+    picture's vertical (`vertical_sd_deg`).
+    """
+
+    name: ClassVar[str] = "declared_angle"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """How much steeper, rad; none where the angle is taken at its word."""
+        if not scene.angle_sd_rad:
+            return ()
+        prior = Normal(0.0, scene.angle_sd_rad)
+        return (Parameter("declared_angle", "rad", prior, 0.0, "nuisance", 0.1),)
+
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+        """Of the ramp alone."""
+        if not scene.angle_sd_rad:
+            return None
+        steeper = theta["declared_angle"]
+        return steeper, 0.0 * steeper

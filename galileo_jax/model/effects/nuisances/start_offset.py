@@ -1,0 +1,33 @@
+"""Start offset: each object starts a few millimetres from where it was marked."""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.parameters import Normal, Parameter
+
+SD_M = 0.003  # a point set by hand, sizes told to a millimetre
+
+
+class StartOffset(Effect):
+    """Moves each start along the object's path, downhill positive.
+
+    For object 1 it is the distance to the foot, for the others the gap before they are hit.
+    """
+
+    name: ClassVar[str] = "start_offset"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """One per object, m."""
+        if not scene.has_table:
+            return ()
+        return tuple(
+            Parameter(f"start_offset_{name}", "m", Normal(0.0, SD_M), 0.0, "nuisance", 0.15)
+            for name in scene.names
+        )
+
+    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
+        """Moves every centre along its surface."""
+        if not self.parameters(scene):
+            return path_m
+        offsets = [theta[f"start_offset_{name}"] for name in scene.names]
+        return path_m + offsets[0].__array_namespace__().stack(offsets, axis=-1)

@@ -1,0 +1,150 @@
+"""What a look at a clip suggests of its laws' parameters: the middles and widths of priors.
+
+The widths are many times what the fit will tell. A search must begin somewhere: a swing whose
+period is off by a half has a misfit that says nothing of where to go.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.model.effects.air import expected_drags
+from galileo_jax.model.effects.effect import FALL_LENGTH
+from galileo_jax.model.effects.nuisances.perspective import Perspective
+from galileo_jax.observation.observation import Observation
+
+START_FRAMES = 6  # the start's velocity is read off so many
+START_SD_M_S = 1.0
+PERIOD_SD, MANY_PERIODS = 0.3, 400  # of its logarithm; tried
+FLOOR_SD_M = 0.005  # as a declared height is known
+UNKNOWN_RADIUS_M = 0.05  # half the height of an object whose size nobody declared
+DENSITY_RATIO = (0.5, 0.8)  # steel in water 0.13, a bubble 800
+WEIGHED_RATIO_SD = 0.03  # where density, mass and size are declared
+EYE_M = 1.6  # as high as a camera is held
+DISTANCE = 1.5  # of the camera from a high fall, in its lengths: it fills half of the picture
+UNKNOWN_M_S, UNKNOWN_M = 10.0, 3.0  # widths where nobody knows how long a metre is
+
+
+def expected(
+    clip: Clip, observation: Observation, half_height_m: float
+) -> Mapping[str, tuple[float, float]]:
+    """The two numbers of each prior, by the parameter's name; of every law that might ask.
+
+    Empty where the objects slide on a ramp.
+    """
+    if SCENARIOS[clip.scenario].has_ramp:
+        return {}
+    seen = np.flatnonzero(observation.mask[0])
+    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
+    down_m = place_m[1, 0] - place_m[1]
+    velocity = _start_velocity(times_s, place_m)
+    known = clip.is_scale_known
+    middle = (float(down_m.min()) + float(down_m.max())) / 2
+    width = float(np.ptp(down_m))
+
+    def start(value: float) -> tuple[float, float]:
+        return (value, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
+
+    return {
+        "start_velocity_x": start(velocity[0]),
+        "start_velocity_y": start(velocity[1]),
+        "start_speed": start(-velocity[1]),
+        "rest": (middle, max(width, 0.01)) if known else (0.0, UNKNOWN_M),
+        "period": (_period_s(times_s, down_m), PERIOD_SD),
+        "density_ratio": _density_ratio(clip),
+        "floor_height": _floor_height(clip, place_m[1], half_height_m),
+        **(_high_fall(clip, float(down_m.max())) if clip.scenario == "fall" and known else {}),
+    }
+
+
+def _high_fall(clip: Clip, length_m: float) -> dict[str, tuple[float, float]]:
+    """How a high fall is seen, and what the air does there; nothing where it is low."""
+    found, declared = pitched(length_m), clip.objects[0]
+    if found and declared.shape == "sphere" and declared.size_m is not None:
+        found |= expected_drags(declared.size_m[0], length_m, clip.gravity)
+    return found
+
+
+def pitched(length_m: float) -> dict[str, tuple[float, float]]:
+    """What a camera that is held at eye height and aimed at the middle of a fall makes of it.
+
+    Nothing where the fall is so low that its middle can be at eye height. Else the camera looks
+    up (or, from where the fall begins, down) by atan t, and the scale changes along the fall by
+    p = t / (DISTANCE (1 + t^2)).
+    """
+    above_m = length_m / 2 - EYE_M
+    if above_m <= 0:
+        return {}
+    slope = above_m / (DISTANCE * length_m)
+    change = slope / (DISTANCE * (1 + slope**2))
+    return {Perspective.name: (0.0, change), FALL_LENGTH: (length_m, 0.0)}
+
+
+def _start_velocity(times_s: np.ndarray, place_m: np.ndarray) -> tuple[float, float]:
+    """The velocity `(x, y)` in the first frame, m/s, from a parabola through the first few."""
+    count = min(len(times_s), START_FRAMES)
+    if count < 2:
+        return 0.0, 0.0
+    after = times_s[:count] - times_s[0]
+    x, y = (np.polyfit(after, row[:count], min(2, count - 1))[-2] for row in place_m)
+    return float(x), float(y)
+
+
+def _period_s(times_s: np.ndarray, down_m: np.ndarray) -> float:
+    """The period of the sine that leaves least over, s (a least-squares periodogram)."""
+    if len(times_s) < 5:
+        return 1.0
+    span = float(times_s[-1] - times_s[0])
+    step = float(np.median(np.diff(times_s)))
+    periods = np.geomspace(3 * step, 2 * span, MANY_PERIODS)
+    left = []
+    for period in periods:
+        turn = 2 * math.pi * (times_s - times_s[0]) / period
+        design = np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1)
+        solution = np.linalg.lstsq(design, down_m, rcond=None)[0]
+        left.append(np.sum((down_m - design @ solution) ** 2))
+    return float(periods[np.argmin(left)])
+
+
+def _density_ratio(clip: Clip) -> tuple[float, float]:
+    """Liquid over object: the middle and the width of its logarithm."""
+    declared = clip.objects[0]
+    volume = volume_m3(declared)
+    if clip.liquid_density is None or declared.mass_kg is None or volume is None:
+        return DENSITY_RATIO
+    return clip.liquid_density * volume / declared.mass_kg, WEIGHED_RATIO_SD
+
+
+def volume_m3(declared: ClipObject) -> float | None:
+    """Of an object; None where its size is not known."""
+    size = declared.size_m
+    if size is None:
+        return None
+    match declared.shape:
+        case "box":
+            return math.prod(size)
+        case "cylinder":
+            return math.pi * size[0] ** 2 * size[1]
+        case "torus":
+            return 2 * math.pi**2 * size[0] * size[1] ** 2
+        case "sphere":
+            return 4 / 3 * math.pi * size[0] ** 3
+
+
+def _floor_height(clip: Clip, y_m: np.ndarray, half_height_m: float) -> tuple[float, float]:
+    """How high the centre is when the object touches the floor, y as measured.
+
+    Where it is not declared: a little below the lowest place seen, by what the object goes
+    from frame to frame there.
+    """
+    if isinstance(clip.floor, float):
+        if clip.objects[0].size_m is None:
+            return clip.floor + UNKNOWN_RADIUS_M / 2, UNKNOWN_RADIUS_M / 2
+        return clip.floor + half_height_m, FLOOR_SD_M
+    lowest = int(np.argmin(y_m))
+    near = y_m[max(lowest - 1, 0) : lowest + 2]
+    step = float(np.ptp(near)) + FLOOR_SD_M
+    return float(y_m[lowest]) - step / 4, step / 2

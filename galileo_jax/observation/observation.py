@@ -1,0 +1,36 @@
+"""An observation: what was measured, in metres and seconds, with its errors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+NOMINAL_SCALE_PX_PER_M = 500.0
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Measured positions of the objects; the model is compared with these.
+
+    Axes: x along the travel (positive in the direction of `Clip.direction`), y up;
+    the origin is the foot of the ramp at table level. The point followed is the
+    object's centre up to an unknown constant offset of a few millimetres.
+
+    Attributes:
+      names: the objects' names.
+      times_s: `[frame]`, s.
+      position_m: `[object, 2, frame]`, m; NaN where `mask` is False.
+      covariance_m2: `[object, 2, 2, frame]`, m^2, tracking error of each frame (independent
+        between frames).
+      mask: `[object, frame]`, True where the point was measured.
+    """
+
+    names: tuple[str, ...]
+    times_s: np.ndarray
+    position_m: np.ndarray
+    covariance_m2: np.ndarray
+    mask: np.ndarray
+
+    @property
+    def velocity_m_s(self) -> np.ndarray:
+        """The velocity profile `[object, 2, frame - 1]`, m/s (Galileo's comparison space)."""
+        return np.diff(self.position_m, axis=-1) / np.diff(self.times_s)

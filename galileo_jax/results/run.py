@@ -1,0 +1,92 @@
+"""A run: what `fit` leaves in its folder, and what later commands read from it.
+
+DIR/result.json       numbers, by contract (DESIGN.md 2.3)
+DIR/observation.csv   the track in metres with its covariance
+DIR/clip.yaml         the clip as fitted, overrides included
+DIR/posterior.nc      draws of all parameters (ArviZ InferenceData)
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.schema import Clip, ClipFile
+from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
+from galileo_jax.files.atomic_write import write_json, write_text
+from galileo_jax.inference.build_problem import make_problem
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.problem import Problem
+from galileo_jax.model.effects.registry import load_file, load_library, make_effects
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
+
+RESULT, OBSERVATION = "result.json", "observation.csv"
+CLIP, POSTERIOR = "clip.yaml", "posterior.nc"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A finished fit.
+
+    Attributes:
+      folder: where it is.
+      clip: as fitted.
+      problem: observation, model and engine, as fitted.
+      posterior: draws in the parameters' units, names as `trials.names`.
+      result: result.json.
+    """
+
+    folder: Path
+    clip: Clip
+    problem: Problem
+    posterior: Posterior
+    result: dict[str, Any]
+
+    @property
+    def trials(self) -> JointProblem:
+        """The problem alone."""
+        return JointProblem((self.problem,))
+
+
+def save_run(
+    folder: Path, clip: Clip, observation: Observation, posterior: Posterior, result: dict[str, Any]
+) -> None:
+    """Writes a run; result.json last, so that a folder with it is complete."""
+    keys = clip.model_dump(mode="json", include=set(ClipFile.model_fields))
+    for key in ("video", "track"):
+        if (file := getattr(clip, key)) is not None:
+            keys[key] = str(Path(file).resolve())
+    write_text(folder / CLIP, yaml.safe_dump(keys, sort_keys=False))
+    write_observation_csv(folder / OBSERVATION, observation)
+    posterior.to_netcdf(folder / POSTERIOR)
+    write_json(folder / RESULT, result)
+
+
+def load_run(folder: Path, engine: str = "auto") -> Run:
+    """Reads a run.
+
+    Raises:
+      InputError: not a folder that `fit` has finished; names the file that is missing.
+    """
+    folder = Path(folder)
+    if not (folder / RESULT).is_file():
+        raise InputError(f"{folder}: no {RESULT}; a folder written by `galileo fit` expected")
+    try:
+        result = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{folder / RESULT}: not JSON ({error})") from error
+    clip = load_clip(folder / CLIP)
+    observation = read_observation_csv(folder / OBSERVATION)
+    posterior = Posterior.from_netcdf(folder / POSTERIOR)
+    load_library()
+    for path in result.get("effects_from", []):
+        load_file(path)
+    effects = make_effects(result["effects"])
+    motion = result.get("motion", "planar")
+    problem = make_problem(clip, observation, engine, effects, motion=motion)
+    return Run(folder, clip, problem, posterior, result)

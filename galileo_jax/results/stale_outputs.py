@@ -1,0 +1,73 @@
+"""What other commands left in a run's folder, and whether a new fit makes it wrong.
+
+A prediction continues the fit that lay there: with a new fit it is wrong, and one command makes
+it again, so that its files go. A comparison and a diagnosis say of the clip what they say, whatever
+is fitted later: they stay, and are told of where they were made of another track.
+"""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.observation.observation import Observation
+
+PREDICTION = "prediction.json"
+PICTURES = ("prediction.svg", "prediction.html", "first_and_last.png")  # those of `predict`
+PREDICTION_KEYS = {"run", "seconds_beyond_clip_s", "version"}  # what makes the file one of ours
+DOCUMENTS = {"compare": "compare/compare.json", "diagnose": "diagnosis/diagnosis.json"}
+TRACKS = "tracks"  # key of those documents: the digests of what they were made of
+RUN_FILES = ("clip.yaml", "observation.csv", "report.html")
+
+
+def digest(observation: Observation) -> str:
+    """What tells one track from another: names, times, which points were seen and where."""
+    found = hashlib.sha256(json.dumps(observation.names).encode())
+    seen = np.where(observation.mask[:, None], observation.position_m, 0.0)
+    for array in (observation.times_s, seen, observation.mask):
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()[:16]
+
+
+def forget_prediction(folder: Path) -> bool:
+    """Removes what `predict` wrote of the fit that lay in `folder`; returns whether it had."""
+    found = _document(folder / PREDICTION)
+    if not found.keys() >= PREDICTION_KEYS:
+        return False
+    for name in (PREDICTION, *PICTURES):
+        (folder / name).unlink(missing_ok=True)
+    return True
+
+
+def forget_single_run(folder: Path) -> None:
+    """Removes what makes `folder` the run of one clip, where now several are fitted together."""
+    if (folder / "result.json").is_file() and (folder / "clip.yaml").is_file():
+        for name in RUN_FILES:
+            (folder / name).unlink(missing_ok=True)
+
+
+def outdated(folder: Path, observations: Sequence[Observation]) -> list[str]:
+    """One sentence for every comparison and diagnosis below `folder` of other tracks."""
+    now = [digest(observation) for observation in observations]
+    told = []
+    for verb, name in DOCUMENTS.items():
+        document = _document(folder / name)
+        if document.get(TRACKS, now) != now:
+            clips = " ".join(map(str, document.get("clips", [])))
+            told.append(
+                f"{(folder / name).parent}: made of an earlier track; "
+                f"make it again: galileo {verb} {clips}"
+            )
+    return told
+
+
+def _document(path: Path) -> dict[str, Any]:
+    """A JSON document; empty where there is none."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return found if isinstance(found, dict) else {}

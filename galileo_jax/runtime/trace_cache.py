@@ -1,0 +1,145 @@
+"""Jitted functions that are traced once per machine, not once per process.
+
+JAX's persistent cache keeps what XLA makes of a program, but every process still traces it in
+Python first: seconds for a Levenberg-Marquardt step. A `kept` function leaves the traced program
+(`jax.export`) beside that cache; later processes read it in tens of milliseconds.
+
+A program is found by its name, its static arguments, the shapes of the others, and a hash of all
+code that it could depend on: this package's sources and the versions of the libraries below.
+"""
+
+import contextlib
+import functools
+import hashlib
+import threading
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from jax.core import Tracer
+
+from galileo_jax.files.atomic_write import replacing
+
+FOLDER = "traces"  # in that of JAX's cache
+LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "lineax", "optimistix")
+# LAPACK's routines may change with jaxlib; programs of another jaxlib are not read.
+LAPACK = tuple(
+    jax.export.DisabledSafetyCheck.custom_call(name)
+    for name in ("lapack_dormqr_ffi", "lapack_sormqr_ffi")
+)
+
+
+def kept(num_static: int) -> Callable[[Callable[..., Any]], "Kept"]:
+    """Decorates a function of `num_static` static arguments, then PyTrees of arrays.
+
+    It returns arrays, or tuples of them, and is jitted as it is where its program cannot be kept:
+    inside another trace, on several devices, with JAX's cache off, or where a static argument
+    comes from outside this package (a user's effect, which may change unseen).
+    """
+    return lambda function: Kept(function, num_static)
+
+
+class Kept:
+    """See `kept`."""
+
+    def __init__(self, function: Callable[..., Any], num_static: int):
+        functools.update_wrapper(self, function)
+        self._function, self._num_static = function, num_static
+        self._jitted = jax.jit(function, static_argnums=tuple(range(num_static)))
+        self._programs: dict[Any, Callable[..., Any]] = {}
+        self._lock = threading.Lock()
+
+    def __call__(self, *args: Any) -> Any:
+        """Runs the function."""
+        static, traced = args[: self._num_static], args[self._num_static :]
+        leaves, tree = jax.tree.flatten(traced)
+        if any(isinstance(leaf, Tracer) for leaf in leaves):
+            return self._jitted(*args)
+        leaves = [leaf if isinstance(leaf, jax.Array) else np.asarray(leaf) for leaf in leaves]
+        shapes = tuple((leaf.shape, leaf.dtype) for leaf in leaves)
+        # The setting may be the calling thread's own; dtypes of constants follow it.
+        key = (static, tree, shapes, _setting("jax_enable_x64"))
+        program = self._programs.get(key)
+        if program is None:
+            with self._lock:  # parts of a batch come on threads: one of them traces
+                program = self._programs.get(key) or self._program(key)
+                self._programs[key] = program
+        return program(leaves)
+
+    def _program(self, key: Any) -> Callable[..., Any]:
+        """Reads the program, or traces and writes it; maps leaves to the function's result."""
+        static, tree, shapes, is_64_bit = key
+
+        def flat(leaves: list[Any]) -> Any:
+            return self._function(*static, *jax.tree.unflatten(tree, leaves))
+
+        folder, text = _folder(), _text(static)
+        if folder is None or text is None:
+            return jax.jit(flat)
+        names = (self._function.__module__, self._function.__qualname__, text, str(tree))
+        wanted = repr((*names, [(s, str(d)) for s, d in shapes], is_64_bit, _code()))
+        path = (
+            folder / f"{self._function.__name__}-{hashlib.sha256(wanted.encode()).hexdigest()[:32]}"
+        )
+        program = _read(path) or _write(path, flat, shapes)
+
+        def call(leaves: list[Any]) -> Any:
+            return program(leaves)
+
+        call.__name__ = self._function.__name__  # for JAX's logs and profiles
+        return jax.jit(call)
+
+
+def _folder() -> Path | None:
+    """Where programs are kept; None: nowhere."""
+    cache = _setting("jax_compilation_cache_dir")
+    if not cache or not _setting("jax_enable_compilation_cache") or jax.device_count() > 1:
+        return None
+    return Path(cache) / FOLDER
+
+
+def _setting(name: str) -> Any:
+    return getattr(jax.config, name)  # also what a thread has set for itself
+
+
+def _read(path: Path) -> Callable[..., Any] | None:
+    try:
+        return jax.export.deserialize(bytearray(path.read_bytes())).call
+    except Exception:  # not there, or damaged, which raises anything: it is made again
+        return None
+
+
+def _write(path: Path, flat: Callable[..., Any], shapes: Any) -> Callable[..., Any]:
+    described = [jax.ShapeDtypeStruct(shape, dtype) for shape, dtype in shapes]
+    program = jax.export.export(jax.jit(flat), disabled_checks=LAPACK)(described)
+    # A cache that cannot be written is no reason to stop.
+    with contextlib.suppress(OSError), replacing(path) as temporary:
+        temporary.write_bytes(program.serialize())
+    return program.call
+
+
+def _text(static: Any) -> str | None:
+    """A static argument's name, the same in every process; None where it has none."""
+    if isinstance(static, tuple):
+        parts = [_text(part) for part in static]
+        return None if None in parts else f"({', '.join(filter(None, parts))})"
+    if isinstance(static, str | int | float | bool) or static is None:
+        return repr(static)
+    owner = static if hasattr(static, "__qualname__") else type(static)
+    is_ours = owner.__module__.split(".")[0] == __name__.split(".")[0]
+    return f"{owner.__module__}.{owner.__qualname__}" if is_ours else None
+
+
+@functools.cache
+def _code() -> str:
+    """Hash of all that a program's text may depend on, but for its arguments."""
+    package = Path(__file__).parents[1]
+    found = hashlib.sha256(jax.default_backend().encode())
+    for name in LIBRARIES:
+        found.update(f"{name} {version(name)}".encode())
+    for path in sorted(package.rglob("*.py")):
+        found.update(str(path.relative_to(package)).encode() + b"\0" + path.read_bytes())
+    return found.hexdigest()

@@ -1,0 +1,87 @@
+"""What stands in NAME.truth.json; y along the travel and z up, as in clips made elsewhere."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.simulation.declared import Declared
+from galileo_jax.simulation.motion import Motion
+from galileo_jax.simulation.truth import Truth
+
+
+def truth_record(
+    truth: Truth, declared: Declared, motion: Motion, frames: Motion
+) -> dict[str, Any]:
+    """The experiment, what was hidden in it, and what became of it.
+
+    Args:
+      truth: the experiment.
+      declared: what was said of it.
+      motion: from the release on.
+      frames: at the times of the clip's frames.
+    """
+    parameters = {
+        effect.name: [p for p in effect.parameters(truth.surroundings) if p.role == "effect"]
+        for effect in truth.effects
+    }
+    hidden = {name: found for name, found in parameters.items() if found}
+    names = [parameter.name for found in hidden.values() for parameter in found]
+    values = truth.effect_values
+    stand_m = (truth.object2_x_m, *truth.beyond_x_m)[: len(truth.objects) - 1]
+    events = motion.events_s(truth)
+    return {
+        "engine": "galileo_jax",
+        "effect": "+".join(hidden) or "none",
+        "effect_parameters": {name: values[name] for name in names},
+        "nuisances": {name: value for name, value in values.items() if name not in names},
+        "scenario": truth.scenario,
+        "objects": len(truth.objects),
+        **truth.known,
+        "gravity": truth.gravity,
+        "ramp_angle_deg_true": truth.ramp_angle_deg,
+        "ramp_angle_deg_declared": declared.ramp_angle_deg,
+        "release_m": truth.release_m,
+        **{f"object{i}_y_m": place for i, place in enumerate(stand_m, 2)},
+        **{f"size{i}_m": each.size_m for i, each in enumerate(truth.objects, 1)},
+        "events_s": {
+            name: None if time is None else round(time + declared.release_s, 4)
+            for name, time in events.items()
+        },
+        **_off_the_plane(truth, motion),
+        "trajectory": {"t": _rounded(frames.times_s + declared.release_s)}
+        | {each.name: _trajectory(frames, i) for i, each in enumerate(truth.objects)},
+        "frames": len(frames.times_s),
+        "fps_true": declared.true_fps,
+        "fps_declared": declared.fps,
+    }
+
+
+def _trajectory(frames: Motion, index: int) -> Mapping[str, list[Any]]:
+    return {
+        "y": _rounded(frames.position_m[index, 0]),
+        "z": _rounded(frames.position_m[index, 1]),
+        "pitch": _rounded(frames.pitch_rad[index]),
+        "vy": _rounded(frames.velocity_m_s[index, 0]),
+        "vz": _rounded(frames.velocity_m_s[index, 1]),
+    } | _turned(frames, index)
+
+
+def _off_the_plane(truth: Truth, motion: Motion) -> Mapping[str, Any]:
+    """Of free motion: that it is, and where the objects stand across the travel."""
+    if motion.z_m is None:
+        return {}
+    return {"motion": "free", "z_m": {each.name: each.z_m for each in truth.objects}}
+
+
+def _turned(frames: Motion, index: int) -> dict[str, list[Any]]:
+    if frames.z_m is None or frames.quaternion is None:
+        return {}
+    return {
+        "across": _rounded(frames.z_m[index]),
+        "quaternion": _rounded(frames.quaternion[index].T),
+    }
+
+
+def _rounded(values: np.ndarray) -> list[Any]:
+    return np.round(values, 6).tolist()

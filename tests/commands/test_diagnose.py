@@ -1,0 +1,173 @@
+"""`galileo diagnose`: diagnosis.json by contract, a hidden effect is found, wrong calls."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.commands import command, diagnose, simulate
+from galileo_jax.diagnosis import diagnose as loop
+from galileo_jax.diagnosis.document import diagnosis_document
+from galileo_jax.diagnosis.last_model import by_itself
+from galileo_jax.files.atomic_write import write_json
+from galileo_jax.inference.build_problem import make_problem
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.results.run import load_run
+from tests.clip.broken_clips import BROKEN_CLIPS, build_good_track
+from tests.found import diagnosis_of, fit_of, make_trials
+from tests.oracle_run import HIT, make_run
+from tests.precision import in_64_bit
+
+ENTRY = {"mean", "sd", "q025", "q975", "unit", "identified"}
+PLACE = {"object", "axis", "phase", "rmse", "noise", "z"}
+CANDIDATE = {"effect", "parameters", "rmse", "chi2_per_dof", "score", "probability"}
+STATUSES = ("none", "named", "ambiguous", "unknown")
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
+@pytest.fixture(scope="module")
+def trials(tmp_path_factory):
+    with in_64_bit():
+        return make_trials(tmp_path_factory.mktemp("clip"))
+
+
+def check_contract(document):
+    """DESIGN.md 2.4."""
+    assert isinstance(document["adequate"], bool)
+    assert 0 <= document["p_value"] <= 1
+    assert all(set(place) >= PLACE for place in document["where"])
+    for candidate in document["candidates"]:
+        assert set(candidate) >= CANDIDATE | {"confounded_with"}
+        assert all(set(entry) >= ENTRY for entry in candidate["parameters"].values())
+        assert {"k1"} <= set(candidate["parameters"])
+    scores = [candidate["score"] for candidate in document["candidates"]]
+    assert scores == sorted(scores, reverse=True), "best first"
+    status, effects = document["verdict"]["status"], document["verdict"]["effects"]
+    assert status in STATUSES
+    assert bool(effects) == (status in ("named", "ambiguous"))
+    assert document["history"][0]["effects"] == []
+    for row in document["history"]:
+        assert set(row) >= {"effects", "rmse", "chi2_per_dof", "p_value", "k1"}
+
+
+@pytest.mark.parametrize("status", STATUSES)
+def test_the_document_keeps_the_contract(status, trials, tmp_path):
+    document = diagnosis_document(trials, diagnosis_of(trials, status), 0)
+    write_json(tmp_path / "diagnosis.json", document)
+    document = json.loads((tmp_path / "diagnosis.json").read_text())
+    check_contract(document)
+    assert document["verdict"]["status"] == status
+    first = document["candidates"][0]
+    assert set(first["parameters"]) == {"m1", "k1", "m2", "k2", "air_drag"}, "only its own"
+    assert first["parameters"]["air_drag"]["unit"] == "kg/m"
+    assert first["confounded_with"] == (["viscous_drag"] if status == "ambiguous" else [])
+    assert ("missing_force" in document) == (status == "unknown")
+    if status == "unknown":
+        missing = document["missing_force"]["objects"]["object1"]
+        assert missing["formula"] == "a1 = 0.99 sin(6 t)"
+        assert missing["acceleration_m_s2"][0] is None, "not known before it moves"
+        assert len(missing["acceleration_m_s2"]) == len(document["missing_force"]["time_s"])
+
+
+def test_a_hypothesis_by_itself_moves_as_in_the_library(trials, tmp_path):
+    """The smaller model gives the same trajectory from the same fit, bit for bit."""
+    run = make_run(tmp_path, HIT, 1.6)
+    problem = make_problem(run.clip, run.problem.observation, "rigid", make_effects(["air_drag"]))
+    part, fit = JointProblem((problem,)), fit_of(trials, ("air_drag",))
+    alone = by_itself(fit, trials, part)
+    assert alone.free.all()
+    assert alone.jacobian.shape == (part.num_values, len(part.model_parameters))
+    whole = trials.problems[0].simulate(trials.of_clip(trials.theta(fit.z, fit.free), 0))
+    np.testing.assert_array_equal(problem.simulate(part.of_clip(part.theta(alone.z), 0)), whole)
+    with pytest.raises(ValueError, match="has not"):
+        by_itself(fit_of(trials, ("viscous_drag",)), trials, part)
+
+
+@pytest.mark.slow
+def test_finds_what_was_hidden(tmp_path, capsys):
+    """A csv track with strong air drag: told, added, the error falls, and the run can be read."""
+    words = ["--track-only", "--effect", "air_drag", "--strength", "0.7", "--seed", "3"]
+    assert command.run(simulate.main, [*words, "--out", str(tmp_path / "a.csv")]) == 0
+    out = tmp_path / "out"
+    capsys.readouterr()
+    assert command.run(diagnose.main, [str(tmp_path / "a.csv"), "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    document = json.loads((out / "diagnosis.json").read_text())
+    check_contract(document)
+    assert not document["adequate"]
+    assert "air_drag" in document["verdict"]["effects"]
+    before, after = document["history"][0], document["history"][-1]
+    assert after["effects"] == ["air_drag"]
+    assert after["chi2_per_dof"] < 1.5 < before["chi2_per_dof"]
+    assert after["rmse"] < 1.1 * after["noise"]
+    assert "truth: air_drag" in told
+    assert "next: galileo fit" in told and "--effects air_drag" in told
+    rows = [line for line in told.splitlines() if line.startswith(("no effects", "air_drag"))]
+    assert len(rows) >= 2, "one row per round"
+    run = load_run(out / "model")
+    assert run.result["effects"] == ["air_drag"]
+    assert "air_drag" in run.posterior.names
+    assert (out / "report.html").is_file()
+
+
+def test_what_has_no_place_is_no_candidate(tmp_path):
+    """One object on a slope: nothing to hit, no table."""
+    clip = build_good_track(tmp_path)
+    words = [str(clip), "--add", "restitution", "--out", str(tmp_path / "out")]
+    with pytest.raises(diagnose.InputError, match="restitution has no place in"):
+        diagnose.main(words)
+
+
+def test_ctrl_c_leaves_nothing_half_done(tmp_path, capfd, monkeypatch):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(loop, "diagnose", stopped)
+    clip, out = build_good_track(tmp_path), tmp_path / "out"
+    assert command.run(diagnose.main, [str(clip), "--out", str(out)]) == 130
+    assert "stopped" in capfd.readouterr().err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("broken", BROKEN_CLIPS[:3], ids=lambda broken: broken.id)
+def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
+    folder, out = tmp_path / "folder", tmp_path / "out"
+    folder.mkdir()
+    assert command.run(diagnose.main, [str(broken.build(folder)), "--out", str(out)]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert all(word in line for word in broken.words)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--add", "nonsense"], "--add: unknown 'nonsense'; known: auto, none, air_drag"),
+        (["--effects-from", "missing.py"], "missing.py: no such file"),
+        (["--engine", "foo"], "--engine: invalid choice: 'foo'"),
+        (["--seed", "-1"], "'-1' is no whole number"),
+        (["--out", "clip.yaml"], "is a file; a folder expected"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_wrong_call_is_one_line(words, said, tmp_path, capfd, monkeypatch):
+    clip = build_good_track(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert command.run(diagnose.main, [str(clip), *words]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert said in line
+    assert not Path("runs").exists()
+
+
+def test_a_damaged_truth_is_said(tmp_path, capfd):
+    clip = build_good_track(tmp_path)
+    (tmp_path / "clip.truth.json").write_text('{"m1": 1}')
+    assert command.run(diagnose.main, [str(clip)]) == 2
+    assert "clip.truth.json: not a truth with an effect" in capfd.readouterr().err

@@ -1,0 +1,91 @@
+"""A frame rate wrong by a factor is told of, with the likely one; effects are not taken for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_csv import write_observation_csv
+from galileo_jax.measurement.check_frame_rate import apparent_gravity, clock_doubt
+from galileo_jax.measurement.measure import measure
+from galileo_jax.observation.observation import Observation
+from tests.oracle_run import HIT, make_run
+from tests.reference_ramp import solve
+
+NOISE_M = 2e-4
+FPS = 60.0
+
+
+def ramp(tmp_path) -> tuple[Clip, Observation]:
+    """The closed form, at 60 frames/s."""
+    clip = make_run(tmp_path, HIT, 1.6).clip.model_copy(update={"fps": FPS})
+    times = np.arange(96) / FPS
+    centres = solve(HIT, times).position_m
+    noise = NOISE_M * np.random.default_rng(0).standard_normal(centres.shape)
+    covariance = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, ..., None], (2, 2, 2, 96))
+    seen = np.ones((2, 96), bool)
+    return clip, Observation(("object1", "object2"), times, centres + noise, covariance, seen)
+
+
+def fall(tmp_path, gravity: float = 9.81) -> tuple[Clip, Observation]:
+    times = np.arange(40) / FPS
+    away = np.maximum(times - 0.1, 0.0)
+    y = 1.5 - 0.5 * gravity * away**2 + NOISE_M * np.random.default_rng(0).standard_normal(40)
+    position = np.stack([0 * y, y])[None]
+    covariance = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, ..., None], (1, 2, 2, 40))
+    seen = Observation(("ball",), times, position, covariance, np.ones((1, 40), bool))
+    write_observation_csv(tmp_path / "fall.csv", seen)
+    ball = {"name": "ball", "shape": "sphere", "size_m": [0.03]}
+    keys = {"track": "fall.csv", "scenario": "fall", "fps": FPS, "objects": [ball]}
+    (tmp_path / "fall.yaml").write_text(yaml.safe_dump(keys))
+    return load_clip(tmp_path / "fall.yaml"), seen
+
+
+def off(clip: Clip, seen: Observation, factor: float, container: float | None = None):
+    """The same with a rate that is `factor` times the true one."""
+    wrong = clip.model_copy(update={"fps": factor * clip.fps, "container_fps": container})
+    return wrong, replace(seen, times_s=seen.times_s / factor)
+
+
+@pytest.mark.parametrize("make", [ramp, fall])
+def test_the_right_clock_is_not_doubted(make, tmp_path):
+    clip, seen = make(tmp_path)
+    found = apparent_gravity(clip, seen)
+    assert found is not None and found.value == pytest.approx(9.81, rel=0.15)
+    assert clock_doubt(clip, seen) is None
+
+
+@pytest.mark.parametrize("make", [ramp, fall])
+@pytest.mark.parametrize("factor", [0.125, 0.5, 2.0, 10.0])
+def test_a_factor_is_told_with_the_likely_rate(make, factor, tmp_path):
+    clip, seen = make(tmp_path)
+    told = clock_doubt(*off(clip, seen, factor))
+    assert told is not None
+    assert f"fps: {factor * FPS:g}, but" in told and "likely fps: " in told
+    likely = float(told.split("likely fps: ")[1].split()[0])
+    assert likely == pytest.approx(FPS, rel=0.02)
+
+
+def test_the_container_is_believed_where_gravity_agrees(tmp_path):
+    clip, seen = fall(tmp_path)
+    told = clock_doubt(*off(clip, seen, 10.0, container=61.0))
+    assert told is not None and "likely fps: 61, as the container says" in told
+    told = clock_doubt(*off(clip, seen, 10.0, container=30.0))
+    assert told is not None and "container says" not in told
+
+
+@pytest.mark.parametrize("gravity", [5.0, 9.0, 15.0])
+def test_drags_and_small_errors_are_not_taken_for_it(gravity, tmp_path):
+    clip, seen = fall(tmp_path, gravity)
+    assert clock_doubt(clip, seen) is None
+
+
+def test_every_command_that_fits_tells_it(tmp_path, capfd):
+    clip, seen = fall(tmp_path)
+    clip, seen = off(clip, seen, 10.0)
+    write_observation_csv(tmp_path / "fall.csv", seen)
+    assert measure(clip).doubts == (clock_doubt(clip, seen),)
+    assert "likely fps: 60" in capfd.readouterr().err

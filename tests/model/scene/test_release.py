@@ -1,0 +1,44 @@
+"""The release of a clip that does not say when object 1 was let go."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.clip.load import load_clip
+from galileo_jax.measurement.measure import measure
+from galileo_jax.model.scene.scene import build_scene
+
+HELD_S = 0.4
+YAML = """\
+track: held.csv
+scenario: ramp
+ramp_angle_deg: 20.0
+objects: [{name: object1, shape: box, size_m: [0.06, 0.05, 0.06], first_frame: FRAME}]
+"""
+
+
+def write_track(folder: Path, first_frame: str) -> Path:
+    """A box that is held for `HELD_S`, comes down the ramp and goes on along the table."""
+    times, angle = np.arange(60) / 30, math.radians(20.0)
+    since = np.clip(times - HELD_S, 0, None)
+    along = -0.4 + 0.5 * 2.0 * since**2
+    x = np.where(along < 0, along * math.cos(angle) + 0.03 * math.sin(angle), along)
+    y = np.where(along < 0, -along * math.sin(angle) + 0.03 * math.cos(angle), 0.03)
+    x, y = np.array([x, y]) + np.random.default_rng(2).normal(0, 5e-4, (2, 60))
+    rows = [f"{t:.6f},{a:.6f},{b:.6f},0.0005" for t, a, b in zip(times, x, y, strict=True)]
+    (folder / "held.csv").write_text(
+        "\n".join(["time_s,object1_x_m,object1_y_m,object1_sd_m", *rows]) + "\n"
+    )
+    path = folder / "held.yaml"
+    path.write_text(YAML.replace("FRAME", first_frame))
+    return path
+
+
+@pytest.mark.parametrize("first_frame, sd_s", [("12", 1 / 90), ("null", 0.1)])
+def test_release(first_frame: str, sd_s: float, tmp_path: Path) -> None:
+    measured = measure(load_clip(write_track(tmp_path, first_frame)))
+    found = build_scene(measured.clip, measured.observation).surroundings.release_s
+    assert found[0] == pytest.approx(HELD_S, abs=sd_s / 3)
+    assert found[1] == pytest.approx(sd_s, rel=1e-4)
