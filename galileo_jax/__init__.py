@@ -1,3 +1,114 @@
-"""From a video of a sliding object to its masses and friction coefficients."""
+"""From a video of sliding objects to their masses and friction coefficients.
+
+    import galileo_jax as gx
+
+    track = gx.track("clip.mp4")                    # where the objects are, in metres
+    fit = gx.fit(track)                             # masses and frictions, with intervals
+    check = gx.compare(fit)                         # is the model adequate, and where does it fail?
+    found = gx.diagnose(track)                      # which effect is missing?
+    better = gx.fit(track, effects=found.verdict.effects)
+    ahead = gx.predict(better, seconds=2.0)
+
+The names below are public, and nothing else in the package is. None of the functions prints, and
+none depends on the JAX precision of its caller. Errors that a user can mend are `InputError`.
+Everything is imported when it is first used.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from galileo_jax.api.catalogue import effects, scenarios
+    from galileo_jax.api.clips import load
+    from galileo_jax.api.compare import Comparison, compare
+    from galileo_jax.api.diagnose import Diagnosis, diagnose
+    from galileo_jax.api.fit import fit
+    from galileo_jax.api.fit_result import Fit
+    from galileo_jax.api.predict import Prediction, predict
+    from galileo_jax.api.run import load_run
+    from galileo_jax.api.track import Track, track
+    from galileo_jax.clip.schema import Clip
+    from galileo_jax.model.effects.effect import (
+        Array,
+        Effect,
+        Force,
+        Friction,
+        State,
+        Surroundings,
+        Theta,
+    )
+    from galileo_jax.model.effects.registry import register as register_effect
+    from galileo_jax.model.parameters import HalfNormal, LogNormal, Normal, Parameter, Uniform
+    from galileo_jax.runtime.errors import InputError
+    from galileo_jax.runtime.progress import Cancelled
+
+_PLACES = {
+    "galileo_jax.api.catalogue": ("effects", "scenarios"),
+    "galileo_jax.api.clips": ("load",),
+    "galileo_jax.api.compare": ("Comparison", "compare"),
+    "galileo_jax.api.diagnose": ("Diagnosis", "diagnose"),
+    "galileo_jax.api.fit": ("fit",),
+    "galileo_jax.api.fit_result": ("Fit",),
+    "galileo_jax.api.predict": ("Prediction", "predict"),
+    "galileo_jax.api.run": ("load_run",),
+    "galileo_jax.api.track": ("Track", "track"),
+    "galileo_jax.clip.schema": ("Clip",),
+    "galileo_jax.model.effects.effect": (
+        *("Array", "Effect", "Force", "Friction", "State", "Surroundings", "Theta"),
+    ),
+    "galileo_jax.model.effects.registry": ("register_effect",),
+    "galileo_jax.model.parameters": ("HalfNormal", "LogNormal", "Normal", "Parameter", "Uniform"),
+    "galileo_jax.runtime.errors": ("InputError",),
+    "galileo_jax.runtime.progress": ("Cancelled",),
+}
+_PLACE = {name: place for place, names in _PLACES.items() for name in names}
+_RENAMED = {"register_effect": "register"}  # where a name says too little outside its module
+
+__all__ = [
+    "Array",
+    "Cancelled",
+    "Clip",
+    "Comparison",
+    "Diagnosis",
+    "Effect",
+    "Fit",
+    "Force",
+    "Friction",
+    "HalfNormal",
+    "InputError",
+    "LogNormal",
+    "Normal",
+    "Parameter",
+    "Prediction",
+    "State",
+    "Surroundings",
+    "Theta",
+    "Track",
+    "Uniform",
+    "__version__",
+    "compare",
+    "diagnose",
+    "effects",
+    "fit",
+    "load",
+    "load_run",
+    "predict",
+    "register_effect",
+    "scenarios",
+    "track",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Imports a public name when it is first asked for."""
+    if name not in _PLACE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_PLACE[name]), _RENAMED.get(name, name))
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

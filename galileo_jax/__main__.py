@@ -1,5 +1,6 @@
 """The `galileo` console script: `galileo VERB ...` is `python -m galileo_jax.VERB ...`."""
 
+import difflib
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -20,6 +21,8 @@ VERBS = (
     ("export", "write tracks and fits as csv, parquet or netCDF"),
     ("train", "train and test the neural estimators"),
     ("sweep", "many clips, many ways, from one config"),
+    ("effects", "list the effects that a model can have"),
+    ("scenarios", "list the scenes that a clip can show"),
 )
 
 USAGE = "usage: galileo VERB ..., galileo VERB --help, galileo --version"
@@ -41,7 +44,13 @@ def main(argv: Sequence[str]) -> int | None:
         print(f"galileo {__version__}")
         return 0
     if verb not in dict(VERBS):
-        raise InputError(f"unknown verb {verb!r}; {_known()}")
+        near = difflib.get_close_matches(verb, dict(VERBS), n=1)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        raise InputError(
+            f"unknown verb {verb!r}{hint} {_known()}"
+            if hint
+            else f"unknown verb {verb!r}; {_known()}"
+        )
     return import_module(f"galileo_jax.commands.{verb}").main(rest)
 
 

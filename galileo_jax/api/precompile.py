@@ -1,47 +1,42 @@
-"""What one core can do while another tracks the video: import, and build the programs.
+"""What one core can do while another tracks the video: import, and compile the programs.
 
-Programs are built for a clip that looks as the tracked one will: as many frames, as many objects,
-the same laws. Where it turns out otherwise (sizes that were null), only time is lost.
+Programs are compiled for a clip that looks as the tracked one will: as many frames, as many
+objects, the same laws. Where it turns out otherwise (sizes that were null), only time is lost.
 """
 
 import contextlib
 import threading
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING
 
+import jax
 import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
-from galileo_jax.runtime.jax_setup import set_up
-
-if TYPE_CHECKING:
-    from galileo_jax.inference.fits.gradient import GradientFitter
 
 START_M, APART_M, SD_M = -0.3, 0.3, 1e-4  # on the ramp; between objects; of the track
+NEEDED_LATER = ("galileo_jax.report.write", "matplotlib.figure", "xarray")
 
-Build = Callable[[Sequence[Clip], Sequence[Observation]], "GradientFitter"]
+Compile = Callable[[Sequence[Clip], Sequence[Observation]], None]
 
 
-def work_ahead(clips: Sequence[Clip], build: Build | None) -> threading.Thread:
-    """Starts to import and to compile; to be joined before anything is fitted.
+def precompile(clips: Sequence[Clip], compile_for: Compile | None) -> threading.Thread:
+    """Starts to import and to compile in a thread, to be joined before anything is fitted.
 
     Args:
       clips: of the call.
-      build: makes what will fit them, of clips and observations; None: nothing is compiled.
+      compile_for: compiles what will fit clips and observations of these shapes; None: nothing
+        is compiled.
     """
 
     def work() -> None:
-        set_up()
-        for name in ("galileo_jax.inference.fits.gradient", "galileo_jax.results.run"):
-            import_module(name)
-        # What is wrong is told when it is done in earnest.
-        with contextlib.suppress(Exception):
-            if build is not None:
-                _compile(clips, build)
-            for name in ("galileo_jax.report.write", "matplotlib.figure", "xarray"):
+        # The real calls report what is wrong.
+        with contextlib.suppress(Exception), jax.enable_x64(True):
+            if compile_for is not None:
+                _compile(clips, compile_for)
+            for name in NEEDED_LATER:
                 import_module(name)
 
     thread = threading.Thread(target=work, daemon=True)
@@ -49,10 +44,10 @@ def work_ahead(clips: Sequence[Clip], build: Build | None) -> threading.Thread:
     return thread
 
 
-def _compile(clips: Sequence[Clip], build: Build) -> None:
+def _compile(clips: Sequence[Clip], compile_for: Compile) -> None:
     filmed = [clip for clip in clips if clip.video is not None]
     if filmed and all(SCENARIOS[clip.scenario].has_table for clip in filmed):
-        build(filmed, [_likely(clip) for clip in filmed]).compile()
+        compile_for(filmed, [_likely(clip) for clip in filmed])
 
 
 def _likely(clip: Clip) -> Observation:

@@ -47,10 +47,11 @@ def load_clip(path: str | Path, **overrides: Any) -> Clip:
     The video is decoded once from end to end (under 1 ms per frame of 640 x 360), because a
     header's frame count and rate cannot be trusted.
     """
-    path = Path(path)
+    source, path = str(path), Path(path)
     given = {key: value for key, value in overrides.items() if value is not None}
     if (place := physics101.place_of(path)) and not has_yaml(path):
-        return check_place(place, physics101.read_labels(place.labels), given)
+        clip = check_place(place, physics101.read_labels(place.labels), given)
+        return clip.model_copy(update={"source": source})
     yaml_path = find_yaml(path)
     content = read_mapping(yaml_path)
     is_shared = content.get("video") is not None and is_track(path)
@@ -60,7 +61,8 @@ def load_clip(path: str | Path, **overrides: Any) -> Clip:
     clip = check_clip(yaml_path, content | given, overridden=frozenset(given))
     check_belongs(clip, path)
     # Beside a video the same yaml needs what the track does not.
-    return clip if is_shared else with_unused(clip)
+    clip = clip if is_shared else with_unused(clip)
+    return clip.model_copy(update={"source": source})
 
 
 def with_unused(clip: Clip) -> Clip:

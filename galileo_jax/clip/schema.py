@@ -303,6 +303,7 @@ class Clip(ClipFile):
 
     Attributes:
       path: the yaml.
+      source: what was asked for, as it was written in the call: a video, a track or the yaml.
       video: the video file; None for a csv track.
       track: the track file, ours or another tool's; None for a video.
       track_units: of a track file of another tool, or of its calibration; "px" = pixels.
@@ -331,6 +332,7 @@ class Clip(ClipFile):
     """
 
     path: Path
+    source: str = ""
     is_own_track: bool = False
     frame_count: int
     frame_size_px: tuple[int, int] | None = None

@@ -1,37 +1,65 @@
 """What `fit`, `compare` and `diagnose` have in common on the command line."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.same_objects import check_same_objects, check_scale
 from galileo_jax.clip.schema import Clip
 from galileo_jax.commands import command
 from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.runtime.errors import InputError
 
 
 def add_clip_options(parser: command.Parser, out: str) -> None:
     """Adds what `fit`, `compare` and `diagnose` have in common; `out` is the help of --out."""
     parser.add_argument(
-        "--effects-from", action="append", default=[], metavar="FILE", help="more effects (Python)"
+        "--effects-from",
+        action="append",
+        default=[],
+        metavar="FILE.py",
+        help="Python file that registers more effects (may be given several times)",
     )
-    parser.add_argument("--out", help=out)
-    parser.add_argument("--seed", type=command.whole_number(0), default=0)
-    parser.add_argument("--engine", choices=ENGINES, default="auto")
-    parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
+    parser.add_argument("--out", metavar="DIR", help=out)
+    parser.add_argument(
+        "--seed",
+        type=command.whole_number(0),
+        default=0,
+        help="of everything random; the same seed gives the same numbers (default %(default)s)",
+    )
+    parser.add_argument(
+        "--engine",
+        choices=ENGINES,
+        default="auto",
+        help="what rolls the model out (default %(default)s: rigid)",
+    )
+    parser.add_argument(
+        "--pixels-per-metre",
+        type=float,
+        metavar="SCALE",
+        help="overrides the clip's scale (default: the yaml's)",
+    )
 
 
-def load_clips(paths: Sequence[str], pixels_per_metre: float | None = None) -> list[Clip]:
-    """Loads and checks the clips of a call, trials of the same objects.
+def load_clips(call_clips: Sequence[str], pixels_per_metre: float | None) -> list[Clip]:
+    """The clips of a call, with their warnings printed."""
+    clips = [load_clip(path, pixels_per_metre=pixels_per_metre) for path in call_clips]
+    warn(warning for clip in clips for warning in clip.warnings)
+    return clips
+
+
+def warn(lines: Iterable[str]) -> None:
+    """Prints warnings to stderr, each once."""
+    for line in dict.fromkeys(lines):
+        command.console().print(f"warning: {line}", soft_wrap=True, markup=False)
+
+
+def out_folder(out: str | None, clips: Sequence[Clip], below: str = "") -> Path:
+    """Where a call's results go: `--out`, or runs/ and the clips' names, and a folder in it.
 
     Raises:
-      InputError: a clip is wrong, two have the same name, or they are not trials of the same
-        objects.
+      InputError: it is a file.
     """
-    clips = [load_clip(Path(path), pixels_per_metre=pixels_per_metre) for path in paths]
-    for clip in clips:
-        for warning in clip.warnings:
-            command.console().print(f"warning: {warning}")
-        check_scale(clip)
-    check_same_objects(clips)
-    return clips
+    folder = Path(out) if out else Path("runs") / "+".join(clip.path.stem for clip in clips)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out: {folder} is a file; a folder expected")
+    return folder if out else folder / below

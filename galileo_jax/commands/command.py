@@ -26,7 +26,9 @@ class Parser(argparse.ArgumentParser):
     """
 
     def __init__(self, **given: Any):
-        super().__init__(allow_abbrev=False, **given)
+        # The examples below the options keep their lines.
+        keeps_lines = argparse.RawDescriptionHelpFormatter
+        super().__init__(allow_abbrev=False, formatter_class=keeps_lines, **given)
 
     def error(self, message: str) -> NoReturn:
         """Raises the complaint as an `InputError`."""
@@ -70,6 +72,11 @@ def refuse_ignored(argv: Sequence[str], options: Sequence[str], why: str) -> Non
 def console() -> Console:
     """Progress and notes go to stderr; stdout is for results."""
     return Console(stderr=True, highlight=False)
+
+
+def say(line: str) -> None:
+    """Prints a note to stderr, as it stands."""
+    console().print(line, soft_wrap=True, markup=False)
 
 
 def progress() -> Progress:

@@ -1,226 +1,72 @@
 """`galileo diagnose`: which effect is missing in the model of a clip?"""
 
-import argparse
-import json
-import shlex
-import time
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from galileo_jax import __version__
-from galileo_jax.api.precompile import work_ahead
-from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import Clip
 from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import add_clip_options, load_clips
-from galileo_jax.commands.fit import out_folder, write_fit
-from galileo_jax.files.atomic_write import write_json
-from galileo_jax.measurement.measure import Measurement, inferred, measure
-from galileo_jax.results.stale_outputs import TRACKS, digest
-from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.jax_setup import set_up
+from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
+from galileo_jax.results.truth import hidden_effect
 
 if TYPE_CHECKING:
-    from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
-    from galileo_jax.inference.fits.gradient import GradientFitter
-    from galileo_jax.inference.joint_problem import JointProblem
-    from galileo_jax.observation.observation import Observation
+    from galileo_jax.api.diagnose import Diagnosis
 
 NUM_CANDIDATES = 5
 FRICTIONS = ("k1", "k2")
+EXAMPLES = """examples:
+  galileo diagnose clip.mp4                             what is missing is added
+  galileo diagnose clip1.mp4 clip2.mp4 --add none       trials together; nothing is added
+"""
 
 
 def main(argv: Sequence[str]) -> int | None:
     """Diagnoses clips; writes diagnosis.json, a page, and a run of the model it ends with."""
     call = _parser().parse_args(argv)
     clips = load_clips(call.clips, call.pixels_per_metre)
-    out = out_folder(call, clips)
-    out = out if call.out else out / "diagnosis"
-    hidden = read_hidden(clips[0])
-    _check_effects(call)
-    ahead = work_ahead(clips, lambda some, seen: _fitter(_trials(some, seen, call)))
-    timings, began = {}, time.perf_counter()
-    measured = [measure(clip) for clip in clips]
-    ahead.join()
-    clips = [one.clip for one in measured]
-    timings["track"] = time.perf_counter() - began
-    began = time.perf_counter()
-    diagnosis, trials, record = _diagnose(measured, call)
-    timings["diagnose"] = time.perf_counter() - began
-    document = {
-        "clips": call.clips,
-        TRACKS: [digest(one.observation) for one in measured],
-        **record,
-        **inferred(measured),
-        "left_out": _absent(trials),
-        "engine": trials.problems[0].engine.name,
-        "timings_s": {key: round(value, 3) for key, value in timings.items()},
-        "version": __version__,
-        "seed": call.seed,
-    }
-    write_json(out / "diagnosis.json", document)
-    from galileo_jax.report import findings
-    from galileo_jax.report.diagnosis_page import Told, write_diagnosis_page
+    out = out_folder(call.out, clips, "diagnosis")
+    hidden = hidden_effect(clips[0])
+    from galileo_jax.api.diagnose import diagnose
 
-    go_on = findings.how_to_go_on(diagnosis, call.clips, call.effects_from)
-    print("\n".join(_told(diagnosis, record, go_on, hidden)))
-    with command.console().status("drawing"):
-        again = shlex.join(["galileo", "diagnose", *argv])
-        told = Told(diagnosis, document, go_on, hidden, tuple(clips), again, call.seed)
-        title = ", ".join(one.name for one in measured)
-        write_diagnosis_page(out / "report.html", title, trials, told)
-        _write_model(diagnosis, trials, measured, call, out / "model", timings)
-    command.console().print(f"{out}/diagnosis.json, {out}/report.html, {out}/model", soft_wrap=True)
+    with progress_display() as display:
+        found = diagnose(
+            clips,
+            add=call.add,
+            effects_from=call.effects_from,
+            engine=call.engine,
+            seed=call.seed,
+            on_progress=_RoundPrinter(display),
+        )
+        print("\n".join(_lines(found, hidden)))
+        display("writing the page", 1.0)
+        found.save(out)
+    warn(line for one in found.measurements for line in (*one.remarks, *one.doubts))
+    command.say(f"{out}/diagnosis.json, {out}/report.html, {out}/model")
     return None
 
 
-def read_hidden(clip: Clip) -> str | None:
-    """What NAME.truth.json beside a synthetic clip says was hidden in it; None without.
+class _RoundPrinter:
+    """Prints each round when it is done; shows progress otherwise."""
 
-    It is shown beside the verdict, and nothing else is done with it.
+    def __init__(self, display: ProgressDisplay):
+        self._display = display
+        self._rows: list[Mapping[str, Any]] = []
 
-    Raises:
-      InputError: the file is there and names no effect.
-    """
-    path = clip.path.with_suffix(".truth.json")
-    if not path.is_file():
-        return None
-    try:
-        return str(json.loads(path.read_text(encoding="utf-8"))["effect"])
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: not a truth with an effect ({error})") from error
-
-
-def _check_effects(call: argparse.Namespace) -> None:
-    """Loads the library and the user's files before anything is computed."""
-    from galileo_jax.model.effects.registry import effect_names, load_file
-
-    for path in call.effects_from:
-        load_file(path)
-    known = effect_names()
-    if call.add not in ("auto", "none", *known):
-        raise InputError(f"--add: unknown {call.add!r}; known: auto, none, {', '.join(known)}")
+    def __call__(self, stage: str, share_done: float, partial: Any) -> None:
+        self._display(stage, share_done)
+        if isinstance(partial, dict) and "round" in partial:
+            self._rows.append(partial["round"])
+            if len(self._rows) == 1:
+                self._display.print(_round_head(self._rows[0]))
+            self._display.print(_round_line(self._rows))
 
 
-def _diagnose(
-    measured: Sequence[Measurement], call: argparse.Namespace
-) -> tuple["Diagnosis", "JointProblem", dict[str, Any]]:
-    """The diagnosis, its trials, and diagnosis.json; prints each round when it is done."""
-    set_up()
-    from galileo_jax.diagnosis.diagnose import diagnose
-    from galileo_jax.diagnosis.document import diagnosis_document, history_row
-    from galileo_jax.inference.fits.gradient import Code
-
-    clips, observations = [m.clip for m in measured], [m.observation for m in measured]
-    trials = _trials(clips, observations, call)
-    if call.add not in ("auto", "none", *trials.all_effects):
-        raise InputError(f"--add: {call.add} has no place in {clips[0].path}")
-    rows: list[dict[str, Any]] = []
-    with command.console().status("starting") as status:
-
-        def on_round(one: "Round") -> None:
-            if one.hypothesis.fit.code is Code.FAILED:
-                raise InputError(f"{clips[0].path}: {one.hypothesis.fit.code}")
-            rows.append(history_row(trials, one, call.seed))
-            status.stop()  # the table is for stdout, which a spinner would swallow
-            if len(rows) == 1:
-                print(_round_head(rows[0]))
-            print(_round_line(rows), flush=True)
-            status.start()
-
-        diagnosis = diagnose(
-            trials,
-            seed=call.seed,
-            add=call.add,
-            on_stage=status.update,
-            on_round=on_round,
-        )
-        record = diagnosis_document(trials, diagnosis, call.seed)
-    return diagnosis, trials, record
-
-
-def _fitter(trials: "JointProblem") -> "GradientFitter":
-    """What `diagnose` fits them with."""
-    from galileo_jax.diagnosis.diagnose import fitter_of
-
-    return fitter_of(trials)
-
-
-def _trials(
-    clips: Sequence[Clip], observations: "Sequence[Observation]", call: argparse.Namespace
-) -> "JointProblem":
-    """The joint problem with all effects and nameless forms that have a place in the scene."""
-    from galileo_jax.inference.build_problem import make_joint_problem
-    from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
-    from galileo_jax.model.effects.registry import effect_names, make_effects
-
-    def trials_with(names: Sequence[str]) -> "JointProblem":
-        forms = tuple(form for form in FORMS if form.name in names)
-        effects = make_effects([name for name in names if name not in FORM_NAMES])
-        return make_joint_problem(clips, observations, call.engine, (*effects, *forms))
-
-    without = SCENARIOS[clips[0].scenario].without
-    names = [name for name in (*effect_names(), *FORM_NAMES) if name not in without]
-    trials = trials_with(names)
-    absent = trials.without_place()
-    return trials_with([name for name in names if name not in absent]) if absent else trials
-
-
-def _absent(trials: "JointProblem") -> list[str]:
-    """Effects of the library that were no candidates."""
-    from galileo_jax.model.effects.registry import effect_names
-
-    return [name for name in effect_names() if name not in trials.all_effects]
-
-
-def _write_model(
-    diagnosis: "Diagnosis",
-    trials: "JointProblem",
-    measured: Sequence[Measurement],
-    call: argparse.Namespace,
-    out: Path,
-    timings: dict[str, float],
-) -> None:
-    """A run of the last round's model, as `fit --effects` would leave it but for its page."""
-    from galileo_jax.diagnosis.last_model import by_itself
-    from galileo_jax.inference.build_problem import make_joint_problem
-    from galileo_jax.inference.laplace import laplace_posterior
-    from galileo_jax.model.effects.registry import make_effects
-
-    last = diagnosis.rounds[-1].hypothesis
-    part = make_joint_problem(
-        [one.clip for one in measured],
-        [one.observation for one in measured],
-        call.engine,
-        make_effects(last.effects),
-    )
-    fit = by_itself(last.fit, trials, part)
-    notes: dict[str, Any] = {"engine": part.problems[0].engine.name, "status": fit.code.value}
-    if call.effects_from:
-        notes["effects_from"] = [str(Path(path).resolve()) for path in call.effects_from]
-    write_fit(
-        measured,
-        part,
-        laplace_posterior(part, fit, call.seed),
-        fit.z,
-        out,
-        files=call.clips,
-        method="grad",
-        seed=call.seed,
-        timings=timings,
-        notes=notes,
-        with_pages=False,
-    )
-
-
-def _round_head(first: dict[str, Any]) -> str:
+def _round_head(first: Mapping[str, Any]) -> str:
     """Names of the columns of the table of rounds."""
     frictions = "".join(f"  {name:<28}" for name in FRICTIONS if name in first)
     return f"{'model with':<26}{'rmse m/s':>9}{'chi2/dof':>10}{'p':>9}{frictions}".rstrip()
 
 
-def _round_line(rows: Sequence[dict[str, Any]]) -> str:
+def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
     """The last of the rounds, and how the friction coefficients changed since the one before."""
     from galileo_jax.report import findings
 
@@ -229,36 +75,34 @@ def _round_line(rows: Sequence[dict[str, Any]]) -> str:
     for name in FRICTIONS:
         if name not in row:
             continue
-        told = findings.value_text(row[name])
+        value = findings.value_text(row[name])
         if len(rows) > 1:
-            told += f" ({row[name]['mean'] - rows[-2][name]['mean']:+.4f})"
-        frictions += f"  {told:<28}"
+            value += f" ({row[name]['mean'] - rows[-2][name]['mean']:+.4f})"
+        frictions += f"  {value:<28}"
     return (
         f"{findings.effects_text(row['effects']):<26}{row['rmse']:>9.4f}"
         f"{row['chi2_per_dof']:>10.2f}{findings.p_text(row['p_value']):>9}{frictions}".rstrip()
     )
 
 
-def _told(
-    diagnosis: "Diagnosis", record: dict[str, Any], go_on: str, hidden: str | None
-) -> list[str]:
+def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
     """Candidates, the verdict, and how to go on."""
     from galileo_jax.inference.fits.gradient import BEHIND, Code
     from galileo_jax.report import findings
 
+    diagnosis, record = found.found, found.document
     lines = ["", f"{'candidates':<26}{'probability':>12}{'evidence':>12}{'p':>9}  strength"]
-    for made, told in list(zip(diagnosis.candidates, record["candidates"], strict=True))[
-        :NUM_CANDIDATES
-    ]:
-        strengths = findings.strength_texts(made.effects, told).values()
-        is_behind = diagnosis.candidates[0].log_evidence - told["score"] > BEHIND
+    shown = list(zip(diagnosis.candidates, record["candidates"], strict=True))[:NUM_CANDIDATES]
+    for made, entry in shown:
+        strengths = findings.strength_texts(made.effects, entry).values()
+        is_behind = diagnosis.candidates[0].log_evidence - entry["score"] > BEHIND
         is_settled = made.hypothesis.fit.code is Code.CONVERGED
-        evidence = "far behind" if is_behind and not is_settled else f"{told['score']:+.1f}"
+        evidence = "far behind" if is_behind and not is_settled else f"{entry['score']:+.1f}"
         lines.append(
-            f"{told['effect']:<26}{told['probability']:>12.3f}{evidence:>12}"
-            f"{findings.p_text(told['p_value']):>9}  " + ", ".join(strengths)
+            f"{entry['effect']:<26}{entry['probability']:>12.3f}{evidence:>12}"
+            f"{findings.p_text(entry['p_value']):>9}  " + ", ".join(strengths)
         )
-    lines += ["", findings.verdict(diagnosis)]
+    lines += ["", found.sentence]
     if hidden is not None:
         lines.append(f"truth: {hidden}")
     if diagnosis.missing is not None:
@@ -273,15 +117,20 @@ def _told(
             f"{row['clip']} predicted from the others: {row['rmse_before']:.4f} m/s, with what was "
             f"added {row['rmse_after']:.4f}"
         )
-    lines += [f"- {sentence}" for sentence in diagnosis.verdict.advice]
-    return [*lines, f"next: {go_on}"]
+    lines += [f"- {sentence}" for sentence in found.verdict.advice]
+    return [*lines, f"next: {found.next_command}"]
 
 
 def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo diagnose", description=__doc__)
-    parser.add_argument("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
-    parser.add_argument(
-        "--add", default="auto", metavar="auto|none|NAME", help="what to add to the model"
+    parser = command.Parser(prog="galileo diagnose", description=__doc__, epilog=EXAMPLES)
+    add = parser.add_argument
+    add("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
+    add(
+        "--add",
+        default="auto",
+        metavar="auto|none|NAME",
+        help="what to add to the model: what the verdict names, nothing, or an effect "
+        "(default %(default)s)",
     )
     add_clip_options(parser, out="folder (default runs/CLIP/diagnosis)")
     return parser

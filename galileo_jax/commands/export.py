@@ -36,7 +36,7 @@ def main(argv: Sequence[str]) -> int | None:
         from galileo_jax.commands.clip_options import load_clips
         from galileo_jax.measurement.measure import measure
 
-        measured = measure(load_clips([str(source)])[0])
+        measured = measure(load_clips([str(source)], None)[0])
         out = call.out or Path(f"{measured.name}_export")
         written = _export_tracks({measured.name: measured.observation}, out, call.to)
     print("\n".join(str(path) for path in written))

@@ -6,11 +6,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from galileo_jax.commands import command
-from galileo_jax.files.atomic_write import write_json, write_text
+from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
 
-NUM_DRAWS, MOST_DRAWS = 200, 10_000
+NUM_DRAWS, MOST_DRAWS = 200, 10_000  # as api.predict has them, which imports JAX
 LONGEST_S = 60.0
+EXAMPLES = """examples:
+  galileo predict runs/clip --seconds 2
+  galileo predict runs/clip --seconds 5 --draws 1000 --out ahead
+"""
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -20,32 +24,16 @@ def main(argv: Sequence[str]) -> int | None:
     if out.exists() and not out.is_dir():
         what = "RUN" if call.out is None else "--out"
         raise InputError(f"{what}: {out} is a file; a folder expected")
+    from galileo_jax.api.predict import predict
 
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    from galileo_jax.prediction.extrapolate import answers, extrapolate
-    from galileo_jax.report.continuation import continuation_figure
-    from galileo_jax.report.figure import to_svg
-    from galileo_jax.report.first_and_last import write_first_and_last
-    from galileo_jax.report.prediction import told, write_prediction
-    from galileo_jax.results.run import load_run
-
-    with command.console().status("rolling out") as status:
-        run = load_run(call.run)
-        motions = extrapolate(run, call.seconds, call.draws, call.seed)
-        found = answers(run, motions, call.seconds, call.seed)
-        status.update("drawing")
-        svg = to_svg(continuation_figure(run, motions), "prediction")
-        try:
-            found["picture"] = write_first_and_last(run, motions, out / "first_and_last.png")
-            write_text(out / "prediction.svg", svg)
-            page = write_prediction(out, run, found, svg)
-            write_json(out / "prediction.json", found)
-        except OSError as error:
-            raise InputError(f"--out: {out}: {error.strerror or error}") from error
-    print("\n".join(told(run, found)))
-    print(f"{out}/prediction.json, prediction.svg, first_and_last.png, {page.name}")
+    with progress_display() as display:
+        ahead = predict(
+            call.run, seconds=call.seconds, draws=call.draws, seed=call.seed, on_progress=display
+        )
+        display("drawing", 1.0)
+        written = ahead.save(out)
+    print("\n".join(ahead.sentences))
+    print(f"{out}/{', '.join(path.name for path in written)}")
     return None
 
 
@@ -54,17 +42,18 @@ def _parser() -> command.Parser:
         prog="galileo predict",
         description="Continue a fitted scene beyond its clip, with 95 % intervals from the "
         "posterior: will it move, how far, where does it stop, does it hit.",
+        epilog=EXAMPLES,
     )
     add = parser.add_argument
     add("run", type=Path, metavar="RUN", help="the folder that fit wrote")
     add("--seconds", type=_seconds, required=True, metavar="S", help="how long beyond the clip")
-    add("--out", type=Path, metavar="DIR", help="default: RUN")
-    add("--seed", type=command.whole_number(0), default=0)
+    add("--out", type=Path, metavar="DIR", help="where to write (default: RUN)")
+    add("--seed", type=command.whole_number(0), default=0, help="of the draws (default 0)")
     add(
         "--draws",
         type=command.whole_number(2, most=MOST_DRAWS),
         default=NUM_DRAWS,
-        help=f"rollouts (default {NUM_DRAWS})",
+        help="how many rollouts of posterior draws (default %(default)s)",
     )
     return parser
 

@@ -1,4 +1,4 @@
-"""`galileo track`: follow a clip's objects; csv, and an overlay to check by eye."""
+"""`galileo track`: follow the objects of a clip; csv and an overlay to check by eye."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,48 +6,50 @@ from pathlib import Path
 import numpy as np
 
 from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.commands import command
+from galileo_jax.commands.clip_options import warn
+from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking import Track, track_clip
-from galileo_jax.tracking.overlay import write_overlay_picture, write_overlay_video
 from galileo_jax.tracking.pixel_csv import write_pixel_csv
-from galileo_jax.tracking.to_metres import observe
-from galileo_jax.video import decode
+from galileo_jax.tracking.track import Track
+
+EXAMPLES = """examples:
+  galileo track clip.mp4
+  galileo track clip.mp4 --pixels-per-metre 640 --out tracked
+"""
 
 
 def main(argv: Sequence[str]) -> int | None:
     """Writes DIR/track_px.csv, track_m.csv (if the scale is known), overlay.mp4, overlay.png."""
     call = _parser().parse_args(argv)
     clip = load_clip(call.clip, pixels_per_metre=call.pixels_per_metre)
-    for warning in clip.warnings:
-        _say(f"warning: {warning}")
+    warn(clip.warnings)
     if clip.video is None:
         raise InputError(f"{clip.path}: video: missing; a csv track is tracked already")
     out: Path = call.out or Path(f"{clip.path.stem}_track")
-    with command.progress() as bar:
-        track = track_clip(clip)
-        task = bar.add_task("drawing", total=clip.frame_count)
+    from galileo_jax.api.track import track
+
+    with progress_display() as display:
+        found = track(clip, on_progress=display)
+        assert found.pixels is not None  # of a video
         try:
             out.mkdir(parents=True, exist_ok=True)
-            write_pixel_csv(out / "track_px.csv", track)
+            write_pixel_csv(out / "track_px.csv", found.pixels)
             written = ["track_px.csv"]
             if clip.pixels_per_metre is not None:
-                write_observation_csv(out / "track_m.csv", observe(clip, track))
+                found.save(out / "track_m.csv")
                 written.append("track_m.csv")
-            write_overlay_picture(out / "overlay.png", decode.frames(clip.video), track)
-            write_overlay_video(
-                out / "overlay.mp4",
-                decode.frames(clip.video),
-                track,
-                advance=lambda: bar.advance(task),
-            )
+            display("drawing the overlay", 1.0)
+            found.save_overlay(out)
         except OSError as error:
             raise InputError(f"--out: {out}: {error.strerror or error}") from error
-    for line in _summary(track):
-        _say(line)
+    warn(found.warnings[len(clip.warnings) :])
+    for line in _summary(found.pixels):
+        command.say(line)
     if clip.pixels_per_metre is None:
-        _say("note: no csv in metres: pixels_per_metre is not known; give --pixels-per-metre")
+        command.say(
+            "note: no csv in metres: pixels_per_metre is not known; give --pixels-per-metre"
+        )
     for name in [*written, "overlay.png", "overlay.mp4"]:
         print(out / name)
     return None
@@ -70,17 +72,20 @@ def _summary(track: Track) -> list[str]:
     return lines
 
 
-def _say(line: str) -> None:
-    command.console().print(line, soft_wrap=True, markup=False)
-
-
 def _parser() -> command.Parser:
     parser = command.Parser(
         prog="galileo track",
         description="Follow the objects of a clip. Writes csv tracks in pixels and, if the scale "
         "is known, in metres, and the paths drawn over the video.",
+        epilog=EXAMPLES,
     )
-    parser.add_argument("clip", type=Path, metavar="CLIP", help="video or its yaml")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="default: NAME_track")
-    parser.add_argument("--pixels-per-metre", type=float, help="overrides the clip's scale")
+    add = parser.add_argument
+    add("clip", type=Path, metavar="CLIP", help="video or its yaml")
+    add("--out", type=Path, metavar="DIR", help="where to write (default: NAME_track)")
+    add(
+        "--pixels-per-metre",
+        type=float,
+        metavar="SCALE",
+        help="overrides the clip's scale (default: the yaml's)",
+    )
     return parser

@@ -24,7 +24,7 @@ def main(argv: Sequence[str]) -> int | None:
         raise InputError("galileo train: one of --out DIR (train) and --test DIR expected")
     import jax
 
-    jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_enable_x64", True)  # replaced when train becomes a public function
     compilation_cache.enable()
     return _test(call) if call.test else _train(call)
 

@@ -16,6 +16,7 @@ from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import Engine, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.runtime.batching import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
+from galileo_jax.runtime.progress import check_cancelled
 from galileo_jax.runtime.trace_cache import kept
 from galileo_jax.similarity.gaussian_likelihood import (
     GaussianLikelihood,
@@ -68,6 +69,7 @@ class Problem:
 
     def simulate_batch(self, theta: np.ndarray) -> np.ndarray:
         """`simulate` of `[batch, parameter]`: `[batch, object, 2, frame]`."""
+        check_cancelled()
         motion = padded_motion(*self.engine.simulate(theta))
         times = self.observation.times_s
         frames = np.pad(times, (0, rounded_up(len(times), FRAMES) - len(times)), mode="edge")

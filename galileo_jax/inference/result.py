@@ -240,7 +240,8 @@ def make_result(
         for name, entry in table["parameters"].items():
             entry["identified"] = entry["identified"] and not name.startswith("k")
         unscaled = SCALE_WARNING if has_surface else FREE_SCALE_WARNING
-        notes = notes | {"warnings": [*notes.get("warnings", []), unscaled]}
+        said = [*notes.get("warnings", []), unscaled]
+        notes = notes | {"warnings": list(dict.fromkeys(said))}
     # Every parameter takes from the residuals what the data told of it.
     effective = float(np.sum(1 - np.clip(spread[: len(trials.model_parameters)] ** 2, 0, 1)))
     nuisance = [p.role == "nuisance" for p in trials.model_parameters]

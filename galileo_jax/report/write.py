@@ -22,8 +22,14 @@ PAGE, PLOTS = "report.html", "plots"
 OURS = ("velocity_", "position_", "residuals_", "pairs", "trace")  # names of plots begin so
 
 
-def write_report(run: Run) -> Path:
-    """Writes a finished fit's plots (SVG) and its page; returns the page's path."""
+def write_report(run: Run, page: Path | None = None) -> Path:
+    """Writes a finished fit's page, and its plots (SVG) beside it; returns the page's path.
+
+    Args:
+      run: the fit.
+      page: where to; default: report.html in the run's folder.
+    """
+    page = page or run.folder / PAGE
     fitted = evaluate(run, seed=int(run.result["seed"]))
     shown: dict[str, dict[str, str]] = {}
     files: dict[str, str] = {}
@@ -34,14 +40,13 @@ def write_report(run: Run) -> Path:
         files[name] = svg
         shown.setdefault("draws", {})[name] = to_inline(svg, f"{name} of the posterior's draws")
     for name, svg in files.items():
-        write_text(run.folder / PLOTS / f"{name}.svg", svg)
-    for path in (run.folder / PLOTS).glob("*.svg"):
+        write_text(page.parent / PLOTS / f"{name}.svg", svg)
+    for path in (page.parent / PLOTS).glob("*.svg"):
         if path.stem.startswith(OURS) and path.stem not in files:  # of an earlier fit
             path.unlink()
     model = ", ".join(run.result["effects"]) or "fitted"
     centres = np.median(fitted.position_m, axis=0) - fitted.offset_m[..., None]
     shown["motion"] = {run.problem.name: animation(run.clip, run.problem, {model: centres})}
-    page = run.folder / PAGE
     write_text(page, render(run, fitted, shown))
     return page
 

@@ -27,6 +27,7 @@ from galileo_jax.runtime.errors import InputError
 
 RESULT, OBSERVATION = "result.json", "observation.csv"
 CLIP, POSTERIOR = "clip.yaml", "posterior.nc"
+CHECKPOINT = "chains.checkpoint.npz"
 
 
 @dataclass(frozen=True)

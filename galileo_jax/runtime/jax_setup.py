@@ -11,9 +11,6 @@ LEAST_THREADS = 2
 @functools.cache
 def set_up() -> None:
     """Sets it once per process, before JAX computes anything."""
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
     from galileo_jax.runtime.batching import num_cores
 
     # Compiled chains call MuJoCo's engines back, and these run JAX themselves: with one thread,

@@ -18,7 +18,7 @@ from galileo_jax.runtime.registry import entry_names
 Whole = Annotated[int, Field(strict=True, ge=0)]
 Count = Annotated[int, Field(strict=True, ge=1)]
 Name = Annotated[str, Field(strict=True)]
-NoiseModel = Literal["camera", "tracker"]
+NoiseModel = Literal["camera", "bodies", "tracker"]
 
 
 def _entry_of(package: str) -> AfterValidator:
@@ -57,12 +57,13 @@ class Grad(_Settings):
     Attributes:
       effects: in the model.
       noise: "camera": the tracker's errors and what a camera is known to do to a picture;
-        "tracker": the tracker's errors alone, of displacements.
+        "bodies": those and what bodies do that are no points; "tracker": the tracker's errors
+        alone, of displacements; None: as the clip was measured.
     """
 
     method: Literal["grad"] = "grad"
     effects: tuple[Name, ...] = ()
-    noise: NoiseModel = "camera"
+    noise: NoiseModel | None = None
 
 
 class Mh(_Settings):
@@ -77,7 +78,7 @@ class Mh(_Settings):
 
     method: Literal["mh"]
     effects: tuple[Name, ...] = ()
-    noise: NoiseModel = "camera"
+    noise: NoiseModel | None = None
     sampler: Sampler = "mixture"
     chains: Annotated[int, Field(strict=True, ge=2)] = 8
     max_steps: Annotated[int, Field(strict=True, ge=25, multiple_of=25)] = 4000

@@ -103,18 +103,21 @@ class Store:
             arrays = {name: file[name] for name in ARRAYS}
             names = tuple(str(name) for name in file["names"])
             clip = Clip.model_validate(json.loads(str(file["clip"])))
-            inferred = json.loads(str(file["inferred"]))
-        return Measurement(clip, Observation(names=names, **arrays), inferred)
+            notes = json.loads(str(file["notes"]))
+        seen = Observation(names=names, **arrays)
+        said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
+        return Measurement(clip, seen, seen, None, notes["inferred"], **said)
 
     def save_clip(self, digest: str, measured: Measurement) -> None:
         """Keeps a tracked clip."""
         seen = measured.observation
+        notes = {key: getattr(measured, key) for key in ("inferred", "doubts", "remarks")}
         with replacing(self._clip(digest)) as path:
             np.savez_compressed(
                 path,
                 names=np.array(seen.names),
                 clip=np.array(measured.clip.model_dump_json()),
-                inferred=np.array(json.dumps(measured.inferred)),
+                notes=np.array(json.dumps(notes)),
                 **{name: getattr(seen, name) for name in ARRAYS},
             )
 

@@ -1,0 +1,224 @@
+"""`compare`: is the model adequate for the data, and where does it fail?"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from galileo_jax import __version__
+from galileo_jax.api.command_line import command_line
+from galileo_jax.api.effect_choice import EffectsLike
+from galileo_jax.api.fit import fit as fit_tracks
+from galileo_jax.api.fit_result import Fit
+from galileo_jax.api.track import TrackLike
+from galileo_jax.comparison.compare import Comparison as Compared
+from galileo_jax.comparison.compare import compare as compare_fit
+from galileo_jax.comparison.document import comparison_document
+from galileo_jax.files.atomic_write import write_json
+from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
+from galileo_jax.results.stale_outputs import TRACKS, digest
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
+
+FITTED = 0.6  # share of the work, for progress
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A fitted model against the data.
+
+    Attributes:
+      fit: what was compared.
+      gradient: the best fit.
+      found: p-value, cells and residuals in full.
+      document: compare.json.
+      command: the command that does the same.
+    """
+
+    fit: Fit
+    gradient: GradientFit
+    found: Compared
+    document: Mapping[str, Any]
+    command: str
+
+    @property
+    def p_value(self) -> float:
+        """How likely the model would be to miss the data as badly somewhere, if it were true."""
+        return self.found.p_value
+
+    @property
+    def is_adequate(self) -> bool:
+        """Whether the data do not contradict the model (p >= 0.01)."""
+        return self.found.is_adequate
+
+    @property
+    def error(self) -> Mapping[str, float]:
+        """`rmse, noise, l1, l2` of velocities, m/s, and `chi2_per_dof`."""
+        return self.found.error
+
+    @property
+    def cells(self) -> "pd.DataFrame":
+        """One row per place looked at, the worst first.
+
+        `clip, object, axis, phase, rmse, noise` (m/s), `z` (standard deviations of what the model
+        itself would give) and `whiteness` (correlation of neighbouring residuals).
+        """
+        import pandas as pd
+
+        return pd.DataFrame([asdict(place) for place in self.found.where])
+
+    @in_float64
+    def plot(self) -> "go.Figure":
+        """Measured and fitted motion along the path, with the stretches where it fails shaded."""
+        from galileo_jax.report.along import along_paths
+        from galileo_jax.report.figures import comparison_figure
+
+        return comparison_figure(
+            along_paths(self.fit.problem, self.gradient, self.found, self._seed)
+        )
+
+    @in_float64
+    def report(self, path: str | Path) -> Path:
+        """Writes the page (one HTML file, no network needed)."""
+        from galileo_jax.report import comparison_page
+        from galileo_jax.report.along import along_paths
+
+        problem, gradient = self.fit.problem, self.gradient
+        page = comparison_page.Compared(
+            self.found,
+            problem,
+            problem.theta(gradient.z, gradient.free),
+            tuple(one.clip for one in self.fit.measurements),
+            problem.all_effects,
+            along_paths(problem, gradient, self.found, self._seed),
+            self.command,
+            self._seed,
+        )
+        comparison_page.write_comparison_page(Path(path), ", ".join(self.fit.names), page)
+        return Path(path)
+
+    def save(self, folder: str | Path) -> Path:
+        """Writes compare.json and report.html into a folder."""
+        folder = Path(folder)
+        self.report(folder / "report.html")
+        write_json(folder / "compare.json", self.document)
+        return folder
+
+    @property
+    def _seed(self) -> int:
+        return int(self.document["seed"])
+
+    def __repr__(self) -> str:
+        """In one line."""
+        said = "adequate" if self.is_adequate else "not adequate"
+        return f"<Comparison {', '.join(self.fit.names)}: {said}, p = {self.p_value:.2g}>"
+
+    def _repr_html_(self) -> str:
+        return self.cells._repr_html_()  # pyright: ignore
+
+
+@in_float64
+def compare(
+    fit: Fit | TrackLike | Sequence[TrackLike],
+    *,
+    effects: EffectsLike = (),
+    effects_from: Sequence[str | Path] = (),
+    engine: str = "auto",
+    seed: int | None = None,
+    pixels_per_metre: float | None = None,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Comparison:
+    """Tests a fitted model against its data, everywhere at once, with one p-value.
+
+    Residuals are compared with those of replicates: data drawn from the fitted model and fitted
+    again (parametric bootstrap), so that p is corrected for having looked in many places.
+
+    Args:
+      fit: a fit; or tracks, clips or files, which are fitted first.
+      effects: names of effects in the model of that fit; a `Fit` has its own.
+      effects_from: Python files that register more effects.
+      engine: that rolls out.
+      pixels_per_metre: overrides the clips' scale.
+      seed: of starts and replicates; None: the fit's own, or 0.
+      on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Raises:
+      InputError: a clip or an effect is wrong, or a `Fit` is given with another model.
+      Cancelled: `cancel` was set.
+
+    Example:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("ramp.csv", seed=1, track_only=True)
+      >>> check = gx.compare(gx.fit("ramp.csv"))
+      >>> check.is_adequate
+      True
+    """
+    began = time.perf_counter()
+    with progress.scope(on_progress, cancel):
+        if isinstance(fit, Fit):
+            if effects or effects_from or pixels_per_metre:
+                where = fit.folder or ", ".join(fit.names)
+                raise InputError(
+                    f"{where}: a run has its own effects and scale; give its clip to change"
+                )
+            chosen = int(fit.result["seed"]) if seed is None else seed
+            words = [fit.folder] if fit.folder else list(fit.result["clips"])
+            of_model = () if fit.folder else fit.effects
+            files = () if fit.folder else fit.result.get("effects_from", ())
+        else:
+            chosen = 0 if seed is None else seed
+            with progress.part(0.0, FITTED):
+                fit = fit_tracks(
+                    fit,
+                    effects=effects,
+                    effects_from=effects_from,
+                    engine=engine,
+                    seed=chosen,
+                    pixels_per_metre=pixels_per_metre,
+                )
+            words, of_model, files = list(fit.result["clips"]), fit.effects, effects_from
+        command = command_line(
+            "compare",
+            words,
+            effects=of_model,
+            effects_from=files,
+            engine=engine,
+            seed=chosen or None,
+            pixels_per_metre=pixels_per_metre,
+        )
+        with progress.part(FITTED, 1.0):
+            return _compared(fit, chosen, command, began)
+
+
+def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
+    gradient = fit.gradient
+    if gradient is None or seed != int(fit.result["seed"]):
+        progress.report("fitting", 0.0)
+        gradient = GradientFitter(fit.problem).fit(seed)
+        if gradient.code is Code.FAILED:
+            raise InputError(f"{fit.result['clips'][0]}: {gradient.code}")
+    progress.report("comparing with replicates of the fitted model", 0.3)
+    found = compare_fit(fit.problem, gradient, seed)
+    document: dict[str, Any] = {
+        "clips": list(fit.result["clips"]),
+        TRACKS: [digest(problem.observation) for problem in fit.problem.problems],
+        "effects": list(fit.problem.all_effects),
+        **comparison_document(found),
+        "converged": gradient.code is Code.CONVERGED,
+        "engine": fit.problem.problems[0].engine.name,
+        "seconds": round(time.perf_counter() - began, 3),
+        "version": __version__,
+        "seed": seed,
+    }
+    made = Comparison(fit, gradient, found, document, command)
+    progress.report("compared", 1.0, made)
+    return made

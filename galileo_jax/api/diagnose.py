@@ -1,0 +1,358 @@
+"""`diagnose`: which physical effect is missing? Add it, and watch the error fall."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from galileo_jax import __version__
+from galileo_jax.api.command_line import command_line
+from galileo_jax.api.effect_choice import check_addition
+from galileo_jax.api.fit_result import Fit, make_fit
+from galileo_jax.api.precompile import precompile
+from galileo_jax.api.track import TrackLike, as_measurements
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.diagnosis.diagnose import diagnose as run_loop
+from galileo_jax.diagnosis.diagnose import fitter_of
+from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
+from galileo_jax.diagnosis.diagnosis import Round, Verdict
+from galileo_jax.diagnosis.document import diagnosis_document, history_row
+from galileo_jax.diagnosis.last_model import by_itself
+from galileo_jax.files.atomic_write import write_json
+from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.fits.gradient import Code
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.laplace import laplace_posterior
+from galileo_jax.measurement.measure import Measurement, inferred
+from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
+from galileo_jax.model.effects.registry import effect_names, make_effects
+from galileo_jax.observation.observation import Observation
+from galileo_jax.results.stale_outputs import TRACKS, digest
+from galileo_jax.results.truth import hidden_effect
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
+
+TRACKED = 0.2  # share of the work, for progress
+STAGES = {  # how a stage begins, and how much is done by then
+    "fitting the model": 0.02,
+    "comparing it": 0.1,
+    "fitting": 0.2,
+    "comparing the best": 0.6,
+    "fitting pairs": 0.75,
+    "inferring": 0.85,
+    "predicting": 0.92,
+    "looking at each": 0.95,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What is missing in the model of a clip.
+
+    Attributes:
+      measurements: the clips and where their objects were.
+      problem: the joint problem with every effect that has a place there.
+      found: hypotheses, comparisons and the missing force in full.
+      document: diagnosis.json.
+      command: the command that does the same.
+      effects_from: files whose effects were candidates.
+    """
+
+    measurements: tuple[Measurement, ...]
+    problem: JointProblem
+    found: Found
+    document: Mapping[str, Any]
+    command: str
+    effects_from: tuple[str, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """`status` (none, named, ambiguous, unknown), `effects`, `form`, `advice`."""
+        return self.found.verdict
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in one sentence."""
+        from galileo_jax.report import findings
+
+        return findings.verdict(self.found)
+
+    @property
+    def candidates(self) -> "pd.DataFrame":
+        """One row per candidate, the best first.
+
+        `effect, probability, score` (log evidence over the model without it, nats), `p_value`,
+        `rmse` (m/s), `chi2_per_dof`, `score_test_z`, `confounded_with`.
+        """
+        import pandas as pd
+
+        columns = ["effect", "probability", "score", "p_value", "rmse", "chi2_per_dof"]
+        return pd.DataFrame(
+            self.document["candidates"], columns=[*columns, "score_test_z", "confounded_with"]
+        )
+
+    @property
+    def rounds(self) -> "pd.DataFrame":
+        """One row per round of the loop: how the error falls and the frictions move.
+
+        `effects, rmse, noise` (m/s), `chi2_per_dof, p_value`, `k1, k1_sd, k2, k2_sd`.
+        """
+        import pandas as pd
+
+        rows = []
+        for row in self.document["history"]:
+            frictions = {name: row[name] for name in ("k1", "k2") if name in row}
+            flat = {key: value for key, value in row.items() if key not in frictions}
+            flat["effects"] = ", ".join(row["effects"]) or "none"
+            for name, entry in frictions.items():
+                flat |= {name: entry["mean"], f"{name}_sd": entry["sd"]}
+            rows.append(flat)
+        return pd.DataFrame(rows)
+
+    @property
+    def missing_force(self) -> "pd.DataFrame | None":
+        """Where the verdict is unknown: the missing acceleration itself, else None.
+
+        `object, time_s, path_m, speed_m_s, acceleration_m_s2, sd_m_s2, formula`.
+        """
+        import pandas as pd
+
+        record = self.document.get("missing_force")
+        if record is None:
+            return None
+        columns = ("path_m", "speed_m_s", "acceleration_m_s2", "sd_m_s2", "formula")
+        parts = [
+            pd.DataFrame(
+                {"object": name, "time_s": record["time_s"]}
+                | {column: entry[column] for column in columns}
+            )
+            for name, entry in record["objects"].items()
+        ]
+        return pd.concat(parts, ignore_index=True)
+
+    @cached_property
+    def best(self) -> Fit:
+        """The fit of the last round's model, as `fit` with its effects gives it."""
+        return self._best()
+
+    @in_float64
+    def _best(self) -> Fit:
+        last, seed = self.found.rounds[-1].hypothesis, int(self.document["seed"])
+        part = make_joint_problem(
+            [one.clip for one in self.measurements],
+            [one.observation for one in self.measurements],
+            self.problem.problems[0].engine.name,
+            make_effects(last.effects),
+        )
+        gradient = by_itself(last.fit, self.problem, part)
+        notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
+        notes["status"] = gradient.code.value
+        if self.effects_from:
+            notes["effects_from"] = [str(Path(path).resolve()) for path in self.effects_from]
+        return make_fit(
+            self.measurements,
+            part,
+            laplace_posterior(part, gradient, seed),
+            gradient.z,
+            gradient,
+            method="grad",
+            seed=seed,
+            timings=self.document["timings_s"],
+            notes=notes,
+        )
+
+    @property
+    def next_command(self) -> str:
+        """The command that comes next."""
+        from galileo_jax.report import findings
+
+        return findings.how_to_go_on(
+            self.found, list(self.document["clips"]), list(self.effects_from)
+        )
+
+    @in_float64
+    def plot(self) -> "go.Figure":
+        """The error over the rounds, and the candidates' probabilities."""
+        from galileo_jax.report.figures import diagnosis_figure
+
+        return diagnosis_figure(self.found, self.document)
+
+    @in_float64
+    def report(self, path: str | Path) -> Path:
+        """Writes the page (one HTML file, no network needed) and its plots beside it."""
+        from galileo_jax.report.diagnosis_page import Told, write_diagnosis_page
+
+        clips = tuple(one.clip for one in self.measurements)
+        page = Told(
+            self.found,
+            self.document,
+            self.next_command,
+            hidden_effect(clips[0]),
+            clips,
+            self.command,
+            int(self.document["seed"]),
+        )
+        title = ", ".join(one.name for one in self.measurements)
+        write_diagnosis_page(Path(path), title, self.problem, page)
+        return Path(path)
+
+    def save(self, folder: str | Path) -> Path:
+        """Writes diagnosis.json, report.html and, below model/, the run of the last model."""
+        folder = Path(folder)
+        write_json(folder / "diagnosis.json", self.document)
+        self.report(folder / "report.html")
+        self.best.save(folder / "model", report=False)
+        return folder
+
+    def __repr__(self) -> str:
+        """In one line."""
+        names = ", ".join(one.name for one in self.measurements)
+        return f"<Diagnosis {names}: {self.sentence}>"
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        table = self.rounds._repr_html_()  # pyright: ignore
+        return f"<p>{escape(self.sentence)}</p>{table}"
+
+
+@in_float64
+def diagnose(
+    tracks: TrackLike | Sequence[TrackLike],
+    *,
+    add: str = "auto",
+    effects_from: Sequence[str | Path] = (),
+    engine: str = "auto",
+    seed: int = 0,
+    pixels_per_metre: float | None = None,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Diagnosis:
+    """Asks which effect is missing, adds it, and shows how the error falls.
+
+    Every effect of the library is fitted together with masses, frictions and nuisances; evidence
+    ranks them and charges for every parameter (docs/diagnosis.md).
+
+    Args:
+      tracks: a track or several (trials of the same objects); a clip or a file is tracked first.
+      add: "auto": what the verdict names; "none": nothing; or an effect's name.
+      effects_from: Python files that register more candidates.
+      engine: that rolls out.
+      seed: of everything random; the same seed gives the same numbers.
+      pixels_per_metre: overrides the clips' scale.
+      on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
+        `{"round": row}` for the base model and for what is added, as in diagnosis.json's history,
+        and `{"candidate": row}` for each candidate.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Raises:
+      InputError: a clip, an effect or an option is wrong.
+      Cancelled: `cancel` was set; work stops between two batches.
+
+    Example:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("drag.csv", seed=3, effects={"air_drag": {}}, strength=0.7,
+      ...     track_only=True)
+      >>> found = gx.diagnose("drag.csv")
+      >>> found.verdict.status, found.verdict.effects
+      ('named', ('air_drag',))
+    """
+    files = tuple(str(path) for path in effects_from)
+    check_addition(add, files)
+    with progress.scope(on_progress, cancel):
+        with progress.part(0.0, TRACKED):
+            measured, track_s = as_measurements(
+                tracks, pixels_per_metre, lambda clips: _compile_beside(clips, engine)
+            )
+        command = command_line(
+            "diagnose",
+            [one.clip.source for one in measured],
+            effects_from=files,
+            add=add,
+            engine=engine,
+            seed=seed or None,
+            pixels_per_metre=pixels_per_metre,
+        )
+        with progress.part(TRACKED, 1.0):
+            return _diagnosed(measured, add, engine, seed, track_s, files, command)
+
+
+def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
+    def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
+        fitter_of(_with_library(some, seen, engine)).compile()
+
+    return precompile(clips, compile_for).join
+
+
+def _with_library(
+    clips: Sequence[Clip], observations: Sequence[Observation], engine: str
+) -> JointProblem:
+    """The joint problem with all effects and nameless forms that have a place in the scene."""
+
+    def problem_with(names: Sequence[str]) -> JointProblem:
+        forms = tuple(form for form in FORMS if form.name in names)
+        effects = make_effects([name for name in names if name not in FORM_NAMES])
+        return make_joint_problem(clips, observations, engine, (*effects, *forms))
+
+    without = SCENARIOS[clips[0].scenario].without
+    names = [name for name in (*effect_names(), *FORM_NAMES) if name not in without]
+    problem = problem_with(names)
+    absent = problem.without_place()
+    return problem_with([name for name in names if name not in absent]) if absent else problem
+
+
+def _diagnosed(
+    measured: Sequence[Measurement],
+    add: str,
+    engine: str,
+    seed: int,
+    track_s: float,
+    files: tuple[str, ...],
+    command: str,
+) -> Diagnosis:
+    clips, observations = [one.clip for one in measured], [one.observation for one in measured]
+    began = time.perf_counter()
+    problem = _with_library(clips, observations, engine)
+    if add not in ("auto", "none", *problem.all_effects):
+        raise InputError(f"--add: {add} has no place in {clips[0].path}")
+
+    share = 0.0
+
+    def on_stage(stage: str) -> None:
+        nonlocal share
+        share = max([share, *(done for begin, done in STAGES.items() if stage.startswith(begin))])
+        progress.report(stage, share)
+
+    def on_round(one: Round) -> None:
+        if one.hypothesis.fit.code is Code.FAILED:
+            raise InputError(f"{clips[0].path}: {one.hypothesis.fit.code}")
+        progress.report("compared", share, {"round": history_row(problem, one, seed)})
+
+    found = run_loop(problem, seed=seed, add=add, on_stage=on_stage, on_round=on_round)
+    record = diagnosis_document(problem, found, seed)
+    document = {
+        "clips": [clip.source for clip in clips],
+        TRACKS: [digest(observation) for observation in observations],
+        **record,
+        **inferred(measured),
+        "left_out": [name for name in effect_names() if name not in problem.all_effects],
+        "engine": problem.problems[0].engine.name,
+        "timings_s": {
+            "track": round(track_s, 3),
+            "diagnose": round(time.perf_counter() - began, 3),
+        },
+        "version": __version__,
+        "seed": seed,
+    }
+    made = Diagnosis(tuple(measured), problem, found, document, command, files)
+    progress.report("diagnosed", 1.0, made)
+    return made

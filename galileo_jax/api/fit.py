@@ -1,0 +1,382 @@
+"""`fit`: from tracks to masses, friction coefficients and effects, with honest intervals."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of
+from galileo_jax.api.fit_result import Fit, make_fit
+from galileo_jax.api.precompile import precompile
+from galileo_jax.api.track import TrackLike, as_measurements
+from galileo_jax.clip.schema import Clip
+from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.checkpoint_identity import identity_of
+from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.laplace import laplace_posterior
+from galileo_jax.inference.metropolis import NUM_CHAINS
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.measurement.measure import Measurement
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.similarity.gaussian_likelihood import NoiseModel
+
+BLOCK_STEPS = 25  # of every chain, between two looks at convergence
+WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
+MAX_STEPS = 4000
+THESIS_CHAINS = 16
+TRACKED, FITTED = 0.4, 0.6  # shares of the work, for progress
+OFF_THE_PLANE = "an object has a z_m: motion in a plane takes no notice; see --motion free"
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """What `fit` was asked for; the arguments of the same names."""
+
+    method: Literal["grad", "mh", "cnn"] = "grad"
+    effects: tuple[str, ...] = ()
+    effects_from: tuple[str, ...] = ()
+    motion: str = "planar"
+    engine: str = "auto"
+    noise: NoiseModel | None = None
+    seed: int = 0
+    sampler: str = "mixture"
+    max_steps: int = MAX_STEPS
+    chains: int | None = None
+    init: Literal["grad", "cnn"] = "grad"
+    preset: Literal["galileo", "thesis"] = "galileo"
+    similarity: str = "thesis_gaussian"
+    acceptance: str = "coin"
+    selection: str = "best"
+
+
+OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
+OF_THESIS = ("similarity", "acceptance", "selection")
+
+
+@in_float64
+def fit(
+    tracks: TrackLike | Sequence[TrackLike],
+    *,
+    method: Literal["grad", "mh", "cnn"] = "grad",
+    effects: EffectsLike = (),
+    effects_from: Sequence[str | Path] = (),
+    motion: str = "planar",
+    engine: str = "auto",
+    noise: NoiseModel | None = None,
+    seed: int = 0,
+    pixels_per_metre: float | None = None,
+    sampler: str = "mixture",
+    max_steps: int = MAX_STEPS,
+    chains: int | None = None,
+    init: Literal["grad", "cnn"] = "grad",
+    preset: Literal["galileo", "thesis"] = "galileo",
+    similarity: str = "thesis_gaussian",
+    acceptance: str = "coin",
+    selection: str = "best",
+    checkpoint: str | Path | None = None,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Fit:
+    """Estimates masses, friction coefficients and the strengths of effects.
+
+    Args:
+      tracks: a track or several (trials of the same objects: one joint fit); a clip or a file is
+        tracked first.
+      method: "grad": Levenberg-Marquardt and a normal approximation, seconds; "mh":
+        Metropolis-Hastings, started from it; "cnn": a trained network, at once.
+      effects: names of effects in the model ("a,b" or a sequence), or classes.
+      effects_from: Python files that register more effects.
+      motion: "planar", or "free": from the first hit on objects turn and tip (MuJoCo's C engine).
+      engine: "auto", "rigid", "c" or "mjx".
+      noise: the errors a track is taken to have: "camera", "bodies" or "tracker"; None: as the
+        clip was measured.
+      seed: of everything random; the same seed gives the same numbers.
+      pixels_per_metre: overrides the clips' scale.
+      sampler: of method "mh".
+      max_steps: of method "mh", per chain, after the warm-up.
+      chains: of method "mh", how many; None: 8 (preset "thesis": 16).
+      init: of method "mh": what chains start from, "grad" or "cnn".
+      preset: of method "mh": "galileo", or "thesis": the sampler this project began with.
+      similarity: of preset "thesis".
+      acceptance: of preset "thesis".
+      selection: of preset "thesis".
+      checkpoint: a file; chains that were interrupted go on from it.
+      on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Returns:
+      The fit: `summary()`, `posterior`, `residuals`, `plot()`, `report(path)`, `save(folder)`.
+
+    Raises:
+      InputError: a clip, an effect or an option is wrong.
+      Cancelled: `cancel` was set; work stops between two batches.
+
+    Example:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("ramp.csv", seed=1, track_only=True)
+      >>> fit = gx.fit("ramp.csv", seed=0)
+      >>> abs(fit.parameters["k1"]["mean"] - made.truths[0]["k1"]) < 0.01
+      True
+    """
+    options = FitOptions(
+        method=method,
+        effects=names_of(effects),
+        effects_from=tuple(str(path) for path in effects_from),
+        motion=motion,
+        engine=engine,
+        noise=noise,
+        seed=seed,
+        sampler=sampler,
+        max_steps=max_steps,
+        chains=chains,
+        init=init,
+        preset=preset,
+        similarity=similarity,
+        acceptance=acceptance,
+        selection=selection,
+    )
+    _check(options)
+    with progress.scope(on_progress, cancel):
+        with progress.part(0.0, TRACKED):
+            measured, track_s = as_measurements(
+                tracks, pixels_per_metre, lambda clips: _compile_beside(clips, options)
+            )
+        with progress.part(TRACKED, 1.0):
+            return _fitted(measured, options, track_s, Path(checkpoint) if checkpoint else None)
+
+
+def _check(options: FitOptions) -> None:
+    """What is wrong with a call whatever its clips are.
+
+    Raises:
+      InputError: an option that this method does not have, or a value that it does not know.
+    """
+    from galileo_jax.inference.samplers import sampler_names
+    from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
+
+    _one_of("method", options.method, ("grad", "mh", "cnn"))
+    _one_of("engine", options.engine, ENGINES)
+    _one_of("motion", options.motion, MOTIONS)
+    _one_of("sampler", options.sampler, sampler_names())
+    _one_of("init", options.init, ("grad", "cnn"))
+    _one_of("preset", options.preset, ("galileo", "thesis"))
+    _refuse_ignored(options)
+    if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
+        raise InputError(
+            f"--max-steps: {options.max_steps} is no multiple of {BLOCK_STEPS}, {BLOCK_STEPS} or "
+            "more"
+        )
+    if options.motion == "free":
+        if options.engine not in ("auto", "c"):
+            raise InputError(
+                f"--engine {options.engine}: it moves objects in a plane; --motion free takes c"
+            )
+        for name in ("method", "init"):
+            if getattr(options, name) == "cnn":
+                raise InputError(f"--{name} cnn: the network knows motion in a plane only")
+    chosen_effects(options.effects, options.effects_from)
+
+
+def _refuse_ignored(options: FitOptions) -> None:
+    """Refuses options that differ from their default and would be ignored."""
+    if options.method != "mh":
+        ignored = ("preset", "chains", *OF_GALILEO, *OF_THESIS)
+        why = f"of --method mh, not of {options.method}"
+    elif options.preset == "thesis":
+        ignored, why = OF_GALILEO, "not of --preset thesis"
+    else:
+        ignored, why = OF_THESIS, "of --preset thesis only"
+    plain = FitOptions()
+    for name in ignored:
+        if getattr(options, name) != getattr(plain, name):
+            raise InputError(f"--{name.replace('_', '-')}: {why}")
+
+
+def _one_of(name: str, value: str, known: Sequence[str]) -> None:
+    if value not in known:
+        raise InputError(f"--{name}: unknown {value!r}; known: {', '.join(known)}")
+
+
+def _problem(
+    clips: Sequence[Clip], observations: Sequence[Observation], options: FitOptions
+) -> JointProblem:
+    """The joint problem of the model that was asked for.
+
+    Raises:
+      InputError: an effect has no place in these clips.
+    """
+    effects = chosen_effects(options.effects, options.effects_from)
+    problem = make_joint_problem(
+        clips, observations, options.engine, effects, options.noise, options.motion
+    )
+    if absent := problem.without_place():
+        raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
+    return problem
+
+
+def _compile_beside(clips: Sequence[Clip], options: FitOptions) -> Any:
+    """Compiles in a thread while clips are tracked; returns what waits for it."""
+
+    def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
+        GradientFitter(_problem(some, seen, options)).compile()
+
+    return precompile(clips, None if options.method == "cnn" else compile_for).join
+
+
+def _fitted(
+    measured: Sequence[Measurement],
+    options: FitOptions,
+    track_s: float,
+    checkpoint: Path | None,
+) -> Fit:
+    if options.preset == "thesis" and len(measured) > 1:
+        raise InputError("--preset thesis: one clip expected")
+    clips = [one.clip for one in measured]
+    problem = _problem(clips, [one.observation for one in measured], options)
+    timings = {"track": track_s, "compile": 0.0, "fit": 0.0}
+    notes: dict[str, Any] = {"engine": problem.problems[0].engine.name}
+    gradient: GradientFit | None = None
+    began = time.perf_counter()
+    if options.method == "cnn":
+        posterior, z_best, extra = _by_network(problem, options)
+    elif options.preset == "thesis":
+        posterior, z_best, extra = _by_thesis(problem, options)
+    else:
+        fitter = GradientFitter(problem)
+        progress.report("compiling", 0.0)
+        fitter.compile()
+        timings["compile"] = time.perf_counter() - began
+        began = time.perf_counter()
+        gradient, starts, extra = _gradient(fitter, options)
+        if gradient.code is Code.FAILED:
+            raise InputError(f"{clips[0].path}: {gradient.code}")
+        posterior, z_best = laplace_posterior(problem, gradient, options.seed), gradient.z
+        extra = {"status": gradient.code.value} | extra
+        if options.method == "mh":
+            posterior = _by_chains(problem, gradient, starts, measured, options, checkpoint)
+            extra |= {
+                "status": posterior.status.value,
+                "sampler": options.sampler,
+                "sampling": dict(posterior.stats),
+            }
+    timings["fit"] = time.perf_counter() - began
+    notes |= extra | {"motion": options.motion}
+    if options.motion == "planar" and any(item.z_m for clip in clips for item in clip.objects):
+        notes["warnings"] = [OFF_THE_PLANE]
+    if options.effects_from:
+        notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
+    made = make_fit(
+        tuple(measured),
+        problem,
+        posterior,
+        z_best,
+        gradient,
+        method=options.method,
+        seed=options.seed,
+        timings=timings,
+        notes=notes,
+    )
+    progress.report("fitted", 1.0, made)
+    return made
+
+
+def _gradient(
+    fitter: GradientFitter, options: FitOptions
+) -> tuple[GradientFit, np.ndarray | None, dict[str, Any]]:
+    """The mode, where chains start in z (None: dispersed round it), and notes."""
+    if options.init == "cnn":
+        from galileo_jax.neural.start import start_from_network
+
+        chains = options.chains or NUM_CHAINS
+        start = start_from_network(fitter.trials, options.seed, chains)
+        return start.fit, start.z, start.notes
+    shares = {"searching": 0.1, "refining": 0.3}
+    found = fitter.fit(
+        options.seed, on_stage=lambda stage: progress.report(stage, shares.get(stage, 0.2))
+    )
+    return found, None, {}
+
+
+def _by_chains(
+    problem: JointProblem,
+    gradient: GradientFit,
+    starts: np.ndarray | None,
+    measured: Sequence[Measurement],
+    options: FitOptions,
+    checkpoint: Path | None,
+) -> Posterior:
+    """Samples; resumes what an interruption left in the checkpoint."""
+    from galileo_jax.inference.metropolis import metropolis_posterior
+    from galileo_jax.inference.samplers.driver import Progress, Settings
+
+    settings = Settings(
+        warmup_steps=WARMUP_STEPS, block_steps=BLOCK_STEPS, max_steps=options.max_steps
+    )
+
+    def on_block(state: Progress) -> None:
+        share = state.num_steps / (WARMUP_STEPS + options.max_steps)
+        progress.report("sampling", FITTED + (1 - FITTED) * share, state)
+
+    progress.report("sampling", FITTED)
+    if checkpoint is not None:
+        checkpoint.parent.mkdir(parents=True, exist_ok=True)
+    return metropolis_posterior(
+        problem,
+        gradient,
+        options.seed,
+        sampler=options.sampler,
+        settings=settings,
+        num_chains=options.chains or NUM_CHAINS,
+        starts=starts,
+        checkpoint=checkpoint,
+        identity=identity_of(
+            measured,
+            problem,
+            effects_from=options.effects_from,
+            options=(
+                options.sampler,
+                options.seed,
+                ",".join(options.effects),
+                options.init,
+                options.chains or NUM_CHAINS,
+            ),
+        ),
+        on_block=on_block,
+    )
+
+
+def _by_network(
+    problem: JointProblem, options: FitOptions
+) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
+    """The trained network's answer."""
+    from galileo_jax.neural.estimate import cnn_posterior
+
+    return cnn_posterior(problem, options.seed)
+
+
+def _by_thesis(
+    problem: JointProblem, options: FitOptions
+) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
+    """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
+    import jax.numpy as jnp
+
+    from galileo_jax.inference.thesis_preset import thesis_posterior
+    from galileo_jax.model.parameters import inverse
+
+    chosen = {name: getattr(options, name) for name in OF_THESIS}
+    posterior, best = thesis_posterior(
+        problem, options.seed, **chosen, num_chains=options.chains or THESIS_CHAINS
+    )
+    middle = problem.theta(np.zeros(len(problem.names)))
+    theta = [best.get(name, rest) for name, rest in zip(problem.names, middle, strict=True)]
+    z_best = np.asarray(inverse(problem.parameters, jnp.asarray(theta)))
+    notes = {"status": posterior.status.value, "preset": options.preset, **chosen, "best": best}
+    return posterior, z_best, notes

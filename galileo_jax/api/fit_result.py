@@ -1,0 +1,296 @@
+"""What `fit` returns: the posterior, and everything that is made of it."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.files.atomic_write import write_json
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.result import make_result
+from galileo_jax.measurement.measure import Measurement, inferred
+from galileo_jax.model.parameters import inverse
+from galileo_jax.results.run import CHECKPOINT, POSTERIOR, RESULT, Run, save_run
+from galileo_jax.results.stale_outputs import forget_prediction, forget_single_run
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
+    from arviz import InferenceData
+
+BEST = "z_best"  # in the posterior's provenance
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A finished fit of one clip, or of several trials of the same objects.
+
+    Attributes:
+      measurements: the clips and where their objects were.
+      problem: the model of them.
+      posterior: draws of all parameters, in their units.
+      result: result.json: `parameters`, `derived`, `nuisances`, `error`, ...; the keys are in
+        docs/files.md.
+      z_best: `[parameter]`, the best fit, in the search space; None of a run that an
+        earlier version wrote.
+      gradient: the gradient fit that the posterior came from; None where there was none.
+      folder: where the run lies; None until it is saved.
+    """
+
+    measurements: tuple[Measurement, ...]
+    problem: JointProblem
+    posterior: Posterior
+    result: Mapping[str, Any]
+    z_best: np.ndarray | None = None
+    gradient: GradientFit | None = None
+    folder: Path | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the clips."""
+        return tuple(one.name for one in self.measurements)
+
+    @property
+    def converged(self) -> bool:
+        """Whether the search or the chains settled."""
+        return bool(self.result["converged"])
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Of the model."""
+        return tuple(self.result["effects"])
+
+    @property
+    def parameters(self) -> Mapping[str, Mapping[str, Any]]:
+        """By name: `mean, sd, q025, q975, unit, identified`; masses, frictions, effects."""
+        return self.result["parameters"]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know before the fit is trusted, one line each."""
+        return tuple(self.result.get("warnings", ()))
+
+    def summary(self) -> "pd.DataFrame":
+        """One row per parameter: `kind, mean, sd, q025, q975, unit, identified`.
+
+        `identified` is False where the clip does not determine the parameter: the interval is
+        then the prior's.
+        """
+        import pandas as pd
+
+        rows = {
+            name: {"kind": kind, **entry}
+            for kind in ("parameters", "derived", "nuisances")
+            for name, entry in self.result[kind].items()
+        }
+        columns = ["kind", "mean", "sd", "q025", "q975", "unit", "identified"]
+        return pd.DataFrame.from_dict(rows, orient="index").reindex(columns=columns)
+
+    @property
+    def inference_data(self) -> "InferenceData":
+        """The posterior as ArviZ's InferenceData, for `az.summary`, `az.plot_ppc`, `az.loo`."""
+        return self.posterior.to_inference_data()
+
+    @property
+    def residuals(self) -> "pd.DataFrame":
+        """One row per clip, object and frame: measured minus the best fit.
+
+        `clip, object, time_s`; `x_m, y_m` (m) without the constant distance of the followed point
+        from the centre; `x_white, y_white`: whitened, in units of the noise at its fitted scale
+        (independent, standard normal if the model is right). NaN where an object was not seen.
+        """
+        return self._residuals()
+
+    @in_float64
+    def _residuals(self) -> "pd.DataFrame":
+        import pandas as pd
+
+        theta = self.problem.theta(self._z())
+        parts = []
+        for c, problem in enumerate(self.problem.problems):
+            seen = problem.observation
+            predicted = problem.simulate(self.problem.of_clip(theta, c))
+            scale = self.problem.noise_scale(theta, c)
+            white = problem.whiten(predicted, scale).reshape(predicted.shape)
+            for k, name in enumerate(seen.names):
+                is_seen = seen.mask[k]
+                left = np.where(is_seen, seen.position_m[k] - predicted[k], np.nan)
+                if is_seen.any():
+                    left -= np.nanmedian(left, axis=-1, keepdims=True)
+                columns: dict[str, Any] = {"clip": problem.name, "object": name}
+                columns["time_s"] = seen.times_s
+                columns |= {f"{axis}_m": left[i] for i, axis in enumerate("xy")}
+                for i, axis in enumerate("xy"):
+                    columns[f"{axis}_white"] = np.where(is_seen, white[k, i], np.nan)
+                parts.append(pd.DataFrame(columns))
+        return pd.concat(parts, ignore_index=True)
+
+    def _z(self) -> np.ndarray:
+        """The best fit; of a run that an earlier version wrote the posterior's median."""
+        if self.z_best is not None:
+            return self.z_best
+        median = np.median(self.posterior.flat(), axis=0)
+        return np.asarray(inverse(self.problem.parameters, jnp.asarray(median)))
+
+    def runs(self, folder: Path) -> tuple[Run, ...]:
+        """The fit of every clip, as `save` leaves it in `folder` and below."""
+        if len(self.measurements) == 1:
+            (one,) = self.measurements
+            clip_problem = self.problem.problems[0]
+            return (Run(folder, one.clip, clip_problem, self.posterior, dict(self.result)),)
+        return tuple(self._alone(i, folder / one.name) for i, one in enumerate(self.measurements))
+
+    @in_float64
+    def _alone(self, index: int, folder: Path) -> Run:
+        """One clip of a joint fit, with the joint posterior of its parameters."""
+        one, alone = self.measurements[index], self.problem.alone(index)
+        columns = self.problem.columns_of(index)
+        own = self.posterior.chosen(columns, alone.names)
+        result = make_result(
+            alone,
+            own,
+            self._z()[columns],
+            clips=[one.clip.source],
+            method=str(self.result["method"]),
+            seed=int(self.result["seed"]),
+            timings_s=dict(self.result["timings_s"]),
+            notes=_notes(self.result),
+        )
+        return Run(folder, one.clip, self.problem.problems[index], own, result)
+
+    @in_float64
+    def plot(self) -> "go.Figure":
+        """Measured and fitted velocities, with residuals in units of the noise below."""
+        from galileo_jax.report.figures import fit_figure
+        from galileo_jax.report.fitted import evaluate
+
+        runs = self.runs(self.folder or Path("."))
+        return fit_figure([evaluate(run, seed=int(self.result["seed"])) for run in runs])
+
+    @in_float64
+    def report(self, path: str | Path) -> tuple[Path, ...]:
+        """Writes the page of the fit (one HTML file, no network needed) and its plots beside it.
+
+        Args:
+          path: the page; of several clips each has its own: NAME.html becomes NAME_CLIP.html.
+
+        Returns:
+          the pages.
+        """
+        from galileo_jax.report.write import write_report
+
+        path = Path(path)
+        runs = self.runs(self.folder or path.parent)
+        if len(runs) == 1:
+            return (write_report(runs[0], path),)
+        return tuple(
+            write_report(run, path.with_name(f"{path.stem}_{run.problem.name}{path.suffix}"))
+            for run in runs
+        )
+
+    @in_float64
+    def save(self, folder: str | Path, *, report: bool = True) -> "Fit":
+        """Writes the run: result.json, posterior.nc, observation.csv, clip.yaml, report.html.
+
+        Of several clips each has a run of its own below `folder`, with the joint posterior. A
+        prediction of an earlier fit there is removed: it is wrong now.
+
+        Args:
+          folder: made where it is not there.
+          report: whether to write the pages, too.
+
+        Returns:
+          the fit, with its `folder`.
+        """
+        from galileo_jax.report.write import PAGE, write_report
+
+        folder = Path(folder)
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"--out: {folder} is a file; a folder expected")
+        forget_prediction(folder)
+        several = len(self.measurements) > 1
+        if several:
+            forget_single_run(folder)
+        for run, one in zip(self.runs(folder), self.measurements, strict=True):
+            forget_prediction(run.folder)
+            save_run(run.folder, one.clip, one.observation, run.posterior, run.result)
+            if report:
+                write_report(run, run.folder / PAGE)
+        if several:
+            self.posterior.to_netcdf(folder / POSTERIOR)
+            write_json(folder / RESULT, self.result)
+        (folder / CHECKPOINT).unlink(missing_ok=True)
+        return replace(self, folder=folder)
+
+    def __repr__(self) -> str:
+        """In one line."""
+        shown = [
+            f"{name} = {entry['mean']:.4g} +- {entry['sd']:.2g}"
+            for name, entry in {**self.parameters, **self.result["derived"]}.items()
+            if entry["identified"] and re.fullmatch(r"k\d+|mass_ratio", name)
+        ]
+        model = "+".join(self.effects) or "no effects"
+        return f"<Fit {', '.join(self.names)} ({model}): {', '.join(shown)}>"
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()  # pyright: ignore
+
+
+def make_fit(
+    measurements: tuple[Measurement, ...],
+    problem: JointProblem,
+    posterior: Posterior,
+    z_best: np.ndarray,
+    gradient: GradientFit | None,
+    *,
+    method: str,
+    seed: int,
+    timings: Mapping[str, float],
+    notes: Mapping[str, Any],
+) -> Fit:
+    """A `Fit` with its result.json.
+
+    Args:
+      measurements: the clips.
+      problem: the model of them.
+      posterior: draws in the parameters' units.
+      z_best: `[parameter]`, the best fit.
+      gradient: where it came from, if it is a gradient fit.
+      method: of the fit.
+      seed: of everything random.
+      timings: by stage, s.
+      notes: what else the method has to say, for result.json.
+    """
+    if doubts := [doubt for one in measurements for doubt in one.doubts]:
+        notes = {**notes, "warnings": [*doubts, *notes.get("warnings", [])]}
+    stored = {**posterior.provenance, BEST: [float(value) for value in z_best]}
+    posterior = replace(posterior, provenance=stored)
+    result = make_result(
+        problem,
+        posterior,
+        z_best,
+        clips=[one.clip.source for one in measurements],
+        method=method,
+        seed=seed,
+        timings_s={key: round(value, 3) for key, value in timings.items()},
+        notes={**notes, **inferred(measurements)},
+    )
+    return Fit(measurements, problem, posterior, result, z_best, gradient)
+
+
+OF_RESULT = {
+    *("clips", "method", "converged", "effects", "parameters", "nuisances", "derived", "error"),
+    *("timings_s", "version", "seed"),
+}  # what `make_result` writes by itself
+
+
+def _notes(result: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in result.items() if key not in OF_RESULT}

@@ -1,0 +1,236 @@
+"""`track`: where a clip's objects were, in metres and seconds, with an error for every point."""
+
+import itertools
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from galileo_jax.api.clips import ClipLike, as_clip, as_list
+from galileo_jax.clip.same_objects import check_same_objects, check_scale
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_csv import write_observation_csv
+from galileo_jax.measurement.measure import Measurement, measure
+from galileo_jax.measurement.track_cache import track_once
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.tracking.pixel_csv import write_pixel_csv
+from galileo_jax.tracking.track import Track as PixelTrack
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Where a clip's objects were, frame by frame.
+
+    Attributes:
+      clip: with what was inferred filled in (an angle, foot or size that was null).
+      pixels: in the video, px; None where the clip is a track already.
+      measurement: in metres; None where nobody knows the scale.
+    """
+
+    clip: Clip
+    pixels: PixelTrack | None
+    measurement: Measurement | None
+
+    @property
+    def name(self) -> str:
+        """The clip's, without folder and suffix."""
+        return self.clip.path.stem
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know before the track is trusted, one line each."""
+        return self.clip.warnings if self.measurement is None else self.measurement.warnings
+
+    @property
+    def observation(self) -> Observation:
+        """In metres: `times_s [frame]`, `position_m [object, 2, frame]`, `covariance_m2`, `mask`.
+
+        Raises:
+          InputError: nobody knows the scale.
+        """
+        return self._measured().observation
+
+    def to_dataframe(self) -> "pd.DataFrame":
+        """One row per object and frame: `object, time_s, x_m, y_m, sd_x_m, sd_y_m, is_visible`.
+
+        x along the travel, y up, origin at the foot of the ramp; NaN where it was not seen. Of a
+        video also `x_px, y_px`; without a scale only these.
+        """
+        import pandas as pd
+
+        parts = []
+        for k, name in enumerate(item.name for item in self.clip.objects):
+            columns: dict[str, Any] = {}
+            if self.measurement is not None:
+                seen = self.measurement.whole
+                sd = np.sqrt(np.diagonal(seen.covariance_m2[k], axis1=0, axis2=1))
+                columns |= {"time_s": seen.times_s}
+                columns |= {f"{axis}_m": seen.position_m[k, i] for i, axis in enumerate("xy")}
+                columns |= {f"sd_{axis}_m": sd[:, i] for i, axis in enumerate("xy")}
+                columns |= {"is_visible": seen.mask[k]}
+            if self.pixels is not None:
+                columns |= {"time_s": self.pixels.times_s}
+                columns |= {
+                    f"{axis}_px": self.pixels.position_px[k, :, i] for i, axis in enumerate("xy")
+                }
+                columns.setdefault("is_visible", self.pixels.is_visible[k])
+            parts.append(pd.DataFrame({"object": name, **columns}))
+        return pd.concat(parts, ignore_index=True)
+
+    def plot(self) -> "go.Figure":
+        """Positions and velocities over time, one panel per axis."""
+        from galileo_jax.report.figures import track_figure
+
+        return track_figure(self.observation, self.name)
+
+    def save(self, path: str | Path) -> Path:
+        """Writes a csv that `load` reads again: in metres, or in pixels where no scale is known.
+
+        Raises:
+          InputError: the file cannot be written.
+        """
+        path = Path(path)
+        try:
+            if self.measurement is not None:
+                write_observation_csv(path, self.measurement.whole)
+            else:
+                assert self.pixels is not None  # a csv track in px needs its scale to load
+                write_pixel_csv(path, self.pixels)
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror or error}") from error
+        return path
+
+    def save_overlay(self, folder: str | Path) -> tuple[Path, ...]:
+        """Draws the paths over the video: `overlay.png` and `overlay.mp4` in `folder`.
+
+        Raises:
+          InputError: the clip is a track already, or the files cannot be written.
+        """
+        from galileo_jax.tracking.overlay import write_overlay_picture, write_overlay_video
+        from galileo_jax.video import decode
+
+        pixels, video = self.pixels, self.clip.video
+        if pixels is None or video is None:
+            raise InputError(f"{self.clip.path}: video: missing; a csv track is tracked already")
+        picture, film = Path(folder) / "overlay.png", Path(folder) / "overlay.mp4"
+        drawn = itertools.count(1)
+        write_overlay_picture(picture, decode.frames(video), pixels)
+        write_overlay_video(
+            film,
+            decode.frames(video),
+            pixels,
+            advance=lambda: progress.report(
+                "drawing the overlay", next(drawn) / len(pixels.times_s)
+            ),
+        )
+        return picture, film
+
+    def _measured(self) -> Measurement:
+        if self.measurement is None:
+            check_scale(self.clip)
+            raise AssertionError("only a ramp without a scale is not measured")
+        return self.measurement
+
+    def __repr__(self) -> str:
+        """In one line."""
+        names = ", ".join(item.name for item in self.clip.objects)
+        return f"<Track {self.name}: {names}, {self.clip.frame_count} frames>"
+
+    def _repr_html_(self) -> str:
+        return self.to_dataframe()._repr_html_()  # pyright: ignore
+
+
+TrackLike = Track | ClipLike
+
+
+@in_float64
+def track(
+    clip: ClipLike,
+    *,
+    pixels_per_metre: float | None = None,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Track:
+    """Follows the objects of a clip through its video, or reads its csv track.
+
+    A video that was tracked before is not tracked again: tracks are cached by the content of the
+    video and its yaml (`GALILEO_JAX_CACHE=off` switches that off).
+
+    Args:
+      clip: a clip, or what `load` takes.
+      pixels_per_metre: overrides the clip's scale.
+      on_progress: called with the stage, the share done (0 to 1) and None.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Raises:
+      InputError: an object cannot be found or followed; the clip is wrong.
+      Cancelled: `cancel` was set.
+
+    Example:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
+      >>> list(gx.track("slide.csv").to_dataframe().columns)
+      ['object', 'time_s', 'x_m', 'y_m', 'sd_x_m', 'sd_y_m', 'is_visible']
+    """
+    with progress.scope(on_progress, cancel):
+        return _tracked(as_clip(clip, pixels_per_metre))
+
+
+def _tracked(clip: Clip) -> Track:
+    if SCENARIOS[clip.scenario].has_table and not clip.is_scale_known and clip.video is not None:
+        return Track(clip, track_once(clip), None)
+    measured = measure(clip)
+    return Track(measured.clip, measured.pixels, measured)
+
+
+def as_measurements(
+    tracks: TrackLike | Sequence[TrackLike],
+    pixels_per_metre: float | None,
+    before: Callable[[Sequence[Clip]], Callable[[], None]] = lambda _: lambda: None,
+) -> tuple[list[Measurement], float]:
+    """The measurements of trials of the same objects, tracked where they are not.
+
+    Args:
+      tracks: one or several, or the clips, or their files.
+      pixels_per_metre: overrides the clips' scale.
+      before: is given the clips, once they are checked, if any is to be tracked: what can go on
+        beside that begins; what it returns is called when all are tracked.
+
+    Returns:
+      the measurements, and how long tracking took, s.
+
+    Raises:
+      InputError: a clip is wrong, or they are not trials of the same objects.
+    """
+    given = as_list(tracks)
+    if not given:
+        raise InputError("no clip given; one or more expected")
+    clips = [
+        as_clip(one.clip if isinstance(one, Track) else one, pixels_per_metre) for one in given
+    ]
+    for clip in clips:
+        check_scale(clip)
+    check_same_objects(clips)
+    if all(isinstance(one, Track) for one in given) and pixels_per_metre is None:
+        return [one._measured() for one in given], 0.0
+    join = before(clips)
+    began = time.perf_counter()
+    measured = []
+    for i, (one, clip) in enumerate(zip(given, clips, strict=True)):
+        with progress.part(i / len(clips), (i + 1) / len(clips)):
+            is_done = isinstance(one, Track) and pixels_per_metre is None
+            measured.append(one._measured() if is_done else measure(clip))
+    join()
+    return measured, time.perf_counter() - began

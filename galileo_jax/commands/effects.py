@@ -1,0 +1,34 @@
+"""`galileo effects`: the effects that a model can have, one line each."""
+
+from collections.abc import Sequence
+
+from galileo_jax.commands import command
+
+EXAMPLES = """examples:
+  galileo effects
+  galileo effects --effects-from my_effect.py
+"""
+
+
+def main(argv: Sequence[str]) -> int | None:
+    """Prints a line for each."""
+    call = _parser().parse_args(argv)
+    from galileo_jax.api.catalogue import effects
+
+    known = effects(call.effects_from)
+    width = max(map(len, known.index))
+    for name, meaning in known["meaning"].items():
+        print(f"{name:<{width}}  {meaning}")
+    return None
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="galileo effects", description=__doc__, epilog=EXAMPLES)
+    parser.add_argument(
+        "--effects-from",
+        action="append",
+        default=[],
+        metavar="FILE.py",
+        help="Python file that registers more effects (may be given several times)",
+    )
+    return parser
