@@ -11,6 +11,7 @@ from galileo_jax.api.command_line import command_line
 from galileo_jax.api.effect_choice import EffectsLike
 from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit
+from galileo_jax.api.run import load_run
 from galileo_jax.api.track import TrackLike
 from galileo_jax.comparison.compare import Comparison as Compared
 from galileo_jax.comparison.compare import compare as compare_fit
@@ -142,7 +143,7 @@ def compare(
     again (parametric bootstrap), so that p is corrected for having looked in many places.
 
     Args:
-      fit: a fit; or tracks, clips or files, which are fitted first.
+      fit: a fit or the folder of a saved one; or tracks, clips or files, which are fitted first.
       effects: names of effects in the model of that fit; a `Fit` has its own.
       effects_from: Python files that register more effects.
       engine: that rolls out.
@@ -164,12 +165,16 @@ def compare(
     """
     began = time.perf_counter()
     with progress.scope(on_progress, cancel):
-        if isinstance(fit, Fit):
+        is_folder = isinstance(fit, str | Path) and Path(fit).is_dir()
+        if is_folder or isinstance(fit, Fit):
             if effects or effects_from or pixels_per_metre:
-                where = fit.folder or ", ".join(fit.names)
+                where = fit if is_folder else ", ".join(fit.names)  # pyright: ignore
                 raise InputError(
                     f"{where}: a run has its own effects and scale; give its clip to change"
                 )
+            if is_folder:
+                fit = load_run(fit, engine=engine)  # pyright: ignore
+            assert isinstance(fit, Fit)
             chosen = int(fit.result["seed"]) if seed is None else seed
             words = [fit.folder] if fit.folder else list(fit.result["clips"])
             of_model = () if fit.folder else fit.effects

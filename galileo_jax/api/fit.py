@@ -337,20 +337,18 @@ def _by_chains(
         num_chains=options.chains or NUM_CHAINS,
         starts=starts,
         checkpoint=checkpoint,
-        identity=identity_of(
-            measured,
-            problem,
-            effects_from=options.effects_from,
-            options=(
-                options.sampler,
-                options.seed,
-                ",".join(options.effects),
-                options.init,
-                options.chains or NUM_CHAINS,
-            ),
-        ),
+        identity=checkpoint_identity(measured, problem, options),
         on_block=on_block,
     )
+
+
+def checkpoint_identity(
+    measured: Sequence[Measurement], problem: JointProblem, options: FitOptions
+) -> str:
+    """What the chains sample: a checkpoint of anything else is refused."""
+    chains = options.chains or NUM_CHAINS
+    chosen = (options.sampler, options.seed, options.effects, options.init, chains)
+    return identity_of(measured, problem, effects_from=options.effects_from, options=chosen)
 
 
 def _by_network(

@@ -31,11 +31,10 @@ def main(argv: Sequence[str]) -> int | None:
     else:
         out = out_folder(call.out, clips, "compare")
     from galileo_jax.api.compare import compare
-    from galileo_jax.api.run import load_run
 
     with progress_display() as display:
         compared = compare(
-            load_run(runs[0], engine=call.engine) if runs else clips,
+            runs[0] if runs else clips,
             effects=call.effects,
             effects_from=call.effects_from,
             engine=call.engine,

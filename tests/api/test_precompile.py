@@ -30,10 +30,10 @@ def test_a_likely_clip_is_compiled_as_the_tracked_one(tmp_path):
 
 
 def test_what_is_wrong_is_told_later(tmp_path):
-    def build(_):
+    def build(*_):
         raise ValueError("in earnest, this is told when the clip is fitted")
 
     filmed = make_run(tmp_path, HIT, 1.6).clip.model_copy(update={"video": Path("clip.mp4")})
     asked = []
-    precompile.work_ahead([filmed], lambda *given: build(asked.append(given))).join()
+    precompile.precompile([filmed], lambda *given: build(asked.append(given))).join()
     assert len(asked) == 1

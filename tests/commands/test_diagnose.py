@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from galileo_jax.api import diagnose as api
 from galileo_jax.commands import command, diagnose, simulate
-from galileo_jax.diagnosis import diagnose as loop
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.diagnosis.last_model import by_itself
 from galileo_jax.files.atomic_write import write_json
@@ -15,6 +15,7 @@ from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.results.run import load_run
+from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import BROKEN_CLIPS, build_good_track
 from tests.found import diagnosis_of, fit_of, make_trials
 from tests.oracle_run import HIT, make_run
@@ -121,7 +122,7 @@ def test_what_has_no_place_is_no_candidate(tmp_path):
     """One object on a slope: nothing to hit, no table."""
     clip = build_good_track(tmp_path)
     words = [str(clip), "--add", "restitution", "--out", str(tmp_path / "out")]
-    with pytest.raises(diagnose.InputError, match="restitution has no place in"):
+    with pytest.raises(InputError, match="restitution has no place in"):
         diagnose.main(words)
 
 
@@ -129,7 +130,7 @@ def test_ctrl_c_leaves_nothing_half_done(tmp_path, capfd, monkeypatch):
     def stopped(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(loop, "diagnose", stopped)
+    monkeypatch.setattr(api, "run_loop", stopped)
     clip, out = build_good_track(tmp_path), tmp_path / "out"
     assert command.run(diagnose.main, [str(clip), "--out", str(out)]) == 130
     assert "stopped" in capfd.readouterr().err

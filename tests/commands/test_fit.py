@@ -12,6 +12,7 @@ import yaml
 from rich.progress import Progress
 
 from galileo_jax import report
+from galileo_jax.api.fit import OFF_THE_PLANE
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.commands import command, fit, simulate
 from galileo_jax.inference.samplers import driver
@@ -377,5 +378,5 @@ def test_what_stands_off_the_plane_is_warned_of(simulated, tmp_path, capsys):
     content["objects"][1]["z_m"] = 0.01
     (tmp_path / "off.yaml").write_text(yaml.safe_dump(content))
     result = run_fit(tmp_path / "off.yaml", tmp_path / "run")
-    assert result["warnings"] == [fit.OFF_THE_PLANE]
+    assert result["warnings"] == [OFF_THE_PLANE]
     assert "has a z_m" in " ".join(capsys.readouterr().err.split())

@@ -54,7 +54,7 @@ def write_track(
 @pytest.mark.parametrize("declared", ["20.0", "null"])
 @pytest.mark.parametrize("direction", ["right", "left"])
 @pytest.mark.parametrize("angle_deg", [10.0, 20.0, 30.0])
-def test_foot(angle_deg: float, direction: str, declared: str, tmp_path: Path, capsys) -> None:
+def test_foot(angle_deg: float, direction: str, declared: str, tmp_path: Path) -> None:
     declared = declared if declared == "null" else str(angle_deg)
     measured = measure(load_clip(write_track(tmp_path, angle_deg, direction, declared)))
     # 0.3 px of noise in 20 points before and after, 0.4 m from the bend: under a pixel.
@@ -62,7 +62,7 @@ def test_foot(angle_deg: float, direction: str, declared: str, tmp_path: Path, c
     assert measured.inferred["origin_px"]["mean"] == list(measured.clip.origin_px or ())
     assert measured.clip.ramp_angle_deg == pytest.approx(angle_deg, abs=0.2)
     assert ("ramp_angle_deg" in measured.inferred) == (declared == "null")
-    lines = capsys.readouterr().err.splitlines()
+    lines = measured.remarks
     assert "origin_px: null; " in lines[0]
     assert len(lines) == len(measured.inferred)
 

@@ -53,7 +53,7 @@ def write_track(
 
 @pytest.mark.parametrize("scenario", ["incline", "ramp"])
 @pytest.mark.parametrize("angle_deg", [8.0, 20.0, 35.0])
-def test_angle_of_the_path(scenario: str, angle_deg: float, tmp_path: Path, capsys) -> None:
+def test_angle_of_the_path(scenario: str, angle_deg: float, tmp_path: Path) -> None:
     measured = measure(load_clip(write_track(tmp_path, angle_deg, 2.0, scenario)))
     found = measured.inferred["ramp_angle_deg"]
     # 36 points of 0.5 mm over 0.2 m and more: 0.15 degrees at worst.
@@ -62,7 +62,7 @@ def test_angle_of_the_path(scenario: str, angle_deg: float, tmp_path: Path, caps
     assert measured.clip.ramp_angle_deg == found["mean"]
     assert measured.clip.ramp_angle_sd_deg == found["sd"]
     assert inferred([measured]) == {"inferred": {"slide": {"ramp_angle_deg": dict(found)}}}
-    line = capsys.readouterr().err
+    (line,) = measured.remarks
     assert "ramp_angle_deg: null; object1's path falls by" in line
     assert line.count("ramp_angle_deg") == 1
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.load import load_clip
-from galileo_jax.commands.clip_options import load_clips
 from galileo_jax.measurement.measure import measure
 from galileo_jax.measurement.truncate_at_stop import arrest_frame, until_arrest
 from galileo_jax.observation.observation import Observation
@@ -69,11 +68,13 @@ def write_clip(folder: Path, scenario: str, more: str = "") -> Path:
     return path
 
 
-def test_what_follows_is_left_out_and_it_is_said(tmp_path, capsys):
-    (clip,) = load_clips([str(write_clip(tmp_path, "fall"))])
-    seen = measure(clip).observation.mask[0]
+def test_what_follows_is_left_out_and_it_is_said(tmp_path):
+    measured = measure(load_clip(write_clip(tmp_path, "fall")))
+    seen = measured.observation.mask[0]
     assert seen[:60].all() and not seen[60:].any()
-    assert "object1 is stopped by something after 0.983 s" in capsys.readouterr().err
+    (remark,) = measured.remarks
+    assert "object1 is stopped by something after 0.983 s" in remark
+    assert measured.whole.mask[0, 60:].any(), "the whole track is still there"
 
 
 def test_a_declared_floor_is_in_the_scene(tmp_path):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from galileo_jax.commands.fit import write_fit
+from galileo_jax.api.fit_result import make_fit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.measurement.measure import Measurement
@@ -29,24 +29,26 @@ def precision():
 
 def fit_again(run: Run, names: tuple[str, ...]) -> None:
     """Writes the fit of as many copies of the run's clip into the run's folder."""
-    clips = [run.clip.model_copy(update={"path": Path(f"{name}.csv")}) for name in names]
+    named = {name: f"{name}.csv" for name in names}
+    clips = [
+        run.clip.model_copy(update={"path": Path(file), "source": file}) for file in named.values()
+    ]
     seen = run.problem.observation
     trials = JointProblem(tuple(replace(run.problem, name=name) for name in names))
     z = 0.1 * np.random.default_rng(0).standard_normal((8, len(trials.parameters)))
     posterior = Posterior(trials.names, trials.theta(z)[None], np.zeros((1, 8)), Status.CONVERGED)
-    write_fit(
-        [Measurement(clip, seen, seen) for clip in clips],
+    made = make_fit(
+        tuple(Measurement(clip, seen, seen) for clip in clips),
         trials,
         posterior,
         z[0],
-        run.folder,
-        files=[str(clip.path) for clip in clips],
+        None,
         method="grad",
         seed=0,
         timings={},
         notes={"status": "the fit converged"},
-        with_pages=False,
     )
+    made.save(run.folder, report=False)
 
 
 def write_predicted(folder: Path, content: object) -> None:

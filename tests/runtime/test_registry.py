@@ -16,7 +16,7 @@ def test_entries_are_named_as_their_files():
 
 def test_fit_lists_them_without_jax():
     said = (
-        "import sys; from galileo_jax import fit; text = fit._parser().format_help(); "
+        "import sys; from galileo_jax.commands import fit; text = fit._parser().format_help(); "
         "assert 'random_walk' in text and 'earth_mover' in text; assert 'jax' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", said], check=True)
