@@ -214,8 +214,10 @@ def make_tracks(seed: int, count: int, noise: str) -> list[Track]:
         )
 
     (problem,) = make_joint_problem(
-        [clip], [seen(np.tile(start, NUM_FRAMES))], noise=noise
-    ).problems  # pyright: ignore
+        [clip],
+        [seen(np.tile(start, NUM_FRAMES))],
+        noise=noise,  # pyright: ignore
+    ).problems
     trials = JointProblem((problem,))
     generator = np.random.default_rng([seed, 9])
     tracks: list[Track] = []

@@ -22,12 +22,12 @@ import tables
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import simulate
-from galileo_jax.commands.fit import read_truth
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import measure
+from galileo_jax.results.truth import true_parameters
 from galileo_jax.runtime import compilation_cache
 
 CASES = {
@@ -73,7 +73,7 @@ def _fit(options: Sequence[str], seed: int) -> tuple[Mapping[str, float], dict[s
             given = ("--track-only", "--solver", "fine", "--seed", str(seed), "--out", str(track))
             simulate.main([*options, *given])
         clip = load_clip(track)
-        measured, truth = measure(clip), read_truth(clip)
+        measured, truth = measure(clip), true_parameters(clip)
     trials = make_joint_problem([measured.clip], [measured.observation])
     fit = GradientFitter(trials).fit(seed)
     posterior = laplace_posterior(trials, fit, seed)

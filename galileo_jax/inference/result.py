@@ -172,7 +172,8 @@ def _derived_by_laws(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[
     def told(rows: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         found: dict[str, tuple[np.ndarray, str]] = {}
         for effect in model.effects + model.nuisances:
-            found |= effect.derived(model.by_name(rows), scene)
+            for name, (values, unit) in effect.derived(model.by_name(rows), scene).items():
+                found[name] = np.asarray(values), unit
         return found
 
     z = np.random.default_rng(0).standard_normal((NUM_PRIOR_DRAWS, len(trials.parameters)))

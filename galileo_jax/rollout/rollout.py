@@ -20,6 +20,7 @@ from typing import Protocol
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import forward
@@ -27,6 +28,10 @@ from galileo_jax.rollout.motion import pitch
 from galileo_jax.rollout.trajectory import Trajectory
 
 JUMP_M_S2 = 30.0  # no steady force accelerates so much
+
+Places = Float[np.ndarray, "batch object 2 record"]
+Motion = tuple[Places, Places]
+"""Centres (m) and velocities (m/s), from the release on, every `Model.record_dt_s`."""
 
 Rollout = Callable[[jax.Array, jax.Array], Trajectory]
 
@@ -37,8 +42,8 @@ class Engine(Protocol):
     name: str
     model: Model
 
-    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """`[batch, parameter]` to centres and velocities `[batch, object, 2, record + 1]`."""
+    def simulate(self, theta: Float[np.ndarray, "batch parameter"]) -> "Motion":
+        """Parameters, in their units, to centres (m) and velocities (m/s)."""
         ...
 
 

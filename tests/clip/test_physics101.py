@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.same_objects import check_same_objects
 from galileo_jax.commands import command, label, simulate
-from galileo_jax.commands.clip_options import load_clips
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import good_video
 
@@ -81,7 +81,8 @@ def test_object_before_set_up_and_other_scenarios(tmp_path: Path) -> None:
 def test_trials_have_different_names(tmp_path: Path) -> None:
     paths = [add_clip(tmp_path, "ramp", "20_01", "c_block_01", trial) for trial in ("01", "02")]
     write_labels(tmp_path, LABELS)
-    clips = load_clips([str(path) for path in paths])
+    clips = [load_clip(path) for path in paths]
+    check_same_objects(clips)
     assert [clip.path.stem for clip in clips] == ["20_01-c_block_01-01", "20_01-c_block_01-02"]
 
 

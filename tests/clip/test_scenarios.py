@@ -17,6 +17,7 @@ from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import effect_names, make_effects
 from galileo_jax.model.parameters import absent
 from galileo_jax.model.scene.expected import expected
+from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.free import FreeTruth, draw_free, solve_free
@@ -202,7 +203,7 @@ def test_simulate_writes_a_track_that_loads(scenario, tmp_path):
     truth = json.loads(out.with_suffix(".truth.json").read_text())
     assert load_clip(out).frame_count == truth["frames"]
     assert truth["effect"] == "none"
-    assert fit.read_truth(load_clip(out)) == truth["parameters"]
+    assert true_parameters(load_clip(out)) == truth["parameters"]
 
 
 @pytest.mark.parametrize(
