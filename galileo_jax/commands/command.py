@@ -3,7 +3,8 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NoReturn
 
 from rich.console import Console
@@ -11,12 +12,14 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.progress import OnProgress
 
 
 class Parser(argparse.ArgumentParser):
@@ -27,6 +30,11 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **given: Any):
         super().__init__(allow_abbrev=False, **given)
+
+    def examples(self, *lines: str) -> None:
+        """Shows calls at the end of --help."""
+        self.formatter_class = argparse.RawDescriptionHelpFormatter
+        self.epilog = "examples:\n" + "\n".join(f"  {line}" for line in lines)
 
     def error(self, message: str) -> NoReturn:
         """Raises the complaint as an `InputError`."""
@@ -85,6 +93,18 @@ def progress() -> Progress:
         disable=not shown.is_terminal,
         transient=True,
     )
+
+
+@contextmanager
+def progress_bar() -> Iterator[OnProgress]:
+    """An `on_progress` for the public functions: one bar; silent when stderr is not a terminal."""
+    shown = console()
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
+    with Progress(
+        *columns, TimeElapsedColumn(), console=shown, disable=not shown.is_terminal, transient=True
+    ) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda stage, share, _: bar.update(task, description=stage, completed=share)
 
 
 def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None = None) -> int:
