@@ -3,7 +3,6 @@
 Sentences name the command's options (`--track-noise`); the keyword of an option has its name.
 """
 
-import difflib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -13,6 +12,7 @@ from typing import Any, NamedTuple, get_args
 from galileo_jax.clip.schema import MAX_ACROSS_M, Shape
 from galileo_jax.rollout.engine_names import MOTIONS
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import check_known
 from galileo_jax.simulation.motion import LONGEST_S, SOLVERS
 from galileo_jax.simulation.settings import (
     CAMERA_FAULTS,
@@ -135,7 +135,7 @@ def shapes_of(settings: Settings) -> tuple[Shape, ...]:
     usual = SHAPES[settings.scenario]
     shapes = settings.shapes or usual
     for shape in shapes:
-        _check_known("--shapes", "shape", shape, get_args(Shape))
+        check_known("--shapes", "shape", shape, get_args(Shape))
     is_multi = settings.scenario == "multi"
     most = MOST_OBJECTS if is_multi else len(usual)
     if not (2 if is_multi else most) <= len(shapes) <= most:
@@ -147,20 +147,12 @@ def shapes_of(settings: Settings) -> tuple[Shape, ...]:
 
 
 def _check_names(settings: Settings) -> None:
-    _check_known("--scenario", "scenario", settings.scenario, SCENARIO_NAMES)
-    _check_known("--motion", "kind of motion", settings.motion, MOTIONS)
-    _check_known("--solver", "solver", settings.solver, SOLVERS)
-    _check_known("--direction", "direction", settings.direction, DIRECTIONS)
+    check_known("--scenario", "scenario", settings.scenario, SCENARIO_NAMES)
+    check_known("--motion", "kind of motion", settings.motion, MOTIONS)
+    check_known("--solver", "solver", settings.solver, SOLVERS)
+    check_known("--direction", "direction", settings.direction, DIRECTIONS)
     for fault in settings.camera_fault:
-        _check_known("--camera-fault", "fault", fault, CAMERA_FAULTS)
-
-
-def _check_known(name: str, noun: str, value: Any, known: Sequence[str]) -> None:
-    if value in known:
-        return
-    close = difflib.get_close_matches(str(value), known, n=1)
-    hint = f"did you mean {close[0]}? " if close else ""
-    raise InputError(f"{name}: unknown {noun} {value!r}; {hint}known: {', '.join(known)}")
+        check_known("--camera-fault", "fault", fault, CAMERA_FAULTS)
 
 
 def _check_free_motion(settings: Settings) -> None:
