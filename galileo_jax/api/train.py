@@ -15,6 +15,7 @@ from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 
 if TYPE_CHECKING:
+    from galileo_jax.neural.config import TrainConfig
     from galileo_jax.neural.evaluation import Evaluation
 
 PRESETS = ("thesis", "galileo")
@@ -106,7 +107,7 @@ def train(
         return _train(out, load_config(path, **overrides), Path(data or out / "data"))
 
 
-def _train(out: Path, config, data_folder: Path) -> Trained:
+def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
     from galileo_jax.neural.dataset import load_or_make
     from galileo_jax.neural.presets import make_task
     from galileo_jax.neural.training import train as train_network

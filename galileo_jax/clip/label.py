@@ -64,8 +64,8 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     Raises:
       InputError: nothing is declared, or the clip would be wrong; nothing is written then.
     """
-    check_known("--level", "level", declared.level, LEVELS)
     if (place := physics101.place_of(path)) and not has_yaml(path):
+        check_known("--level", "level", declared.level, LEVELS)
         return _label_place(place, declared)
     if declared.level != LEVELS[-1]:
         raise InputError(f"--level: {path} is not in folders of Physics 101")

@@ -63,11 +63,9 @@ def _parser() -> command.Parser:
         "always of the trial, sizes of the object (default %(default)s)",
     )
     _add_object_options(
-        parser.add_argument_group(
-            "objects (repeat for each; a new NAME adds an object; default: unchanged)"
-        )
+        parser.add_argument_group("objects (repeat for each; a new NAME adds an object)")
     )
-    _add_scene_options(parser.add_argument_group("scale and ramp (default: unchanged)"))
+    _add_scene_options(parser.add_argument_group("scale and ramp"))
     _add_track_options(parser.add_argument_group("of a track file"))
     return parser
 
@@ -78,12 +76,18 @@ def _add_object_options(objects: Any) -> None:
             option, nargs=count, action="append", default=[], metavar=metavar, help=meaning
         )
 
-    add("--point", ("NAME", "X", "Y"), 3, "its centre in its first frame, pixels")
+    add(
+        "--point",
+        ("NAME", "X", "Y"),
+        3,
+        "its centre in its first frame, pixels (default: unchanged)",
+    )
     add(
         "--size",
         ("NAME", "METRES"),
         "+",
-        "box: length depth height; cylinder: radius length; torus: radii; sphere: radius",
+        "box: length depth height; cylinder: radius length; torus: radii; sphere: radius "
+        "(default: unchanged)",
     )
     add(
         "--shape",
@@ -102,23 +106,31 @@ def _add_object_options(objects: Any) -> None:
 
 def _add_scene_options(scene: Any) -> None:
     add = scene.add_argument
-    add("--pixels-per-metre", type=float, metavar="PX", help="of the picture")
+    add("--pixels-per-metre", type=float, metavar="PX", help="of the picture (default: unchanged)")
     add(
         "--scale",
         nargs=5,
         type=float,
         metavar=(*LINE, "METRES"),
-        help="two pixels and the distance between them, in place of --pixels-per-metre",
+        help="two pixels and the distance between them, in place of --pixels-per-metre "
+        "(default: unchanged)",
     )
-    add("--ramp-angle", type=float, metavar="DEG", help="of the ramp, degrees")
+    add("--ramp-angle", type=float, metavar="DEG", help="of the ramp, degrees (default: unchanged)")
     add(
         "--ramp",
         nargs=4,
         type=float,
         metavar=LINE,
-        help="two pixels on the ramp: its angle and direction, in place of --ramp-angle",
+        help="two pixels on the ramp: its angle and direction, in place of --ramp-angle "
+        "(default: unchanged)",
     )
-    add("--origin", nargs=2, type=float, metavar=("X", "Y"), help="foot of the ramp, pixels")
+    add(
+        "--origin",
+        nargs=2,
+        type=float,
+        metavar=("X", "Y"),
+        help="foot of the ramp, pixels (default: unchanged)",
+    )
 
 
 def _add_track_options(track: Any) -> None:

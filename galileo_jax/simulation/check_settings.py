@@ -175,31 +175,35 @@ def _check_masses_and_frictions(values: Mapping[str, float], count: int) -> None
 
 
 def _number(name: str, value: Any, limit: Limit) -> float | int:
-    is_number = isinstance(value, Integral if limit.is_whole else Real)
-    if not is_number or not limit.low <= value <= limit.high:
+    kind = Integral if limit.is_whole else Real
+    number = float(value) if isinstance(value, kind) else math.nan
+    if not limit.low <= number <= limit.high:
         high = limit.high
         within = f"at least {limit.low:g}" if high == math.inf else f"in [{limit.low:g}, {high:g}]"
         noun = "whole number" if limit.is_whole else "number"
-        text = f"{value:g}" if isinstance(value, Real) else str(value)
+        text = f"{value:g}" if isinstance(value, float) else str(value)
         raise InputError(f"{name}: {text!r} is no {noun} {within}")
-    return int(value) if limit.is_whole else float(value)
+    return int(value) if isinstance(value, Integral) and limit.is_whole else number
 
 
 def _values(name: str, values: Mapping[str, Any], form: str) -> dict[str, float]:
     """Values by parameter, finite."""
+    numbers = {}
     for key, value in values.items():
-        if not isinstance(value, Real) or not math.isfinite(value):
+        numbers[key] = float(value) if isinstance(value, Real) else math.nan
+        if not math.isfinite(numbers[key]):
             raise InputError(f"{name}: '{key}={value}' is not {form}")
-    return {key: float(value) for key, value in values.items()}
+    return numbers
 
 
 def _size(size: Any) -> tuple[int, int]:
-    sides = tuple(size) if isinstance(size, Sequence) and not isinstance(size, str) else ()
-    is_size = len(sides) == 2 and all(
-        isinstance(side, Integral) and SMALLEST_PX <= side <= LARGEST_PX and side % 2 == 0
-        for side in sides
-    )
-    if not is_size:
+    sides: list[Any] = [] if isinstance(size, str) or not isinstance(size, Sequence) else [*size]
+    if len(sides) != 2 or not all(map(_is_side, sides)):
         text = "x".join(map(str, sides)) if sides else str(size)
         raise InputError(f"--size: {text!r} is no size; even numbers such as 640x360 expected")
     return int(sides[0]), int(sides[1])
+
+
+def _is_side(value: Any) -> bool:
+    is_whole = isinstance(value, Integral)
+    return is_whole and SMALLEST_PX <= int(value) <= LARGEST_PX and int(value) % 2 == 0
