@@ -57,6 +57,10 @@ class LabelledClip:
     clip: Clip
     notes: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"<LabelledClip {self.path}>"
+
 
 def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     """Creates or updates the yaml beside a clip; comments and order of an old one stay.
