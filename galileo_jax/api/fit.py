@@ -24,6 +24,7 @@ from galileo_jax.measurement.measure import Measurement
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
@@ -162,12 +163,12 @@ def _check(options: FitOptions) -> None:
     from galileo_jax.inference.samplers import sampler_names
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
-    _one_of("method", options.method, ("grad", "mh", "cnn"))
-    _one_of("engine", options.engine, ENGINES)
-    _one_of("motion", options.motion, MOTIONS)
-    _one_of("sampler", options.sampler, sampler_names())
-    _one_of("init", options.init, ("grad", "cnn"))
-    _one_of("preset", options.preset, ("galileo", "thesis"))
+    check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
+    check_known("--engine", "engine", options.engine, ENGINES)
+    check_known("--motion", "motion", options.motion, MOTIONS)
+    check_known("--sampler", "sampler", options.sampler, sampler_names())
+    check_known("--init", "init", options.init, ("grad", "cnn"))
+    check_known("--preset", "preset", options.preset, ("galileo", "thesis"))
     _refuse_ignored(options)
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
@@ -198,11 +199,6 @@ def _refuse_ignored(options: FitOptions) -> None:
     for name in ignored:
         if getattr(options, name) != getattr(plain, name):
             raise InputError(f"--{name.replace('_', '-')}: {why}")
-
-
-def _one_of(name: str, value: str, known: Sequence[str]) -> None:
-    if value not in known:
-        raise InputError(f"--{name}: unknown {value!r}; known: {', '.join(known)}")
 
 
 def _problem(

@@ -27,11 +27,6 @@ SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
 SIMILARITIES = entry_names("galileo_jax.similarity.library")
 BLOCK_STEPS = 25  # as api.fit has it, which imports JAX
 
-EXAMPLES = """examples:
-  galileo fit clip.mp4                                  seconds
-  galileo fit clip1.mp4 clip2.mp4 --method mh           trials of the same objects, sampled
-"""
-
 
 def main(argv: Sequence[str]) -> int | None:
     """Fits a clip, or several trials together, and writes a run."""
@@ -126,7 +121,7 @@ def _refuse_ignored(call: Any, argv: Sequence[str]) -> None:
 
 
 def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo fit", description=__doc__, epilog=EXAMPLES)
+    parser = command.Parser(prog="galileo fit", description=__doc__)
     add = parser.add_argument
     add("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
     add(
@@ -195,5 +190,9 @@ def _parser() -> command.Parser:
         choices=("best", "least_variance"),
         default="best",
         help="how the answer is taken from the chains, of --preset thesis (default %(default)s)",
+    )
+    parser.examples(
+        "galileo fit clip.mp4                                  seconds",
+        "galileo fit clip1.mp4 clip2.mp4 --method mh           trials of the same objects, sampled",
     )
     return parser

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from galileo_jax.clip.load import check_clip, load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
-from galileo_jax.clip.yaml_edit import dump
-from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.clip.yaml_file import read_mapping, yaml_text
 from galileo_jax.commands import command, label
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import (
@@ -253,6 +252,6 @@ def test_aliases_and_deep_nesting_give_one_line(tmp_path: Path) -> None:
 
 def test_dumped_yaml_reads_back(tmp_path: Path) -> None:
     content = read_mapping(build_good(tmp_path))
-    (tmp_path / "new.yaml").write_text(dump(content))
+    (tmp_path / "new.yaml").write_text(yaml_text(content))
     assert read_mapping(tmp_path / "new.yaml") == content
     assert good_video()

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.same_objects import check_same_objects
-from galileo_jax.commands import command, label, simulate
+from galileo_jax.commands import command, label
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import good_video
 
@@ -115,6 +116,16 @@ def test_label_writes_the_table(tmp_path: Path, capsys) -> None:
     assert load_clip(other).objects[0].point_px is None
 
 
+def test_label_keeps_the_tables_comments(tmp_path: Path, capsys) -> None:
+    path = add_clip(tmp_path, "ramp", "20_01", "c_block_01", "03")
+    text = f"# measured in May\n{yaml.safe_dump(LABELS)}"
+    labels = write_labels(tmp_path, text)
+    assert run(path, "--gravity", 9.8) == 0
+    assert "comments" not in capsys.readouterr().err
+    assert labels.read_text().startswith("# measured in May\n")
+    assert load_clip(path).gravity == 9.8
+
+
 @pytest.mark.parametrize("labels, words", [
     ("clips: [1]", "clips: [1] is not a mapping"),
     ("clips:\n  ramp: 3", "clips.'ramp': 3 is not a mapping"),
@@ -152,8 +163,7 @@ def test_simulated_clip_in_the_tree_is_fitted(tmp_path: Path) -> None:
     from galileo_jax.commands import fit
 
     made = tmp_path / "clip.mp4"
-    options = "--seed 5 --angle 20 --k1 0.2 --k2 0.3 --m1 0.2 --m2 0.2"
-    assert command.run(simulate.main, [*shlex.split(options), "--out", str(made)]) == 0
+    simulate(made, seed=5, k1=0.2, k2=0.3, m1=0.2, m2=0.2)
     declared = yaml.safe_load(made.with_suffix(".yaml").read_text())
     path = tmp_path.joinpath("scenarios", "ramp", "20_01", "object1", "01", "Camera_1.mp4")
     path.parent.mkdir(parents=True)

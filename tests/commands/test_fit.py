@@ -13,8 +13,9 @@ from rich.progress import Progress
 
 from galileo_jax import report
 from galileo_jax.api.fit import OFF_THE_PLANE
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.commands import command, fit, simulate
+from galileo_jax.commands import command, fit
 from galileo_jax.inference.samplers import driver
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results.run import load_run
@@ -81,10 +82,8 @@ def deviation(entry, truth):
 def simulated(tmp_path_factory):
     """A track by the project's own simulator, and its truth."""
     folder = tmp_path_factory.mktemp("simulated")
-    assert (
-        command.run(simulate.main, ["--track-only", "--seed", "3", "--out", f"{folder}/a.csv"]) == 0
-    )
-    return folder / "a.yaml", json.loads((folder / "a.truth.json").read_text())
+    made = simulate(folder / "a.csv", track_only=True, seed=3)
+    return folder / "a.yaml", made.truths[0]
 
 
 @pytest.fixture(scope="module")
@@ -209,11 +208,9 @@ def test_incline(tmp_path):
 @pytest.mark.slow
 @pytest.mark.video
 def test_a_video(tmp_path):
-    """Rendered, tracked and fitted, all by the commands."""
+    """Rendered, tracked and fitted."""
     video = tmp_path / "clip.mp4"
-    words = ["--seed", "11", "--seconds", "1.4", "--size", "480x270", "--out", str(video)]
-    assert command.run(simulate.main, words) == 0
-    truth = json.loads((tmp_path / "clip.truth.json").read_text())
+    (truth,) = simulate(video, seed=11, seconds=1.4, size=(480, 270)).truths
     result = run_fit(video, tmp_path / "run")
     assert result["parameters"]["k1"]["mean"] == pytest.approx(truth["k1"], abs=K1_ATOL)
     assert result["timings_s"]["track"] > 0
