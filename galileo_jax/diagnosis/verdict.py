@@ -177,7 +177,7 @@ def verdict_of_pairs(
         return UNKNOWN
     best = pairs[0]
     helps = best.log_evidence - best_single.log_evidence > LEAST_GAIN
-    is_clean = best.p_value is not None and best.p_value >= PAIR_P
+    is_clean = (best.p_value or 0.0) >= PAIR_P
     verdict = verdict_of(pairs, base_misfit, decisive) if helps and is_clean else None
     return verdict or UNKNOWN
 
@@ -190,10 +190,10 @@ def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | Non
 
     Args:
       verdict: not none.
-      candidates: all, pairs first where there are any, each group ranked.
+      candidates: those that the verdict is on, ranked, before any others.
     """
     if verdict.status == "unknown":
-        best = best_named([c for c in candidates if len(c.effects) == 1])
+        best = best_named(candidates)
         return best if best.log_evidence > LEAST_GAIN else None
     names = ("+".join(verdict.effects), verdict.effects[0])
     return next(c for c in candidates if c.name in names)

@@ -239,8 +239,9 @@ def test_a_pair_must_leave_nothing(p_value, status):
     assert verdict_of_pairs((pair,), SINGLE, BASE_MISFIT, DECISIVE).status == status
 
 
-def test_it_is_the_best_pair_that_must():
-    pairs = (candidate(PAIR, 60.0, 0.04), candidate("air_drag+stribeck", 59.0, 0.9))
+@pytest.mark.parametrize("p_value", [0.04, None])
+def test_it_is_the_best_pair_that_must(p_value):
+    pairs = (candidate(PAIR, 60.0, p_value), candidate("air_drag+stribeck", 59.0, 0.9))
     assert verdict_of_pairs(pairs, SINGLE, BASE_MISFIT, DECISIVE) == Verdict("unknown", ())
 
 
