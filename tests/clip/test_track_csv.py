@@ -34,7 +34,7 @@ def make_observation(seed: int, is_isotropic: bool, num_frames: int = 40) -> Obs
     return Observation(names, np.arange(num_frames) / 30, position, covariance, mask)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1), is_isotropic=st.booleans())
 def test_written_track_reads_back(seed: int, is_isotropic: bool, tmp_path_factory) -> None:
     path = tmp_path_factory.getbasetemp() / "track.csv"
@@ -166,7 +166,7 @@ def test_too_few_rows_to_estimate_the_error(tmp_path: Path) -> None:
         read_observation_csv(path)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(text=st.text(alphabet='time_s,object1_x_m\n\r\t0123.e-"; nai\0', max_size=80))
 def test_garbage_gives_one_line(text: str, tmp_path_factory) -> None:
     path = tmp_path_factory.getbasetemp() / "garbage.csv"

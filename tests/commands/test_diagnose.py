@@ -103,7 +103,8 @@ def test_finds_what_was_hidden(tmp_path, capsys):
     document = json.loads((out / "diagnosis.json").read_text())
     check_contract(document)
     assert not document["adequate"]
-    assert "air_drag" in document["verdict"]["effects"]
+    assert document["verdict"]["status"] == "named", document["verdict"]
+    assert document["verdict"]["effects"] == ["air_drag"]
     before, after = document["history"][0], document["history"][-1]
     assert after["effects"] == ["air_drag"]
     assert after["chi2_per_dof"] < 1.5 < before["chi2_per_dof"]

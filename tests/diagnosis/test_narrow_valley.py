@@ -10,7 +10,8 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
-from galileo_jax.diagnosis.diagnose import DECISIVE, fitter_of
+from galileo_jax.diagnosis.diagnose import fitter_of
+from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import make_effects

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.diagnosis.diagnose import DECISIVE
+from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.model.effects import effect_names
 from galileo_jax.model.effects.effect import State
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
