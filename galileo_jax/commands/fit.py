@@ -44,7 +44,7 @@ OF_GALILEO, OF_THESIS = (
 INITS = ("grad", "cnn")
 OFF_THE_PLANE = "an object has a z_m: motion in a plane takes no notice; see --motion free"
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
-SIMILARITIES = entry_names("galileo_jax.similarity.library")
+SIMILARITIES = entry_names("galileo_jax.thesis.similarities")
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -360,7 +360,7 @@ def _metropolis(
 
 def _thesis(trials: "JointProblem", call):
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
-    from galileo_jax.inference.thesis_preset import thesis_posterior
+    from galileo_jax.thesis.estimate import thesis_posterior
 
     chosen = {name: getattr(call, name) for name in ("similarity", "acceptance", "selection")}
     posterior, best = thesis_posterior(trials, call.seed, **chosen)

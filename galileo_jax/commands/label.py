@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.clip import physics101
 from galileo_jax.clip.load import (
     YAML_SUFFIXES,
     check_belongs,
     check_clip,
-    check_place,
     find_yaml,
     has_yaml,
     with_unused,
@@ -23,6 +21,8 @@ from galileo_jax.clip.yaml_edit import Key, dump, edited
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.commands import command
 from galileo_jax.files.atomic_write import write_text
+from galileo_jax.physics101 import place as physics101
+from galileo_jax.physics101.source import check_place
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video.decode import probe
 

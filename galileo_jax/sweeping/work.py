@@ -101,8 +101,8 @@ def _by_thesis(settings: Thesis, trials: "JointProblem") -> Found:
     import jax
     import jax.numpy as jnp
 
-    from galileo_jax.inference.thesis_preset import thesis_posterior
     from galileo_jax.model.parameters import inverse
+    from galileo_jax.thesis.estimate import thesis_posterior
 
     if len(trials.problems) > 1:
         raise InputError("method thesis: one clip expected")

@@ -8,7 +8,7 @@ from galileo_jax.neural.config import load_config
 from galileo_jax.neural.dataset import load_or_make
 from galileo_jax.neural.training import cosine_rate, train
 from galileo_jax.runtime.errors import InputError
-from tests.neural.test_thesis_network import config
+from tests.thesis.test_network import config
 
 
 class Toy:
@@ -17,7 +17,7 @@ class Toy:
     shard_size = 50
 
     def __init__(self, settings):
-        from galileo_jax.neural.thesis_task import ThesisTask
+        from galileo_jax.thesis.task import ThesisTask
 
         self._task = ThesisTask(settings)
         self.loss = self._task.loss

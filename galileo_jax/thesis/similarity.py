@@ -45,7 +45,9 @@ class AbstractSimilarity(eqx.Module):
         """The similarity; all three `[object, 2, frame - 1]`, zeros where masked."""
 
 
-_SIMILARITIES = Registry(AbstractSimilarity, "similarity", "similarities")
+_SIMILARITIES: Registry[type[AbstractSimilarity]] = Registry(
+    "similarity", "similarities", "galileo_jax.thesis.similarities"
+)
 
 register = _SIMILARITIES.register
 similarity_names = _SIMILARITIES.names

@@ -5,7 +5,7 @@ from typing import ClassVar
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.similarity.similarity import AbstractSimilarity, register
+from galileo_jax.thesis.similarity import AbstractSimilarity, register
 
 
 @register

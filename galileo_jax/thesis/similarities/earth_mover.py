@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
-from galileo_jax.similarity.similarity import AbstractSimilarity, register
+from galileo_jax.thesis.similarity import AbstractSimilarity, register
 
 
 @register

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from galileo_jax.similarity import similarity_class, similarity_names
-from galileo_jax.similarity.library.earth_mover import least_work
+from galileo_jax.thesis.similarities.earth_mover import least_work
+from galileo_jax.thesis.similarity import similarity_class, similarity_names
 
 FLOAT32_RTOL = 2e-5  # sums of a few dozen numbers
 

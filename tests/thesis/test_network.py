@@ -4,13 +4,13 @@ import pytest
 from flax import nnx
 
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.thesis_network import (
+from galileo_jax.thesis.network import (
     Convolution,
     ThesisNetwork,
     average_pool,
     count_parameters,
 )
-from galileo_jax.neural.thesis_task import CM, OBJECT2_M, ThesisTask
+from galileo_jax.thesis.task import CM, OBJECT2_M, ThesisTask
 from tests.ramp_model import HIT
 
 THESIS_PARAMETERS = 13_252
