@@ -41,6 +41,7 @@ import jax.numpy as jnp
 import numpy as np
 import tables
 from scipy import stats
+from tempering import temper
 
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.commands import command
@@ -55,7 +56,6 @@ from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.samplers import dispersed_starts, sample
 from galileo_jax.inference.samplers.driver import Settings
 from galileo_jax.inference.samplers.library.random_walk import RandomWalk
-from galileo_jax.inference.tempering import temper
 from galileo_jax.neural.estimate import cnn_posterior
 from galileo_jax.neural.start import start_from_network
 from galileo_jax.observation.observation import Observation

@@ -29,7 +29,6 @@ class EarthMover(AbstractSimilarity):
     """
 
     name: ClassVar[str] = "earth_mover"
-    is_log_likelihood: ClassVar[bool] = False
 
     def _of_measured(self, predicted, observed, mask) -> jax.Array:
         num_frames = predicted.shape[-1]

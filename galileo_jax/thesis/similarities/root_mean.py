@@ -21,7 +21,6 @@ class RootMeanSimilarity(AbstractSimilarity):
     """
 
     name: ClassVar[str] = "root_mean"
-    is_log_likelihood: ClassVar[bool] = False
 
     def _of_measured(self, predicted, observed, mask) -> jax.Array:
         size = jnp.abs(predicted) + jnp.abs(observed)
