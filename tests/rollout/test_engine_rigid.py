@@ -17,7 +17,7 @@ from galileo_jax.rollout.rollout import JUMP_M_S2, at_times
 from galileo_jax.rollout.trajectory import Trajectory
 from tests.ramp_model import HIT, make_model, make_theta
 from tests.reference_ramp import Experiment, solve
-from tests.rollout.rolled import rolled
+from tests.rollout.rolled import derivatives, rolled
 from tests.rollout.simple_effects import EVERY_KIND, Drag, Spring, Stribeck, Wind
 
 CLOSED_FORM_ATOL = 1e-9  # m and m/s; 1e-14 is typical
@@ -128,13 +128,7 @@ def test_derivatives_are_those_of_the_motion():
     times = jnp.asarray(times[away])
     assert len(jumps) == 2 and len(times) > 30
 
-    def centres(z):
-        return at_times(rolled(engine, z), times)[0]
-
-    slopes = np.asarray(jax.jit(jax.jacfwd(centres))(z))
-    many = jax.jit(jax.vmap(centres))
-    offsets = STEP_Z * np.eye(len(z))
-    differences = np.asarray(many(z + offsets) - many(z - offsets)) / (2 * STEP_Z)
+    slopes, differences = derivatives(engine, z, times, STEP_Z)
     for i, parameter in enumerate(model.parameters):
         wanted = differences[i]
         if parameter.step is None:
