@@ -21,10 +21,10 @@ from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.dataset import make_samples
 from galileo_jax.neural.evaluation import TEST_SHARD
 from galileo_jax.neural.task import Arrays
-from galileo_jax.neural.thesis_network import RANGES, ThesisNetwork
-from galileo_jax.neural.thesis_task import ThesisTask
 from galileo_jax.neural.training import train
 from galileo_jax.runtime.progress import scope
+from galileo_jax.thesis.network import RANGES, ThesisNetwork
+from galileo_jax.thesis.task import ThesisTask
 
 EPOCHS = 80
 SCALES = (2.0, RANGES[1], 2.0, RANGES[3])

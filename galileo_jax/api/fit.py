@@ -362,8 +362,8 @@ def _by_thesis(
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
     import jax.numpy as jnp
 
-    from galileo_jax.inference.thesis_preset import thesis_posterior
     from galileo_jax.model.parameters import inverse
+    from galileo_jax.thesis.estimate import thesis_posterior
 
     chosen = {name: getattr(options, name) for name in OF_THESIS}
     posterior, best = thesis_posterior(

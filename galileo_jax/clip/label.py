@@ -6,18 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.clip import physics101
 from galileo_jax.clip.declaration import LEVELS, Declaration
 from galileo_jax.clip.load import (
     YAML_SUFFIXES,
     check_belongs,
     check_clip,
-    check_place,
     find_yaml,
     has_yaml,
     with_unused,
 )
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_files.read import is_track
 from galileo_jax.clip.yaml_file import read_mapping, yaml_text
 from galileo_jax.clip.yaml_update import updated_text
@@ -68,9 +67,9 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     Raises:
       InputError: nothing is declared, or the clip would be wrong; nothing is written then.
     """
-    if (place := physics101.place_of(path)) and not has_yaml(path):
+    if not has_yaml(path) and (source := source_of(path)):
         check_known("--level", "level", declared.level, LEVELS)
-        return _label_place(place, declared)
+        return source.label(path, declared)
     if declared.level != LEVELS[-1]:
         raise InputError(f"--level: {path} is not in folders of Physics 101")
     yaml_path = _yaml_path(path)
@@ -88,49 +87,14 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     if is_new:
         text = yaml_text({key: content[key] for key in KEY_ORDER if key in content})
     else:
-        text, lost = _updated(yaml_path, content)
+        text, lost = updated_file(yaml_path, content)
         notes += lost
     write_text(yaml_path, text)
     return LabelledClip(yaml_path, clip, notes)
 
 
-def _label_place(place: physics101.Place, declared: Declaration) -> LabelledClip:
-    """Writes into the labels of Physics 101: sizes by object, all else for one of the folders."""
-    if declared.scenario is not None:
-        raise InputError(f"--scenario: the folders of {place.video} say {place.scenario}")
-    old = physics101.read_labels(place.labels)
-    things, clips = copy.deepcopy(old.things), copy.deepcopy(old.clips)
-    here, objects = declared.clip_values(), declared.object_values()
-    if not here and not objects:
-        raise InputError(f"{place.video}: nothing to write; see galileo label --help")
-    by_trial: dict[str, dict[str, Any]] = {}
-    for name, values in objects.items():
-        if name != place.object:
-            here["target"] = name
-        things[name] = dict(things.get(name, {"shape": "box"}) or {})
-        for key, value in values.items():
-            if key in physics101.BY_OBJECT:
-                by_trial.setdefault(key, {})[name] = value
-            else:
-                things[name][key] = value
-    if here:
-        level = place.level(declared.level)
-        clips[level] = (clips.get(level) or {}) | here
-    trial = clips.setdefault(place.levels[-1], {}) if by_trial else {}
-    for key, values in by_trial.items():
-        trial[key] = (trial.get(key) or {}) | values
-    clip = check_place(place, physics101.Labels(things, clips))
-    tables = {"objects": things, "clips": clips}
-    content = {key: table for key, table in tables.items() if table}
-    text, notes = yaml_text(content), ()
-    if place.labels.is_file():
-        text, notes = _updated(place.labels, content)
-    write_text(place.labels, text)
-    return LabelledClip(place.labels, clip, notes)
-
-
-def _updated(path: Path, content: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
-    """The file's text with new values, and a note where its comments are lost."""
+def updated_file(path: Path, content: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """A yaml file's text with new values, and a note where its comments are lost."""
     old_text = path.read_text(encoding="utf-8-sig")
     text, has_comments = updated_text(old_text, content, KEY_ORDER)
     is_lost = not has_comments and "#" in old_text

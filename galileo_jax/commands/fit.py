@@ -24,7 +24,7 @@ OF_GALILEO, OF_THESIS = (
     ("--similarity", "--acceptance", "--selection"),
 )
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
-SIMILARITIES = entry_names("galileo_jax.similarity.library")
+SIMILARITIES = entry_names("galileo_jax.thesis.similarities")
 BLOCK_STEPS = 25  # as api.fit has it, which imports JAX
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.api.label import label
-from galileo_jax.clip import physics101
 from galileo_jax.clip.declaration import LEVELS
 from galileo_jax.clip.load import has_yaml
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.sources import source_of
 from galileo_jax.commands import command
 
 LINE = ("X1", "Y1", "X2", "Y2")
@@ -18,7 +18,7 @@ def main(argv: Sequence[str]) -> int | None:
     """Creates or updates the yaml beside a clip; writes nothing unless the result is valid."""
     asked = vars(_parser().parse_args(argv))
     path: Path = asked.pop("clip")
-    if not physics101.place_of(path) or has_yaml(path):
+    if not source_of(path) or has_yaml(path):
         command.refuse_ignored(argv, ["--level"], f"{path} is not in folders of Physics 101")
     for name in ("point", "size"):
         asked[name] = {thing: values for thing, *values in asked[name]}

@@ -8,7 +8,7 @@ displacements count: for independent tracking errors that is the likelihood of t
 profile with its exact (tridiagonal) covariance, without losing the first frame's noise.
 """
 
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -44,9 +44,6 @@ class Whitening(NamedTuple):
 
 class GaussianLikelihood:
     """A normalised log-likelihood of positions; see the module."""
-
-    name: ClassVar[str] = "gaussian"
-    is_log_likelihood: ClassVar[bool] = True
 
     @staticmethod
     def prepare(

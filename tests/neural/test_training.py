@@ -9,7 +9,7 @@ from galileo_jax.neural.dataset import load_or_make
 from galileo_jax.neural.training import cosine_rate, train
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import scope
-from tests.neural.test_thesis_network import config
+from tests.thesis.test_network import config
 
 
 class Toy:
@@ -18,7 +18,7 @@ class Toy:
     shard_size = 50
 
     def __init__(self, settings):
-        from galileo_jax.neural.thesis_task import ThesisTask
+        from galileo_jax.thesis.task import ThesisTask
 
         self._task = ThesisTask(settings)
         self.loss = self._task.loss

@@ -5,7 +5,7 @@ from typing import ClassVar
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.similarity.similarity import AbstractSimilarity, register
+from galileo_jax.thesis.similarity import AbstractSimilarity, register
 
 
 @register
@@ -21,7 +21,6 @@ class RootMeanSimilarity(AbstractSimilarity):
     """
 
     name: ClassVar[str] = "root_mean"
-    is_log_likelihood: ClassVar[bool] = False
 
     def _of_measured(self, predicted, observed, mask) -> jax.Array:
         size = jnp.abs(predicted) + jnp.abs(observed)

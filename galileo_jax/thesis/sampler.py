@@ -13,7 +13,6 @@ import numpy as np
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
 from galileo_jax.inference.samplers.driver import Progress, Settings, sample
-from galileo_jax.inference.samplers.registry import register
 from galileo_jax.inference.samplers.sampler import (
     AbstractSampler,
     Info,
@@ -59,7 +58,6 @@ class ThesisState(NamedTuple):
     num_steps: jax.Array
 
 
-@register
 class Thesis(AbstractSampler):
     """Uniform proposals within 0.05 of each parameter, within 0.5 on every 20th step.
 

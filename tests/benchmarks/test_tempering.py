@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.inference.tempering import temper
+from benchmarks.tempering import temper
 
 NUM_PARTICLES = 512
 MONTE_CARLO = 5 / np.sqrt(NUM_PARTICLES)  # five standard errors

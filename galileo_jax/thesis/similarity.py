@@ -16,12 +16,9 @@ class AbstractSimilarity(eqx.Module):
 
     Attributes:
       name: in the registry.
-      is_log_likelihood: True for a normalized log-likelihood of the observed profile, which
-        evidence and cross-validation need; False for a mere score, good for ranking.
     """
 
     name: ClassVar[str]
-    is_log_likelihood: ClassVar[bool]
 
     def __call__(
         self, predicted_m_s: ArrayLike, observed_m_s: ArrayLike, mask: ArrayLike
@@ -45,7 +42,9 @@ class AbstractSimilarity(eqx.Module):
         """The similarity; all three `[object, 2, frame - 1]`, zeros where masked."""
 
 
-_SIMILARITIES = Registry(AbstractSimilarity, "similarity", "similarities")
+_SIMILARITIES: Registry[type[AbstractSimilarity]] = Registry(
+    "similarity", "similarities", "galileo_jax.thesis.similarities"
+)
 
 register = _SIMILARITIES.register
 similarity_names = _SIMILARITIES.names

@@ -6,10 +6,9 @@ import numpy as np
 
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.inference.samplers import thesis
-from galileo_jax.inference.samplers.thesis import NUM_CHAINS
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.similarity.similarity import similarity_class
+from galileo_jax.thesis.sampler import NUM_CHAINS, Acceptance, Selection, infer
+from galileo_jax.thesis.similarity import similarity_class
 
 SEARCHED = ("m1", "k1", "m2", "k2")
 
@@ -49,12 +48,12 @@ def thesis_posterior(
         velocity = jnp.diff(predicted, axis=-1) / dt
         return measure(velocity, observed, jnp.asarray(both))
 
-    answer = thesis.infer(
+    answer = infer(
         jax.random.key(seed),
         log_similarity,
         SEARCHED,
-        acceptance=thesis.Acceptance(acceptance),
-        selection=thesis.Selection(selection),
+        acceptance=Acceptance(acceptance),
+        selection=Selection(selection),
         num_chains=num_chains,
     )
     draws = answer.posterior.draws

@@ -5,7 +5,7 @@ from typing import ClassVar
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.similarity.similarity import AbstractSimilarity, register
+from galileo_jax.thesis.similarity import AbstractSimilarity, register
 
 
 @register
@@ -20,7 +20,6 @@ class GaussianSimilarity(AbstractSimilarity):
     """
 
     name: ClassVar[str] = "thesis_gaussian"
-    is_log_likelihood: ClassVar[bool] = True
     variance_m2_s2: float = 0.05
 
     def _of_measured(self, predicted, observed, mask) -> jax.Array:

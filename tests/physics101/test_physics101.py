@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+import galileo_jax.physics101  # noqa: F401  # a source of clips
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.same_objects import check_same_objects

@@ -69,11 +69,6 @@ def average_pool(x: jax.Array) -> jax.Array:
     return x.mean(axis=(2, 4))
 
 
-def count_parameters(network: nnx.Module) -> int:
-    """How many numbers are learned."""
-    return sum(leaf.size for leaf in jax.tree.leaves(nnx.state(network, nnx.Param)))
-
-
 def log_mean_absolute_errors(network: ThesisNetwork, batch: dict[str, jax.Array]) -> jax.Array:
     """The thesis's loss, each of the four mean absolute errors in units of itself.
 

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
-from galileo_jax.similarity.similarity import AbstractSimilarity, register
+from galileo_jax.thesis.similarity import AbstractSimilarity, register
 
 
 @register
@@ -29,7 +29,6 @@ class EarthMover(AbstractSimilarity):
     """
 
     name: ClassVar[str] = "earth_mover"
-    is_log_likelihood: ClassVar[bool] = False
 
     def _of_measured(self, predicted, observed, mask) -> jax.Array:
         num_frames = predicted.shape[-1]

@@ -1,16 +1,16 @@
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from flax import nnx
 
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.thesis_network import (
+from galileo_jax.thesis.network import (
     Convolution,
     ThesisNetwork,
     average_pool,
-    count_parameters,
 )
-from galileo_jax.neural.thesis_task import CM, OBJECT2_M, ThesisTask
+from galileo_jax.thesis.task import CM, OBJECT2_M, ThesisTask
 from tests.ramp_model import HIT
 
 THESIS_PARAMETERS = 13_252
@@ -31,7 +31,8 @@ def config(**overrides) -> TrainConfig:
 
 
 def test_it_has_the_thesiss_number_of_parameters():
-    assert count_parameters(ThesisNetwork(60, nnx.Rngs(0))) == THESIS_PARAMETERS
+    leaves = jax.tree.leaves(nnx.state(ThesisNetwork(60, nnx.Rngs(0)), nnx.Param))
+    assert sum(leaf.size for leaf in leaves) == THESIS_PARAMETERS
 
 
 @pytest.mark.parametrize("frames", [60, 110])
@@ -72,14 +73,10 @@ def test_mujocos_engine_makes_the_same_data(x64):
 
 
 def _key():
-    import jax
-
     return jax.random.key(0)
 
 
 def test_convolution_and_pool_are_the_usual_ones():
-    import jax
-
     x = jax.random.normal(_key(), (2, 4, 30, 3))
     ours = Convolution(3, 5, nnx.Rngs(0))
     usual = nnx.Conv(3, 5, (1, 7), padding="VALID", rngs=nnx.Rngs(0))

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from galileo_jax.inference.posterior import Posterior, Status
-from galileo_jax.inference.samplers.thesis import (
+from galileo_jax.thesis.sampler import (
     Acceptance,
     Selection,
     Thesis,

@@ -12,11 +12,12 @@ from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.neural.config import TrainConfig
+from galileo_jax.neural.presets import PRESETS
 from galileo_jax.neural.task import Arrays
-from galileo_jax.neural.thesis_network import RANGES, ThesisNetwork, log_mean_absolute_errors
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import Engine
 from galileo_jax.simulation import Truth
+from galileo_jax.thesis.network import RANGES, ThesisNetwork, log_mean_absolute_errors
 
 # Object 2 stands so close that it is nearly always hit; the thesis does not tell its distances.
 NAMES = ("m1", "k1", "m2", "k2")
@@ -26,9 +27,11 @@ THESIS_MAE = dict(zip(NAMES, (0.1686, 0.0004, 0.1605, 0.0232), strict=True))
 CM = 100.0
 
 
+@PRESETS.register
 class ThesisTask:
     """Data, network and loss of preset `thesis`."""
 
+    name = "thesis"
     loss = staticmethod(log_mean_absolute_errors)
     shard_size = 2000
 
