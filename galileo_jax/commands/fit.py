@@ -44,6 +44,7 @@ OF_GALILEO, OF_THESIS = (
 INITS = ("grad", "cnn")
 OFF_THE_PLANE = "an object has a z_m: motion in a plane takes no notice; see --motion free"
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
+FREE = "galileo_jax.model.effects.free"
 SIMILARITIES = entry_names("galileo_jax.similarity.library")
 
 
@@ -60,6 +61,10 @@ def main(argv: Sequence[str]) -> int | None:
     truth = read_truth(clips[0])
     if call.effects or call.effects_from:
         chosen_effects(call)  # a wrong name is told before anything is tracked
+    if call.free:
+        from galileo_jax.model.effects.free_quantities import make_free_quantities
+
+        make_free_quantities(call.free)
     ahead = work_ahead(clips, None if call.method == "cnn" else fitter_of(call, call.motion))
     timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
     began = time.perf_counter()
@@ -137,7 +142,8 @@ def built(
     from galileo_jax.inference.build_problem import make_joint_problem
 
     effects = chosen_effects(call)
-    trials = make_joint_problem(clips, observations, call.engine, effects, motion=motion)
+    free = getattr(call, "free", ())  # of `fit` alone
+    trials = make_joint_problem(clips, observations, call.engine, effects, motion=motion, free=free)
     if absent := trials.without_place():
         raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
     return trials
@@ -171,6 +177,8 @@ def fit_clips(
     notes["motion"] = call.motion
     if call.motion == "planar" and any(item.z_m for m in measured for item in m.clip.objects):
         notes["warnings"] = [OFF_THE_PLANE]
+    if call.free:
+        notes["free"] = sorted(call.free)
     if call.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in call.effects_from]
 
@@ -461,6 +469,13 @@ def _parser() -> command.Parser:
     parser.add_argument("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
     parser.add_argument("--method", choices=METHODS, default="grad")
     parser.add_argument("--effects", default="", help="a,b: effects in the model")
+    parser.add_argument(
+        "--free",
+        type=lambda text: tuple(name for name in text.split(",") if name),
+        default=(),
+        metavar="NAMES",
+        help="declared quantities to infer instead: " + ", ".join(entry_names(FREE)),
+    )
     add_clip_options(parser, out="folder of the run (default runs/CLIP)")
     parser.add_argument(
         "--motion",
