@@ -436,9 +436,12 @@ def read_truth(clip: Clip) -> dict[str, float]:
 def _table(result: dict[str, Any], truth: Mapping[str, float]) -> str:
     """What the user asked for, in a few lines; with a column for the truth if it is known."""
     from galileo_jax.inference.per_mass import SUFFIX
+    from galileo_jax.results.shown_parameters import shown_parameters
 
-    lines = [f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"]
-    for name, entry in (result["parameters"] | result["derived"]).items():
+    shown = shown_parameters(result)
+    title = f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"
+    lines = [title] if shown else []
+    for name, entry in shown.items():
         unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
         interval = f"[{entry['q025']:.4g}, {entry['q975']:.4g}]{unit}"
         known = "" if entry["identified"] else "   not determined by this clip"

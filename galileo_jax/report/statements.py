@@ -9,6 +9,7 @@ from galileo_jax.inference.confounded import confounded_with_gravity
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fitted import Fitted
 from galileo_jax.results.run import CLIP, Run
+from galileo_jax.results.shown_parameters import shown_parameters
 
 MEANINGS = {
     "mass_ratio": "m1 / m2",
@@ -59,7 +60,7 @@ def meaning(name: str) -> str | None:
 def undetermined(run: Run, fitted: Fitted) -> dict[str, str]:
     """Why each main parameter that the clip does not tell is not told, by name."""
     found = {}
-    for name, entry in {**run.result["parameters"], **run.result.get("derived", {})}.items():
+    for name, entry in shown_parameters(run.result).items():
         if not entry["identified"] and name != "phi":
             found[name] = _reason(name, run, fitted)
     return found
