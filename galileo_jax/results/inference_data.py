@@ -8,15 +8,29 @@
 
 Positions stand along one dimension `measurement`, as gaps (NaN) are allowed neither by `az.loo` nor
 by `az.plot_ppc`; its coordinates `clip`, `object`, `axis`, `frame` and `time_s` say what is what.
+
+Leave-one-out weighs draws by 1 / p(y_i | y_-i), so that a few draws far out would decide. Those of
+`fit --method grad` come from a normal approximation; for `log_likelihood` they are drawn again
+with the weights posterior density over normal density, smoothed (PSIS). The attribute
+`importance_pareto_k` says whether that was possible: above 0.7 take the draws of `--method mh`.
+
+Source: Vehtari, Simpson, Gelman, Yao and Gabry (2024), Pareto smoothed importance sampling, Journal
+of Machine Learning Research 25(72); Magnusson, Andersen, Jonasson and Vehtari (2019), Bayesian
+leave-one-out cross-validation for large data, ICML.
 """
 
 from typing import TYPE_CHECKING
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
+from galileo_jax.inference.convergence import arviz
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
+from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +51,7 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
 
     Of the posterior's draws evenly many of every chain are rolled out: at most
     `NUM_PREDICTIVE_DRAWS` for `posterior_predictive`, `NUM_LIKELIHOOD_DRAWS` for
-    `log_likelihood`; their coordinate `draw` says which.
+    `log_likelihood`; their coordinate `draw` says which (it only counts draws drawn again).
 
     Args:
       trials: what was fitted.
@@ -52,7 +66,8 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
       ValueError: the posterior is of other parameters.
 
     Limits: the posterior's draws contain the simulator's own errors (`inference/model_error.py`)
-    of a few tenths of a per cent, and so does what is computed from them.
+    of a few tenths of a per cent, and so does what is computed from them; of draws drawn again the
+    weights take them out.
     """
     import xarray as xr
 
@@ -73,7 +88,13 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     along = ("chain", "draw", "measurement")
     indices, theta = _thinned(posterior, NUM_PREDICTIVE_DRAWS)
     predicted = _predictive(trials, theta.reshape(-1, theta.shape[-1]), rng)
-    like_indices, like_theta = _thinned(posterior, NUM_LIKELIHOOD_DRAWS)
+    nats = {"units": "1", "long_name": "log p(y_i | y_-i), y in m"}
+    if posterior.provenance.get("method") == "grad":
+        like_theta, pareto_k = _drawn_again(trials, posterior, rng)
+        like_indices = np.arange(len(like_theta))
+        nats["importance_pareto_k"] = f"{pareto_k:.3g}"
+    else:
+        like_indices, like_theta = _thinned(posterior, NUM_LIKELIHOOD_DRAWS)
     density = _log_likelihood(trials, like_theta.reshape(-1, theta.shape[-1]))
 
     def group(values: np.ndarray, at: np.ndarray, attrs: dict[str, str]) -> "xr.Dataset":
@@ -84,7 +105,6 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     observed = _chosen(trials, [problem.data.observed_m[None] for problem in trials.problems])[0]
     index = {"chain": [0], "draw": np.arange(NUM_PRIOR_DRAWS)}
     metres = {"units": "m", "long_name": "position"}
-    nats = {"units": "1", "long_name": "log p(y_i | y_-i), y in m"}
     data.add_groups(
         {
             "prior": xr.Dataset(prior, index),
@@ -141,6 +161,32 @@ def _thinned(posterior: Posterior, most: int) -> tuple[np.ndarray, np.ndarray]:
     count = min(length, max(1, most // chains))
     at = np.linspace(0, length - 1, count).round().astype(int)
     return at, posterior.draws[:, at].astype(float)
+
+
+def _drawn_again(
+    trials: JointProblem, posterior: Posterior, rng: np.random.Generator
+) -> tuple[np.ndarray, float]:
+    """Draws of the posterior out of those of its normal approximation.
+
+    Returns:
+      `[draw, parameter]`, and the weights' Pareto shape.
+    """
+    theta = posterior.flat().astype(float)
+    z = np.asarray(inverse(trials.parameters, jnp.asarray(theta)))
+    weights = -0.5 * np.sum(z**2, axis=1) - posterior.log_density.reshape(-1)
+    for clip, problem in enumerate(trials.problems):
+        scale = jnp.asarray(_noise_scales(trials, theta, clip))
+        predicted = jnp.asarray(_positions(trials, theta, clip))
+        weights += np.asarray(_log_densities(predicted, scale, problem.data))
+    smoothed, pareto_k = arviz().psislw(weights)
+    share = np.cumsum(np.exp(smoothed))
+    # Evenly spaced through the weights: no draw comes in more or less often than its share.
+    count = min(len(theta), NUM_LIKELIHOOD_DRAWS)
+    places = (np.arange(count) + rng.uniform()) / count * share[-1]
+    return theta[np.searchsorted(share, places)], float(pareto_k)
+
+
+_log_densities = jax.jit(jax.vmap(GaussianLikelihood.log_density, (0, 0, None)))
 
 
 def _positions(trials: JointProblem, theta: np.ndarray, clip: int) -> np.ndarray:

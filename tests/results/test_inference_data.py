@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import yaml
@@ -14,7 +15,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.convergence import arviz
-from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.posterior import Posterior, Status
@@ -63,10 +64,19 @@ def write_incline(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def fitted(tmp_path_factory) -> tuple[JointProblem, Posterior]:
+def trials(tmp_path_factory) -> JointProblem:
     one = measure(load_clip(write_incline(tmp_path_factory.mktemp("incline"))))
-    trials = make_joint_problem([one.clip], [one.observation])
-    return trials, laplace_posterior(trials, GradientFitter(trials).fit(0), 0)
+    return make_joint_problem([one.clip], [one.observation])
+
+
+@pytest.fixture(scope="module")
+def fit(trials) -> GradientFit:
+    return GradientFitter(trials).fit(0)
+
+
+@pytest.fixture(scope="module")
+def fitted(trials, fit) -> tuple[JointProblem, Posterior]:
+    return trials, laplace_posterior(trials, fit, 0)
 
 
 @pytest.fixture(scope="module")
@@ -138,12 +148,27 @@ def test_loo_prefers_the_model_that_fits(fitted, data):
     assert worse.elpd_loo < loo.elpd_loo - 10
 
 
+def test_draws_of_a_poor_approximation_are_weighted(trials, fit, fitted):
+    """Drawn again, those of one twice as wide are the posterior's; and `az.loo` finds the same."""
+    _, posterior = fitted
+    wide = laplace_posterior(trials, replace(fit, covariance=4 * fit.covariance), 0)
+    again, pareto_k = module._drawn_again(trials, wide, np.random.default_rng(0))
+    assert pareto_k < 0.7
+    k1 = trials.names.index("k1")
+    assert wide["k1"].std() > 1.8 * posterior["k1"].std()
+    assert again[:, k1].std() == pytest.approx(posterior["k1"].std(), rel=0.15)
+    assert again[:, k1].mean() == pytest.approx(posterior["k1"].mean(), abs=posterior["k1"].std())
+    az = arviz()
+    found = [az.loo(inference_data(trials, one)).elpd_loo for one in (posterior, wide)]
+    assert found[0] == pytest.approx(found[1], abs=0.5)
+
+
 @pytest.mark.filterwarnings("ignore:Passing a dict or None:DeprecationWarning")
 def test_plot_ppc(data):
     matplotlib.use("Agg")
     axes = arviz().plot_ppc(data, num_pp_samples=20, random_seed=0)
     assert len(np.atleast_1d(axes).ravel()[0].lines) >= 3
-    matplotlib.pyplot.close("all")
+    plt.close("all")
 
 
 def test_files_of_it_are_read_as_a_posterior(fitted, data, tmp_path):
@@ -170,7 +195,7 @@ def test_several_clips_and_chains(fitted):
     draws = np.tile(theta, (2, 30, 1))
     posterior = Posterior(trials.names, draws, np.zeros((2, 30)), Status.CONVERGED)
     found = inference_data(trials, posterior)
-    like = found.log_likelihood.position
+    like = found["log_likelihood"].position
     count = 2 * (FRAMES - 1)
     assert list(like["clip"].values) == ["clip"] * count + ["other"] * count
     assert like.shape == (2, 30, 2 * count)
