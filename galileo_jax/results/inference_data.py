@@ -10,9 +10,10 @@ Positions stand along one dimension `measurement`, as gaps (NaN) are allowed nei
 by `az.plot_ppc`; its coordinates `clip`, `object`, `axis`, `frame` and `time_s` say what is what.
 
 Leave-one-out weighs draws by 1 / p(y_i | y_-i), so that a few draws far out would decide. Those of
-`fit --method grad` come from a normal approximation; for `log_likelihood` they are drawn again
-with the weights posterior density over normal density, smoothed (PSIS). The attribute
-`importance_pareto_k` says whether that was possible: above 0.7 take the draws of `--method mh`.
+`--method grad` come from a normal approximation, and all contain the simulator's own errors
+(`inference/model_error.py`). So for `log_likelihood` they are drawn again, with the weights
+posterior density over the density that they were drawn from, smoothed (PSIS). The attribute
+`importance_pareto_k` says whether that was possible: above 0.7 `az.loo` is not to be trusted.
 
 Source: Vehtari, Simpson, Gelman, Yao and Gabry (2024), Pareto smoothed importance sampling, Journal
 of Machine Learning Research 25(72); Magnusson, Andersen, Jonasson and Vehtari (2019), Bayesian
@@ -27,7 +28,7 @@ import numpy as np
 
 from galileo_jax.inference.convergence import arviz
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 NUM_PRIOR_DRAWS = 1000
 NUM_PREDICTIVE_DRAWS = 200
 NUM_LIKELIHOOD_DRAWS = 1000
+NUM_WEIGHTED_DRAWS = 4000  # of which those are drawn again
 OPEN_M = 0.5
 """Coordinates with more noise are ignored by the likelihood (across a fall): they are left out."""
 
@@ -65,9 +67,8 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     Raises:
       ValueError: the posterior is of other parameters.
 
-    Limits: the posterior's draws contain the simulator's own errors (`inference/model_error.py`)
-    of a few tenths of a per cent, and so does what is computed from them; of draws drawn again the
-    weights take them out.
+    Limits: draws whose density is not known (of the network, of the thesis's sampler) are not
+    weighted: `log_likelihood` is then as good as they are.
     """
     import xarray as xr
 
@@ -89,16 +90,16 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     indices, theta = _thinned(posterior, NUM_PREDICTIVE_DRAWS)
     predicted = _predictive(trials, theta.reshape(-1, theta.shape[-1]), rng)
     nats = {"units": "1", "long_name": "log p(y_i | y_-i), y in m"}
-    if posterior.provenance.get("method") == "grad":
+    if _has_density(posterior):
         like_theta, pareto_k = _drawn_again(trials, posterior, rng)
-        like_indices = np.arange(len(like_theta))
+        like_indices, like_theta = np.arange(len(like_theta)), like_theta[None]
         nats["importance_pareto_k"] = f"{pareto_k:.3g}"
     else:
         like_indices, like_theta = _thinned(posterior, NUM_LIKELIHOOD_DRAWS)
     density = _log_likelihood(trials, like_theta.reshape(-1, theta.shape[-1]))
 
     def group(values: np.ndarray, at: np.ndarray, attrs: dict[str, str]) -> "xr.Dataset":
-        shaped = values.reshape(len(posterior.draws), len(at), -1)
+        shaped = values.reshape(-1, len(at), values.shape[-1])
         coords = {**measurement, "chain": np.arange(len(shaped)), "draw": at}
         return xr.Dataset({"position": (along, shaped, attrs)}, coords)
 
@@ -163,17 +164,27 @@ def _thinned(posterior: Posterior, most: int) -> tuple[np.ndarray, np.ndarray]:
     return at, posterior.draws[:, at].astype(float)
 
 
+def _has_density(posterior: Posterior) -> bool:
+    """Whether `log_density` is that of the draws in z, up to a constant.
+
+    Chains run in coordinates of constant determinant (`fits/valley.py`).
+    """
+    of_chains = "sampler" in posterior.provenance and posterior.status is not Status.FIXED_LENGTH
+    return of_chains or posterior.provenance.get("method") == "grad"
+
+
 def _drawn_again(
     trials: JointProblem, posterior: Posterior, rng: np.random.Generator
 ) -> tuple[np.ndarray, float]:
-    """Draws of the posterior out of those of its normal approximation.
+    """Draws of the posterior out of draws near it.
 
     Returns:
       `[draw, parameter]`, and the weights' Pareto shape.
     """
-    theta = posterior.flat().astype(float)
+    at, thinned = _thinned(posterior, NUM_WEIGHTED_DRAWS)
+    theta = thinned.reshape(-1, thinned.shape[-1])
     z = np.asarray(inverse(trials.parameters, jnp.asarray(theta)))
-    weights = -0.5 * np.sum(z**2, axis=1) - posterior.log_density.reshape(-1)
+    weights = -0.5 * np.sum(z**2, axis=1) - posterior.log_density[:, at].reshape(-1)
     for clip, problem in enumerate(trials.problems):
         scale = jnp.asarray(_noise_scales(trials, theta, clip))
         predicted = jnp.asarray(_positions(trials, theta, clip))
