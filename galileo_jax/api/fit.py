@@ -21,6 +21,7 @@ from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.metropolis import NUM_CHAINS
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
+from galileo_jax.model.effects.free_quantities import make_free_quantities
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
@@ -44,6 +45,7 @@ class FitOptions:
     method: Literal["grad", "mh", "cnn"] = "grad"
     effects: tuple[str, ...] = ()
     effects_from: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
     motion: str = "planar"
     engine: str = "auto"
     noise: NoiseModel | None = None
@@ -69,6 +71,7 @@ def fit(
     method: Literal["grad", "mh", "cnn"] = "grad",
     effects: EffectsLike = (),
     effects_from: Sequence[str | Path] = (),
+    free: EffectsLike = (),
     motion: str = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
@@ -95,6 +98,7 @@ def fit(
         Metropolis-Hastings, started from it; "cnn": a trained network, at once.
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
+      free: declared quantities to infer instead, such as "gravity".
       motion: "planar", or "free": from the first hit on objects turn and tip (MuJoCo's C engine).
       engine: "auto", "rigid", "c" or "mjx".
       noise: the errors a track is taken to have: "camera", "bodies" or "tracker"; None: as the
@@ -131,6 +135,7 @@ def fit(
         method=method,
         effects=names_of(effects),
         effects_from=tuple(str(path) for path in effects_from),
+        free=names_of(free),
         motion=motion,
         engine=engine,
         noise=noise,
@@ -184,6 +189,7 @@ def _check(options: FitOptions) -> None:
             if getattr(options, name) == "cnn":
                 raise InputError(f"--{name} cnn: the network knows motion in a plane only")
     chosen_effects(options.effects, options.effects_from)
+    make_free_quantities(options.free)
 
 
 def _refuse_ignored(options: FitOptions) -> None:
@@ -211,7 +217,7 @@ def _problem(
     """
     effects = chosen_effects(options.effects, options.effects_from)
     problem = make_joint_problem(
-        clips, observations, options.engine, effects, options.noise, options.motion
+        clips, observations, options.engine, effects, options.noise, options.motion, options.free
     )
     if absent := problem.without_place():
         raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
@@ -267,6 +273,8 @@ def _fitted(
     notes |= extra | {"motion": options.motion}
     if options.motion == "planar" and any(item.z_m for clip in clips for item in clip.objects):
         notes["warnings"] = [OFF_THE_PLANE]
+    if options.free:
+        notes["free"] = sorted(options.free)
     if options.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
     made = make_fit(
@@ -343,7 +351,9 @@ def checkpoint_identity(
 ) -> str:
     """What the chains sample: a checkpoint of anything else is refused."""
     chains = options.chains or NUM_CHAINS
-    chosen = (options.sampler, options.seed, options.effects, options.init, chains)
+    chosen = (
+        *(options.sampler, options.seed, options.effects, options.free, options.init, chains),
+    )
     return identity_of(measured, problem, effects_from=options.effects_from, options=chosen)
 
 

@@ -88,5 +88,6 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
         load_file(path)
     effects = make_effects(result["effects"])
     motion = result.get("motion", "planar")
-    problem = make_problem(clip, observation, engine, effects, motion=motion)
+    free = result.get("free", [])
+    problem = make_problem(clip, observation, engine, effects, motion=motion, free=free)
     return Run(folder, clip, problem, posterior, result)

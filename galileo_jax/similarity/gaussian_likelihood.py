@@ -75,7 +75,7 @@ class GaussianLikelihood:
         return Whitening(
             np.where(mask[:, None], observation.position_m, 0.0),
             inverse_root,
-            basis.reshape(patterns.shape),
+            basis.reshape(len(gain), *patterns.shape[1:]),  # of short tracks fewer than patterns
             gain,
             np.float64(2 * mask.sum()),
         )

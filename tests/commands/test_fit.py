@@ -180,7 +180,8 @@ def test_nothing_moves(tmp_path):
 
 
 @pytest.mark.slow
-def test_one_object(tmp_path):
+def test_one_object(tmp_path, capsys):
+    """Its mass is in the result, as nothing tells it, and is not shown."""
     times = np.arange(40) / 30
     alone = replace(HIT, object2_x_m=None)
     clip = write_clip(tmp_path, solve(alone, times).position_m, times)
@@ -189,6 +190,9 @@ def test_one_object(tmp_path):
     assert result["derived"] == {}
     assert deviation(result["parameters"]["k1"], HIT.friction[0]) < SIGMAS
     assert not result["parameters"]["m1"]["identified"]
+    shown = capsys.readouterr().out
+    assert shown.count("k1") == 1
+    assert "m1" not in shown and "m2" not in shown
 
 
 @pytest.mark.slow

@@ -10,8 +10,8 @@ the plane of the picture. Hooks see and return numbers along it, positive downhi
 the ramp; in the plane, along the velocity.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple
 
 import jax
@@ -101,7 +101,7 @@ class Surroundings:
     Attributes:
       names: of the objects.
       angle_rad: the ramp's; of a path straight down pi / 2, in the plane 0.
-      gravity: m/s^2.
+      gravity: m/s^2, as declared; to the hooks of the motion `[...]` where it is inferred.
       half_length_m, half_height_m: `[object]`, along the travel and across it.
       corner_m: `[object]`, x at which each centre's path bends from ramp to table; inf
         without a table.
@@ -239,6 +239,10 @@ class Effect:
         """
         return None
 
+    def gravity(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the acceleration of free fall `[...]`, m/s^2, or None: as declared."""
+        return None
+
     def foot(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns the factor on the speed kept at the foot `[...]`, or None."""
         return None
@@ -266,3 +270,16 @@ class Effect:
     ) -> Float[AnyArray, "object 2 frame"]:
         """Maps true centres to measured ones, `[object, 2, frame]`, m (scale, camera)."""
         return position_m
+
+
+def true_surroundings(effects: Sequence[Effect], theta: Theta, scene: Surroundings) -> Surroundings:
+    """The scene with what the parameters say of gravity in place of what is declared."""
+    for effect in effects:
+        if (gravity := effect.gravity(theta, scene)) is not None:
+            scene = replace(scene, gravity=gravity)
+    return scene
+
+
+def infers_gravity(effects: Sequence[Effect]) -> bool:
+    """Whether one of the effects puts a parameter in place of the declared gravity."""
+    return any(type(effect).gravity is not Effect.gravity for effect in effects)
