@@ -8,11 +8,11 @@ from collections.abc import Sequence
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.registry import Registry, entry_names, load_entries
+from galileo_jax.runtime.registry import Registry, entry_names
 
 PACKAGE = "galileo_jax.model.effects.free"
 
-_registry = Registry(Effect, "quantity", "quantities")
+_registry: Registry[type[Effect]] = Registry("quantity", "quantities", PACKAGE)
 register = _registry.register
 
 
@@ -27,11 +27,10 @@ def make_free_quantities(names: Sequence[str]) -> tuple[Effect, ...]:
     Raises:
       InputError: a name is unknown (the message lists the known) or given twice.
     """
-    load_entries(PACKAGE)
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"free: {name!r} is named twice")
     try:
         return tuple(_registry.get(name)() for name in sorted(names))
-    except ValueError as error:
+    except InputError as error:
         raise InputError(f"free: {error}") from error
