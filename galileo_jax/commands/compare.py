@@ -50,7 +50,7 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.comparison.document import comparison_document
     from galileo_jax.inference.fits.gradient import Code, GradientFitter
     from galileo_jax.report import comparison_page
-    from galileo_jax.report.along import along_paths
+    from galileo_jax.report.path_residuals import path_residuals
 
     with command.console().status("fitting") as status:
         fit = GradientFitter(trials).fit(call.seed, on_stage=status.update)
@@ -59,15 +59,15 @@ def main(argv: Sequence[str]) -> int | None:
         status.update("comparing with replicates of the fitted model")
         comparison = compare(trials, fit, call.seed)
         status.update("drawing")
-        shown = along_paths(trials, fit, comparison, call.seed)
+        paths = path_residuals(trials, fit, comparison, call.seed)
         page, title = compared.out / "report.html", ", ".join(p.name for p in trials.problems)
-        told = comparison_page.Compared(
+        told = comparison_page.ComparisonReport(
             comparison,
             trials,
             trials.theta(fit.z, fit.free),
             compared.declared,
             trials.all_effects,
-            shown,
+            paths,
             shlex.join(["galileo", "compare", *argv]),
             call.seed,
         )
@@ -126,12 +126,12 @@ def _of_run(folder: Path, call: argparse.Namespace) -> Compared:
 def _told(trials: "JointProblem", comparison: "Comparison") -> list[str]:
     """The verdict, the worst cells and the nuisances outside their priors."""
     from galileo_jax.comparison.document import pulled
-    from galileo_jax.report import findings
+    from galileo_jax.report import diagnosis_text
 
     several = len(trials.problems) > 1
     width = max(len(problem.name) for problem in trials.problems) + 2 if several else 0
     lines = [
-        findings.adequacy(comparison, trials.all_effects),
+        diagnosis_text.adequacy(comparison, trials.all_effects),
         "",
         f"{'clip' if several else '':<{width}}{'object':<10}{'axis':<6}{'phase':<11}"
         f"{'rmse':>8}{'noise':>8} m/s{'z':>7}",
@@ -141,7 +141,7 @@ def _told(trials: "JointProblem", comparison: "Comparison") -> list[str]:
             f"{place.clip if several else '':<{width}}{place.object:<10}{place.axis:<6}"
             f"{place.phase:<11}{place.rmse:>8.4f}{place.noise:>8.4f}{place.z:>11.1f}"
         )
-    return lines + [findings.pull_text(pull) for pull in pulled(comparison)]
+    return lines + [diagnosis_text.pull_text(pull) for pull in pulled(comparison)]
 
 
 def _parser() -> command.Parser:

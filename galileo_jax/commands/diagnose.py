@@ -60,14 +60,14 @@ def main(argv: Sequence[str]) -> int | None:
         "seed": call.seed,
     }
     write_json(out / "diagnosis.json", document)
-    from galileo_jax.report import findings
-    from galileo_jax.report.diagnosis_page import Told, write_diagnosis_page
+    from galileo_jax.report import diagnosis_text
+    from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
 
-    go_on = findings.how_to_go_on(diagnosis, call.clips, call.effects_from)
+    go_on = diagnosis_text.next_command(diagnosis, call.clips, call.effects_from)
     print("\n".join(_told(diagnosis, record, go_on, hidden)))
     with command.console().status("drawing"):
         again = shlex.join(["galileo", "diagnose", *argv])
-        told = Told(diagnosis, document, go_on, hidden, tuple(clips), again, call.seed)
+        told = DiagnosisReport(diagnosis, document, go_on, hidden, tuple(clips), again, call.seed)
         title = ", ".join(one.name for one in measured)
         write_diagnosis_page(out / "report.html", title, trials, told)
         _write_model(diagnosis, trials, measured, call, out / "model", timings)
@@ -222,20 +222,20 @@ def _round_head(first: dict[str, Any]) -> str:
 
 def _round_line(rows: Sequence[dict[str, Any]]) -> str:
     """The last of the rounds, and how the friction coefficients changed since the one before."""
-    from galileo_jax.report import findings
+    from galileo_jax.report import diagnosis_text
 
     row = rows[-1]
     frictions = ""
     for name in FRICTIONS:
         if name not in row:
             continue
-        told = findings.value_text(row[name])
+        told = diagnosis_text.value_text(row[name])
         if len(rows) > 1:
             told += f" ({row[name]['mean'] - rows[-2][name]['mean']:+.4f})"
         frictions += f"  {told:<28}"
     return (
-        f"{findings.effects_text(row['effects']):<26}{row['rmse']:>9.4f}"
-        f"{row['chi2_per_dof']:>10.2f}{findings.p_text(row['p_value']):>9}{frictions}".rstrip()
+        f"{diagnosis_text.effects_text(row['effects']):<26}{row['rmse']:>9.4f}"
+        f"{row['chi2_per_dof']:>10.2f}{diagnosis_text.p_text(row['p_value']):>9}{frictions}".rstrip()
     )
 
 
@@ -244,21 +244,21 @@ def _told(
 ) -> list[str]:
     """Candidates, the verdict, and how to go on."""
     from galileo_jax.inference.fits.gradient import BEHIND, Code
-    from galileo_jax.report import findings
+    from galileo_jax.report import diagnosis_text
 
     lines = ["", f"{'candidates':<26}{'probability':>12}{'evidence':>12}{'p':>9}  strength"]
     for made, told in list(zip(diagnosis.candidates, record["candidates"], strict=True))[
         :NUM_CANDIDATES
     ]:
-        strengths = findings.strength_texts(made.effects, told).values()
+        strengths = diagnosis_text.strength_texts(made.effects, told).values()
         is_behind = diagnosis.candidates[0].log_evidence - told["score"] > BEHIND
         is_settled = made.hypothesis.fit.code is Code.CONVERGED
         evidence = "far behind" if is_behind and not is_settled else f"{told['score']:+.1f}"
         lines.append(
             f"{told['effect']:<26}{told['probability']:>12.3f}{evidence:>12}"
-            f"{findings.p_text(told['p_value']):>9}  " + ", ".join(strengths)
+            f"{diagnosis_text.p_text(told['p_value']):>9}  " + ", ".join(strengths)
         )
-    lines += ["", findings.verdict(diagnosis)]
+    lines += ["", diagnosis_text.verdict(diagnosis)]
     if hidden is not None:
         lines.append(f"truth: {hidden}")
     if diagnosis.missing is not None:
@@ -267,7 +267,7 @@ def _told(
             for name, entry in record["missing_force"]["objects"].items()
         ]
     if "each_clip" in record:
-        lines += findings.each_clip(record["each_clip"])
+        lines += diagnosis_text.each_clip(record["each_clip"])
     for row in record.get("left_one_out", []):
         lines.append(
             f"{row['clip']} predicted from the others: {row['rmse_before']:.4f} m/s, with what was "

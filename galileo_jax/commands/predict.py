@@ -25,10 +25,10 @@ def main(argv: Sequence[str]) -> int | None:
 
     jax.config.update("jax_enable_x64", True)
     from galileo_jax.prediction.extrapolate import answers, extrapolate
-    from galileo_jax.report.continuation import continuation_figure
-    from galileo_jax.report.figure import to_svg
+    from galileo_jax.report.draw import to_svg
     from galileo_jax.report.first_and_last import write_first_and_last
-    from galileo_jax.report.prediction import told, write_prediction
+    from galileo_jax.report.prediction import prediction_lines, write_prediction
+    from galileo_jax.report.prediction_chart import prediction_chart
     from galileo_jax.results.run import load_run
 
     with command.console().status("rolling out") as status:
@@ -36,15 +36,15 @@ def main(argv: Sequence[str]) -> int | None:
         motions = extrapolate(run, call.seconds, call.draws, call.seed)
         found = answers(run, motions, call.seconds, call.seed)
         status.update("drawing")
-        svg = to_svg(continuation_figure(run, motions), "prediction")
+        chart = prediction_chart(run, motions)
         try:
-            found["picture"] = write_first_and_last(run, motions, out / "first_and_last.png")
-            write_text(out / "prediction.svg", svg)
-            page = write_prediction(out, run, found, svg)
+            write_first_and_last(run, motions, out / "first_and_last.png")
+            write_text(out / "prediction.svg", to_svg(chart))
+            page = write_prediction(out, run, found, chart)
             write_json(out / "prediction.json", found)
         except OSError as error:
             raise InputError(f"--out: {out}: {error.strerror or error}") from error
-    print("\n".join(told(run, found)))
+    print("\n".join(prediction_lines(run, found)))
     print(f"{out}/prediction.json, prediction.svg, first_and_last.png, {page.name}")
     return None
 

@@ -34,7 +34,8 @@ def _train(call: argparse.Namespace) -> None:
     from galileo_jax.neural.dataset import load_or_make
     from galileo_jax.neural.presets import make_task
     from galileo_jax.neural.training import train
-    from galileo_jax.report.loss_curve import loss_svg
+    from galileo_jax.report.draw import to_svg
+    from galileo_jax.report.training_chart import loss_chart
 
     path = call.config or config_path(f"train_{call.preset}.yaml")
     config = load_config(
@@ -67,7 +68,7 @@ def _train(call: argparse.Namespace) -> None:
             bar.update(trained, completed=progress.epoch, description=text)
 
         progress = train(task, config, data, out, on_epoch)
-    write_text(out / "loss.svg", loss_svg(progress.losses))
+    write_text(out / "loss.svg", to_svg(loss_chart(progress.losses)))
     seconds = time.perf_counter() - began
     write_json(
         out / "training.json",

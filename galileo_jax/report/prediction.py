@@ -1,4 +1,4 @@
-"""What a prediction says: lines for the terminal, and its section of the report."""
+"""The results of a prediction: lines for the terminal, and its section of the report."""
 
 import base64
 import re
@@ -8,18 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.files.atomic_write import write_text
-from galileo_jax.report.figure import to_inline
-from galileo_jax.report.shell import document, figure_section, header, table
-from galileo_jax.report.write import PAGE
+from galileo_jax.report.chart import Chart
+from galileo_jax.report.fit_page import PAGE
+from galileo_jax.report.html_page import chart_section, document, header, table, with_plotly
 from galileo_jax.results.run import Run
 
-LEAST_M = 5e-4  # after the clip, that is worth telling
-OVER = "all is at rest when the clip ends, and stays so; what follows happened in the clip"
+LEAST_M = 5e-4  # of motion after the clip; less is not mentioned
+OVER = "everything is at rest when the clip ends and stays so: these values describe the clip"
 ALONE = "prediction.html"  # where there is no report to go into
 
 
-def told(run: Run, found: Mapping[str, Any]) -> list[str]:
-    """The answers, prediction.json, as lines for the reader."""
+def prediction_lines(run: Run, found: Mapping[str, Any]) -> list[str]:
+    """The answers of prediction.json as lines for the terminal."""
     verb, is_free = _verb(run), _is_free(run)
     until = found["predicted_until_s"]
     lines = [f"until {until:.2f} s, {found['seconds_beyond_clip_s']:g} s after the clip's end:"]
@@ -65,12 +65,12 @@ def is_over(found: Mapping[str, Any]) -> bool:
 
 
 def _is_free(run: Run) -> bool:
-    """Whether the height says something of its own: no surface leads the objects."""
+    """Whether no surface guides the objects, so that their height is independent of x."""
     return not run.problem.model.scene.surroundings.has_surface
 
 
 def _verb(run: Run) -> str:
-    """What the objects do; what may turn does not slide."""
+    """What the objects do; those that roll do not slide."""
     turns = any(run.problem.model.scene.surroundings.rolls)
     return "move" if turns or _is_free(run) else "slide"
 
@@ -85,19 +85,19 @@ def _interval(entry: Mapping[str, float], unit: str) -> str:
     return f"{mean} {unit} ({low} to {high})"
 
 
-def write_prediction(folder: Path, run: Run, found: Mapping[str, Any], svg: str) -> Path:
+def write_prediction(folder: Path, run: Run, found: Mapping[str, Any], chart: Chart) -> Path:
     """Puts the prediction's section into the folder's report, in place of an earlier one.
 
     Args:
       folder: with first_and_last.png in it; without a report the section is a page of its own.
-      run: what was continued.
+      run: the fit that was extrapolated.
       found: prediction.json.
-      svg: the motion continued.
+      chart: of the predicted motion.
 
     Returns:
       the page that has it.
     """
-    section = _section(run, found, svg, (folder / "first_and_last.png").read_bytes())
+    section = _section(run, found, chart, (folder / "first_and_last.png").read_bytes())
     page = folder / PAGE
     if page.is_file() and "</main>" in (text := page.read_text(encoding="utf-8")):
         write_text(page, _inserted(text, section))
@@ -116,10 +116,10 @@ def _inserted(page: str, section: str) -> str:
     if 'href="#prediction"' not in page:
         page = page.replace("</nav>", '<a href="#prediction">Prediction</a></nav>', 1)
     before, after = page.rsplit("</main>", 1)
-    return f"{before}{section}</main>{after}"
+    return with_plotly(f"{before}{section}</main>{after}")
 
 
-def _section(run: Run, found: Mapping[str, Any], svg: str, picture: bytes) -> str:
+def _section(run: Run, found: Mapping[str, Any], chart: Chart, picture: bytes) -> str:
     columns = _columns(run)
     rows = [
         [f"<code>{escape(name)}</code>", *(cell(entry) for cell in columns.values())]
@@ -134,14 +134,14 @@ def _section(run: Run, found: Mapping[str, Any], svg: str, picture: bytes) -> st
     over = f"<p>{OVER[0].upper()}{OVER[1:]}.</p>\n" if is_over(found) else ""
     encoded = base64.b64encode(picture).decode("ascii")
     stills = f'<img src="data:image/png;base64,{encoded}" style="max-width:100%" alt="the stills">'
-    motion = figure_section(
+    motion = chart_section(
         "Prediction",
         f"{found['seconds_beyond_clip_s']:g} s beyond the clip's end, from {found['num_draws']} "
         "draws of the posterior: mean and 95 % interval.",
-        {"motion": to_inline(svg, "measured and predicted motion")},
-        "narrow",
+        [chart],
+        "stack",
     )
-    caption = "First and last frame of the clip, as filmed and as simulated, and the end."
+    caption = "First and last frame of the clip, filmed and simulated, and the predicted end."
     return (
         f'<section id="prediction">\n{motion}\n{over}{table(("", *columns), rows)}\n{hit}'
         f"<figure><figcaption>{caption}</figcaption>{stills}</figure>\n</section>\n"

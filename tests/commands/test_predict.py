@@ -8,12 +8,12 @@ from typing import cast
 import jax
 import numpy as np
 import pytest
+from galileo_jax.report.shell import document, header
 
 from galileo_jax.commands import command, predict
 from galileo_jax.prediction.extrapolate import crossing_s, extrapolate
 from galileo_jax.report import gl_view
 from galileo_jax.report.prediction import is_over, told
-from galileo_jax.report.shell import document, header
 from galileo_jax.results.run import Run
 from tests.oracle_run import HIT, MISS, STILL, make_run
 from tests.ramp_model import make_surroundings

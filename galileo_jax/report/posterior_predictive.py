@@ -1,4 +1,4 @@
-"""What the posterior says of the clip's own frames; all plots read from it."""
+"""The posterior predictive of a clip: simulated positions in its frames, and residuals."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -17,7 +17,7 @@ from galileo_jax.prediction.extrapolate import (
     hit_s,
     roll_out,
 )
-from galileo_jax.report.phase import Phase
+from galileo_jax.report.chart import Phase
 from galileo_jax.results.run import Run
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
@@ -25,8 +25,8 @@ NUM_DRAWS = 100
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """The fit in the clip's frames.
+class PosteriorPredictive:
+    """The fit in the frames of the clip.
 
     Attributes:
       observation: what was measured.
@@ -53,7 +53,7 @@ class Fitted:
         return np.linalg.norm(span, axis=-1) > 2e-3
 
 
-def evaluate(run: Run, seed: int) -> Fitted:
+def posterior_predictive(run: Run, seed: int) -> PosteriorPredictive:
     """Rolls out the posterior's median, for the residuals, and draws, for the bands."""
     problem = run.problem
     observation, surroundings = problem.observation, problem.model.scene.surroundings
@@ -74,7 +74,7 @@ def evaluate(run: Run, seed: int) -> Fitted:
     drawn = as_measured(problem.model, draws)
     drawn = drawn + _offset(observation, drawn)[..., None]
     hits = _hits(centre, surroundings)
-    return Fitted(
+    return PosteriorPredictive(
         observation=observation,
         position_m=drawn,
         noise_scale=noise_scale,
