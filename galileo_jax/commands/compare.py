@@ -48,9 +48,9 @@ def main(argv: Sequence[str]) -> int | None:
     trials = compared.trials
     from galileo_jax.comparison.compare import compare
     from galileo_jax.comparison.document import comparison_document
+    from galileo_jax.comparison.path_residuals import path_residuals
     from galileo_jax.inference.fits.gradient import Code, GradientFitter
     from galileo_jax.report import comparison_page
-    from galileo_jax.report.path_residuals import path_residuals
 
     with command.console().status("fitting") as status:
         fit = GradientFitter(trials).fit(call.seed, on_stage=status.update)

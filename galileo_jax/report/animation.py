@@ -90,15 +90,11 @@ def _caption(video: VideoFrames | None) -> str:
     if video is None:
         return "The scene from the side. Arrow keys move the slider frame by frame."
     step = video.frames[1] - video.frames[0] if len(video.frames) > 1 else 1
-    every = "" if step == 1 else f" Every {_ordinal(step)} frame is shown."
+    every = "" if step == 1 else f" One frame in {step} is shown."
     return (
         "The clip, with the tracked points and the fitted motion drawn over it."
         f"{every} Arrow keys move the slider frame by frame."
     )
-
-
-def _ordinal(number: int) -> str:
-    return {2: "second", 3: "third"}.get(number, f"{number}th")
 
 
 def _legend(problem: Problem, models: list[str], video: VideoFrames | None) -> str:

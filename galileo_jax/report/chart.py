@@ -9,6 +9,8 @@ from itertools import chain
 
 import numpy as np
 
+from galileo_jax.comparison.phases import Phase
+
 Values = np.ndarray | Sequence[float] | Sequence[str]  # str: categories
 
 
@@ -84,32 +86,10 @@ class Boxes:
     width: float = 0.6
 
 
-@dataclass(frozen=True)
-class Matrix:
-    """Numbers `[row, column]` by category, the larger the darker; zeros are left empty."""
-
-    columns: Sequence[str]
-    rows: Sequence[str]
-    values: np.ndarray
-    colour: str
-    name: str
-
-
-Mark = Line | Band | Points | Bars | Boxes | Matrix
-
-
-@dataclass(frozen=True)
-class Phase:
-    """A time during which an object moves in one way.
-
-    Attributes:
-      name: "ramp", "foot", "table", "fall", "at rest", "after the hit", ...
-      start_s, end_s: on the clip's clock.
-    """
-
-    name: str
-    start_s: float
-    end_s: float
+Mark = Line | Band | Points | Bars | Boxes
+SHADED_PHASES = ("held", "foot", "collision")
+LETTER = 0.021  # of the panel's width, what a letter of a phase's name takes
+NAMES_ROOM = 0.14  # of a panel's height, for the phases' names
 
 
 @dataclass(frozen=True)
@@ -122,7 +102,7 @@ class Panel:
       title: over the axes.
       xlabel: quantity and unit; "" where the panel below has the same axis.
       xlim, ylim: ends of the axes; None = whatever is drawn.
-      is_log_y: the y axis is logarithmic.
+      is_log_y: the y axis is logarithmic; it has no `ylim` then.
       has_y_ticks: whether the y axis has numbers.
       phases: named on top; passages between phases are shaded.
       highlight: of x, where the model fails.
@@ -142,6 +122,24 @@ class Panel:
     highlight: tuple[float, float] | None = None
     level: float | None = None
     divider: tuple[float, str] | None = None
+
+    @property
+    def spans(self) -> list[tuple[float, float, str, float]]:
+        """What is shaded: start and end in x, colour, opacity."""
+        found = [(p.start_s, p.end_s, "ink", 0.06) for p in self.phases if p.name in SHADED_PHASES]
+        return found + ([(*self.highlight, "fails", 0.3)] if self.highlight else [])
+
+    @property
+    def names(self) -> list[tuple[float, str]]:
+        """The names of the phases that are wide enough for them, and the x of their middles."""
+        if self.xlim is None:
+            return []
+        letter = LETTER * (self.xlim[1] - self.xlim[0])
+        return [
+            ((phase.start_s + phase.end_s) / 2, phase.name)
+            for phase in self.phases
+            if phase.end_s - phase.start_s > letter * len(phase.name)
+        ]
 
 
 @dataclass(frozen=True)
@@ -172,6 +170,11 @@ class Chart:
         return [self.panels[i : i + step] for i in range(0, len(self.panels), step)]
 
     @property
+    def marks(self) -> list[Mark]:
+        """Of all panels."""
+        return [mark for panel in self.panels if panel for mark in panel.marks]
+
+    @property
     def shares_x(self) -> bool:
         """Whether the panels of a column have the x axis of the last."""
         return not any(p.xlabel for p in chain.from_iterable(self.rows[:-1]) if p)
@@ -188,16 +191,6 @@ def stacked(name: str, label: str, panels: Iterable[Panel], panel_px: int | None
     *upper, last = panels
     joined = (*(replace(panel, xlabel="") for panel in upper), last)
     return Chart(name, label, joined, panel_px=panel_px)
-
-
-SHADED_PHASES = ("held", "foot", "collision")
-LETTER = 0.021  # of the panel's width, what a letter of a phase's name takes
-NAMES_ROOM = 0.14  # of a panel's height, for the phases' names
-
-
-def is_named(phase: Phase, xlim: tuple[float, float]) -> bool:
-    """Whether a phase is wide enough for its name."""
-    return phase.end_s - phase.start_s > LETTER * len(phase.name) * (xlim[1] - xlim[0])
 
 
 def time_limits(times_s: np.ndarray) -> tuple[float, float]:

@@ -3,9 +3,9 @@
 import numpy as np
 
 from galileo_jax.comparison.local_tests import WHOLE
+from galileo_jax.comparison.path_residuals import PathResiduals
 from galileo_jax.report.chart import Band, Chart, Line, Panel, Points
 from galileo_jax.report.fit_charts import residual_panel
-from galileo_jax.report.path_residuals import PathResiduals
 from galileo_jax.report.style import object_colour
 
 

@@ -10,13 +10,13 @@ import numpy as np
 from galileo_jax.clip.schema import Clip
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.comparison.document import pulled
+from galileo_jax.comparison.path_residuals import PathResiduals
 from galileo_jax.files.atomic_write import write_text
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.animation import animation
 from galileo_jax.report.comparison_charts import failure_chart
 from galileo_jax.report.html_page import chart_section, document, header, items, table
-from galileo_jax.report.path_residuals import PathResiduals
 from galileo_jax.report.provenance import provenance
 
 NUM_CELLS = 12

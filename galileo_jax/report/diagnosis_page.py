@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.clip.schema import Clip
+from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
 from galileo_jax.files.atomic_write import write_text
 from galileo_jax.inference.joint_problem import JointProblem
@@ -20,7 +21,6 @@ from galileo_jax.report.draw import to_svg
 from galileo_jax.report.fit_page import PLOTS
 from galileo_jax.report.fit_text import number
 from galileo_jax.report.html_page import chart_section, document, header, items, legend, table
-from galileo_jax.report.path_residuals import PathResiduals, path_residuals
 from galileo_jax.report.provenance import provenance
 
 NUM_CANDIDATES = 8

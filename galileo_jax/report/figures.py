@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from galileo_jax.comparison.path_residuals import PathResiduals
 from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.observation.observation import Observation
 from galileo_jax.prediction.extrapolate import Motions
+from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.chart import Chart, side_by_side
 from galileo_jax.report.comparison_charts import failure_chart
 from galileo_jax.report.diagnosis_charts import candidates_chart, rounds_chart
 from galileo_jax.report.draw import to_plotly
 from galileo_jax.report.fit_charts import object_chart, track_chart
-from galileo_jax.report.path_residuals import PathResiduals
-from galileo_jax.report.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.prediction_chart import prediction_chart
 from galileo_jax.results.run import Run
 

@@ -1,85 +1,52 @@
 """Charts of a fit: velocities and positions, measured and fitted, and the residuals."""
 
-from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
+from galileo_jax.comparison.phases import Phase
+from galileo_jax.comparison.worst_interval import Interval, worst_interval
 from galileo_jax.observation.observation import Observation
+from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.chart import (
     Band,
     Chart,
     Line,
     Panel,
-    Phase,
     Points,
     stacked,
     time_limits,
     with_room,
 )
-from galileo_jax.report.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.style import object_colour
-from galileo_jax.report.worst_interval import worst_interval
 
+Quantity = Literal["velocity", "position"]
+UNITS = {"velocity": "m/s", "position": "m"}
 AXES = ("x", "y")
 FAILS_Z = 5.0  # of white noise, the largest of four tracks of 120 frames is over 4.6 in 1 of 100
 SMALLEST_RANGE = 3.3  # of the residuals' axis, in units of the noise
 
 
-@dataclass(frozen=True)
-class FailingInterval:
-    """Where the residuals of one object along one axis deviate most to one side.
-
-    Attributes:
-      name, axis: of the object, and "x" or "y".
-      start_s, end_s: of the frames.
-      z: |sum| / sqrt(frames), in units of the noise.
-    """
-
-    name: str
-    axis: str
-    start_s: float
-    end_s: float
-    z: float
+def failing_interval_of(fitted: PosteriorPredictive) -> tuple[str, str, Interval] | None:
+    """Object, axis and the worst interval of all; None where none is worse than noise makes it."""
+    found = [
+        (name, axis, interval)
+        for name, both in zip(fitted.observation.names, fitted.residuals, strict=True)
+        for axis, values in zip(AXES, both, strict=True)
+        if (interval := worst_interval(values, fitted.observation.times_s)) is not None
+    ]
+    worst = max(found, key=lambda one: one[2].z, default=None)
+    return worst if worst is not None and worst[2].z > FAILS_Z else None
 
 
-def failing_interval_of(fitted: PosteriorPredictive) -> FailingInterval | None:
-    """The worst interval of all objects; None where none is worse than noise makes it."""
-    found = []
-    times = fitted.observation.times_s
-    for name, both in zip(fitted.observation.names, fitted.residuals, strict=True):
-        for axis, values in zip(AXES, both, strict=True):
-            frames = np.flatnonzero(np.isfinite(values))
-            if (interval := worst_interval(values[frames])) is not None:
-                start, end, z = interval
-                start_s, end_s = float(times[frames[start]]), float(times[frames[end]])
-                found.append(FailingInterval(name, axis, start_s, end_s, z))
-    worst = max(found, key=lambda one: one.z, default=None)
-    return worst if worst is not None and worst.z > FAILS_Z else None
-
-
-def velocity_chart(fitted: PosteriorPredictive, index: int, axis: int, clip: str) -> Chart:
-    """The velocity profile of one object along one axis.
-
-    Dark band: the model's velocity with the posterior's uncertainty. Light band: where 95 % of
-    measured velocities are expected, tracking noise included.
-    """
-    panel = velocity_panel(fitted, index, axis)
-    return _chart(fitted, index, axis, clip, "velocity", panel)
-
-
-def position_chart(fitted: PosteriorPredictive, index: int, axis: int, clip: str) -> Chart:
-    """The position of one object along one axis."""
-    observation = fitted.observation
-    panel = _profile_panel(
-        fitted,
-        (index, axis),
-        "position, m",
-        observation.times_s,
-        fitted.position_m[:, index, axis],
-        fitted.noise_scale * np.sqrt(observation.covariance_m2[index, axis, axis]),
-        observation.position_m[index, axis],
-    )
-    return _chart(fitted, index, axis, clip, "position", panel)
+def profile_chart(
+    fitted: PosteriorPredictive, quantity: Quantity, index: int, axis: int, clip: str
+) -> Chart:
+    """The velocity profile or the position of one object along one axis."""
+    name = fitted.observation.names[index]
+    label = f"{quantity} of {name} along {AXES[axis]} against time, measured and fitted"
+    panel = profile_panel(fitted, quantity, index, axis)
+    return Chart(f"{quantity}_{name}_{AXES[axis]}", label, (panel,), clip)
 
 
 def residual_chart(fitted: PosteriorPredictive, index: int, clip: str) -> Chart:
@@ -92,7 +59,7 @@ def residual_chart(fitted: PosteriorPredictive, index: int, clip: str) -> Chart:
 def object_chart(fitted: PosteriorPredictive, index: int) -> Chart:
     """Both velocities of one object, and its residuals below."""
     name = fitted.observation.names[index]
-    velocities = (velocity_panel(fitted, index, axis) for axis in range(len(AXES)))
+    velocities = (profile_panel(fitted, "velocity", index, axis) for axis in range(len(AXES)))
     label = f"velocity of {name} against time, measured and fitted, and residuals"
     return stacked(f"fit_{name}", label, (*velocities, fit_residual_panel(fitted, index)))
 
@@ -115,27 +82,10 @@ def track_chart(observation: Observation, axis: int) -> Chart:
     return Chart(f"track_{AXES[axis]}", f"measured {AXES[axis]} against time", (panel,))
 
 
-def velocity_panel(fitted: PosteriorPredictive, index: int, axis: int) -> Panel:
-    """As `velocity_chart`."""
-    observation = fitted.observation
-    step = np.diff(observation.times_s)
-    variance = observation.covariance_m2[index, axis, axis] * fitted.noise_scale**2
-    return _profile_panel(
-        fitted,
-        (index, axis),
-        "velocity, m/s",
-        observation.times_s[:-1] + step / 2,
-        np.diff(fitted.position_m[:, index, axis], axis=-1) / step,
-        np.sqrt(variance[1:] + variance[:-1]) / step,
-        observation.velocity_m_s[index, axis],
-    )
-
-
 def fit_residual_panel(fitted: PosteriorPredictive, index: int) -> Panel:
     """The whitened residuals of one object in x and y."""
     name = fitted.observation.names[index]
-    worst = failing_interval_of(fitted)
-    is_here = worst is not None and worst.name == name
+    found = failing_interval_of(fitted)
     x, y = fitted.residuals[index]
     return residual_panel(
         fitted.observation.times_s,
@@ -143,7 +93,7 @@ def fit_residual_panel(fitted: PosteriorPredictive, index: int) -> Panel:
         index,
         title=f"{name} (filled: x, hollow: y)",
         phases=fitted.phases[index],
-        highlight=(worst.start_s, worst.end_s) if worst is not None and is_here else None,
+        highlight=(found[2].start_s, found[2].end_s) if found and found[0] == name else None,
     )
 
 
@@ -190,31 +140,28 @@ def residual_panel(
     )
 
 
-def _chart(
-    fitted: PosteriorPredictive, index: int, axis: int, clip: str, quantity: str, panel: Panel
-) -> Chart:
-    name = fitted.observation.names[index]
-    label = f"{quantity} of {name} along {AXES[axis]} against time, measured and fitted"
-    return Chart(f"{quantity}_{name}_{AXES[axis]}", label, (panel,), clip)
+def profile_panel(fitted: PosteriorPredictive, quantity: Quantity, index: int, axis: int) -> Panel:
+    """The velocity or the position of one object along one axis, measured and fitted.
 
-
-def _profile_panel(
-    fitted: PosteriorPredictive,
-    which: tuple[int, int],
-    ylabel: str,
-    times_s: np.ndarray,
-    drawn: np.ndarray,
-    noise: np.ndarray,
-    measured: np.ndarray,
-) -> Panel:
-    """Bands of `drawn` `[draw, time]` with the measured values on top; `noise` is their sd."""
-    index, axis = which
+    Dark band: the model with the uncertainty of the posterior. Light band: where 95 % of
+    measurements are expected, tracking noise included.
+    """
+    observation = fitted.observation
+    times_s, drawn = observation.times_s, fitted.position_m[:, index, axis]
+    measured = observation.position_m[index, axis]
+    variance = fitted.noise_scale**2 * observation.covariance_m2[index, axis, axis]
+    if quantity == "velocity":
+        step = np.diff(times_s)
+        times_s, drawn = times_s[:-1] + step / 2, np.diff(drawn, axis=-1) / step
+        measured = observation.velocity_m_s[index, axis]
+        variance = (variance[1:] + variance[:-1]) / step**2
+    noise = np.sqrt(variance)
     colour = object_colour(index)
     low, median, high = np.quantile(drawn, [0.025, 0.5, 0.975], axis=0)
     spread = 1.96 * np.sqrt(drawn.var(axis=0) + np.where(np.isfinite(noise), noise, 0.0) ** 2)
     mean = drawn.mean(axis=0)
     return Panel(
-        ylabel=ylabel,
+        ylabel=f"{quantity}, {UNITS[quantity]}",
         marks=(
             Band(times_s, mean - spread, mean + spread, colour, "95 % of measurements", 0.16),
             Band(times_s, low, high, colour, "95 % of the model", 0.4),

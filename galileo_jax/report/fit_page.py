@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.files.atomic_write import write_text
+from galileo_jax.prediction.posterior_predictive import PosteriorPredictive, posterior_predictive
 from galileo_jax.report import fit_text
 from galileo_jax.report.animation import animation
 from galileo_jax.report.chart import Chart
@@ -16,14 +17,12 @@ from galileo_jax.report.draw import to_svg
 from galileo_jax.report.fit_charts import (
     AXES,
     failing_interval_of,
-    position_chart,
+    profile_chart,
     residual_chart,
-    velocity_chart,
 )
 from galileo_jax.report.fit_text import meaning, number
-from galileo_jax.report.html_page import chart_section, details, document, header, legend
+from galileo_jax.report.html_page import chart_section, details, document, header, legend, table
 from galileo_jax.report.posterior_charts import pair_chart, trace_chart
-from galileo_jax.report.posterior_predictive import PosteriorPredictive, posterior_predictive
 from galileo_jax.report.provenance import provenance
 from galileo_jax.report.style import object_colour
 from galileo_jax.results.run import Run
@@ -57,10 +56,10 @@ def _charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
         draws.append(trace_chart(run.posterior, names))
     both = [(i, axis) for i in objects for axis in range(len(AXES))]
     return {
-        "velocity": [velocity_chart(fitted, *one, clip) for one in both],
+        "velocity": [profile_chart(fitted, "velocity", *one, clip) for one in both],
         "residuals": [residual_chart(fitted, i, clip) for i in objects],
         "draws": draws,
-        "position": [position_chart(fitted, *one, clip) for one in both],
+        "position": [profile_chart(fitted, "position", *one, clip) for one in both],
     }
 
 
@@ -164,11 +163,12 @@ def _failure(fitted: PosteriorPredictive) -> str:
         "Residuals: measured minus fitted, in units of the noise. If the model is right they show "
         "no pattern, and 95 % of them are inside the grey band. "
     )
-    worst = failing_interval_of(fitted)
-    if worst is None:
+    found = failing_interval_of(fitted)
+    if found is None:
         return text + "No interval deviates more than noise does."
+    name, axis, worst = found
     return (
-        f"{text}Yellow: the interval that deviates most, {worst.name} along {worst.axis} from "
+        f"{text}Yellow: the interval that deviates most, {name} along {axis} from "
         f"{worst.start_s:.2f} to {worst.end_s:.2f} s (its mean is {worst.z:.0f} standard errors "
         "from 0). Run galileo compare to test the model, and galileo diagnose to find the effect "
         "that it lacks."
@@ -200,23 +200,21 @@ def _table(heading: str, entries: Mapping[str, Mapping[str, Any]], note: str = "
     for name, entry in entries.items():
         sd = entry["sd"]
         low, high = number(entry["q025"], sd), number(entry["q975"], sd)
-        unit = "" if entry["unit"] == "1" else entry["unit"]
-        is_known = "yes" if entry["identified"] else "no"
+        unit = "" if entry["unit"] == "1" else escape(entry["unit"])
         rows.append(
-            f"<tr><td><code>{escape(name)}</code></td>"
-            f'<td class="meaning">{escape(meaning(name) or "")}</td>'
-            f'<td class="n">{number(entry["mean"], sd)} {escape(unit)}</td>'
-            f'<td class="n">{number(sd, sd)}</td><td class="n">{low} to {high}</td>'
-            f"<td>{is_known}</td></tr>"
+            [
+                f"<code>{escape(name)}</code>",
+                escape(meaning(name) or ""),
+                f"{number(entry['mean'], sd)} {unit}",
+                number(sd, sd),
+                f"{low} to {high}",
+                "yes" if entry["identified"] else "no",
+            ]
         )
-    head = (
-        '<tr><th scope="col">name</th><th scope="col" class="meaning">meaning</th>'
-        '<th scope="col">mean</th><th scope="col">sd</th><th scope="col">95 % interval</th>'
-        '<th scope="col">determined</th></tr>'
-    )
+    head = ("name", "meaning", "mean", "sd", "95 % interval", "determined")
     text = f"<p>{escape(note)}</p>" if note else ""
     top = f"<h2>{escape(heading)}</h2>\n" if heading else ""
-    return f'{top}{text}<div class="table"><table>{head}{"".join(rows)}</table></div>'
+    return f"{top}{text}{table(head, rows, only_wide=('meaning',))}"
 
 
 def _provenance(run: Run) -> str:

@@ -6,7 +6,7 @@ import shlex
 from typing import Any
 
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.report.posterior_predictive import PosteriorPredictive
+from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.results.run import CLIP, Run
 
 MEANINGS = {

@@ -2,15 +2,17 @@
 
 import base64
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from html import escape
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from galileo_jax.files.atomic_write import write_text
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.fit_page import PAGE
-from galileo_jax.report.html_page import chart_section, document, header, table, with_plotly
+from galileo_jax.report.html_page import chart_section, document, header, legend, table, with_plotly
+from galileo_jax.report.style import object_colour
 from galileo_jax.results.run import Run
 
 LEAST_M = 5e-4  # of motion after the clip; less is not mentioned
@@ -20,38 +22,48 @@ ALONE = "prediction.html"  # where there is no report to go into
 
 def prediction_lines(run: Run, found: Mapping[str, Any]) -> list[str]:
     """The answers of prediction.json as lines for the terminal."""
-    verb, is_free = _verb(run), _is_free(run)
     until = found["predicted_until_s"]
     lines = [f"until {until:.2f} s, {found['seconds_beyond_clip_s']:g} s after the clip's end:"]
     if is_over(found):
         lines.append(OVER)
     for name, entry in found["objects"].items():
-        slides, stops = entry["slides_probability"], entry["stops_probability"]
-        lines.append(f"{name}: will it {verb}? {_chance(slides)}")
-        if slides == 0:
-            continue
-        lines.append(f"  how far: {_interval(entry['travelled_m'], 'm')}")
-        beyond = entry["travelled_beyond_clip_m"]
-        if beyond["q975"] > LEAST_M:
-            lines.append(f"  of that after the clip: {_interval(beyond, 'm')}")
-        lines.append(f"  does it stop? {_chance(stops)}")
-        if entry["rest_x_m"] and entry["rest_time_s"]:
-            lines.append(
-                f"  at x = {_interval(entry['rest_x_m'], 'm')}, "
-                f"after {_interval(entry['rest_time_s'], 's')}"
-            )
-        if stops < 1 or is_free:
-            line = f"  at the end at x = {_interval(entry['end_x_m'], 'm')}"
-            if is_free:
-                line += f", y = {_interval(entry['end_y_m'], 'm')}"
-            lines.append(line)
+        for i, (question, answer) in enumerate(_answers(run, entry).items()):
+            mark = "" if question.endswith("?") else ":"
+            lines.append(f"{f'{name}: ' if i == 0 else '  '}{question}{mark} {answer}")
     if found["hit"] is not None:
-        first, second = list(found["objects"])[:2]
-        line = f"does {first} hit {second}? {_chance(found['hit']['probability'])}"
-        if found["hit"]["time_s"]:
-            line += f", after {_interval(found['hit']['time_s'], 's')}"
-        lines.append(line)
+        lines.append(_hit(found))
     return lines
+
+
+def _answers(run: Run, entry: Mapping[str, Any]) -> dict[str, str]:
+    """What the posterior predicts of one object, by question."""
+    surroundings = run.problem.model.scene.surroundings
+    is_free = not surroundings.has_surface
+    verb = "move" if any(surroundings.rolls) or is_free else "slide"
+    slides, stops = entry["slides_probability"], entry["stops_probability"]
+    answers = {f"will it {verb}?": _chance(slides)}
+    if slides == 0:
+        return answers
+    answers["how far"] = _interval(entry["travelled_m"], "m")
+    beyond = entry["travelled_beyond_clip_m"]
+    if beyond["q975"] > LEAST_M:
+        answers["of that after the clip"] = _interval(beyond, "m")
+    answers["does it stop?"] = _chance(stops)
+    if entry["rest_x_m"] and entry["rest_time_s"]:
+        answers["where it stops"] = f"x = {_interval(entry['rest_x_m'], 'm')}"
+        answers["when it stops"] = _interval(entry["rest_time_s"], "s")
+    if stops < 1 or is_free:
+        answers["where it is at the end"] = f"x = {_interval(entry['end_x_m'], 'm')}" + (
+            f", y = {_interval(entry['end_y_m'], 'm')}" if is_free else ""
+        )
+    return answers
+
+
+def _hit(found: Mapping[str, Any]) -> str:
+    first, second = list(found["objects"])[:2]
+    hit = found["hit"]
+    when = f", after {_interval(hit['time_s'], 's')}" if hit["time_s"] else ""
+    return f"does {first} hit {second}? {_chance(hit['probability'])}{when}"
 
 
 def is_over(found: Mapping[str, Any]) -> bool:
@@ -62,17 +74,6 @@ def is_over(found: Mapping[str, Any]) -> bool:
         for entry in objects
     )
     return not moves_on and any(entry["slides_probability"] > 0 for entry in objects)
-
-
-def _is_free(run: Run) -> bool:
-    """Whether no surface guides the objects, so that their height is independent of x."""
-    return not run.problem.model.scene.surroundings.has_surface
-
-
-def _verb(run: Run) -> str:
-    """What the objects do; those that roll do not slide."""
-    turns = any(run.problem.model.scene.surroundings.rolls)
-    return "move" if turns or _is_free(run) else "slide"
 
 
 def _chance(probability: float) -> str:
@@ -120,18 +121,14 @@ def _inserted(page: str, section: str) -> str:
 
 
 def _section(run: Run, found: Mapping[str, Any], chart: Chart, picture: bytes) -> str:
-    columns = _columns(run)
+    answers = {name: _answers(run, entry) for name, entry in found["objects"].items()}
+    columns = dict.fromkeys(chain.from_iterable(answers.values()))
     rows = [
-        [f"<code>{escape(name)}</code>", *(cell(entry) for cell in columns.values())]
-        for name, entry in found["objects"].items()
+        [f"<code>{escape(name)}</code>", *(own.get(question, "") for question in columns)]
+        for name, own in answers.items()
     ]
-    hit = ""
-    if found["hit"] is not None:
-        first, second = list(found["objects"])[:2]
-        when = _cell(found["hit"]["time_s"], "s")
-        chance = _chance(found["hit"]["probability"])
-        hit = f"<p>Does {escape(first)} hit {escape(second)}? {chance}, {when}.</p>\n"
-    over = f"<p>{OVER[0].upper()}{OVER[1:]}.</p>\n" if is_over(found) else ""
+    hit = f"<p>{escape(_sentence(_hit(found)))}</p>\n" if found["hit"] is not None else ""
+    over = f"<p>{_sentence(OVER)}</p>\n" if is_over(found) else ""
     encoded = base64.b64encode(picture).decode("ascii")
     stills = f'<img src="data:image/png;base64,{encoded}" style="max-width:100%" alt="the stills">'
     motion = chart_section(
@@ -140,6 +137,14 @@ def _section(run: Run, found: Mapping[str, Any], chart: Chart, picture: bytes) -
         "draws of the posterior: mean and 95 % interval.",
         [chart],
         "stack",
+        legend(
+            [
+                ("dot", "ink", "measured"),
+                *(("line", object_colour(i), f"{name}, median") for i, name in enumerate(answers)),
+                ("dashed", "soft", "beyond the clip"),
+                ("fill", "soft", "95 % of the posterior"),
+            ]
+        ),
     )
     caption = "First and last frame of the clip, filmed and simulated, and the predicted end."
     return (
@@ -148,22 +153,5 @@ def _section(run: Run, found: Mapping[str, Any], chart: Chart, picture: bytes) -
     )
 
 
-def _columns(run: Run) -> dict[str, Callable[[Mapping[str, Any]], str]]:
-    """Each column's title, and its cell of an object's entry."""
-    columns: dict[str, Callable[[Mapping[str, Any]], str]] = {
-        f"will it {_verb(run)}?": lambda entry: _chance(entry["slides_probability"]),
-        "how far": lambda entry: _cell(entry["travelled_m"], "m"),
-        "after the clip": lambda entry: _cell(entry["travelled_beyond_clip_m"], "m"),
-        "does it stop?": lambda entry: _chance(entry["stops_probability"]),
-        "where": lambda entry: _cell(entry["rest_x_m"], "m"),
-        "when": lambda entry: _cell(entry["rest_time_s"], "s"),
-    }
-    if _is_free(run):
-        del columns["where"]  # of x alone, which says little here
-        columns["x at the end"] = lambda entry: _cell(entry["end_x_m"], "m")
-        columns["y at the end"] = lambda entry: _cell(entry["end_y_m"], "m")
-    return columns
-
-
-def _cell(entry: Mapping[str, float] | None, unit: str) -> str:
-    return _interval(entry, unit) if entry else "never"
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."

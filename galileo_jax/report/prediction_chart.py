@@ -26,16 +26,16 @@ def prediction_chart(run: Run, motions: Motions) -> Chart:
         low, median, high = np.quantile(shown[:, i], [0.025, 0.5, 0.975], axis=0)
         colour, during = object_colour(i), times <= clip_end_s
         marks += [
-            Band(times, low, high, colour, f"{name}, 95 % of the posterior", 0.25),
-            Line(times[during], median[during], colour, f"{name}, median"),
-            Line(times[~during], median[~during], colour, f"{name}, predicted", is_dashed=True),
+            Band(times, low, high, colour, "", 0.25),
+            Line(times[during], median[during], colour, name),
+            Line(times[~during], median[~during], colour, "", is_dashed=True),
             Points(observation.times_s, observation.position_m[i, axis], "ink", "measured",
                    size_px=3.3),
         ]  # fmt: skip
     panel = Panel(
         ylabel=("x, m", "y, m")[axis],
         marks=tuple(marks),
-        title="Measured positions, median and 95 % of the posterior",
+        title="Measured (dots), median and 95 % of the posterior",
         xlabel="time, s",
         divider=(clip_end_s, "end of the clip"),
     )

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.files.atomic_write import write_text
-from galileo_jax.report.chart import Boxes, Chart, Matrix, Panel
+from galileo_jax.report.chart import Boxes, Chart, Panel
 from galileo_jax.report.html_page import chart_section, document, header, legend, table
 from galileo_jax.report.provenance import versions
 
 COLOURS = ("object2", "object1", "good", "fails", "ink", "soft")
 QUANTITIES = {"k1": "k1", "k2": "k2", "mass_ratio": "m1/m2"}
-BOXES_PX, CELL_PX = 190, 34
+BOXES_PX = 190
 MAX_FAILURES = 50  # listed; the table on disk has all
 Row = Mapping[str, Any]
 
@@ -142,18 +142,20 @@ def _confusion(rows: Sequence[Row]) -> list[str]:
     hidden = sorted({h for h, _ in known})
     verdicts = sorted({v for _, v in known}, key=lambda v: (v not in hidden, v))
     count = Counter(known)
-    z = np.array([[count[h, v] for v in verdicts] for h in hidden])
-    matrix = Matrix(verdicts, hidden, z, "object2", "cells")
-    label = "confusion matrix of hidden and named effects"
-    chart = Chart(
-        "confusion", label, (Panel("", (matrix,), xlabel="named"),), panel_px=CELL_PX * len(hidden)
-    )
+    most = max(count.values())
+    lines = [[escape(h), *(_shaded(count[h, v], most) for v in verdicts)] for h in hidden]
     right = sum(n for (h, v), n in count.items() if h == v)
-    caption = (
-        f"Rows: the effect hidden in the clip. Columns: the verdict of the diagnosis. {right} of "
-        f"{len(known)} are right; none means that no effect is missing."
-    )
-    return [chart_section("Hidden and named", caption, [chart], "stack")]
+    return [
+        f"<h2>Hidden and named</h2>\n<p>Rows: the effect hidden in the clip. Columns: the verdict "
+        f"of the diagnosis. {right} of {len(known)} are named right; none means that no effect is "
+        f"missing.</p>\n{table(['', *verdicts], lines)}"
+    ]
+
+
+def _shaded(number: int, most: int) -> str:
+    """The number on a ground that is the darker the larger it is; nothing for 0."""
+    share = round(80 * number / most)
+    return f'<span class="share" style="--share:{share}%">{number}</span>' if number else ""
 
 
 def _methods(rows: Sequence[Row], label: Callable[[Row], str]) -> str:

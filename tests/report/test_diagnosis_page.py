@@ -7,12 +7,12 @@ import pytest
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import Place
+from galileo_jax.comparison.path_residuals import failing_interval, path_residuals
 from galileo_jax.comparison.phases import PHASES
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.comparison_page import ComparisonReport, write_comparison_page
 from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
-from galileo_jax.report.path_residuals import failing_interval, path_residuals
 from galileo_jax.report.provenance import digest
 from tests.found import comparison_of, diagnosis_of, fit_of, make_trials
 from tests.precision import in_64_bit

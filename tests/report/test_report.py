@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import Clip
+from galileo_jax.prediction.posterior_predictive import posterior_predictive
 from galileo_jax.report import write_report
 from galileo_jax.report.animation import animation
 from galileo_jax.report.fit_charts import failing_interval_of
 from galileo_jax.report.fit_text import fit_quality, number, undetermined
 from galileo_jax.report.html_page import document
-from galileo_jax.report.posterior_predictive import posterior_predictive
 from galileo_jax.report.provenance import digest
 from galileo_jax.report.video_frames import BUDGET_BYTES, sample_frames
 from galileo_jax.results.run import load_run
@@ -109,8 +109,9 @@ def test_the_failing_interval_is_found_and_noise_has_none(run):
     quiet = np.random.default_rng(0).standard_normal(fitted.residuals.shape)
     assert failing_interval_of(replace(fitted, residuals=quiet)) is None
     quiet[0, 0, 10:16] += 6.0
-    worst = failing_interval_of(replace(fitted, residuals=quiet))
-    assert worst is not None and (worst.name, worst.axis) == ("object1", "x")
+    found = failing_interval_of(replace(fitted, residuals=quiet))
+    assert found is not None and found[:2] == ("object1", "x")
+    worst = found[2]
     assert (worst.start_s, worst.end_s) == pytest.approx((10 / 30, 15 / 30), abs=1 / 30)
 
 
@@ -159,7 +160,8 @@ def test_residuals_are_whitened_and_the_hit_is_found(run):
     fitted = posterior_predictive(run, seed=0)
     assert fitted.residuals.std() == pytest.approx(1.0, abs=0.6)
     assert fitted.hits_s[0] == pytest.approx(solve(HIT, np.zeros(1)).hit_s, abs=0.02)
-    assert [phase.name for phase in fitted.phases[0]] == ["ramp", "foot", "table", "after the hit"]
+    found = [phase.name for phase in fitted.phases[0]]
+    assert found == ["at rest", "ramp", "foot", "table", "collision", "after"]
 
 
 def test_the_hit_of_objects_that_part_is_where_the_closed_form_has_it(tmp_path):

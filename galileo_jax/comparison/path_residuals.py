@@ -1,19 +1,17 @@
 """Each object's motion along its path, measured and fitted, and the residuals."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, Place
 from galileo_jax.comparison.local_tests import AXES, WHOLE
-from galileo_jax.comparison.phases import PHASES
+from galileo_jax.comparison.phases import PHASES, Phase, phases_of
+from galileo_jax.comparison.worst_interval import worst_interval
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.problem import Problem
-from galileo_jax.report.chart import Phase
-from galileo_jax.report.worst_interval import worst_interval
 
 NUM_DRAWS = 60
 MARKED_Z = 3.0  # below it a cell is no place where the model fails
@@ -119,7 +117,7 @@ def _object(
         noise_m=noise,
         along=np.sum(tangent * white, axis=0),
         across=np.sum(normal * white, axis=0),
-        phases=_phases(labels, times),
+        phases=phases_of(labels, times),
         failing_s=None if worst is None else failing_interval(white, labels, times, worst),
         worst=worst,
     )
@@ -137,14 +135,10 @@ def failing_interval(
       worst: the cell.
     """
     values = white[AXES.index(worst.axis)]
-    chosen = np.isfinite(values)
     if worst.phase != WHOLE:
-        chosen &= labels == PHASES.index(worst.phase)
-    frames = np.flatnonzero(chosen)
-    if (window := worst_interval(values[frames])) is None:
-        return None
-    first, last, _ = window
-    return float(times_s[frames[first]]), float(times_s[frames[last]])
+        values = np.where(labels == PHASES.index(worst.phase), values, np.nan)
+    found = worst_interval(values, times_s)
+    return None if found is None else (found.start_s, found.end_s)
 
 
 def _tangent(problem: Problem, index: int, centre_m: np.ndarray) -> np.ndarray:
@@ -170,12 +164,3 @@ def _worst(comparison: Comparison, clip: str, name: str) -> Place | None:
         return None
     own = [p for p in comparison.where if (p.clip, p.object) == (clip, name) and p.z > MARKED_Z]
     return own[0] if own else None
-
-
-def _phases(labels: np.ndarray, times_s: np.ndarray) -> tuple[Phase, ...]:
-    borders = [0, *map(int, np.flatnonzero(np.diff(labels)) + 1), len(labels) - 1]
-    return tuple(
-        Phase(PHASES[labels[start]], float(times_s[start]), float(times_s[end]))
-        for start, end in pairwise(borders)
-        if end > start
-    )
