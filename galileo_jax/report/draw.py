@@ -197,10 +197,12 @@ def _furnish(figure: "go.Figure", panel: Panel, at: dict[str, Any]) -> None:
     on_x = each | {"tickangle": -SLANT_DEG} if isinstance(panel.marks[0], Boxes) else {}
     is_flipped = isinstance(panel.marks[0], Bars) and panel.marks[0].is_horizontal
     on_y = each | {"autorange": "reversed"} if is_flipped else {}
+    if panel.is_log_y:
+        on_y = {"type": "log"}
     figure.update_xaxes(title_text=escape(panel.xlabel), range=panel.xlim, **on_x, **at)
     figure.update_yaxes(
         title_text=escape(panel.ylabel), range=panel.ylim, showgrid=panel.has_y_ticks,
-        showticklabels=panel.has_y_ticks, type="log" if panel.is_log_y else None, **on_y, **at,
+        showticklabels=panel.has_y_ticks, **on_y, **at,
     )  # fmt: skip
     for start, end, colour, opacity in panel.spans:
         look = {"fillcolor": _rgba(colour, opacity), "line_width": 0, "layer": "below"}
