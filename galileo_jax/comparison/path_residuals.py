@@ -89,10 +89,10 @@ def _object(
     title: str,
 ) -> PathResiduals:
     observation = problem.observation
-    seen, times = observation.mask[index], observation.times_s
+    is_tracked, times = observation.mask[index], observation.times_s
     tangent = _tangent(problem, index, best[index])
-    difference = np.where(seen, observation.position_m[index] - best[index], np.nan)
-    offset = np.nanmedian(difference, axis=1) if seen.any() else np.zeros(2)
+    difference = np.where(is_tracked, observation.position_m[index] - best[index], np.nan)
+    offset = np.nanmedian(difference, axis=1) if is_tracked.any() else np.zeros(2)
     path = _path(problem, index, best[index], tangent)
     moved = np.einsum("at,bat->bt", tangent, draws[:, index] - best[index])
     # Each draw, like the fit, up to the constant offset of the tracked point.
@@ -100,7 +100,7 @@ def _object(
     low, high = np.quantile(moved, [0.025, 0.975], axis=0) if len(moved) else (0 * path, 0 * path)
     covariance = observation.covariance_m2[index]
     noise = scale * np.sqrt(np.einsum("at,abt,bt->t", tangent, covariance, tangent))
-    white = np.where(seen, comparison.white[clip][index], np.nan)
+    white = np.where(is_tracked, comparison.white[clip][index], np.nan)
     normal = np.stack([-tangent[1], tangent[0]])
     labels = comparison.labels[clip][index]
     worst = _worst(comparison, problem.name, observation.names[index])

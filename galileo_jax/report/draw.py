@@ -49,7 +49,7 @@ def _layout(chart: Chart) -> _Layout:
     column_gap = PLAIN_PX if is_narrow else LEFT_PX + RIGHT_PX
     panel_width = CELL_PX if is_narrow else PANEL_PX
     lower_top = TITLE_PX if any(p and p.title for row in lower for p in row) else PLAIN_PX
-    row_gap = PLAIN_PX if chart.shares_x else LABEL_PX + lower_top
+    row_gap = lower_top if chart.shares_x else LABEL_PX + lower_top
     panel_height = chart.panel_px or (STACKED_PX if lower else ALONE_PX)
     marks = chart.marks
     on_x = [len(name) for mark in marks if isinstance(mark, Boxes) for name in mark.x]
@@ -250,8 +250,11 @@ def to_svg(chart: Chart) -> str:
                 axes.locator_params(axis="x", nbins=2)
                 axes.tick_params(labelsize=7)
             _draw_panel(axes, panel)
-        if 1 < len({mark.name for mark in chart.marks if mark.name}) <= MOST_NAMES:
-            grid[0, 0].legend(loc="best", handlelength=1.4, labelspacing=0.25)
+        handles, names = grid[0, 0].get_legend_handles_labels()
+        named = dict(zip(names, handles, strict=True))  # each name once
+        if 1 < len(named) <= MOST_NAMES:
+            look = {"loc": "best", "handlelength": 1.4, "labelspacing": 0.25}
+            grid[0, 0].legend(named.values(), named.keys(), **look)
         figure.align_ylabels()
         return save_svg(figure, chart.name)
 

@@ -47,6 +47,8 @@ def write_first_and_last(run: Run, motions: Motions, path: Path) -> None:
         for j, column in enumerate(columns):
             for axes, (title, picture) in zip(grid[:, j], column, strict=False):
                 axes.imshow(picture)
-                axes.set_title(title)
+                axes.set(title=title, xticks=[], yticks=[])
+                axes.set_axis_on()
+                axes.spines[:].set(visible=True, alpha=0.3)
         with replacing(path) as temporary:
             figure.savefig(temporary)

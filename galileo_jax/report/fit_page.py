@@ -103,8 +103,8 @@ def _header(title: str, run: Run) -> str:
     effects = ", ".join(result["effects"]) or "none beyond friction and impact"
     mark = "" if result["converged"] else ' class="warn"'
     caution = fit_text.caution(result)
-    said = [*([caution] if caution else []), *result.get("warnings", [])]
-    warning = "".join(f'<p class="warn">{escape(line)}</p>\n' for line in said)
+    cautions = [*([caution] if caution else []), *result.get("warnings", [])]
+    warning = "".join(f'<p class="warn">{escape(line)}</p>\n' for line in cautions)
     more = (
         f"<p{mark}>{escape(fit_text.convergence(run))}</p>\n{warning}"
         f'<p class="soft">Method {escape(result["method"])}; effects: {escape(effects)}.</p>\n'

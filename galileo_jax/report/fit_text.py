@@ -119,14 +119,14 @@ def fit_quality(result: dict[str, Any]) -> str:
     if chi2 is None or not math.isfinite(chi2):
         return "chi2 per degree of freedom cannot be computed."
     if chi2 < CHI2_GOOD:
-        said = "The model fits, with less noise than the tracker states"
+        text = "The model fits, with less noise than the tracker states"
     elif chi2 <= CHI2_HIGH:
-        said = "The model fits: the residuals have the size of the tracking noise"
+        text = "The model fits: the residuals have the size of the tracking noise"
     elif chi2 <= CHI2_BAD:
-        said = "The residuals are larger than tracking noise explains; see where the model fails"
+        text = "The residuals are larger than tracking noise explains; see where the model fails"
     else:
-        said = "The model does not describe this clip; do not trust its parameters"
-    return f"{said} (chi2 per degree of freedom {chi2:.2f})."
+        text = "The model does not describe this clip; do not trust its parameters"
+    return f"{text} (chi2 per degree of freedom {chi2:.2f})."
 
 
 def fits(result: dict[str, Any]) -> bool:

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,12 +27,16 @@ def panel(**more) -> Panel:
     return Panel("v, m/s", marks, **({"xlabel": "time, s", "xlim": (0.0, 2.0)} | more))
 
 
+def plotly_of(chart: Chart, has_legend: bool = True) -> Any:
+    return to_plotly(chart, has_legend)
+
+
 def chart(*panels: Panel) -> Chart:
     return Chart("a", "a chart", panels or (panel(title="one <b>"),))
 
 
 def test_plotly_has_every_mark_with_its_values():
-    band, line, points = to_plotly(chart()).data
+    band, line, points = plotly_of(chart()).data
     assert band.fill == "toself" and len(band.x) == 2 * len(X)
     assert line.x == pytest.approx(X) and line.y == pytest.approx(X)
     assert np.isnan(points.y[2]) and points.error_y.array == pytest.approx(0.196 + 0 * X)
@@ -41,7 +46,7 @@ def test_plotly_has_every_mark_with_its_values():
 
 def test_phases_failing_times_levels_and_dividers_are_drawn_by_both():
     one = panel(phases=PHASES, highlight=(0.4, 0.6), level=0.0, divider=(1.5, "the end"))
-    figure = to_plotly(chart(one))
+    figure = plotly_of(chart(one))
     rectangles = [(s.x0, s.x1) for s in figure.layout.shapes if s.type == "rect"]
     assert rectangles == [(1.0, 1.1), (0.4, 0.6)], "the foot, and where the model fails"
     texts = [note.text for note in figure.layout.annotations]
@@ -52,36 +57,36 @@ def test_phases_failing_times_levels_and_dividers_are_drawn_by_both():
 
 
 def test_names_from_outside_are_escaped():
-    assert to_plotly(chart()).layout.annotations[0].text == "one &lt;b&gt;"
+    assert plotly_of(chart()).layout.annotations[0].text == "one &lt;b&gt;"
     hostile = replace(chart(panel(title="</script>")), label='"><b>', clip='"<i>')
     element = chart_element(hostile)
     assert element.count("</script>") == 1 and "<b>" not in element and "<i>" not in element
 
 
 def test_a_legend_names_each_kind_of_mark_once():
-    figure = to_plotly(chart(panel(xlabel=""), panel()))
+    figure = plotly_of(chart(panel(xlabel=""), panel()))
     assert [t.name for t in figure.data if t.showlegend] == ["95 %", "fitted", "measured"]
-    assert figure.layout.showlegend and not to_plotly(chart(), False).layout.showlegend
+    assert figure.layout.showlegend and not plotly_of(chart(), False).layout.showlegend
 
 
 def test_panels_share_x_where_only_the_last_has_a_label():
     shared, own = chart(panel(xlabel=""), panel()), chart(panel(), panel())
-    assert to_plotly(shared).layout.xaxis.matches == "x2"
-    assert to_plotly(own).layout.xaxis.matches is None
-    assert to_plotly(own).layout.height > to_plotly(shared).layout.height
+    assert plotly_of(shared).layout.xaxis.matches == "x2"
+    assert plotly_of(own).layout.xaxis.matches is None
+    assert plotly_of(own).layout.height > plotly_of(shared).layout.height
 
 
 def test_charts_side_by_side_are_columns():
     two = side_by_side("two", "two charts", [chart(panel(xlabel=""), panel())] * 2)
     assert two.columns == 2 and len(two.rows) == 2
-    figure = to_plotly(two)
+    figure = plotly_of(two)
     assert figure.layout.xaxis.domain[1] < figure.layout.xaxis2.domain[0]
     assert figure.layout.yaxis3.domain[1] < figure.layout.yaxis.domain[0]
 
 
 def test_bars_and_boxes_have_categories():
     bars = Bars(["a", "b"], [1.0, 3.0], "accent", "p", texts=("1", "3"), is_horizontal=True)
-    figure = to_plotly(chart(Panel("", (bars,), xlabel="p")))
+    figure = plotly_of(chart(Panel("", (bars,), xlabel="p")))
     assert figure.layout.yaxis.autorange == "reversed", "the first on top"
     assert list(figure.data[0].y) == ["a", "b"] and list(figure.data[0].x) == [1.0, 3.0]
     svg = to_svg(chart(Panel("", (bars,), xlabel="p")))
@@ -90,7 +95,7 @@ def test_bars_and_boxes_have_categories():
         Boxes(["air", "none"] * 3, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "object1", name, offset, 0.4)
         for name, offset in (("grad", -0.2), ("mh", 0.2))
     )
-    assert to_plotly(chart(Panel("error", boxes))).layout.boxmode == "group"
+    assert plotly_of(chart(Panel("error", boxes))).layout.boxmode == "group"
     assert ">none</text>" in to_svg(chart(Panel("error", boxes)))
 
 

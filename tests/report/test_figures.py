@@ -1,7 +1,8 @@
 """The figures for notebooks: what is in them, of each kind of result."""
 
+from typing import Any
+
 import numpy as np
-import plotly.graph_objects as go
 import pytest
 
 from galileo_jax.comparison.path_residuals import path_residuals
@@ -37,13 +38,13 @@ def trials(tmp_path_factory):
         return make_trials(tmp_path_factory.mktemp("clip"))
 
 
-def traces(figure: go.Figure, name: str) -> list:
+def traces(figure: Any, name: str) -> list:
     return [trace for trace in figure.data if trace.name == name]
 
 
 def test_a_track_has_the_measured_positions(run):
     observation = run.problem.observation
-    figure = track_figure(observation, "clip")
+    figure: Any = track_figure(observation, "clip")
     x, y = traces(figure, "object1")
     assert x.y == pytest.approx(observation.position_m[0, 0], abs=1e-6, nan_ok=True)
     assert y.y == pytest.approx(observation.position_m[0, 1], abs=1e-6, nan_ok=True)
@@ -52,7 +53,7 @@ def test_a_track_has_the_measured_positions(run):
 
 def test_a_fit_has_velocities_and_residuals_of_every_object(run):
     fitted = posterior_predictive(run, seed=0)
-    figure = fit_figure(fitted)
+    figure: Any = fit_figure(fitted)
     measured = traces(figure, "measured")
     assert len(measured) == len(traces(figure, "fitted")) == 4
     velocities = run.problem.observation.velocity_m_s
@@ -68,7 +69,8 @@ def test_a_comparison_shades_where_the_model_fails(trials):
     fine = path_residuals(trials, fit_of(trials, ()), comparison_of(trials, 0.5), 0)
 
     def highlighted(paths) -> list[tuple[float, float]]:
-        shapes = comparison_figure(paths).layout.shapes
+        figure: Any = comparison_figure(paths)
+        shapes = figure.layout.shapes
         return [(s.x0, s.x1) for s in shapes if s.type == "rect" and ",0.3)" in s.fillcolor]
 
     assert highlighted(fails) == [pytest.approx(fails[0].failing_s)] * 3, "in all three panels"
@@ -77,7 +79,7 @@ def test_a_comparison_shades_where_the_model_fails(trials):
 
 def test_a_diagnosis_has_the_errors_of_rounds_and_the_probabilities(trials):
     diagnosis = diagnosis_of(trials, "named")
-    figure = diagnosis_figure(diagnosis)
+    figure: Any = diagnosis_figure(diagnosis)
     (bars,) = traces(figure, "probability")
     assert list(bars.y) == ["air_drag", "viscous_drag", "release_delay"]
     assert bars.x == pytest.approx([0.9, 0.09, 1e-4])
@@ -88,13 +90,13 @@ def test_a_diagnosis_has_the_errors_of_rounds_and_the_probabilities(trials):
 
 def test_a_diagnosis_without_candidates_has_one_bar(trials):
     diagnosis = diagnosis_of(trials, "none")
-    figure = diagnosis_figure(type(diagnosis)(diagnosis.rounds, (), diagnosis.verdict))
+    figure: Any = diagnosis_figure(type(diagnosis)(diagnosis.rounds, (), diagnosis.verdict))
     assert [list(bar.x) for bar in figure.data if bar.type == "bar"] == [["1. no effects"]]
 
 
 def test_a_prediction_goes_on_after_the_clip(run):
     motions = extrapolate(run, 0.5, 8, 0)
-    figure = prediction_figure(run, motions)
+    figure: Any = prediction_figure(run, motions)
     end_s = run.problem.observation.times_s[-1]
     assert max(max(trace.x) for trace in figure.data) == pytest.approx(end_s + 0.5, abs=0.02)
     dashed = [trace for trace in figure.data if trace.line.dash == "dash"]
