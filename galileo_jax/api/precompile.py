@@ -41,7 +41,7 @@ def work_ahead(clips: Sequence[Clip], build: Build | None) -> threading.Thread:
         with contextlib.suppress(Exception):
             if build is not None:
                 _compile(clips, build)
-            for name in ("galileo_jax.report.write", "matplotlib.figure", "xarray"):
+            for name in ("galileo_jax.report.fit_page", "matplotlib.figure", "xarray"):
                 import_module(name)
 
     thread = threading.Thread(target=work, daemon=True)

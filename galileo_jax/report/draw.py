@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 TITLE_PX, PLAIN_PX, LABEL_PX, END_PX, LEFT_PX, RIGHT_PX = 30, 12, 46, 26, 58, 12
-ALONE_PX, STACKED_PX, PANEL_PX, CELL_PX, LEGEND_PX = 210, 150, 410, 100, 40
+ALONE_PX, STACKED_PX, PANEL_PX, CELL_PX = 210, 150, 410, 100
+LEGEND_PX, LEGEND_WIDTH_PX = 40, 800  # of one line
 LETTER_PX, SLANTED_PX, SLANT_DEG = 6.5, 4.5, 35  # of the names of categories
 PX_PER_INCH, POINTS_PER_PX = 100, 0.72
 SVG_LEFT_PX = 22  # more: the letters of its numbers are wider
@@ -106,7 +107,8 @@ def to_plotly(chart: Chart, has_legend: bool = True) -> "go.Figure":
                 _furnish(figure, panel, {"row": i, "col": j})
     if size.panel_width == CELL_PX:
         figure.update_xaxes(nticks=3, tickangle=0, tickfont={"size": 10})
-    legend_px = LEGEND_PX if has_legend else 0
+    letters_px = sum(LETTER_PX * len(group) for group in named)
+    legend_px = LEGEND_PX * (1 + letters_px // LEGEND_WIDTH_PX) if has_legend else 0
     is_grouped = any(isinstance(mark, Boxes) and mark.offset for mark in chart.marks)
     return figure.update_layout(
         template=_template(),
