@@ -27,10 +27,10 @@ from enum import StrEnum
 
 import jax.numpy as jnp
 import numpy as np
-from scipy.special import ndtri
 
 from galileo_jax.inference.fits.programs import FAILED
 from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost
+from galileo_jax.inference.fits.starts import scattered_starts
 from galileo_jax.inference.fits.steps import DAMPINGS, TRIED_SHARE, Damped, Edges, normal_matrices
 from galileo_jax.inference.trials import NOISE_SD, Trials
 from galileo_jax.parameters import inverse
@@ -140,7 +140,6 @@ class GradientFitter:
         self._settled = settings.settled if is_smooth else settings.settled_if_rough
         self._is_nuisance = np.array([p.role == "nuisance" for p in parameters])
         zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
-        self._rest = np.clip(zero, -1.0, 1.0)
         self._is_positive_nuisance = self._is_nuisance & ~np.isfinite(zero)
         self._edges = Edges.of(parameters)
 
@@ -169,7 +168,7 @@ class GradientFitter:
         effects = self.trials.all_effects if effects is None else effects
         free = self.trials.free(effects)[: self._count]
         on_stage("searching")
-        starts = self._batch(self._starts(seed, free), free)
+        starts = self._batch(scattered_starts(self.trials, free, self.settings.num_starts, seed), free)
         best = np.argsort(self._residuals.costs(starts))[: self.settings.num_refined]
         found, costs, num_steps = self._search(starts.take(best))
         on_stage("refining")
@@ -431,24 +430,6 @@ class GradientFitter:
         coarse = self.trials.coarse_steps
         half = 0.5 / np.sqrt(1 + np.sum([np.sum(j**2, axis=1) for j in jacobian], axis=0))
         return np.clip(half, self._smallest_step * coarse, LARGEST_STEP * coarse)
-
-    def _starts(self, seed: int, free: np.ndarray) -> np.ndarray:
-        """Scattered starts in z: all but nuisances in a Latin hypercube, those at rest."""
-        parameters = self.trials.model_parameters
-        count = self.settings.num_starts
-        scattered = [i for i, p in enumerate(parameters) if p.role != "nuisance" and free[i]]
-        generator = np.random.default_rng(seed)
-        ranks = np.stack([generator.permutation(count) for _ in scattered], axis=1)
-        share = (ranks + generator.random(ranks.shape)) / count
-        starts = np.tile(self._rest, (count, 1))
-        angle = self.trials.problems[0].model.scene.surroundings.angle_rad
-        for column, i in enumerate(scattered):
-            u = share[:, column]
-            if parameters[i].name.startswith("k") and parameters[i].role == "main":
-                # Above tan(angle) nothing slides and every start looks alike.
-                u = u * min(np.tan(angle) if parameters[i].name == "k1" else 0.5, 0.98) + 0.01
-            starts[:, i] = ndtri(np.clip(u, 0.01, 0.99))
-        return starts
 
 
 def _covariances(jacobian: Sequence[np.ndarray], free: np.ndarray) -> np.ndarray:
