@@ -324,13 +324,11 @@ def _noise_and_costs(trials: Trials, z: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 METHODS: dict[str, Method] = {
-    "ours": functools.partial(ours, settings=Settings(num_exact=0)),
-    "ours, with the inner problem": functools.partial(ours, settings=Settings(num_exact=4)),
+    "ours": functools.partial(ours, settings=Settings()),
     "optimistix LevenbergMarquardt": functools.partial(with_optimistix, solver="LevenbergMarquardt"),
     "optimistix Dogleg": functools.partial(with_optimistix, solver="Dogleg"),
     "optimistix with our descent": functools.partial(with_optimistix, solver="OurDescent"),
-    "whole `fit`, ours": functools.partial(whole_fit, settings=Settings(num_exact=0)),
-    "whole `fit`, inner problem": functools.partial(whole_fit, settings=Settings(num_exact=4)),
+    "whole `fit`, ours": functools.partial(whole_fit, settings=Settings()),
 }
 
 

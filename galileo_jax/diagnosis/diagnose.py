@@ -26,7 +26,7 @@ from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.left_out import left_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.effects.forms import FORM_NAMES
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter, Settings
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.result import error_of
 from galileo_jax.inference.trials import Trials
 
@@ -142,8 +142,8 @@ def diagnose(
 
 
 def fitter_of(trials: Trials) -> GradientFitter:
-    """What fits all hypotheses: with linear steps, many at once."""
-    return GradientFitter(trials, Settings(num_exact=0))
+    """What fits all hypotheses."""
+    return GradientFitter(trials)
 
 
 def _round(

@@ -112,7 +112,7 @@ def test_a_fit_comes_back_from_the_edge(edge):
     """Where a coefficient of friction no longer moves with z."""
     with in_64_bit():
         trials = make_trials([HIT])
-        fitter = GradientFitter(trials, Settings(num_exact=0))
+        fitter = GradientFitter(trials)
         best = fitter.fit(0)
         count = len(trials.model_parameters)
         start = best.z[:count].copy()
