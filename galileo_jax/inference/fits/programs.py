@@ -150,6 +150,6 @@ def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
     return jax.vmap(one)(size, is_first, here, there)
 
 
-def _function_info(at: Quadratic) -> optx.FunctionInfo.EvalGradHessian:
+def _function_info(at: Quadratic) -> Any:
     hessian = lx.MatrixLinearOperator(at.normal, lx.positive_semidefinite_tag)
     return optx.FunctionInfo.EvalGradHessian(at.cost, at.gradient, hessian)
