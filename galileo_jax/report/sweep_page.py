@@ -1,4 +1,4 @@
-"""The page of a sweep: errors by effect and by method, what was taken for what, what failed."""
+"""The page of a sweep: each clip, errors by effect and by method, verdicts, what failed."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -12,6 +12,7 @@ from galileo_jax.files.atomic_write import write_text
 from galileo_jax.report.plotly_chart import figure_element
 from galileo_jax.report.provenance import versions
 from galileo_jax.report.shell import document, figure_section, header, legend, table
+from galileo_jax.report.sweep_clips import ClipRow, clips_section
 
 COLOURS = ("object2", "object1", "good", "fails", "ink", "soft")
 QUANTITIES = {"k1": "k1", "k2": "k2", "mass_ratio": "m1/m2"}
@@ -21,7 +22,9 @@ MAX_FAILURES = 50  # listed; the table on disk has all
 Row = Mapping[str, Any]
 
 
-def write_sweep_page(path: Path, title: str, rows: Sequence[Row], command: str) -> None:
+def write_sweep_page(
+    path: Path, title: str, rows: Sequence[Row], command: str, clips: Sequence[ClipRow] = ()
+) -> None:
     """Writes the page.
 
     Args:
@@ -29,13 +32,16 @@ def write_sweep_page(path: Path, title: str, rows: Sequence[Row], command: str) 
       title: of the sweep.
       rows: as `sweeping.summary.make_rows` gives them.
       command: that makes it again.
+      clips: a row for each, in the order in which they are shown.
     """
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] == "failed"]
-    label = _labels(done)
+    label = labels(done)
     lead = f"{len(done)} of {len(rows)} cells done"
     lead += f", {len(failed)} failed: see below." if failed else "."
     sections = [header("sweep", title, lead, is_good=not failed)]
+    if clips:
+        sections.append(clips_section(clips))
     sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
     sections += _errors("Error by method", _METHOD, done, label, label)
     sections += _confusion(done)
@@ -54,7 +60,7 @@ _EFFECT = (
 _METHOD = "The same by method and by those of its options that differ between cells."
 
 
-def _labels(rows: Iterable[Row]) -> Callable[[Row], str]:
+def labels(rows: Iterable[Row]) -> Callable[[Row], str]:
     """A cell's method with those options that differ between cells of this method."""
     seen: dict[str, dict[str, set[str]]] = {}
     for row in rows:
