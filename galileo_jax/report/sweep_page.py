@@ -42,8 +42,11 @@ def write_sweep_page(
     sections = [header("sweep", title, lead, is_good=not failed)]
     if clips:
         sections.append(clips_section(clips))
-    sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
-    sections += _errors("Error by method", _METHOD, done, label, label)
+    is_truth_known = any(row["hidden"] for row in done)
+    if is_truth_known:
+        sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
+    caption = _METHOD if is_truth_known else _NO_TRUTH
+    sections += _errors("Error by method", caption, done, label, label)
     sections += _confusion(done)
     if done:
         sections.append(_methods(done, label))
@@ -58,6 +61,10 @@ _EFFECT = (
     "no truth is known, the velocity error over the tracking noise: 1 is noise alone."
 )
 _METHOD = "The same by method and by those of its options that differ between cells."
+_NO_TRUTH = (
+    "The velocity error over the tracking noise, by method and by those of its options that "
+    "differ: 1 is noise alone."
+)
 
 
 def labels(rows: Iterable[Row]) -> Callable[[Row], str]:

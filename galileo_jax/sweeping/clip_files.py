@@ -88,7 +88,9 @@ class Packed:
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_bytes(content)
             clip = Path(folder) / self.name
-            here = Unpacked(clip, {clip.parent: Path(self.source).parent, Path(folder): self.root})
+            origins = {clip.parent: Path(self.source).parent}
+            origins.setdefault(Path(folder), self.root)
+            here = Unpacked(clip, origins)
             try:
                 yield here
             except InputError as error:

@@ -147,7 +147,7 @@ def sweep(
     _check(engine, address, workers, cpus_per_worker, gpus_per_worker)
     each = Resources(cpus_per_worker, gpus_per_worker)
     if isinstance(config, Mapping):
-        name, plain = "sweep", _plain(config)
+        name, plain = Path(out).name if out is not None else "sweep", _plain(config)
         configs = make_configs("config", plain, set, multirun)
     else:
         path = _config_file(str(config))
