@@ -119,7 +119,7 @@ def clips_section(rows: Sequence[ClipRow]) -> str:
     if meanings:
         caption = f"{'; '.join(meanings)}. {caption}"
     if any(row.other_fits for row in rows):
-        caption += " Values are those of a clip's first fit, in the config's order."
+        caption += " Values are those of the first fit of each clip, in the order of the config."
     return (
         f"<h2>Clip by clip</h2>\n<p>{escape(caption)}</p>\n"
         f'<table class="clips"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>'

@@ -2,6 +2,7 @@
 
 import os
 import shlex
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -144,6 +145,7 @@ def sweep(
       >>> list(found.rows["status"])
       ['done']
     """
+    _check_not_imported_by_worker()
     _check(engine, address, workers, cpus_per_worker, gpus_per_worker)
     each = Resources(cpus_per_worker, gpus_per_worker)
     if isinstance(config, Mapping):
@@ -199,6 +201,16 @@ def sweep(
         made = Sweep(store.folder, tuple(tables), tuple(rows))
         report("done", 1.0, made)
     return made
+
+
+def _check_not_imported_by_worker() -> None:
+    """Refuses the call of a script that a worker imports: it would start workers of its own."""
+    script = sys.modules.get("__mp_main__")
+    if script is not None and script is not sys.modules["__main__"]:
+        raise InputError(
+            'sweep: workers import your script; put the call below if __name__ == "__main__":, or '
+            "call it with workers=0"
+        )
 
 
 def _check(engine: str, address: str | None, workers: int | None, cpus: int, gpus: int) -> None:

@@ -35,9 +35,9 @@ def test_a_row_and_a_link_for_each(swept, tmp_path):
     shutil.copytree(swept.folder, moved)
     page = (moved / "report.html").read_text()
     rows = re.findall(r"<tr>.*?</tr>", page[page.index("<tbody>") : page.index("</tbody>")], re.S)
-    names = [re.search(r'<th scope="row">(.*?)</th>', row)[1] for row in rows]
+    names = re.findall(r'<th scope="row">(.*?)</th>', "".join(rows))
     assert names == [f"clip{i}" for i in range(1, NUM_CLIPS + 1)], "2 stands before 10"
-    assert page.index("Clip by clip") == page.index("<h2") + page[page.index("<h2") :].index("C")
+    assert re.findall(r"<h2.*?>(.*?)</h2>", page)[0] == "Clip by clip"
     for name, row in zip(names, rows, strict=True):
         assert "<svg" in row or name == WRONG
         links = re.findall(r'href="(.*?)"', row)

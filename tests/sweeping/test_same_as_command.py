@@ -29,8 +29,10 @@ WORDS = {  # settings of a cell and the words of the command that do the same
     "mh": (MH, ["--method", "mh", "--chains", "4", "--max-steps", "25"]),
     "thesis": (
         THESIS,
-        ["--method", "mh", "--preset", "thesis", "--chains", "2", "--acceptance", "metropolis"]
-        + ["--seed", "1"],
+        [
+            *("--method", "mh", "--preset", "thesis", "--chains", "2"),
+            *("--acceptance", "metropolis", "--seed", "1"),
+        ],
     ),
     "noise": ({"method": "grad", "noise": "tracker"}, ["--noise", "tracker"]),
     "effects": ({"method": "grad", "effects": ["air_drag"]}, ["--effects", "air_drag"]),
@@ -59,7 +61,7 @@ def of_cell(clips, settings, out):
         {"clips": [clips], "common": settings, "reports": False}, out=out / "sweep", workers=0
     )
     assert list(found.rows["status"]) == ["done"], list(found.rows["failure"])
-    return found.folder / "cells" / found.rows["cell"][0] / "result.json"
+    return found.folder / "cells" / found.summary[0]["cell"] / "result.json"
 
 
 def of_command(main, words, out, name="result.json"):
