@@ -122,7 +122,8 @@ def clips_section(rows: Sequence[ClipRow]) -> str:
         caption += " Values are those of the first fit of each clip, in the order of the config."
     return (
         f"<h2>Clip by clip</h2>\n<p>{escape(caption)}</p>\n"
-        f'<table class="clips"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>'
+        f'<div class="table"><table class="clips"><thead><tr>{top}</tr></thead>'
+        f"<tbody>{body}</tbody></table></div>"
     )
 
 

@@ -52,10 +52,12 @@ def _row(
     diagnoses = [cell for cell, _ in done if isinstance(cell.settings, Diagnose)]
     shown = next(iter([*fits, *diagnoses]), None)
     together = [names[other.key] for other in shown.clips if other is not clip] if shown else []
+    alike = Counter(label(row) for _, row in done)
     pages = []
     for cell, row in done:
         if (page := store.page(cell.name, clip.name)) is not None:
             text = "report" if len(done) == 1 else label(row)
+            text += f" seed {row['seed']}" if alike[label(row)] > 1 else ""
             pages.append((text, Path(os.path.relpath(page, store.folder))))
     measured = store.clip(clip.key) if store.has_clip(clip.key) else None
     return ClipRow(

@@ -22,7 +22,7 @@ ENTRY = {"mean": 0.25, "sd": 0.02, "unit": "1", "identified": True}
 UNKNOWN = {**ENTRY, "identified": False}
 
 
-def fit_of(chi2=1.0, **more):
+def fit_of(chi2: float | None = 1.0, **more):
     parameters = {"m1": UNKNOWN, "k1": ENTRY, "k2": UNKNOWN}
     derived = {"mass_ratio": {**ENTRY, "mean": 2.0, "sd": 0.1}, "phi": ENTRY}
     error = {"chi2_per_dof": chi2}
@@ -131,7 +131,9 @@ def test_a_video_has_a_small_picture(tmp_path):
     clip = load_clip(build_good(tmp_path))
     picture = thumbnail(clip, observation_of(np.arange(clip.frame_count)))
     assert picture is not None
-    height, width = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR).shape[:2]
+    decoded = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+    assert decoded is not None
+    height, width = decoded.shape[:2]
     assert max(height, width) == min(PICTURE_PX, max(SIZE_PX))
     text = clips_section([ClipRow("a", picture=picture, fit=fit_of())])
     assert '<img alt="a frame of a" src="data:image/jpeg;base64,' in text

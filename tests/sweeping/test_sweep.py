@@ -91,7 +91,9 @@ def test_pages_up_to_so_many_cells_unless_the_config_says(clips, computed, tmp_p
     asked = {**config, "reports": True}
     found = sweep(asked, out=tmp_path / "out", workers=0)
     assert computed == cells, "pages that are asked for are made though there are results"
-    assert found.report_path.read_text().count('href="cells/') == 4
+    page = found.report_path.read_text()
+    assert page.count('href="cells/') == 4
+    assert page.count(">grad seed 1</a>") == 2, "pages of one clip are told apart"
     assert sweep(asked, out=tmp_path / "out", workers=0) and len(computed) == 4
     monkeypatch.setattr(sweeping, "MOST_PAGES", 4)
     shutil.rmtree(tmp_path / "out")
