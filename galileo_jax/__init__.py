@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from galileo_jax.model.parameters import HalfNormal, LogNormal, Normal, Parameter, Uniform
     from galileo_jax.runtime.errors import InputError
     from galileo_jax.runtime.progress import Cancelled
+    from galileo_jax.sweeping.sweep import Sweep, sweep
 
 _PLACES = {
     "galileo_jax.api.catalogue": ("effects", "scenarios"),
@@ -70,6 +71,7 @@ _PLACES = {
     "galileo_jax.model.parameters": ("HalfNormal", "LogNormal", "Normal", "Parameter", "Uniform"),
     "galileo_jax.runtime.errors": ("InputError",),
     "galileo_jax.runtime.progress": ("Cancelled",),
+    "galileo_jax.sweeping.sweep": ("Sweep", "sweep"),
 }
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 _RENAMED = {"register_effect": "register"}  # where a name says too little outside its module
@@ -93,6 +95,7 @@ __all__ = [
     "Simulated",
     "State",
     "Surroundings",
+    "Sweep",
     "Theta",
     "Track",
     "Uniform",
@@ -109,6 +112,7 @@ __all__ = [
     "register_effect",
     "scenarios",
     "simulate",
+    "sweep",
     "track",
     "train",
 ]

@@ -1,4 +1,4 @@
-"""The page of a sweep: errors by effect and method, confusion of effects, failed cells."""
+"""The page of a sweep: each clip, errors by effect and by method, verdicts, what failed."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -11,6 +11,7 @@ import numpy as np
 from galileo_jax.report.chart import Boxes, Chart, Panel
 from galileo_jax.report.html_page import chart_section, document, header, legend, table
 from galileo_jax.report.provenance import versions
+from galileo_jax.report.sweep_clips import ClipRow, clips_section
 from galileo_jax.runtime.atomic_write import write_text
 
 COLOURS = ("object2", "object1", "good", "fails", "ink", "soft")
@@ -20,7 +21,9 @@ MAX_FAILURES = 50  # listed; the table on disk has all
 Row = Mapping[str, Any]
 
 
-def write_sweep_page(path: Path, title: str, rows: Sequence[Row], command: str) -> None:
+def write_sweep_page(
+    path: Path, title: str, rows: Sequence[Row], command: str, clips: Sequence[ClipRow] = ()
+) -> None:
     """Writes the page.
 
     Args:
@@ -28,15 +31,21 @@ def write_sweep_page(path: Path, title: str, rows: Sequence[Row], command: str) 
       title: of the sweep.
       rows: as `sweeping.summary.make_rows` gives them.
       command: that makes it again.
+      clips: a row for each, in the order in which they are shown.
     """
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] == "failed"]
-    label = _labels(done)
+    label = labels(done)
     lead = f"{len(done)} of {len(rows)} cells done"
     lead += f", {len(failed)} failed: see below." if failed else "."
     sections = [header("sweep", title, lead, is_good=not failed)]
-    sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
-    sections += _errors("Error by method", _METHOD, done, label, label)
+    if clips:
+        sections.append(clips_section(clips))
+    is_truth_known = any(row["hidden"] for row in done)
+    if is_truth_known:
+        sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
+    caption = _METHOD if is_truth_known else _NO_TRUTH
+    sections += _errors("Error by method", caption, done, label, label)
     sections += _confusion(done)
     if done:
         sections.append(_methods(done, label))
@@ -51,9 +60,13 @@ _EFFECT = (
     "no truth is known, the velocity error over the tracking noise: 1 is noise alone."
 )
 _METHOD = "The same by method and by those of its options that differ between cells."
+_NO_TRUTH = (
+    "The velocity error over the tracking noise, by method and by those of its options that "
+    "differ: 1 is noise alone."
+)
 
 
-def _labels(rows: Iterable[Row]) -> Callable[[Row], str]:
+def labels(rows: Iterable[Row]) -> Callable[[Row], str]:
     """A cell's method with those options that differ between cells of this method."""
     seen: dict[str, dict[str, set[str]]] = {}
     for row in rows:

@@ -7,11 +7,12 @@ clips: ["clips/*.yaml", [slow.yaml, fast.yaml]]        # each alone; those in a 
 common: {method: mh}             # options of every cell
 grid: {seed: [0, 1], chains: [4, 8]}                   # all combinations
 list: [{sampler: mixture}, {sampler: random_walk}]     # one by one, each with all of the grid
+reports: true                    # each cell's own page; default: up to 60 cells
 """
 
 import glob
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Annotated, Any
@@ -55,6 +56,8 @@ class SweepConfig(BaseModel):
       common: options of every cell; see `settings` for those of each method.
       grid: options with several values each, of which all combinations are taken.
       list: options that go together, one entry after the other.
+      reports: whether each cell gets a page of its own, which takes about a second and 2 to 5 MB;
+        None: where a sweep has up to 60 cells.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -63,6 +66,7 @@ class SweepConfig(BaseModel):
     clips: tuple[ClipName | tuple[ClipName, ...], ...] = ()
     common: dict[str, Any] = {}
     grid: dict[str, Annotated[list[Any], Field(min_length=1)]] = {}
+    reports: Annotated[bool, Field(strict=True)] | None = None
     list: Annotated[tuple[dict[str, Any], ...], Field(min_length=1)] = ({},)
 
     def all_settings(self) -> tuple[Settings, ...]:
@@ -83,13 +87,13 @@ class SweepConfig(BaseModel):
                     raise InputError(f"{_where(str(error), i, entry, point)}{error}") from None
         return tuple(found)
 
-    def clip_groups(self) -> tuple[tuple[Path, ...], ...]:
-        """The clips, patterns expanded: those of a group are fitted together.
+    def clip_groups(self) -> tuple[tuple[str, ...], ...]:
+        """The clips by name, patterns expanded: those of a group are fitted together.
 
         Raises:
           InputError: nothing has such a name.
         """
-        groups: dict[tuple[Path, ...], None] = {}
+        groups: dict[tuple[str, ...], None] = {}
         for entry in self.clips:
             if isinstance(entry, str):
                 groups |= dict.fromkeys((path,) for path in _matches(entry))
@@ -111,22 +115,39 @@ def load_config(
     Raises:
       InputError: unreadable, or a key is unknown or its value is wrong.
     """
-    content = read_mapping(path)
+    return make_configs(str(path), read_mapping(path), changes, runs)
+
+
+def make_configs(
+    name: str, content: Mapping[str, Any], changes: Sequence[str] = (), runs: Sequence[str] = ()
+) -> tuple[SweepConfig, ...]:
+    """`load_config` for what has been read.
+
+    Args:
+      name: of the config, for messages.
+      content: its keys.
+      changes: as for `load_config`.
+      runs: as for `load_config`.
+
+    Raises:
+      InputError: a key is unknown or its value is wrong.
+    """
+    plain = deepcopy(dict(content))
     for change in changes:
         key, value = _split("--set", change)
-        _put(content, f"--set {change}", key, _parsed(f"--set {change}", value))
+        _put(plain, f"--set {change}", key, _parsed(f"--set {change}", value))
     many = [_split("--multirun", run) for run in runs]
     options = [_parsed(f"--multirun {key}={text}", f"[{text}]") for key, text in many]
     configs = []
     for values in itertools.product(*options):
-        one = deepcopy(content)
+        one = deepcopy(plain)
         for (key, text), value in zip(many, values, strict=True):
             _put(one, f"--multirun {key}={text}", key, value)
-        configs.append(_checked(path, one))
+        configs.append(_checked(name, one))
     return tuple(configs)
 
 
-def _checked(path: Path, content: dict[str, Any]) -> SweepConfig:
+def _checked(name: str, content: dict[str, Any]) -> SweepConfig:
     try:
         config = SweepConfig.model_validate(content)
     except ValidationError as error:
@@ -136,13 +157,13 @@ def _checked(path: Path, content: dict[str, Any]) -> SweepConfig:
         )
         known = ", ".join(SweepConfig.model_fields)
         said = f"unknown; known: {known}" if first["type"] == "extra_forbidden" else first["msg"]
-        raise InputError(f"{path}: {key}: {said}; got {first['input']!r}") from None
+        raise InputError(f"{name}: {key}: {said}; got {first['input']!r}") from None
     try:
         config.all_settings()
     except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+        raise InputError(f"{name}: {error}") from None
     if not config.clips and not config.simulate:
-        raise InputError(f"{path}: clips: missing; files, patterns such as clips/*.yaml expected")
+        raise InputError(f"{name}: clips: missing; files, patterns such as clips/*.yaml expected")
     return config
 
 
@@ -154,12 +175,12 @@ def _where(message: str, index: int, entry: dict[str, Any], point: dict[str, Any
     return f"list.{index}." if key in entry else "common."
 
 
-def _matches(pattern: str) -> list[Path]:
+def _matches(pattern: str) -> list[str]:
     if not glob.has_magic(pattern):
         if not Path(pattern).is_file():
             raise InputError(f"clips: {pattern}: no such file")
-        return [Path(pattern)]
-    found = sorted(Path(name) for name in glob.glob(pattern, recursive=True))
+        return [pattern]
+    found = sorted(glob.glob(pattern, recursive=True))
     if not found:
         raise InputError(f"clips: no file matches {pattern!r}; --set 'clips=[...]' gives others")
     return found

@@ -26,6 +26,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import replacing, write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.task import Failure
+from galileo_jax.sweeping.work import PAGE, CellResult, MeasuredClip
 
 RESULT, FAILURE = "result.json", "failure.json"
 ARRAYS = ("times_s", "position_m", "covariance_m2", "mask")
@@ -58,7 +59,7 @@ class Store:
                 raise InputError(
                     f"--out: {self.folder}: another sweep is at work there; take another folder"
                 ) from None
-            for pattern in ("cells/*/.*.json", "clips/.*.npz", ".summary.*"):
+            for pattern in ("cells/**/.*", "clips/.*.npz", ".summary.*", ".report.*"):
                 for left in self.folder.glob(pattern):
                     left.unlink()
             for folder in self.folder.glob("simulated/.simulate.*"):
@@ -80,10 +81,24 @@ class Store:
             return None
         return Failure(**json.loads(path.read_text(encoding="utf-8")))
 
-    def save_result(self, name: str, result: dict[str, Any]) -> None:
-        """Keeps a cell's result; a failure before it is forgotten."""
-        write_json(self._cell(name, RESULT), result)
+    def save_result(self, name: str, result: CellResult) -> None:
+        """Writes what came of a cell, result.json last; a failure before it is forgotten."""
+        for file, content in result.files.items():
+            with replacing(self._cell(name, file)) as path:
+                path.write_bytes(content)
+        write_json(self._cell(name, RESULT), result.document)
         self.forget_failure(name)
+
+    def cell_folder(self, name: str) -> Path:
+        """Where a cell's files are."""
+        return self.folder / "cells" / name
+
+    def page(self, name: str, clip: str = "") -> Path | None:
+        """A cell's page, of several clips that of one of them; None where it has none."""
+        for path in (self.cell_folder(name) / clip / PAGE, self.cell_folder(name) / PAGE):
+            if path.is_file():
+                return path
+        return None
 
     def save_failure(self, name: str, failure: Failure) -> None:
         """Keeps why a cell has no result."""
@@ -93,36 +108,40 @@ class Store:
         """Has a cell tried again."""
         self._cell(name, FAILURE).unlink(missing_ok=True)
 
-    def has_clip(self, digest: str) -> bool:
+    def has_clip(self, key: str) -> bool:
         """Whether a clip was tracked."""
-        return self._clip(digest).is_file()
+        return self._clip(key).is_file()
 
-    def clip(self, digest: str) -> Measurement:
+    def clip(self, key: str) -> MeasuredClip:
         """A tracked clip, to the last digit."""
-        with np.load(self._clip(digest)) as file:
+        with np.load(self._clip(key)) as file:
             arrays = {name: file[name] for name in ARRAYS}
             names = tuple(str(name) for name in file["names"])
             clip = Clip.model_validate(json.loads(str(file["clip"])))
             notes = json.loads(str(file["notes"]))
+            picture = file["thumbnail"].tobytes()
         seen = Observation(names=names, **arrays)
         said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
-        return Measurement(clip, seen, seen, None, notes["inferred"], **said)
+        measured = Measurement(clip, seen, seen, None, notes["inferred"], **said)
+        return MeasuredClip(measured, picture or None)
 
-    def save_clip(self, digest: str, measured: Measurement) -> None:
+    def save_clip(self, key: str, measured: MeasuredClip) -> None:
         """Keeps a tracked clip."""
-        seen = measured.observation
-        notes = {key: getattr(measured, key) for key in ("inferred", "doubts", "remarks")}
-        with replacing(self._clip(digest)) as path:
+        one = measured.measurement
+        seen = one.observation
+        notes = {name: getattr(one, name) for name in ("inferred", "doubts", "remarks")}
+        with replacing(self._clip(key)) as path:
             np.savez_compressed(
                 path,
                 names=np.array(seen.names),
-                clip=np.array(measured.clip.model_dump_json()),
+                clip=np.array(one.clip.model_dump_json()),
                 notes=np.array(json.dumps(notes)),
+                thumbnail=np.frombuffer(measured.thumbnail or b"", np.uint8),
                 **{name: getattr(seen, name) for name in ARRAYS},
             )
 
     def _cell(self, name: str, file: str) -> Path:
-        return self.folder / "cells" / name / file
+        return self.cell_folder(name) / file
 
-    def _clip(self, digest: str) -> Path:
-        return self.folder / "clips" / f"{digest[:32]}-{__version__}.npz"
+    def _clip(self, key: str) -> Path:
+        return self.folder / "clips" / f"{key[:32]}-{__version__}.npz"

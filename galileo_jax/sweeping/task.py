@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.progress import Cancelled
 
 MAX_TRIES = 3  # of a task whose worker died: the third death is no accident
 
@@ -61,9 +62,15 @@ class Engine(Protocol):
 
 
 def attempt(task: Task) -> Outcome:
-    """Carries out a task, here and now; whatever it raises becomes its failure."""
+    """Carries out a task, here and now; whatever it raises becomes its failure.
+
+    Raises:
+      Cancelled: the caller asked for it, which is nobody's failure.
+    """
     try:
         return Outcome(task.key, task.function(*task.arguments))
+    except Cancelled:
+        raise
     except InputError as error:
         return Outcome(task.key, failure=Failure("input", _one_line(error)))
     except Exception as error:

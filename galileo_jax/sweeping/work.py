@@ -1,40 +1,82 @@
 """What workers do: from a clip's files to a measurement, and from measurements to a result."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from galileo_jax.api.track import Track
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import Measurement, measure
+from galileo_jax.report.sweep_clips import thumbnail
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.sweeping.clip_files import Packed
 from galileo_jax.sweeping.settings import Diagnose, Settings, Thesis
 
+if TYPE_CHECKING:
+    from galileo_jax.api.fit_result import Fit
+
+PAGE = "report.html"
+FILES = ("video", "track")  # of a clip, beside its yaml
+
+
+@dataclass(frozen=True)
+class MeasuredClip:
+    """A clip as it was tracked.
+
+    Attributes:
+      measurement: without its track in pixels.
+      thumbnail: a picture from the middle of its motion, JPEG; None of a clip without a video.
+    """
+
+    measurement: Measurement
+    thumbnail: bytes | None = None
+
+
+@dataclass(frozen=True)
+class CellResult:
+    """What came of a cell.
+
+    Attributes:
+      document: result.json as `galileo fit` writes it, or diagnosis.json.
+      files: what lies beside it, by path in the cell's folder: the page and, of a fit, the run.
+    """
+
+    document: Mapping[str, Any]
+    files: Mapping[str, bytes] = field(default_factory=dict)
+
 
 @in_float64
-def measure_files(packed: Packed) -> Measurement:
-    """Loads and tracks a clip.
+def measure_files(packed: Packed) -> MeasuredClip:
+    """Loads and tracks a clip; whatever names a file names the one that it came from.
 
     Raises:
       InputError: something is wrong with it.
     """
-    with packed.unpacked() as path:
-        measured = measure(load_clip(path))
-    clip = measured.clip
-    came_from: dict[str, Any] = {
-        "path": packed.path.with_name(clip.path.name),
-        "source": str(packed.path),
-    }
-    for key in ("video", "track"):
-        if (file := getattr(clip, key)) is not None:
-            came_from[key] = packed.path.with_name(Path(file).name)
-    return replace(measured, clip=clip.model_copy(update=came_from), pixels=None)
+    with packed.unpacked() as here:
+        clip = load_clip(here.path)
+        warnings = tuple(map(here.text_of_origin, clip.warnings))
+        named = {"path": here.origin(clip.path), "source": packed.source, "warnings": warnings}
+        measured = measure(clip.model_copy(update=named))
+        clip = measured.clip
+        picture = thumbnail(clip, measured.observation)
+        files = {key: here.origin(file) for key in FILES if (file := getattr(clip, key))}
+        clip = clip.model_copy(update=files)
+    return MeasuredClip(replace(measured, clip=clip, pixels=None), picture)
 
 
-def run_cell(settings: Settings, measured: Sequence[Measurement]) -> dict[str, Any]:
-    """A cell's numbers: result.json as `galileo fit` writes it, or diagnosis.json.
+@in_float64
+def run_cell(
+    settings: Settings, measured: Sequence[Measurement], page_folder: Path | None = None
+) -> CellResult:
+    """A cell's numbers, and its page where it is to have one.
+
+    Args:
+      settings: method and options.
+      measured: the clips.
+      page_folder: the cell's folder, which its page names in commands; nothing is written there.
+        None: no page.
 
     Raises:
       InputError: the clips do not go with each other or with the method.
@@ -44,18 +86,41 @@ def run_cell(settings: Settings, measured: Sequence[Measurement]) -> dict[str, A
 
     tracks = [Track(one.clip, None, one) for one in measured]
     options = settings.model_dump(exclude={"method"})
-    if isinstance(settings, Diagnose):
-        return dict(diagnose(tracks, **options).document)
-    if isinstance(settings, Thesis):
-        options |= {"method": "mh", "preset": "thesis"}
-    else:
-        options["method"] = settings.method
-    found = fit(tracks, **options)
-    _forget_unshared_programs(found)
-    return dict(found.result)
+    with tempfile.TemporaryDirectory(prefix="galileo.") as name:
+        folder = Path(name)
+        if isinstance(settings, Diagnose):
+            found = diagnose(tracks, **options)
+            if page_folder is not None:
+                found.report(folder / PAGE)
+            return CellResult(dict(found.document), _content(folder))
+        if isinstance(settings, Thesis):
+            options |= {"method": "mh", "preset": "thesis"}
+        else:
+            options["method"] = settings.method
+        fitted = fit(tracks, **options)
+        if page_folder is not None:
+            _write_run(fitted, folder, page_folder)
+        _forget_unshared_programs(fitted)
+        return CellResult(dict(fitted.result), _content(folder))
 
 
-def _forget_unshared_programs(found: Any) -> None:
+def _write_run(fitted: "Fit", folder: Path, final: Path) -> None:
+    """Writes the run and its pages, which name the folder that it will lie in."""
+    from galileo_jax.report.fit_page import write_report
+    from galileo_jax.results.run import RESULT
+
+    fitted.save(folder, report=False)
+    (folder / RESULT).unlink()  # the store writes it last
+    for run in fitted.runs(final):
+        write_report(run, folder / run.folder.relative_to(final) / PAGE)
+
+
+def _content(folder: Path) -> dict[str, bytes]:
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def _forget_unshared_programs(found: "Fit") -> None:
     """Frees compiled chains that no other clip can use: a worker would fill up with them."""
     import jax
 

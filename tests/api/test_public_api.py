@@ -96,7 +96,7 @@ def test_fit_compare_predict_are_the_commands(video, folder, capfd):
     assert {"clip", "object", "axis", "phase", "z"} <= set(check.cells.columns)
     assert fit.summary().loc["k1", "identified"]
     for figure in (track.plot(), fit.plot(), check.plot(), ahead.plot()):
-        assert len(figure.data) > 0
+        assert figure.data
     for one in (track, fit, check, ahead):
         assert "<" in one._repr_html_() and "\n" not in repr(one)
     (page,) = fit.report(folder / "page.html")
@@ -128,7 +128,7 @@ def test_the_loop_on_a_hidden_drag(drag, folder, capfd):
     assert without_times(folder / "found" / "diagnosis.json") == without_times(
         folder / "diagnosis" / "diagnosis.json"
     )
-    assert len(found.plot().data) > 0 and "air_drag" in found._repr_html_()
+    assert found.plot().data and "air_drag" in found._repr_html_()
 
 
 def test_the_callers_precision_makes_no_difference(drag):

@@ -8,6 +8,7 @@ import pytest
 from galileo_jax.commands import command, sweep
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping import carry_out
+from galileo_jax.sweeping.work import CellResult
 from tests.clip.broken_clips import build_good_track
 from tests.missing import needed_module
 from tests.report.browser import opened
@@ -37,8 +38,9 @@ def calls(monkeypatch):
     """The cells that were computed; what is computed is made up."""
     made = []
 
-    def compute(settings, measured):
+    def compute(settings, measured, page_folder):
         made.append((settings.method, settings.seed, measured[0].name))
+        page = {} if page_folder is None else {"report.html": b"<title>a page</title>"}
         if settings.seed == 13:
             raise InputError("an unlucky\nseed")
         entry = {"mean": 0.25 + 0.01 * settings.seed, "sd": 0.02, "q025": 0.21, "q975": 0.29}
@@ -47,15 +49,12 @@ def calls(monkeypatch):
         if settings.method == "diagnose":
             verdict = {"status": "named", "effects": ["air_drag"]}
             last = row | {"k1": entry, "effects": ["air_drag"]}
-            return {
-                "adequate": False,
-                "p_value": 1e-9,
-                "verdict": verdict,
-                "history": [row, last],
-            }
+            document = {"adequate": False, "p_value": 1e-9, "verdict": verdict}
+            return CellResult(document | {"history": [row, last]}, page)
         quantities = {"k1": entry, "k2": entry}
         derived = {"mass_ratio": entry}
-        return {"converged": True, "parameters": quantities, "derived": derived, "error": row}
+        document = {"converged": True, "parameters": quantities, "derived": derived}
+        return CellResult(document | {"error": row}, page)
 
     monkeypatch.setattr(carry_out, "run_cell", compute)
     return made
@@ -94,8 +93,8 @@ def test_every_cell_is_a_row_and_what_fails_is_told(tmp_path, clips, calls, caps
     assert "failed: a-grad-" in told.err
     for row in rows:
         folder = tmp_path / "out" / "cells" / row["cell"]
-        name = "result.json" if row["status"] == "done" else "failure.json"
-        assert [path.name for path in folder.iterdir()] == [name]
+        names = ["report.html", "result.json"] if row["status"] == "done" else ["failure.json"]
+        assert sorted(path.name for path in folder.iterdir()) == names
     parquet = needed_module("pyarrow.parquet")
     table = parquet.read_table(tmp_path / "out" / "summary.parquet").to_pylist()
     assert [row["cell"] for row in table] == [row["cell"] for row in rows]

@@ -57,7 +57,7 @@ def test_multirun_is_a_config_for_every_combination(tmp_path):
 
 
 WRONG = {
-    "clip: [a.csv]": "clip: unknown; known: simulate, clips, common, grid, list",
+    "clip: [a.csv]": "clip: unknown; known: simulate, clips, common, grid, reports, list",
     "clips: [3]": "clips.0: Input should be a valid string; got 3",
     "common: {}": "clips: missing; files, patterns",
     "clips: [a]\ncommon: {method: grid}": "common.method: unknown value 'grid'; known: grad, mh",
@@ -106,7 +106,7 @@ def test_clips_by_pattern_and_together(tmp_path, monkeypatch):
     for name in "abc":
         (tmp_path / f"{name}.csv").touch()
     config = load_one(tmp_path, "clips: ['[ab].csv', a.csv, [b.csv, c.csv]]")
-    named = [[path.name for path in group] for group in config.clip_groups()]
+    named = [[Path(name).name for name in group] for group in config.clip_groups()]
     assert named == [["a.csv"], ["b.csv"], ["b.csv", "c.csv"]]
     for text, line in (("['x*']", "no file matches 'x*'"), ("[x.csv]", "x.csv: no such file")):
         with pytest.raises(InputError) as error:

@@ -1,5 +1,7 @@
 """A sweep's folder and a clip's files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
@@ -11,7 +13,7 @@ from galileo_jax.sweeping.clip_files import ClipFiles
 from galileo_jax.sweeping.settings import Grad
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.task import Failure
-from galileo_jax.sweeping.work import measure_files
+from galileo_jax.sweeping.work import CellResult, measure_files
 from tests.clip.broken_clips import build_good_track
 
 
@@ -23,12 +25,15 @@ def clip(tmp_path):
 
 def test_a_clip_comes_back_to_the_last_digit(clip, tmp_path):
     files = ClipFiles.of(clip)
-    measured = measure_files(files.packed())
+    tracked = measure_files(files.packed())
+    measured = tracked.measurement
     assert measured.clip.path == clip.with_suffix(".yaml")
+    assert measured.clip.source == str(clip)
     store = Store(tmp_path / "out")
-    assert not store.has_clip(files.digest)
-    store.save_clip(files.digest, measured)
-    again = store.clip(files.digest)
+    assert not store.has_clip(files.key)
+    store.save_clip(files.key, replace(tracked, thumbnail=b"picture"))
+    assert store.clip(files.key).thumbnail == b"picture"
+    again = store.clip(files.key).measurement
     assert again.clip == measured.clip
     for name in ("times_s", "position_m", "covariance_m2", "mask"):
         np.testing.assert_array_equal(
@@ -65,7 +70,7 @@ def test_files_in_another_folder_travel_along(clip):
     (below / "other.yaml").write_text(yaml.safe_dump(content))
     packed = ClipFiles.of(below / "other.yaml").packed()
     assert set(packed.content) == {"below/other.yaml", "clip.csv"}
-    assert measure_files(packed).name == "other"
+    assert measure_files(packed).measurement.name == "other"
 
 
 def test_a_failure_is_kept_until_there_is_a_result(tmp_path):
@@ -73,7 +78,7 @@ def test_a_failure_is_kept_until_there_is_a_result(tmp_path):
     failure = Failure("bug", "ValueError: no", "Traceback ...")
     store.save_failure("a", failure)
     assert store.failure("a") == failure
-    store.save_result("a", {"k1": float("nan")})
+    store.save_result("a", CellResult({"k1": float("nan")}))
     assert store.failure("a") is None
     assert store.result("a") == {"k1": None}
 

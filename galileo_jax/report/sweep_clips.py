@@ -1,0 +1,264 @@
+"""The first part of a sweep's page: one row for each clip, with a picture and a link to its page.
+
+It needs no truth and adds nothing up: it is for whoever filmed the clips, such as a class.
+"""
+
+import base64
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import cv2
+import numpy as np
+
+from galileo_jax.clip.schema import Clip
+from galileo_jax.observation.observation import Observation
+from galileo_jax.report.fit_text import fits, meaning, number
+from galileo_jax.report.style import object_colour
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.video import decode
+
+PICTURE_PX, QUALITY = 200, 70  # the longer side of a thumbnail, twice as large as it is shown
+DRAWING_PX = (100, 62)
+MOST_POINTS = 60  # of a drawn path
+SHORT = {"mass_ratio": "m1/m2"}  # headings of columns, where they are not the parameter's name
+HEADLINES = re.compile(r"k\d+|mass_ratio(_\d+_\d+)?")
+MASSES = re.compile(r"m\d+|phi")
+Document = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class ClipRow:
+    """A clip and what a sweep found of it.
+
+    Attributes:
+      name: that the clip is shown by.
+      together_with: names of the trials that it was fitted together with.
+      picture: JPEG; None of a clip without a video.
+      observation: its track; None where it could not be tracked.
+      fit: result.json of its fit; None without one.
+      diagnosis: diagnosis.json; None where it was not diagnosed.
+      pages: label and path of its own pages, relative to the sweep's page.
+      failures: why it has no result, a sentence each.
+      other_fits: how many fits it has beside the one that is shown.
+    """
+
+    name: str
+    together_with: tuple[str, ...] = ()
+    picture: bytes | None = None
+    observation: Observation | None = None
+    fit: Document | None = None
+    diagnosis: Document | None = None
+    pages: tuple[tuple[str, Path], ...] = ()
+    failures: tuple[str, ...] = ()
+    other_fits: int = 0
+
+
+def thumbnail(clip: Clip, observation: Observation) -> bytes | None:
+    """A small JPEG from the middle of a clip's motion; None where it has no video.
+
+    Args:
+      clip: with a video that is still there.
+      observation: its track, frame by frame as in the video.
+    """
+    if clip.video is None:
+        return None
+    wanted, picture = middle_frame(observation), None
+    try:
+        for index, frame in enumerate(decode.frames(clip.video)):
+            picture = frame
+            if index >= wanted:
+                break
+    except InputError:  # a picture is no reason to fail
+        return None
+    if picture is None:
+        return None
+    height, width = picture.shape[:2]
+    smaller = min(1.0, PICTURE_PX / max(height, width))
+    size = (max(1, round(width * smaller)), max(1, round(height * smaller)))
+    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+
+
+def middle_frame(observation: Observation) -> int:
+    """The frame in which the objects are half as far from where they began as they come.
+
+    Distances are summed over the objects. Without any motion: the middle of the track.
+    """
+    position = np.where(observation.mask[:, None, :], observation.position_m, np.nan)
+    away = np.zeros(position.shape[-1])
+    for i, is_seen in enumerate(observation.mask):
+        if is_seen.any():
+            first = position[i][:, int(np.argmax(is_seen))]
+            distance = np.hypot(*(position[i] - first[:, None]))
+            distance[~is_seen] = np.interp(
+                np.flatnonzero(~is_seen), np.flatnonzero(is_seen), distance[is_seen]
+            )
+            away += distance
+    if not away.any():
+        return len(away) // 2
+    return int(np.argmax(away >= 0.5 * away.max()))
+
+
+def clips_section(rows: Sequence[ClipRow]) -> str:
+    """The table as HTML, with its heading."""
+    values = [_values(row) for row in rows]
+    columns = list(dict.fromkeys(name for each in values for name in each))
+    columns.sort(key=lambda name: (not HEADLINES.fullmatch(name), "mass" in name))
+    head = ["", "clip", *(SHORT.get(name, name) for name in columns), "model", "report"]
+    top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
+    body = "".join(_row(row, own, columns) for row, own in zip(rows, values, strict=True))
+    meanings = [
+        f"{SHORT.get(name, name)}: {_meaning(name)}" for name in columns if _meaning(name) != name
+    ]
+    caption = "Each value with its standard deviation."
+    if meanings:
+        caption = f"{'; '.join(meanings)}. {caption}"
+    if any(row.other_fits for row in rows):
+        caption += " Values are those of the first fit of each clip, in the order of the config."
+    return (
+        f"<h2>Clip by clip</h2>\n<p>{escape(caption)}</p>\n"
+        f'<div class="table"><table class="clips"><thead><tr>{top}</tr></thead>'
+        f"<tbody>{body}</tbody></table></div>"
+    )
+
+
+def _meaning(name: str) -> str:
+    if name == "mass_ratio":
+        return "mass of object 1 over mass of object 2"
+    return meaning(name) or name
+
+
+def _values(row: ClipRow) -> dict[str, Mapping[str, Any]]:
+    """By name: frictions and mass ratios; of a motion that has none what it does determine."""
+    if row.fit is not None:
+        entries = {**row.fit["parameters"], **row.fit["derived"]}
+        # A method with an answer of its own: its draws are no posterior.
+        best = dict(row.fit.get("best") or {})
+        if {"m1", "m2"} <= set(best):
+            best["mass_ratio"] = best["m1"] / best["m2"]
+        for name in set(best) & set(entries):
+            entries[name] = {**entries[name], "mean": best[name], "sd": None, "identified": True}
+    elif row.diagnosis is not None:
+        last = row.diagnosis["history"][-1]
+        entries = {name: entry for name, entry in last.items() if isinstance(entry, Mapping)}
+    else:
+        return {}
+    found = {name: entry for name, entry in entries.items() if HEADLINES.fullmatch(name)}
+    return found or {
+        name: entry
+        for name, entry in entries.items()
+        if entry["identified"] and not MASSES.fullmatch(name)
+    }
+
+
+def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str]) -> str:
+    together = ""
+    if row.together_with:
+        others = escape(", ".join(row.together_with))
+        together = f'<span class="soft">fitted together with {others}</span>'
+    cells = [
+        f'<td class="picture">{_picture(row)}</td>',
+        f'<th scope="row">{escape(row.name)}{together}</th>',
+    ]
+    if row.fit is None and row.diagnosis is None:
+        said = escape(" ".join(dict.fromkeys(row.failures)) or "Not computed yet.")
+        cells.append(f'<td class="warn why" colspan="{len(columns) + 2}">{said}</td>')
+    else:
+        for name in columns:
+            label = escape(SHORT.get(name, name), quote=True)
+            shown = _value(values[name]) if name in values else ""
+            cells.append(f'<td class="value" data-label="{label}">{shown}</td>')
+        cells.append(f'<td class="model">{_model(row)}</td>')
+        cells.append(f'<td class="pages">{_links(row)}</td>')
+    return f"<tr>{''.join(cells)}</tr>\n"
+
+
+def _value(entry: Mapping[str, Any]) -> str:
+    if not entry["identified"]:
+        return '<span class="soft">not determined</span>'
+    unit = "" if entry["unit"] == "1" else f" {escape(entry['unit'])}"
+    value, sd = number(entry["mean"], entry["sd"]), entry["sd"]
+    return f"{value} &plusmn; {number(sd, sd)}{unit}" if sd else f"{value}{unit}"
+
+
+def _model(row: ClipRow) -> str:
+    """Whether the model describes the clip, or what is missing in it."""
+    if row.diagnosis is not None:
+        said, is_good = _verdict(row.diagnosis["verdict"])
+        error = row.diagnosis["history"][-1]
+    else:
+        assert row.fit is not None
+        error, is_good = row.fit["error"], fits(dict(row.fit))
+        said = "fits" if is_good else "does not fit"
+    mark = "" if is_good else ' class="warn"'
+    failed = ""
+    if row.failures:
+        failed = f'<span class="warn">{escape(row.failures[0])}</span>'
+    chi2 = number(error["chi2_per_dof"], 0.1)
+    return f'<b{mark}>{escape(said)}</b> <span class="soft">chi2 {chi2}</span>{failed}'
+
+
+def _verdict(verdict: Mapping[str, Any]) -> tuple[str, bool]:
+    """What a diagnosis says in a few words, and whether it knows what happens in the clip."""
+    status, effects = verdict["status"], verdict["effects"]
+    if status == "none":
+        return "nothing is missing", True
+    if status == "named":
+        return " and ".join(effects), True
+    if status == "ambiguous":
+        return " or ".join(effects), False
+    return "something unknown is missing", False
+
+
+def _links(row: ClipRow) -> str:
+    return ", ".join(
+        f'<a href="{quote(path.as_posix())}">{escape(label)}</a>' for label, path in row.pages
+    )
+
+
+def _picture(row: ClipRow) -> str:
+    if row.picture is not None:
+        encoded = base64.b64encode(row.picture).decode("ascii")
+        name = escape(row.name, quote=True)
+        return f'<img alt="a frame of {name}" src="data:image/jpeg;base64,{encoded}">'
+    return "" if row.observation is None else _drawing(row.observation, row.name)
+
+
+def _drawing(observation: Observation, name: str) -> str:
+    """The objects' paths, and where they end, to scale."""
+    width, height = DRAWING_PX
+    places = np.moveaxis(np.where(observation.mask[:, None], observation.position_m, np.nan), 1, -1)
+    seen = places[observation.mask]
+    if not len(seen):
+        return ""
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    margin = 6.0
+    scale = min(
+        (size - 2 * margin) / max(extent, 1e-6)
+        for size, extent in zip(DRAWING_PX, high - low, strict=True)
+    )
+    centre = (low + high) / 2
+    shapes = []
+    for i, (path, is_seen) in enumerate(zip(places, observation.mask, strict=True)):
+        own = path[is_seen]
+        if not len(own):
+            continue
+        chosen = own[np.unique(np.linspace(0, len(own) - 1, MOST_POINTS).round().astype(int))]
+        x = width / 2 + scale * (chosen[:, 0] - centre[0])
+        y = height / 2 - scale * (chosen[:, 1] - centre[1])
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+        colour = f"var(--{object_colour(i)})"
+        shapes.append(
+            f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="1.5"/>'
+            f'<circle cx="{x[-1]:.1f}" cy="{y[-1]:.1f}" r="3" fill="{colour}"/>'
+        )
+    label = escape(f"paths of the objects in {name}", quote=True)
+    return (
+        f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{label}">'
+        f"{''.join(shapes)}</svg>"
+    )

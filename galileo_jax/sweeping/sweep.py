@@ -1,0 +1,349 @@
+"""`sweep`: many clips, many ways, from one config; stopped and taken up again at will."""
+
+import os
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import yaml
+
+from galileo_jax import __version__
+from galileo_jax.files.package_data import config_path
+from galileo_jax.report.sweep_page import write_sweep_page
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.atomic_write import write_json, write_text
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.sweeping.carry_out import Watch, carry_out
+from galileo_jax.sweeping.cell import Cell, make_cells
+from galileo_jax.sweeping.clip_files import ClipFiles
+from galileo_jax.sweeping.clip_rows import make_clip_rows
+from galileo_jax.sweeping.config import SweepConfig, load_config, make_configs
+from galileo_jax.sweeping.engine_local import EngineHere, EngineLocal
+from galileo_jax.sweeping.resources import Resources, num_workers
+from galileo_jax.sweeping.simulated import simulated_clips
+from galileo_jax.sweeping.store import Store
+from galileo_jax.sweeping.summary import COLUMNS, Row, make_rows, write_tables
+from galileo_jax.sweeping.task import Engine, Failure
+from galileo_jax.sweeping.work import PAGE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ENGINES = ("local", "ray")
+MOST_PAGES = 60  # cells up to which each gets a page of its own, where the config does not say
+TRACKED, COMPUTED = 0.2, 0.98  # shares of the work, for progress
+CONFIG = "config.yaml"  # in the sweep's folder, of a config that was no file
+Report = Callable[[str, float, Any], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """A finished sweep.
+
+    Attributes:
+      folder: where it lies; `cells/NAME` in it is a run as `galileo fit` leaves it.
+      tables: summary.csv and, where pyarrow is installed, summary.parquet.
+      summary: of each cell, in the config's order; `rows` as plain mappings.
+    """
+
+    folder: Path
+    tables: tuple[Path, ...]
+    summary: tuple[Row, ...]
+
+    @property
+    def report_path(self) -> Path:
+        """The page: each clip, then errors by effect and by method."""
+        return self.folder / PAGE
+
+    @property
+    def rows(self) -> "pd.DataFrame":
+        """One row per cell, in the config's order; empty where there is nothing to say.
+
+        `cell, clips, method, options, effects, seed, hidden, status, failure, converged, verdict,
+        adequate, p_value`; of `k1`, `k2` and `mass_ratio` the value and `_sd, _q025, _q975,
+        _identified` and, where the truth is known, `_true, _error, _covered`; `rmse, noise` (m/s),
+        `chi2_per_dof`.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(list(self.summary), columns=list(COLUMNS))
+
+    @property
+    def failures(self) -> "pd.DataFrame":
+        """One row per cell without a result: `cell, clips, method, failure` (a sentence)."""
+        import pandas as pd
+
+        failed = [row for row in self.summary if row["status"] == "failed"]
+        return pd.DataFrame(failed, columns=["cell", "clips", "method", "failure"])
+
+    def __repr__(self) -> str:
+        """In one line."""
+        failed = sum(row["status"] == "failed" for row in self.summary)
+        done = len(self.summary) - failed
+        return f"<Sweep {self.folder}: {done} cells done, {failed} failed>"
+
+    def _repr_html_(self) -> str:
+        shown = self.rows.dropna(axis="columns", how="all")
+        return shown._repr_html_()  # pyright: ignore
+
+
+def sweep(
+    config: str | Path | Mapping[str, Any],
+    *,
+    out: str | Path | None = None,
+    set: Sequence[str] = (),
+    multirun: Sequence[str] = (),
+    retry: bool = False,
+    engine: Literal["local", "ray"] = "local",
+    address: str | None = None,
+    workers: int | None = None,
+    cpus_per_worker: int = 1,
+    gpus_per_worker: int = 0,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Sweep:
+    """Fits or diagnoses many clips in many ways, and computes only what is not there yet.
+
+    Each cell (a clip, or trials fitted together, with one set of options) gets what `fit` or
+    `diagnose` would give. What is wrong with a clip is its cells' failure, and the sweep goes on.
+    Stopped in any way, the same call goes on where it was (docs/sweeps.md).
+
+    With workers, a script needs its call below `if __name__ == "__main__":`, because each of them
+    imports the script; a notebook does not.
+
+    Args:
+      config: a YAML file, the name of a ready config, or its keys as a mapping.
+      out: the folder; None: `sweeps/` and the config's name.
+      set: "key=value" each, to change the config, such as "common.seed=3".
+      multirun: "key=a,b" each: a config for every combination.
+      retry: whether to try again what failed.
+      engine: "local" or "ray".
+      address: of a Ray cluster; None: one on this machine.
+      workers: processes of the local engine; None: as many as there is room for; 0: none, all is
+        computed in this process.
+      cpus_per_worker: cores.
+      gpus_per_worker: GPUs.
+      on_progress: called with the stage, the share done (0 to 1) and, first, a mapping `cells`,
+        `done`, `folder`; for each cell that fails a mapping `failed` (its name) and `why`; at the
+        end the `Sweep`; else None.
+      cancel: a flag with `is_set`, such as `threading.Event`; with workers it is looked at when a
+        cell is done, and what was in flight is dropped.
+
+    Raises:
+      InputError: the config is wrong, the folder is in use, or no Ray cluster answers.
+      Cancelled: `cancel` was set; the same call goes on where it was.
+
+    Example:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
+      >>> found = gx.sweep({"clips": ["slide.csv"]}, out="sweeps/class", workers=0)
+      >>> list(found.rows["status"])
+      ['done']
+    """
+    _check_not_imported_by_worker()
+    _check(engine, address, workers, cpus_per_worker, gpus_per_worker)
+    each = Resources(cpus_per_worker, gpus_per_worker)
+    if isinstance(config, Mapping):
+        name, plain = Path(out).name if out is not None else "sweep", _plain(config)
+        configs = make_configs("config", plain, set, multirun)
+    else:
+        path = _config_file(str(config))
+        name, plain = path.stem, None
+        configs = load_config(path, set, multirun)
+    _check_effects(configs)
+    groups = [one.clip_groups() for one in configs]
+    store = Store(Path(out) if out is not None else Path("sweeps") / name)
+
+    # What one cell reports is not the sweep's progress; its cancellation is.
+    with progress.scope(lambda *_: None, cancel), store.locked():
+        report = _reporter(on_progress)
+        if plain is not None:
+            write_text(store.folder / CONFIG, yaml.safe_dump(plain, sort_keys=False))
+        report("simulating", 0.0, None)
+        cells, with_page, again = _cells(configs, groups, store)
+        words = ["galileo", "sweep", str(config if plain is None else store.folder / CONFIG)]
+        for option, values in (("--set", set), ("--multirun", multirun)):
+            words += [word for value in values for word in (option, value)]
+        if out is not None or plain is not None:
+            words += ["--out", str(store.folder)]
+        if engine != "local":
+            words += ["--engine", engine, *(["--address", address] if address else [])]
+        command = shlex.join(words)
+        write_json(
+            store.folder / "sweep.json",
+            {
+                "command": command,
+                "configs": [one.model_dump(mode="json") for one in configs],
+                "cells": [cell.name for cell in cells],
+                "version": __version__,
+            },
+        )
+        if retry:
+            for cell in cells:
+                store.forget_failure(cell.name)
+        done = sum(store.has_result(cell.name) and cell.name not in again for cell in cells)
+        report("starting", 0.0, {"cells": len(cells), "done": done, "folder": store.folder})
+        with _engine(engine, address, workers, each) as worker:
+            carry_out(
+                cells, store, worker, _watch(report), with_page=with_page, computed_again=again
+            )
+        report("writing the page", COMPUTED, None)
+        rows = make_rows(cells, store)
+        tables = write_tables(store.folder, rows)
+        write_sweep_page(
+            store.folder / PAGE, name, rows, command, make_clip_rows(cells, store, rows)
+        )
+        made = Sweep(store.folder, tuple(tables), tuple(rows))
+        report("done", 1.0, made)
+    return made
+
+
+def _check_not_imported_by_worker() -> None:
+    """Refuses the call of a script that a worker imports: it would start workers of its own."""
+    script = sys.modules.get("__mp_main__")
+    if script is not None and script is not sys.modules["__main__"]:
+        raise InputError(
+            'sweep: workers import your script; put the call below if __name__ == "__main__":, or '
+            "call it with workers=0"
+        )
+
+
+def _check(engine: str, address: str | None, workers: int | None, cpus: int, gpus: int) -> None:
+    if engine not in ENGINES:
+        raise InputError(f"--engine: unknown {engine!r}; known: {', '.join(ENGINES)}")
+    if address and engine != "ray":
+        raise InputError("--address: for --engine ray only")
+    for name, value, least in (
+        ("workers", 0 if workers is None else workers, 0),
+        ("cpus-per-worker", cpus, 1),
+        ("gpus-per-worker", gpus, 0),
+    ):
+        if value < least:
+            raise InputError(f"--{name}: {value} is no whole number, {least} or more")
+
+
+def _plain(value: Any) -> Any:
+    """A config that can be written: paths are text, sequences are lists."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
+
+
+def _reporter(on_progress: OnProgress | None) -> Report:
+    def report(stage: str, share: float, partial: Any = None) -> None:
+        progress.check_cancelled()
+        if on_progress is not None:
+            on_progress(stage, share, partial)
+
+    return report
+
+
+def _watch(report: Report) -> Watch:
+    """Reports each clip and each cell as it is done."""
+    what, count, done = "tracking", 0, 0
+
+    def share() -> float:
+        start, end = (0.0, TRACKED) if what == "tracking" else (TRACKED, COMPUTED)
+        return start + (end - start) * (done / count if count else 1.0)
+
+    def stage() -> str:
+        return f"{what}, {done} of {count} done"
+
+    def begin(stage_name: str, number: int) -> None:
+        nonlocal what, count, done
+        what, count, done = stage_name, number, 0
+        report(stage(), share(), None)
+
+    def advance() -> None:
+        nonlocal done
+        done += 1
+        report(stage(), share(), None)
+
+    def fail(name: str, failure: Failure) -> None:
+        report(stage(), share(), {"failed": name, "why": failure.line})
+
+    return Watch(begin, advance, fail)
+
+
+def _config_file(name: str) -> Path:
+    """A config by its path; a ready one also by its name, wherever the call is made."""
+    path = Path(name)
+    if path.is_file():
+        return path
+    return config_path(path.name if path.suffix else f"{path.name}.yaml")
+
+
+def _check_effects(configs: Sequence[SweepConfig]) -> None:
+    """Refuses effects that there are not, before anything is computed."""
+    named = {
+        effect
+        for config in configs
+        for settings in config.all_settings()
+        for effect in (*getattr(settings, "effects", ()), getattr(settings, "add", "auto"))
+    } | {one.effect for config in configs for one in config.simulate}
+    if named <= {"auto", "none", None}:
+        return
+    from galileo_jax.model.effects.registry import effect_names
+
+    known = ("auto", "none", None, *effect_names())
+    if unknown := sorted(str(name) for name in named if name not in known):
+        raise InputError(f"effects: unknown {unknown[0]!r}; known: {', '.join(effect_names())}")
+
+
+def _cells(
+    configs: Sequence[SweepConfig], groups: Sequence[tuple[tuple[str, ...], ...]], store: Store
+) -> tuple[tuple[Cell, ...], frozenset[str], frozenset[str]]:
+    """All cells of all configs, each once; makes the clips that are to be simulated.
+
+    Returns:
+      the cells, the names of those that get a page, and of those that have a result and no page
+      though the config asks for one.
+    """
+    files: dict[str, ClipFiles] = {}
+
+    def of(source: str) -> ClipFiles:
+        if source not in files:
+            files[source] = ClipFiles.of(source)
+        return files[source]
+
+    cells: dict[str, Cell] = {}
+    reports: dict[str, bool | None] = {}
+    for config, named in zip(configs, groups, strict=True):
+        made = simulated_clips(store.folder / "simulated", config.simulate)
+        together = [*named, *((str(path),) for path in made)]
+        found = make_cells([tuple(map(of, group)) for group in together], config.all_settings())
+        cells |= {cell.name: cell for cell in found}
+        reports |= {cell.name: config.reports for cell in found}
+    few = len(cells) <= MOST_PAGES
+    with_page = frozenset(name for name, said in reports.items() if (few if said is None else said))
+    again = frozenset(
+        name
+        for name, cell in cells.items()
+        if reports[name] and store.has_result(name) and store.page(name, cell.clips[0].name) is None
+    )
+    return tuple(cells.values()), with_page, again
+
+
+@contextmanager
+def _engine(
+    name: str, address: str | None, workers: int | None, each: Resources
+) -> Iterator[Engine]:
+    if name == "ray":
+        from galileo_jax.sweeping.engine_ray import EngineRay
+
+        engine = EngineRay(address, each)
+    elif workers == 0:
+        engine = EngineHere()
+    else:
+        engine = EngineLocal(workers or num_workers(each), each)
+    try:
+        yield engine
+    finally:
+        engine.close()
