@@ -8,9 +8,8 @@ relative. The last line is JSON.
 
 import argparse
 import json
-import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,12 @@ import numpy as np
 import scoring
 import tables
 
+from galileo_jax.api.fit import fit
+from galileo_jax.api.track import Track
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
-from galileo_jax.commands import command, fit
+from galileo_jax.commands import command
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
@@ -94,18 +95,12 @@ def main(argv: Sequence[str]) -> int | None:
     return None
 
 
-def _fit(path: Path, call: argparse.Namespace) -> dict[str, Any]:
-    """Runs the command's own steps; only the track may come from an earlier run."""
+def _fit(path: Path, call: argparse.Namespace) -> Mapping[str, Any]:
+    """As the command does it; only the track may come from an earlier run."""
     clip = load_clip(path)
-    timings = {"track": 0.0, "compile": 0.0, "fit": 0.0}
-    options = [str(path), "--method", call.method, "--seed", str(call.seed)]
-    with tempfile.TemporaryDirectory() as folder:
-        return fit.fit_clips(
-            [Measurement(clip, _observe(clip, call.tracks))],
-            fit._parser().parse_args(options),
-            Path(folder),
-            timings,
-        )
+    seen = _observe(clip, call.tracks)
+    track = Track(clip, None, Measurement(clip, seen, seen))
+    return fit(track, method=call.method, seed=call.seed).result
 
 
 def _observe(clip: Clip, tracks: Path | None) -> Observation:

@@ -20,13 +20,14 @@ from typing import Any
 
 import tables
 
-from galileo_jax.commands import command, simulate
+from galileo_jax.api.simulate import simulate
+from galileo_jax.commands import command
 
 SHOWN = ("k1", "k2", "mass_ratio")
 COLUMNS = (*(f"d {name}" for name in SHOWN), *(f"sd {name}" for name in SHOWN), "fit s", "cpu s")
 SEEDS = (1, 2, 3)
 METHODS = ("grad", "mh")
-SECONDS = "2"  # of a clip: 60 frames
+SECONDS = 2.0  # of a clip: 60 frames
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -51,10 +52,7 @@ def main(argv: Sequence[str]) -> int | None:
 
 def _simulated(folder: Path, seed: int) -> Path:
     track = folder / f"track{seed}.csv"
-    made = ("--track-only", "--seconds", SECONDS, "--seed", str(seed), "--out", str(track))
-    subprocess.run(
-        [sys.executable, "-m", simulate.__name__, *made], check=True, stdout=subprocess.DEVNULL
-    )
+    simulate(track, track_only=True, seconds=SECONDS, seed=seed)
     return track
 
 

@@ -32,10 +32,11 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.neural.config import load_config
 from galileo_jax.neural.dataset import make_samples
 from galileo_jax.neural.estimate import TRAINED, cnn_posterior, trained_network
-from galileo_jax.neural.galileo_task import GalileoTask, estimate, thesis_clips
+from galileo_jax.neural.galileo_task import GalileoTask, estimate
 from galileo_jax.neural.posterior_network import PosteriorNetwork
 from galileo_jax.neural.task import Arrays
 from galileo_jax.runtime import compilation_cache
+from galileo_jax.thesis.clips import thesis_clips
 
 NUM_THESIS, NUM_CLIPS, NUM_DRAWS = 1000, 2000, 1000
 NOISES_M = (0.0, 2.2e-5, 2e-4, 1e-3)

@@ -17,13 +17,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.problem import Problem
-from galileo_jax.inference.samplers import thesis
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import make_fields, rigid_motion
-from galileo_jax.similarity.library.thesis_gaussian import GaussianSimilarity
 from galileo_jax.simulation import Truth
+from galileo_jax.thesis import sampler as thesis
+from galileo_jax.thesis.similarities.thesis_gaussian import GaussianSimilarity
 
 MAIN = ("m1", "k1", "m2", "k2")
 STEP_S = 1 / 480  # agrees with g (sin - k cos) to 0.2 %, and is what others take

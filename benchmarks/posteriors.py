@@ -41,6 +41,7 @@ import jax.numpy as jnp
 import numpy as np
 import tables
 from scipy import stats
+from tempering import temper
 
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.commands import command
@@ -55,16 +56,15 @@ from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.samplers import dispersed_starts, sample
 from galileo_jax.inference.samplers.driver import Settings
 from galileo_jax.inference.samplers.library.random_walk import RandomWalk
-from galileo_jax.inference.samplers.thesis import NARROW, NUM_STEPS, Acceptance, infer
-from galileo_jax.inference.tempering import temper
 from galileo_jax.neural.estimate import cnn_posterior
 from galileo_jax.neural.start import start_from_network
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime import compilation_cache
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
-from galileo_jax.similarity.similarity import AbstractSimilarity, similarity_class
 from galileo_jax.simulation import Truth
+from galileo_jax.thesis.sampler import NARROW, NUM_STEPS, Acceptance, infer
+from galileo_jax.thesis.similarity import AbstractSimilarity, similarity_class
 
 FPS, NUM_FRAMES, RAMP_ANGLE_DEG = 30.0, 61, 20.0
 NOISE_M = 0.01 / (FPS * math.sqrt(2))
@@ -214,8 +214,10 @@ def make_tracks(seed: int, count: int, noise: str) -> list[Track]:
         )
 
     (problem,) = make_joint_problem(
-        [clip], [seen(np.tile(start, NUM_FRAMES))], noise=noise
-    ).problems  # pyright: ignore
+        [clip],
+        [seen(np.tile(start, NUM_FRAMES))],
+        noise=noise,  # pyright: ignore
+    ).problems
     trials = JointProblem((problem,))
     generator = np.random.default_rng([seed, 9])
     tracks: list[Track] = []

@@ -8,8 +8,6 @@ told, how many 95 % intervals hold the truth, and how many fits call it identifi
 """
 
 import argparse
-import contextlib
-import os
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
@@ -20,21 +18,21 @@ import jax
 import numpy as np
 import tables
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.commands import simulate
-from galileo_jax.commands.fit import read_truth
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import measure
+from galileo_jax.results.truth import true_parameters
 from galileo_jax.runtime import compilation_cache
 
-CASES = {
-    "rolling incline": ("--scenario", "incline", "--shapes", "sphere"),
-    "slipping incline": ("--scenario", "incline", "--shapes", "cylinder", "--angle", "45"),
-    "multi": ("--scenario", "multi"),
-    "multi, a ball": ("--scenario", "multi", "--shapes", "box,sphere,box"),
+CASES: dict[str, dict[str, Any]] = {
+    "rolling incline": {"scenario": "incline", "shapes": ["sphere"]},
+    "slipping incline": {"scenario": "incline", "shapes": ["cylinder"], "angle": 45.0},
+    "multi": {"scenario": "multi"},
+    "multi, a ball": {"scenario": "multi", "shapes": ["box", "sphere", "box"]},
 }
 COLUMNS = ("error", "sd", "covered", "told")
 
@@ -65,15 +63,13 @@ def main(argv: Sequence[str] | None = None) -> None:
     tables.finish("rolling_and_multi", figures)
 
 
-def _fit(options: Sequence[str], seed: int) -> tuple[Mapping[str, float], dict[str, Any]]:
+def _fit(options: Mapping[str, Any], seed: int) -> tuple[Mapping[str, float], dict[str, Any]]:
     """The truth and what a fit of it says."""
     with tempfile.TemporaryDirectory() as folder:
         track = Path(folder) / "clip.csv"
-        with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
-            given = ("--track-only", "--solver", "fine", "--seed", str(seed), "--out", str(track))
-            simulate.main([*options, *given])
+        simulate(track, track_only=True, solver="fine", seed=seed, **options)
         clip = load_clip(track)
-        measured, truth = measure(clip), read_truth(clip)
+        measured, truth = measure(clip), true_parameters(clip)
     trials = make_joint_problem([measured.clip], [measured.observation])
     fit = GradientFitter(trials).fit(seed)
     posterior = laplace_posterior(trials, fit, seed)

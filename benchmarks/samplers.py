@@ -147,7 +147,7 @@ def fit_mh(case: synthetic_tracks.Case, seed: int) -> Answer:
 
 
 def fit_thesis(case: synthetic_tracks.Case, seed: int) -> Answer:
-    from galileo_jax.inference.thesis_preset import thesis_posterior
+    from galileo_jax.thesis.estimate import thesis_posterior
 
     trials = case.trials
     began = time.perf_counter()

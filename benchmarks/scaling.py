@@ -15,7 +15,6 @@ run it on a quiet machine. The last line is JSON.
 
 import argparse
 import contextlib
-import io
 import json
 import logging
 import os
@@ -32,8 +31,9 @@ from typing import Any
 import numpy as np
 import tables
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.commands import command, simulate
+from galileo_jax.commands import command
 from galileo_jax.measurement.measure import measure
 from galileo_jax.runtime.errors import InputError
 
@@ -73,8 +73,7 @@ def make_tracks(folder: Path, count: int) -> list[Path]:
     paths = [folder / f"track_{seed}.csv" for seed in range(count)]
     for seed, path in enumerate(paths):
         if not path.is_file():
-            with contextlib.redirect_stdout(io.StringIO()):
-                simulate.main(["--track-only", "--seed", str(seed), "--out", str(path)])
+            simulate(path, track_only=True, seed=seed)
     return paths
 
 
@@ -285,8 +284,7 @@ def run_sweep(out: Path, config: dict[str, Any], workers: int) -> list[float]:
 def cost_of_tracking(folder: Path) -> float:
     path = folder / "film.mp4"
     if not path.is_file():
-        with contextlib.redirect_stdout(io.StringIO()):
-            simulate.main(["--seed", "1", "--seconds", "1.0", "--out", str(path)])
+        simulate(path, seed=1, seconds=1.0)
     clip = load_clip(path)
     began = time.perf_counter()
     measure(clip)

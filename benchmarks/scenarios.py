@@ -20,7 +20,6 @@ import numpy as np
 import tables
 
 from galileo_jax.clip.schema import Clip
-from galileo_jax.commands.simulate_free import clip_content, noisy, seen_motion
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.laplace import laplace_posterior
@@ -28,6 +27,7 @@ from galileo_jax.inference.result import make_result
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 from galileo_jax.runtime import compilation_cache
 from galileo_jax.simulation.free import FreeTruth, draw_free, solve_free
+from galileo_jax.simulation.free_clip import declared_content, noisy_track, sampled_motion
 
 FPS, NOISE_M = 60.0, 0.001
 SCALES_PX_PER_M = (250.0, 900.0)
@@ -86,8 +86,8 @@ def one_fit(case: Case, seed: int) -> dict:
     """Draws, measures and fits one clip."""
     things, looks = np.random.default_rng([seed, 7]).spawn(2)
     truth = draw_free(things, case.scenario, {}, case.has_floor)
-    frames = seen_motion(truth, solve_free(truth)[0], FPS, truth.seconds)
-    observation = noisy(truth, frames, NOISE_M, looks)
+    frames = sampled_motion(truth, solve_free(truth)[0], FPS, truth.seconds)
+    observation = noisy_track(truth, frames, NOISE_M, looks)
     true = {key: value for key, value in truth.values.items() if key != "m1"}
     if not case.is_scaled:
         scale = float(looks.uniform(*SCALES_PX_PER_M))
@@ -109,7 +109,7 @@ def one_fit(case: Case, seed: int) -> dict:
 
 
 def _clip(truth: FreeTruth, num_frames: int, is_scaled: bool) -> Clip:
-    content = clip_content(truth, FPS)
+    content = declared_content(truth, FPS)
     content.pop("liquid_density", None)  # the ratio of the densities is to be told by the motion
     path = Path("clip.yaml")
     found = {"path": path, "track": Path("clip.csv"), "frame_count": num_frames}

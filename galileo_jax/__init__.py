@@ -24,11 +24,15 @@ if TYPE_CHECKING:
     from galileo_jax.api.clips import load
     from galileo_jax.api.compare import Comparison, compare
     from galileo_jax.api.diagnose import Diagnosis, diagnose
+    from galileo_jax.api.export import export
     from galileo_jax.api.fit import fit
     from galileo_jax.api.fit_result import Fit
+    from galileo_jax.api.label import label
     from galileo_jax.api.predict import Prediction, predict
     from galileo_jax.api.run import load_run
+    from galileo_jax.api.simulate import Simulated, simulate
     from galileo_jax.api.track import Track, track
+    from galileo_jax.api.train import train
     from galileo_jax.clip.schema import Clip
     from galileo_jax.model.effects.effect import (
         Array,
@@ -52,8 +56,12 @@ _PLACES = {
     "galileo_jax.api.fit": ("fit",),
     "galileo_jax.api.fit_result": ("Fit",),
     "galileo_jax.api.predict": ("Prediction", "predict"),
+    "galileo_jax.api.export": ("export",),
+    "galileo_jax.api.label": ("label",),
     "galileo_jax.api.run": ("load_run",),
+    "galileo_jax.api.simulate": ("Simulated", "simulate"),
     "galileo_jax.api.track": ("Track", "track"),
+    "galileo_jax.api.train": ("train",),
     "galileo_jax.clip.schema": ("Clip",),
     "galileo_jax.model.effects.effect": (
         *("Array", "Effect", "Force", "Friction", "State", "Surroundings", "Theta"),
@@ -82,6 +90,7 @@ __all__ = [
     "Normal",
     "Parameter",
     "Prediction",
+    "Simulated",
     "State",
     "Surroundings",
     "Theta",
@@ -91,13 +100,17 @@ __all__ = [
     "compare",
     "diagnose",
     "effects",
+    "export",
     "fit",
+    "label",
     "load",
     "load_run",
     "predict",
     "register_effect",
     "scenarios",
+    "simulate",
     "track",
+    "train",
 ]
 
 

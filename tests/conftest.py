@@ -4,8 +4,10 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from galileo_jax.runtime.compilation_cache import cache_folder
+from tests.missing import find_shared_data
 
 # Before anything imports jax; the commands' own subprocesses inherit it.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
@@ -15,15 +17,15 @@ if folder := cache_folder():
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")
 
-SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+# No test depends on time, on how fast the machine is, or on what it compiles on the way.
+settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("suite")
 
 
 @pytest.fixture
 def shared_data() -> Path:
-    """The development data beside the checkout; a test that needs it is skipped without it."""
-    if not SHARED_DATA.is_dir():
-        pytest.skip("no ../shared/data beside this checkout")
-    return SHARED_DATA
+    """The development data beside the checkout; see `missing` for where there are none."""
+    return find_shared_data()
 
 
 @pytest.fixture

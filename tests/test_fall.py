@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.same_objects import check_same_objects
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.commands import command, diagnose, fit
-from galileo_jax.commands.clip_options import load_clips
 from galileo_jax.inference.build_problem import make_joint_problem, make_problem
 from galileo_jax.model.effects import effect_names, make_effects
 from galileo_jax.model.model import MASS_PRIOR
@@ -138,7 +138,7 @@ def test_mujoco_has_no_fall(engine, tmp_path):
 def test_trials_are_of_the_same_mass(tmp_path):
     paths = [write_fall(tmp_path), write_fall(tmp_path, "other", mass="mass_kg: 0.06")]
     with pytest.raises(InputError, match=r"other.yaml: object1.mass_kg: 0.06, but .*: 0.05; clips"):
-        load_clips([str(path) for path in paths])
+        check_same_objects([load_clip(path) for path in paths])
 
 
 def test_one_object_falls(tmp_path):

@@ -118,7 +118,7 @@ def test_compiled_programs_are_kept_unless_switched_off(setting, is_filled, tmp_
     environment = {key: value for key, value in os.environ.items() if "CACHE" not in key}
     environment[compilation_cache.SWITCH] = "off" if setting == "off" else str(tmp_path)
     code = (
-        "import jax; from galileo_jax.runtime import compilation_cache; compilation_cache.enable(); "
+        "import jax; from galileo_jax.runtime import compilation_cache as c; c.enable(); "
         "jax.config.update('jax_persistent_cache_min_compile_time_secs', 0.0); "
         "jax.jit(lambda x: x * 2 + 1)(1.0)"
     )

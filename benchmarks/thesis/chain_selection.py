@@ -14,7 +14,7 @@ import numpy as np
 import setting
 
 from galileo_jax.commands import command
-from galileo_jax.inference.samplers.thesis import Acceptance, Selection, select
+from galileo_jax.thesis.sampler import Acceptance, Selection, select
 
 
 def main(argv: Sequence[str]) -> int | None:

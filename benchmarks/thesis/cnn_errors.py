@@ -13,11 +13,11 @@ import numpy as np
 import setting
 
 from galileo_jax.commands import command
-from galileo_jax.commands.train import TEST_SHARD
 from galileo_jax.neural.checkpoint import load_network
 from galileo_jax.neural.dataset import make_samples
-from galileo_jax.neural.thesis_network import RANGES
-from galileo_jax.neural.thesis_task import NAMES, THESIS_MAE
+from galileo_jax.neural.evaluation import TEST_SHARD
+from galileo_jax.thesis.network import RANGES
+from galileo_jax.thesis.task import NAMES, THESIS_MAE
 
 
 def main(argv: Sequence[str]) -> int | None:

@@ -13,8 +13,8 @@ import numpy as np
 import setting
 
 from galileo_jax.commands import command
-from galileo_jax.inference.samplers.thesis import NARROW, NUM_CHAINS, NUM_STEPS, WIDE, WIDE_EVERY
-from galileo_jax.neural.thesis_task import NAMES
+from galileo_jax.thesis.sampler import NARROW, NUM_CHAINS, NUM_STEPS, WIDE, WIDE_EVERY
+from galileo_jax.thesis.task import NAMES
 
 NUM_STATES = NUM_CHAINS * (NUM_STEPS + 1)
 

@@ -12,9 +12,9 @@ import numpy as np
 import setting
 
 from galileo_jax.commands import command
-from galileo_jax.neural.thesis_task import RELEASE_M, SIZE_M
 from galileo_jax.report.figure import COLOURS
 from galileo_jax.rollout.motion import pitch
+from galileo_jax.thesis.task import RELEASE_M, SIZE_M
 
 
 def main(argv: Sequence[str]) -> int | None:

@@ -11,7 +11,7 @@ import setting
 
 from galileo_jax.commands import command
 from galileo_jax.neural.checkpoint import load_network
-from galileo_jax.neural.thesis_task import CM
+from galileo_jax.thesis.task import CM
 
 FRAMES = (60, 110)
 

@@ -17,8 +17,9 @@ import setting
 from galileo_jax.commands import command
 from galileo_jax.neural.checkpoint import load_network
 from galileo_jax.neural.estimate import trained_network
-from galileo_jax.neural.galileo_task import estimate, to_clips
-from galileo_jax.neural.thesis_task import CM
+from galileo_jax.neural.galileo_task import estimate
+from galileo_jax.thesis.clips import to_clips
+from galileo_jax.thesis.task import CM
 
 LEAST_NOISE_M = 1e-5  # what the galileo network is told where there is none
 TOLD = (1, 3, 4)  # k1, k2, phi

@@ -12,7 +12,7 @@ import numpy as np
 import setting
 
 from galileo_jax.commands import command
-from galileo_jax.neural.thesis_task import FPS, NAMES
+from galileo_jax.thesis.task import FPS, NAMES
 
 MIDDLE = np.array([0.5, 0.12, 0.5, 0.15])
 RANGES = np.array([[0.1, 1.0], [0.02, 0.3], [0.1, 1.0], [0.02, 0.3]])

@@ -15,14 +15,16 @@ import numpy as np
 import setting
 
 from galileo_jax.commands import command
-from galileo_jax.commands.train import TEST_SHARD
+from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.neural.checkpoint import NETWORK, load_network
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.dataset import make_samples
+from galileo_jax.neural.evaluation import TEST_SHARD
 from galileo_jax.neural.task import Arrays
-from galileo_jax.neural.thesis_network import RANGES, ThesisNetwork
-from galileo_jax.neural.thesis_task import ThesisTask
 from galileo_jax.neural.training import train
+from galileo_jax.runtime.progress import scope
+from galileo_jax.thesis.network import RANGES, ThesisNetwork
+from galileo_jax.thesis.task import ThesisTask
 
 EPOCHS = 80
 SCALES = (2.0, RANGES[1], 2.0, RANGES[3])
@@ -53,10 +55,10 @@ def main(argv: Sequence[str]) -> int | None:
         schedule="cosine", max_epochs=call.num, frames=call.frames,
     )  # fmt: skip
     task = PhiTask(config)
-    with tempfile.TemporaryDirectory() as folder, command.progress() as bar:
-        shown = bar.add_task("training", total=config.max_epochs)
+    with tempfile.TemporaryDirectory() as folder, progress_display() as on_progress:
         data = make_samples(task, config.seed, 0, config.samples)
-        train(task, config, data, Path(folder), lambda now: bar.update(shown, completed=now.epoch))
+        with scope(on_progress):
+            train(task, config, data, Path(folder))
         learned, _ = load_network(Path(folder) / NETWORK)
     of_masses, _ = load_network(setting.NETWORKS / f"thesis_{call.frames}.npz")
     test = make_samples(task, config.seed, TEST_SHARD, 1000)

@@ -1,6 +1,6 @@
 """The thesis's setting, which all scripts here share: scene, truths, sampler, measures, figures.
 
-One fixed scene (galileo_jax/neural/thesis_task.py): 20 degrees, 30 frames/s, 60 or 110 frames,
+One fixed scene (galileo_jax/thesis/task.py): 20 degrees, 30 frames/s, 60 or 110 frames,
 masses in (0, 1) and frictions in (0, 0.3), searched in (0, 1). What is observed are the centres
 with noise that makes 0.01 m/s on the velocities. The engine is the rigid one, not Bullet as in the
 thesis.
@@ -26,12 +26,12 @@ from galileo_jax.commands import command
 from galileo_jax.files.atomic_write import replacing
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.driver import Settings, sample
-from galileo_jax.inference.samplers.thesis import NUM_CHAINS, NUM_STEPS, Acceptance, Thesis, select
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.thesis_task import FPS, NAMES, ThesisTask
 from galileo_jax.report.figure import style
 from galileo_jax.runtime import compilation_cache
-from galileo_jax.similarity.similarity import AbstractSimilarity, similarity_class
+from galileo_jax.thesis.sampler import NUM_CHAINS, NUM_STEPS, Acceptance, Thesis, select
+from galileo_jax.thesis.similarity import AbstractSimilarity, similarity_class
+from galileo_jax.thesis.task import FPS, NAMES, ThesisTask
 
 NOISE_M_S = 0.01
 NOISE_M = NOISE_M_S / (FPS * np.sqrt(2))
@@ -109,7 +109,7 @@ def chains(
     acceptance: Acceptance = Acceptance.COIN,
     count: int = NUM_CHAINS,
 ) -> Posterior:
-    """The thesis's chains of 75 steps from uniform starts (`samplers.thesis`)."""
+    """The thesis's chains of 75 steps from uniform starts (`thesis/sampler.py`)."""
     observed = jnp.asarray(experiment.profile_m_s)
     start_key, key = jax.random.split(jax.random.key(seed))
     return sample(
@@ -124,7 +124,7 @@ def chains(
 
 def infer(experiment: Experiment, seed: int) -> np.ndarray:
     """The thesis's estimate `[4]`: the best sample of 16 chains."""
-    from galileo_jax.inference.samplers.thesis import Selection
+    from galileo_jax.thesis.sampler import Selection
 
     return select(chains(experiment, seed), Selection.BEST)
 

@@ -13,7 +13,7 @@ import setting
 
 from galileo_jax.commands import command
 from galileo_jax.inference.posterior import Posterior
-from galileo_jax.neural.thesis_task import NAMES
+from galileo_jax.thesis.task import NAMES
 
 NUM_CHAINS = 50
 SIMILARITIES = ("thesis_gaussian", "earth_mover", "root_mean")

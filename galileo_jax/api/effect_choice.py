@@ -5,7 +5,7 @@ from pathlib import Path
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.registry import effect_names, load_file, make_effects, register
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import check_known
 
 EffectsLike = str | Sequence[str | type[Effect]]
 
@@ -33,8 +33,7 @@ def check_addition(add: str, files: Sequence[str | Path]) -> None:
     for path in files:
         load_file(path)
     known = effect_names()
-    if add not in ("auto", "none", *known):
-        raise InputError(f"--add: unknown {add!r}; known: auto, none, {', '.join(known)}")
+    check_known("--add", "effect", add, ("auto", "none", *known))
 
 
 def _registered(effect: type[Effect]) -> str:

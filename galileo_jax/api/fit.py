@@ -21,9 +21,11 @@ from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.metropolis import NUM_CHAINS
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
+from galileo_jax.model.effects.free_quantities import make_free_quantities
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
@@ -43,6 +45,7 @@ class FitOptions:
     method: Literal["grad", "mh", "cnn"] = "grad"
     effects: tuple[str, ...] = ()
     effects_from: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()
     motion: str = "planar"
     engine: str = "auto"
     noise: NoiseModel | None = None
@@ -68,6 +71,7 @@ def fit(
     method: Literal["grad", "mh", "cnn"] = "grad",
     effects: EffectsLike = (),
     effects_from: Sequence[str | Path] = (),
+    free: EffectsLike = (),
     motion: str = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
@@ -94,6 +98,7 @@ def fit(
         Metropolis-Hastings, started from it; "cnn": a trained network, at once.
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
+      free: declared quantities to infer instead, such as "gravity".
       motion: "planar", or "free": from the first hit on objects turn and tip (MuJoCo's C engine).
       engine: "auto", "rigid", "c" or "mjx".
       noise: the errors a track is taken to have: "camera", "bodies" or "tracker"; None: as the
@@ -130,6 +135,7 @@ def fit(
         method=method,
         effects=names_of(effects),
         effects_from=tuple(str(path) for path in effects_from),
+        free=names_of(free),
         motion=motion,
         engine=engine,
         noise=noise,
@@ -162,12 +168,12 @@ def _check(options: FitOptions) -> None:
     from galileo_jax.inference.samplers import sampler_names
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
-    _one_of("method", options.method, ("grad", "mh", "cnn"))
-    _one_of("engine", options.engine, ENGINES)
-    _one_of("motion", options.motion, MOTIONS)
-    _one_of("sampler", options.sampler, sampler_names())
-    _one_of("init", options.init, ("grad", "cnn"))
-    _one_of("preset", options.preset, ("galileo", "thesis"))
+    check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
+    check_known("--engine", "engine", options.engine, ENGINES)
+    check_known("--motion", "motion", options.motion, MOTIONS)
+    check_known("--sampler", "sampler", options.sampler, sampler_names())
+    check_known("--init", "init", options.init, ("grad", "cnn"))
+    check_known("--preset", "preset", options.preset, ("galileo", "thesis"))
     _refuse_ignored(options)
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
@@ -183,6 +189,7 @@ def _check(options: FitOptions) -> None:
             if getattr(options, name) == "cnn":
                 raise InputError(f"--{name} cnn: the network knows motion in a plane only")
     chosen_effects(options.effects, options.effects_from)
+    make_free_quantities(options.free)
 
 
 def _refuse_ignored(options: FitOptions) -> None:
@@ -200,11 +207,6 @@ def _refuse_ignored(options: FitOptions) -> None:
             raise InputError(f"--{name.replace('_', '-')}: {why}")
 
 
-def _one_of(name: str, value: str, known: Sequence[str]) -> None:
-    if value not in known:
-        raise InputError(f"--{name}: unknown {value!r}; known: {', '.join(known)}")
-
-
 def _problem(
     clips: Sequence[Clip], observations: Sequence[Observation], options: FitOptions
 ) -> JointProblem:
@@ -215,7 +217,7 @@ def _problem(
     """
     effects = chosen_effects(options.effects, options.effects_from)
     problem = make_joint_problem(
-        clips, observations, options.engine, effects, options.noise, options.motion
+        clips, observations, options.engine, effects, options.noise, options.motion, options.free
     )
     if absent := problem.without_place():
         raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
@@ -271,6 +273,8 @@ def _fitted(
     notes |= extra | {"motion": options.motion}
     if options.motion == "planar" and any(item.z_m for clip in clips for item in clip.objects):
         notes["warnings"] = [OFF_THE_PLANE]
+    if options.free:
+        notes["free"] = sorted(options.free)
     if options.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
     made = make_fit(
@@ -347,7 +351,9 @@ def checkpoint_identity(
 ) -> str:
     """What the chains sample: a checkpoint of anything else is refused."""
     chains = options.chains or NUM_CHAINS
-    chosen = (options.sampler, options.seed, options.effects, options.init, chains)
+    chosen = (
+        *(options.sampler, options.seed, options.effects, options.free, options.init, chains),
+    )
     return identity_of(measured, problem, effects_from=options.effects_from, options=chosen)
 
 
@@ -366,8 +372,8 @@ def _by_thesis(
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
     import jax.numpy as jnp
 
-    from galileo_jax.inference.thesis_preset import thesis_posterior
     from galileo_jax.model.parameters import inverse
+    from galileo_jax.thesis.estimate import thesis_posterior
 
     chosen = {name: getattr(options, name) for name in OF_THESIS}
     posterior, best = thesis_posterior(

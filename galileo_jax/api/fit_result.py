@@ -96,8 +96,18 @@ class Fit:
 
     @property
     def inference_data(self) -> "InferenceData":
-        """The posterior as ArviZ's InferenceData, for `az.summary`, `az.plot_ppc`, `az.loo`."""
-        return self.posterior.to_inference_data()
+        """ArviZ's InferenceData, for `az.summary`, `az.plot_ppc`, `az.loo`.
+
+        Groups posterior, prior, posterior_predictive, log_likelihood (of each measured coordinate
+        given the others), observed_data and sample_stats, with units.
+        """
+        return self._inference_data()
+
+    @in_float64
+    def _inference_data(self) -> "InferenceData":
+        from galileo_jax.results.inference_data import inference_data
+
+        return inference_data(self.problem, self.posterior, int(self.result["seed"]))
 
     @property
     def residuals(self) -> "pd.DataFrame":

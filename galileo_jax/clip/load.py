@@ -1,6 +1,5 @@
 """Loading a clip: every problem is one line that names the file, the key and the remedy."""
 
-import difflib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
@@ -9,13 +8,15 @@ import numpy as np
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from galileo_jax.clip import physics101, placement
+from galileo_jax.clip import placement
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import SIZE_MEANING, Clip, ClipFile, ClipObject, short
+from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_files.read import FileTrack, is_track, read_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.registry import did_you_mean
 from galileo_jax.video import decode
 
 YAML_SUFFIXES = (".yaml", ".yml")
@@ -34,7 +35,8 @@ def load_clip(path: str | Path, **overrides: Any) -> Clip:
     """Loads and checks a clip.
 
     Args:
-      path: the video or the csv track (the yaml beside it, same name), or the yaml.
+      path: the video or the csv track (the yaml beside it, same name), or the yaml; or what
+        one of `SOURCES` recognises.
       **overrides: values for yaml keys that win over the file (`pixels_per_metre=490.0`,
         `fps=240.0`, ...); None leaves the file's value.
 
@@ -49,8 +51,8 @@ def load_clip(path: str | Path, **overrides: Any) -> Clip:
     """
     source, path = str(path), Path(path)
     given = {key: value for key, value in overrides.items() if value is not None}
-    if (place := physics101.place_of(path)) and not has_yaml(path):
-        clip = check_place(place, physics101.read_labels(place.labels), given)
+    if not has_yaml(path) and (other := source_of(path)):
+        clip = other.load(path, given)
         return clip.model_copy(update={"source": source})
     yaml_path = find_yaml(path)
     content = read_mapping(yaml_path)
@@ -82,27 +84,6 @@ def with_unused(clip: Clip) -> Clip:
         unused["track_origin"] = "the track is in pixels; origin_px is the foot"
     told = tuple(f"{clip.path}: {key}: not used; {why}" for key, why in unused.items())
     return clip.model_copy(update={"warnings": clip.warnings + told})
-
-
-def check_place(
-    place: physics101.Place, labels: physics101.Labels, given: dict[str, Any] | None = None
-) -> Clip:
-    """Checks a clip of Physics 101, which its folders and its labels declare.
-
-    Args:
-      place: where it is.
-      labels: of the data set.
-      given: values that win over both.
-    """
-    content, warnings = physics101.content_of(place, labels)
-    given = given or {}
-    try:
-        clip = check_clip(place.yaml, content | given, overridden=frozenset(given))
-    except InputError as error:
-        named = f"{place.labels}: clips: {place.levels[-1]}"
-        raise InputError(str(error).replace(str(place.yaml), named)) from None
-    noted = () if "pixels_per_metre" in given else warnings
-    return clip.model_copy(update={"warnings": clip.warnings + noted})
 
 
 def has_yaml(path: Path) -> bool:
@@ -260,12 +241,7 @@ def _number_hint(value: Any) -> str:
 
 def _unknown_key(key: Any, model: type[BaseModel]) -> str:
     known = list(model.model_fields)
-    close = difflib.get_close_matches(str(key), known, n=1, cutoff=0.6)
-    return (
-        f"unknown key; did you mean {close[0]}?"
-        if close
-        else (f"unknown key; known: {', '.join(known)}")
-    )
+    return "unknown key" + (did_you_mean(str(key), known) or f"; known: {', '.join(known)}")
 
 
 def _check_objects(file: ClipFile, fail: Any) -> None:

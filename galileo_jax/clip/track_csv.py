@@ -4,6 +4,8 @@ Axes as in `Observation`: x along the travel, y up, origin at the foot of the ra
 cell means that the object was not visible. The error of a point is either one standard
 deviation for both axes (`object1_sd_m`) or a full covariance (`object1_sd_x_m`,
 `object1_sd_y_m`, `object1_correlation`); without either it is estimated from the positions.
+
+A track that a spreadsheet has saved again is read as well (`track_files/cells.py`).
 """
 
 import csv
@@ -15,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.clip.track_files.cells import Rows, parse_columns, read_cells
 from galileo_jax.files.atomic_write import write_text
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
@@ -47,17 +50,19 @@ def read_observation_csv(path: Path) -> Observation:
     path = Path(path)
     header, rows = _read_table(path)
     names, columns = _find_columns(path, header)
+    for line, row in rows:
+        _check_length(path, line, row, header, columns)
     if len(rows) < MIN_ROWS:
         raise InputError(f"{path}: {len(rows)} rows; at least {MIN_ROWS} expected")
-    table = _parse(path, header, rows)
-    times = table[:, header.index(TIME)]
+    table = parse_columns(path, rows, {title: at for at, title in enumerate(header)})
+    times = table[TIME]
     lines = [f"line {line}" for line, _ in rows]
     check_times(path, times, lines)
 
     position = np.empty((len(names), 2, len(times)))
     covariance = np.empty((len(names), 2, 2, len(times)))
     for index, name in enumerate(names):
-        column = {field: table[:, at] for field, at in columns[name].items()}
+        column = {field: table[title] for field, title in columns[name].items()}
         position[index] = _positions(path, name, column["x_m"], column["y_m"], lines)
         is_visible = np.isfinite(position[index, 0])
         covariance[index] = _covariance(path, name, column, times, position[index], lines)
@@ -145,39 +150,58 @@ def roughness_covariance_m2(
     return np.repeat(np.diag(np.square(sd))[:, :, None], len(times_s), axis=2)
 
 
-def _read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The header and the rows, each with its line number; blank lines are skipped."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: not a text file in UTF-8; a csv track expected") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    reader = csv.reader(io.StringIO(text))
-    try:
-        rows = [(reader.line_num, [cell.strip() for cell in row]) for row in reader]
-    except csv.Error as error:
-        raise InputError(f"{path}: not csv: line {reader.line_num}: {error}") from None
-    rows = [(line, row) for line, row in rows if any(row)]
-    if not rows:
-        raise InputError(f"{path}: empty; a header with {TIME}, object1_x_m, object1_y_m expected")
-    (_, header), *rest = rows
-    if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
-        raise InputError(f"{path}: columns are not separated by commas")
-    return header, rest
+def _read_table(path: Path) -> tuple[list[str], Rows]:
+    """The titles and the rows, without the columns and rows that are empty."""
+    (_, header), *rows = read_cells(path)
+    untitled = {at for at, title in enumerate(header) if not title}
+    used = {at for _, row in rows for at, cell in enumerate(row) if cell}
+    for line, row in rows:
+        for at in sorted(untitled):
+            if at < len(row) and row[at]:
+                raise InputError(
+                    f"{path}: line {line}: {row[at][:40]!r} stands in column {at + 1}, which "
+                    "has no title; give it one, such as object1_x_m, or empty the column"
+                )
+    shown = [at for at in range(len(header)) if at not in untitled]
+    beyond = range(len(header), max(used, default=0) + 1)
+    titles = [header[at] for at in shown]
+    return titles, [
+        (line, [row[at] for at in (*shown, *beyond) if at < len(row)]) for line, row in rows
+    ]
+
+
+def _check_length(
+    path: Path, line: int, row: list[str], header: list[str], columns: dict[str, dict[str, str]]
+) -> None:
+    """Refuses a row with more cells than titles, or one that is cut off within an object.
+
+    Spreadsheets leave out empty cells at the end of a row: objects that were not visible.
+    """
+    while len(row) > len(header) and not row[-1]:
+        row.pop()
+    given, left_out = set(header[: len(row)]), set(header[len(row) :])
+    is_cut = any(
+        given & set(of.values()) and left_out & set(of.values()) for of in columns.values()
+    )
+    if len(row) <= len(header) and TIME in given and not is_cut:
+        return
+    hint = ""
+    if len(row) > len(header) and all(cell.lstrip("+-").isdigit() for cell in row if cell):
+        hint = "; numbers with a decimal comma need a semicolon between the cells, or a point"
+    raise InputError(
+        f"{path}: line {line}: {len(row)} cells; {len(header)} expected as in the header{hint}"
+    )
 
 
 def _find_columns(
     path: Path, header: list[str]
-) -> tuple[tuple[str, ...], dict[str, dict[str, int]]]:
-    """The objects' names in order, and for each the place of its columns by field."""
+) -> tuple[tuple[str, ...], dict[str, dict[str, str]]]:
+    """The objects' names in order, and for each the titles of its columns by field."""
     repeated = next((name for name in header if header.count(name) > 1), None)
     if repeated is not None:
         raise InputError(f"{path}: column {repeated!r}: given twice; keep one")
-    columns: dict[str, dict[str, int]] = {}
-    for at, title in enumerate(header):
+    columns: dict[str, dict[str, str]] = {}
+    for title in header:
         if title == TIME:
             continue
         field = next((f for f in _FIELDS if title.endswith(f"_{f}") and title != f"_{f}"), None)
@@ -186,7 +210,7 @@ def _find_columns(
             close = difflib.get_close_matches(title, wanted, n=1)
             hint = f"did you mean {close[0]}?" if close else f"known: {', '.join(wanted[:4])}, ..."
             raise InputError(f"{path}: column {title[:40]!r}: unknown; {hint}")
-        columns.setdefault(title.removesuffix(f"_{field}"), {})[field] = at
+        columns.setdefault(title.removesuffix(f"_{field}"), {})[field] = title
     if TIME not in header:
         raise InputError(f"{path}: column {TIME!r}: missing")
     if not columns:
@@ -200,29 +224,6 @@ def _find_columns(
         if missing:
             raise InputError(f"{path}: column '{name}_{missing}': missing")
     return tuple(columns), columns
-
-
-def _parse(path: Path, header: list[str], rows: list[tuple[int, list[str]]]) -> np.ndarray:
-    """`[row, column]`; NaN for an empty cell."""
-    table = np.full((len(rows), len(header)), np.nan)
-    for index, (line, row) in enumerate(rows):
-        if len(row) != len(header):
-            raise InputError(
-                f"{path}: line {line}: {len(row)} cells; {len(header)} expected as in the header"
-            )
-        for at, cell in enumerate(row):
-            if not cell:
-                continue
-            try:
-                table[index, at] = float(cell)
-            except ValueError:
-                table[index, at] = math.nan
-            if not math.isfinite(table[index, at]):
-                raise InputError(
-                    f"{path}: line {line}: {header[at]}: {cell[:40]!r} is not a number; "
-                    "leave the cell empty where nothing was seen"
-                )
-    return table
 
 
 def check_times(path: Path, times: np.ndarray, rows: Sequence[str] | None = None) -> None:

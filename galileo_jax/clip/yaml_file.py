@@ -1,5 +1,6 @@
-"""Reading a yaml mapping strictly: no repeated keys, no tracebacks."""
+"""A yaml mapping: read strictly (no repeated keys, no tracebacks), and written afresh."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -56,3 +57,8 @@ def read_mapping(path: Path) -> dict[str, Any]:
         found = "a list" if isinstance(value, list) else "a single value"
         raise InputError(f"{path}: {found}, not a mapping; 'key: value' expected")
     return value
+
+
+def yaml_text(content: Mapping[str, Any]) -> str:
+    """A new yaml text; short lists on one line."""
+    return yaml.safe_dump(dict(content), sort_keys=False, default_flow_style=None, width=100)

@@ -7,14 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NoReturn
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 from galileo_jax.runtime.errors import InputError
 
@@ -26,9 +18,12 @@ class Parser(argparse.ArgumentParser):
     """
 
     def __init__(self, **given: Any):
-        # The examples below the options keep their lines.
-        keeps_lines = argparse.RawDescriptionHelpFormatter
-        super().__init__(allow_abbrev=False, formatter_class=keeps_lines, **given)
+        super().__init__(allow_abbrev=False, **given)
+
+    def examples(self, *lines: str) -> None:
+        """Shows calls at the end of --help."""
+        self.formatter_class = argparse.RawDescriptionHelpFormatter
+        self.epilog = "examples:\n" + "\n".join(f"  {line}" for line in lines)
 
     def error(self, message: str) -> NoReturn:
         """Raises the complaint as an `InputError`."""
@@ -77,21 +72,6 @@ def console() -> Console:
 def say(line: str) -> None:
     """Prints a note to stderr, as it stands."""
     console().print(line, soft_wrap=True, markup=False)
-
-
-def progress() -> Progress:
-    """A progress bar on stderr; silent when stderr is not a terminal."""
-    shown = console()
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=shown,
-        disable=not shown.is_terminal,
-        transient=True,
-    )
 
 
 def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None = None) -> int:

@@ -13,10 +13,6 @@ if TYPE_CHECKING:
     from galileo_jax.api.compare import Comparison
 
 NUM_CELLS = 6
-EXAMPLES = """examples:
-  galileo compare clip.mp4                              the model without effects
-  galileo compare runs/clip                             a finished fit
-"""
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -73,9 +69,13 @@ def _lines(compared: "Comparison") -> list[str]:
 
 
 def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo compare", description=__doc__, epilog=EXAMPLES)
+    parser = command.Parser(prog="galileo compare", description=__doc__)
     add = parser.add_argument
     add("clips", nargs="+", metavar="CLIP|RUN", help="video, its yaml, a csv track, or a run")
     add("--effects", default="", metavar="A,B", help="effects in the model (default: none)")
     add_clip_options(parser, out="folder (default runs/CLIP/compare, RUN/compare)")
+    parser.examples(
+        "galileo compare clip.mp4                              the model without effects",
+        "galileo compare runs/clip                             a finished fit",
+    )
     return parser

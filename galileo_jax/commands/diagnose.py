@@ -13,10 +13,6 @@ if TYPE_CHECKING:
 
 NUM_CANDIDATES = 5
 FRICTIONS = ("k1", "k2")
-EXAMPLES = """examples:
-  galileo diagnose clip.mp4                             what is missing is added
-  galileo diagnose clip1.mp4 clip2.mp4 --add none       trials together; nothing is added
-"""
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -122,7 +118,7 @@ def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
 
 
 def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo diagnose", description=__doc__, epilog=EXAMPLES)
+    parser = command.Parser(prog="galileo diagnose", description=__doc__)
     add = parser.add_argument
     add("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
     add(
@@ -133,4 +129,8 @@ def _parser() -> command.Parser:
         "(default %(default)s)",
     )
     add_clip_options(parser, out="folder (default runs/CLIP/diagnosis)")
+    parser.examples(
+        "galileo diagnose clip.mp4                             what is missing is added",
+        "galileo diagnose clip1.mp4 clip2.mp4 --add none       trials together; nothing is added",
+    )
     return parser

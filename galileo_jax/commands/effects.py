@@ -4,11 +4,6 @@ from collections.abc import Sequence
 
 from galileo_jax.commands import command
 
-EXAMPLES = """examples:
-  galileo effects
-  galileo effects --effects-from my_effect.py
-"""
-
 
 def main(argv: Sequence[str]) -> int | None:
     """Prints a line for each."""
@@ -23,12 +18,16 @@ def main(argv: Sequence[str]) -> int | None:
 
 
 def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo effects", description=__doc__, epilog=EXAMPLES)
+    parser = command.Parser(prog="galileo effects", description=__doc__)
     parser.add_argument(
         "--effects-from",
         action="append",
         default=[],
         metavar="FILE.py",
         help="Python file that registers more effects (may be given several times)",
+    )
+    parser.examples(
+        "galileo effects",
+        "galileo effects --effects-from my_effect.py",
     )
     return parser

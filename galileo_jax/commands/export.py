@@ -1,219 +1,45 @@
 """`galileo export`: tracks and fits as csv, parquet or netCDF, for other programs."""
 
-import json
-import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.api.export import export
 from galileo_jax.commands import command
-from galileo_jax.files.atomic_write import replacing
-from galileo_jax.files.tables import TABLE_WRITERS, Table
-from galileo_jax.observation.observation import Observation
-from galileo_jax.runtime.errors import InputError
-
-FORMATS = (*TABLE_WRITERS, "netcdf")
-TRACK, PARAMETERS, DRAWS = "track", "parameters", "draws"
-AXES = ("x", "y")
-MEASURED = ("x_m", "y_m", "sd_x_m", "sd_y_m", "correlation")
-OBSERVATION = "observation.csv"
+from galileo_jax.results.export import FORMATS
 
 
 def main(argv: Sequence[str]) -> int | None:
     """Writes what a run, or a clip's track, holds; prints the files."""
-    call = _parser().parse_args(argv)
-    source: Path = call.source
-    if not source.exists():
-        raise InputError(f"{source}: no such file or folder")
-    if source.is_dir():
-        out = call.out or source / "export"
-        written = _export_run(source, out, call.to, call.fitted)
-    else:
-        from galileo_jax.commands.clip_options import load_clips
-        from galileo_jax.measurement.measure import measure
-
-        measured = measure(load_clips([str(source)], None)[0])
-        out = call.out or Path(f"{measured.name}_export")
-        written = _export_tracks({measured.name: measured.observation}, out, call.to)
-    print("\n".join(str(path) for path in written))
+    done = export(**vars(_parser().parse_args(argv)))
+    for warning in done.warnings:
+        command.console().print(f"warning: {warning}", soft_wrap=True, markup=False)
+    print("\n".join(map(str, done.paths)))
     return None
-
-
-def _export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path]:
-    """The tracks, the parameters' summaries and the draws of a run, of one clip or several."""
-    result = _result(folder)
-    folders = _clip_folders(folder, result)
-    tracks = {name: read_observation_csv(one / OBSERVATION) for name, one in folders.items()}
-    fitted = {name: _fitted_m(one) for name, one in folders.items()} if with_fitted else {}
-    posterior = folder / "posterior.nc"
-    if not posterior.is_file():
-        raise InputError(f"{posterior}: no such file; a folder written by `galileo fit` expected")
-    if to == "netcdf":
-        path = out / f"{folder.resolve().name}.nc"
-        with _outputs(out), replacing(path) as temporary:
-            shutil.copyfile(posterior, temporary)
-            for name, observation in tracks.items():
-                group = "observed_data" if len(tracks) == 1 else f"observed_data/{name}"
-                _dataset(observation, fitted.get(name)).to_netcdf(
-                    temporary, mode="a", group=group, engine="h5netcdf"
-                )
-        return [path]
-    tables = {
-        TRACK: _track_table(tracks, fitted),
-        PARAMETERS: _parameter_table(result),
-        DRAWS: _draw_table(posterior),
-    }
-    return _write(tables, out, to)
-
-
-def _export_tracks(tracks: Mapping[str, Observation], out: Path, to: str) -> list[Path]:
-    if to != "netcdf":
-        return _write({TRACK: _track_table(tracks, {})}, out, to)
-    written = []
-    for name, observation in tracks.items():
-        path = out / f"{name}.nc"
-        with _outputs(out), replacing(path) as temporary:
-            _dataset(observation, None).to_netcdf(
-                temporary, mode="w", group="observed_data", engine="h5netcdf"
-            )
-        written.append(path)
-    return written
-
-
-def _write(tables: Mapping[str, Table], out: Path, to: str) -> list[Path]:
-    written = []
-    for name, table in tables.items():
-        path = out / f"{name}.{to}"
-        with _outputs(out):
-            TABLE_WRITERS[to](path, table)
-        written.append(path)
-    return written
-
-
-@contextmanager
-def _outputs(out: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"--out: {out}: {error.strerror or error}") from error
-
-
-def _result(folder: Path) -> dict[str, Any]:
-    path = folder / "result.json"
-    if not path.is_file():
-        raise InputError(f"{folder}: no result.json; a folder written by `galileo fit` expected")
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON ({error})") from None
-
-
-def _clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
-    """Name and folder of every clip; of several clips each has a folder of its own."""
-    if (folder / OBSERVATION).is_file():
-        return {Path(result["clips"][0]).stem: folder}
-    return {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{OBSERVATION}"))}
-
-
-def _fitted_m(folder: Path) -> np.ndarray:
-    """Where a run's model, at the posterior's mean, has the objects: `[object, 2, frame]`, m."""
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    from galileo_jax.results.run import load_run
-
-    run = load_run(folder)
-    mean = run.posterior.flat().mean(axis=0)
-    columns = [run.posterior.names.index(name) for name in run.problem.model.names]
-    return np.asarray(run.problem.simulate(mean[columns]))
-
-
-def _track_table(tracks: Mapping[str, Observation], fitted_m: Mapping[str, np.ndarray]) -> Table:
-    """One row per clip, object and time; empty where the object was not seen."""
-    table: dict[str, list[Any]] = {}
-    for clip, seen in tracks.items():
-        count = len(seen.times_s)
-        for k, name in enumerate(seen.names):
-            covariance = seen.covariance_m2[k]
-            sd_x, sd_y = np.sqrt(covariance[0, 0]), np.sqrt(covariance[1, 1])
-            columns = {
-                "clip": [clip] * count,
-                "object": [name] * count,
-                "time_s": seen.times_s,
-                "x_m": seen.position_m[k, 0],
-                "y_m": seen.position_m[k, 1],
-                "sd_x_m": sd_x,
-                "sd_y_m": sd_y,
-                "correlation": covariance[0, 1] / (sd_x * sd_y),
-            }
-            if clip in fitted_m:
-                columns["fitted_x_m"], columns["fitted_y_m"] = fitted_m[clip][k]
-            for title, values in columns.items():
-                is_measured = title in MEASURED
-                table.setdefault(title, []).extend(
-                    np.where(seen.mask[k], values, np.nan) if is_measured else values
-                )
-    return table
-
-
-def _parameter_table(result: dict[str, Any]) -> Table:
-    """One row per parameter, with the room of result.json where it stands."""
-    rows = [
-        {"name": name, "kind": kind, **entry}
-        for kind in ("parameters", "derived", "nuisances")
-        for name, entry in result[kind].items()
-    ]
-    titles = ("name", "kind", "unit", "mean", "sd", "q025", "q975", "identified")
-    return {title: [row.get(title) for row in rows] for title in titles}
-
-
-def _draw_table(posterior: Path) -> Table:
-    """One row per chain and draw, one column per parameter."""
-    from galileo_jax.inference.posterior import Posterior
-
-    found = Posterior.from_netcdf(posterior)
-    chains, draws = found.draws.shape[:2]
-    return {
-        "chain": np.repeat(np.arange(chains), draws),
-        "draw": np.tile(np.arange(draws), chains),
-        **{name: found[name].reshape(-1) for name in found.names},
-        "log_density": found.log_density.reshape(-1),
-    }
-
-
-def _dataset(seen: Observation, fitted_m: np.ndarray | None) -> Any:
-    """ArviZ's `observed_data`: `position_m [object, axis, time]` and its covariance."""
-    import xarray as xr
-
-    place = ("object", "axis", "time_s")
-    data: dict[str, Any] = {
-        "position_m": (place, seen.position_m),
-        "covariance_m2": (("object", "axis", "other_axis", "time_s"), seen.covariance_m2),
-        "is_seen": (("object", "time_s"), seen.mask.astype("i1")),
-    }
-    if fitted_m is not None:
-        data["fitted_position_m"] = (place, fitted_m)
-    axes = {"axis": list(AXES), "other_axis": list(AXES)}
-    return xr.Dataset(data, {"object": list(seen.names), "time_s": seen.times_s, **axes})
 
 
 def _parser() -> command.Parser:
     parser = command.Parser(
         prog="galileo export",
-        description="Tracks and fits for other programs: csv and parquet as the tables track, "
+        description="Tracks and fits for other programs: csv and parquet as the tables track,\n"
         "parameters and draws; netCDF as one file that ArviZ and xarray read.",
+    )
+    parser.examples(
+        "galileo export runs/clip --to netcdf",
+        "galileo export clip.mp4 --to csv --out tables",
     )
     add = parser.add_argument
     add("source", type=Path, metavar="RUN|CLIP", help="the folder that fit wrote, or a clip")
-    add("--to", choices=FORMATS, required=True)
+    add(
+        "--to",
+        required=True,
+        metavar="FORMAT",
+        help=f"{', '.join(FORMATS)} (no default)",
+    )
     add(
         "--fitted",
         action="store_true",
-        help="of a run: also where the fitted model has the objects, at the posterior's mean",
+        help="of a run: also where the fitted model has the objects, at the posterior's mean "
+        "(default: off)",
     )
     add("--out", type=Path, metavar="DIR", help="default: RUN/export, or CLIP_export")
     return parser

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
 from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.results.shown_parameters import shown_parameters
 from galileo_jax.results.stale_outputs import PREDICTION, outdated
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.engine_names import MOTIONS
@@ -24,13 +25,9 @@ OF_GALILEO, OF_THESIS = (
     ("--similarity", "--acceptance", "--selection"),
 )
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
-SIMILARITIES = entry_names("galileo_jax.similarity.library")
+FREE = "galileo_jax.model.effects.free"
+SIMILARITIES = entry_names("galileo_jax.thesis.similarities")
 BLOCK_STEPS = 25  # as api.fit has it, which imports JAX
-
-EXAMPLES = """examples:
-  galileo fit clip.mp4                                  seconds
-  galileo fit clip1.mp4 clip2.mp4 --method mh           trials of the same objects, sampled
-"""
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -49,6 +46,7 @@ def main(argv: Sequence[str]) -> int | None:
             method=call.method,
             effects=call.effects,
             effects_from=call.effects_from,
+            free=call.free,
             motion=call.motion,
             engine=call.engine,
             noise=call.noise,
@@ -88,8 +86,10 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
     from galileo_jax.inference.per_mass import SUFFIX
 
     result: Mapping[str, Any] = found.result
-    lines = [f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"]
-    for name, entry in (result["parameters"] | result["derived"]).items():
+    shown = shown_parameters(result)
+    title = f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"
+    lines = [title] if shown else []
+    for name, entry in shown.items():
         unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
         interval = f"[{entry['q025']:.4g}, {entry['q975']:.4g}]{unit}"
         known = "" if entry["identified"] else "   not determined by this clip"
@@ -126,7 +126,7 @@ def _refuse_ignored(call: Any, argv: Sequence[str]) -> None:
 
 
 def _parser() -> command.Parser:
-    parser = command.Parser(prog="galileo fit", description=__doc__, epilog=EXAMPLES)
+    parser = command.Parser(prog="galileo fit", description=__doc__)
     add = parser.add_argument
     add("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
     add(
@@ -137,6 +137,12 @@ def _parser() -> command.Parser:
         "(default %(default)s)",
     )
     add("--effects", default="", metavar="A,B", help="effects in the model (default: none)")
+    add(
+        "--free",
+        default="",
+        metavar="A,B",
+        help=f"declared quantities to infer: {', '.join(entry_names(FREE))} (default: none)",
+    )
     add_clip_options(parser, out="folder of the run (default runs/CLIP)")
     add(
         "--motion",
@@ -195,5 +201,9 @@ def _parser() -> command.Parser:
         choices=("best", "least_variance"),
         default="best",
         help="how the answer is taken from the chains, of --preset thesis (default %(default)s)",
+    )
+    parser.examples(
+        "galileo fit clip.mp4                                  seconds",
+        "galileo fit clip1.mp4 clip2.mp4 --method mh           trials of the same objects, sampled",
     )
     return parser

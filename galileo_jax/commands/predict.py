@@ -11,10 +11,6 @@ from galileo_jax.runtime.errors import InputError
 
 NUM_DRAWS, MOST_DRAWS = 200, 10_000  # as api.predict has them, which imports JAX
 LONGEST_S = 60.0
-EXAMPLES = """examples:
-  galileo predict runs/clip --seconds 2
-  galileo predict runs/clip --seconds 5 --draws 1000 --out ahead
-"""
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -42,7 +38,6 @@ def _parser() -> command.Parser:
         prog="galileo predict",
         description="Continue a fitted scene beyond its clip, with 95 % intervals from the "
         "posterior: will it move, how far, where does it stop, does it hit.",
-        epilog=EXAMPLES,
     )
     add = parser.add_argument
     add("run", type=Path, metavar="RUN", help="the folder that fit wrote")
@@ -54,6 +49,10 @@ def _parser() -> command.Parser:
         type=command.whole_number(2, most=MOST_DRAWS),
         default=NUM_DRAWS,
         help="how many rollouts of posterior draws (default %(default)s)",
+    )
+    parser.examples(
+        "galileo predict runs/clip --seconds 2",
+        "galileo predict runs/clip --seconds 5 --draws 1000 --out ahead",
     )
     return parser
 

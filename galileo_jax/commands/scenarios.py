@@ -4,11 +4,6 @@ from collections.abc import Sequence
 
 from galileo_jax.commands import command
 
-EXAMPLES = """examples:
-  galileo scenarios
-  galileo scenarios | grep slope
-"""
-
 
 def main(argv: Sequence[str]) -> int | None:
     """Prints a line for each."""
@@ -23,4 +18,9 @@ def main(argv: Sequence[str]) -> int | None:
 
 
 def _parser() -> command.Parser:
-    return command.Parser(prog="galileo scenarios", description=__doc__, epilog=EXAMPLES)
+    parser = command.Parser(prog="galileo scenarios", description=__doc__)
+    parser.examples(
+        "galileo scenarios",
+        "galileo scenarios | grep slope",
+    )
+    return parser

@@ -13,11 +13,6 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.pixel_csv import write_pixel_csv
 from galileo_jax.tracking.track import Track
 
-EXAMPLES = """examples:
-  galileo track clip.mp4
-  galileo track clip.mp4 --pixels-per-metre 640 --out tracked
-"""
-
 
 def main(argv: Sequence[str]) -> int | None:
     """Writes DIR/track_px.csv, track_m.csv (if the scale is known), overlay.mp4, overlay.png."""
@@ -77,7 +72,6 @@ def _parser() -> command.Parser:
         prog="galileo track",
         description="Follow the objects of a clip. Writes csv tracks in pixels and, if the scale "
         "is known, in metres, and the paths drawn over the video.",
-        epilog=EXAMPLES,
     )
     add = parser.add_argument
     add("clip", type=Path, metavar="CLIP", help="video or its yaml")
@@ -87,5 +81,9 @@ def _parser() -> command.Parser:
         type=float,
         metavar="SCALE",
         help="overrides the clip's scale (default: the yaml's)",
+    )
+    parser.examples(
+        "galileo track clip.mp4",
+        "galileo track clip.mp4 --pixels-per-metre 640 --out tracked",
     )
     return parser

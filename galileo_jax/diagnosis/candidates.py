@@ -50,6 +50,11 @@ class Hypothesis:
     effects: tuple[str, ...]
     fit: GradientFit
 
+    @property
+    def misfit(self) -> float:
+        """By how much chi2 per measured value exceeds 1, which noise alone would give."""
+        return self.fit.chi2 / self.fit.num_values - 1.0
+
 
 def fit_candidates(
     fitter: GradientFitter, base: Hypothesis, candidates: Sequence[tuple[str, ...]], seed: int

@@ -5,7 +5,7 @@
    which charges for every parameter and, through the candidates' equal shares of the
    prior, for how many were tried. Compare the best with the data, too.
 3. Candidates that are adequate and whose evidence is within a factor of the best's cannot
-   be told from it: one is named, several are ambiguous.
+   be told from it: one is named, several are ambiguous. The rules stand in `verdict`.
    The forms without a name (`effects/forms`) are candidates, too: what they explain as well is
    not named, and what they alone explain is unknown. They are twenty times less likely ahead.
 4. Where no single effect is adequate, the best is joined by those whose slopes stand out most.
@@ -18,32 +18,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.comparison.compare import ADEQUATE_P, Comparison, compare
+from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.left_out import left_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter, Settings
+from galileo_jax.diagnosis.pairs import pairs_with, with_largest_scores
+from galileo_jax.diagnosis.verdict import (
+    best_named,
+    decisive_margin,
+    is_nothing_missing,
+    probabilities,
+    rivals,
+    to_add,
+    to_compare,
+    verdict_of,
+    verdict_of_pairs,
+)
+from galileo_jax.inference.fits.gradient import GradientFitter, Settings
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.model.effects.forms import FORM_NAMES
-
-# Evidence of one candidate over another, in nats, at which the other is given up: one in twenty.
-DECISIVE = 3.0
-NUM_COMPARED = 6  # of the best candidates
-# A candidate explains the data if the comparison shows no misfit, or hardly any of what was there:
-# a camera that sees hundredths of a pixel finds fault with every model.
-EXPLAINS_P, LEFT_SHARE = 1e-5, 0.01
-# Two effects have enough freedom to come near anything: a pair must leave nothing at all.
-PAIR_P = 0.05
-PRIOR_NONE = 0.5  # that nothing is missing; the candidates share the rest
-# In nats, at which a candidate is believed although the comparison shows no misfit: tests that
-# look everywhere see less than one that knows where to look.
-CONVINCING = 10.0
-LEAST_GAIN = 10.0  # in nats, for another effect to be added
-NUM_JOINED = 8  # of the other effects, to the best: those with the largest scores
 
 
 def diagnose(
@@ -83,45 +80,36 @@ def diagnose(
     candidates = _candidates(fitter, base, singles, seed)
     if add not in ("auto", "none"):
         chosen = next(c for c in candidates if c.effects == (add,))
-        rounds.append(_round(trials, chosen.hypothesis, seed, on_round))
-    named = [c for c in candidates if not c.is_form]
-    if first.comparison.is_adequate and named[0].log_evidence < CONVINCING:
+        rounds.append(Round(chosen.hypothesis, compare(trials, chosen.hypothesis.fit, seed)))
+        on_round(rounds[-1])
+    is_adequate = first.comparison.is_adequate
+    if is_nothing_missing(is_adequate, candidates):
         return Diagnosis(tuple(rounds), candidates, Verdict("none", ()))
 
     on_stage("comparing the best candidates with the data")
     candidates, compared = _compared(trials, candidates, seed)
-    # Where nothing shows but to those who know where to look, more candidates stay possible.
-    decisive = DECISIVE * (2.0 if first.comparison.is_adequate else 1.0)
-    verdict = _verdict(candidates, base.fit, decisive)
+    decisive = decisive_margin(is_adequate)
+    verdict = verdict_of(candidates, base.misfit, decisive)
     if verdict is None:
         on_stage("fitting pairs of effects")
-        best = named[0]
-        pairs = _pairs(trials, best, [name for name in library if name not in best.effects])
-        joined = _candidates(fitter, best.hypothesis, pairs, seed, base)
-        joined, compared_pairs = _compared(trials, joined, seed)
-        compared |= compared_pairs
-        verdict = _verdict(joined, base.fit, decisive)
-        gain = joined[0].log_evidence - best.log_evidence
-        is_clean = joined[0].p_value is not None and joined[0].p_value >= PAIR_P
-        if verdict is not None and gain > LEAST_GAIN and is_clean:
+        best = best_named(candidates)
+        pairs = pairs_with(best, library)
+        joined: tuple[Candidate, ...] = ()
+        if pairs:
+            pairs = with_largest_scores(pairs, score_tests(trials, best.hypothesis, pairs))
+            joined = _candidates(fitter, best.hypothesis, pairs, seed, base)
+            joined, compared_pairs = _compared(trials, joined, seed)
+            compared |= compared_pairs
+        verdict = verdict_of_pairs(joined, best, base.misfit, decisive)
+        if verdict.status != "unknown":
             candidates = (*joined, *candidates)
-        else:
-            verdict = Verdict("unknown", ())
-    if add == "auto" and verdict.status != "unknown":
-        names = ("+".join(verdict.effects), verdict.effects[0])  # of all that are named, or of one
-        chosen = next(c for c in candidates if c.name in names)
-        extra = Round(chosen.hypothesis, compared[chosen.effects])
-        on_round(extra)
-        rounds.append(extra)
-    elif add == "auto":
-        # What helps most is shown, though it does not explain the data.
-        best = named[0]
-        if best.log_evidence > LEAST_GAIN:
-            if best.effects in compared:
-                rounds.append(Round(best.hypothesis, compared[best.effects]))
-                on_round(rounds[-1])
-            else:
-                rounds.append(_round(trials, best.hypothesis, seed, on_round))
+    chosen = to_add(verdict, candidates) if add == "auto" else None
+    if chosen is not None:
+        comparison = compared.get(chosen.effects)
+        if comparison is None:
+            comparison = compare(trials, chosen.hypothesis.fit, seed)
+        rounds.append(Round(chosen.hypothesis, comparison))
+        on_round(rounds[-1])
     scene = trials.problems[0].model.scene.surroundings
     verdict = replace(verdict, advice=advice(verdict, scene, len(trials.problems)))
     missing = None
@@ -146,14 +134,6 @@ def fitter_of(trials: JointProblem) -> GradientFitter:
     return GradientFitter(trials, Settings(num_exact=0))
 
 
-def _round(
-    trials: JointProblem, hypothesis: Hypothesis, seed: int, on_round: Callable[[Round], None]
-) -> Round:
-    extra = Round(hypothesis, compare(trials, hypothesis.fit, seed))
-    on_round(extra)
-    return extra
-
-
 def _candidates(
     fitter: GradientFitter,
     start: Hypothesis,
@@ -168,9 +148,7 @@ def _candidates(
     scores = score_tests(trials, start, sets)
     evidence = np.array([h.fit.log_evidence for h in found]) - base.fit.log_evidence
     evidence += np.log([_odds(trials, hypothesis) for hypothesis in found])
-    weight = np.append(evidence + np.log((1 - PRIOR_NONE) / len(found)), np.log(PRIOR_NONE))
-    weight = np.exp(weight - weight.max())
-    probability = weight / weight.sum()
+    probability = probabilities(evidence)
     made = []
     for i in np.argsort(-evidence):
         fit = found[i].fit
@@ -203,67 +181,9 @@ def _compared(
     trials: JointProblem, candidates: tuple[Candidate, ...], seed: int
 ) -> tuple[tuple[Candidate, ...], dict[tuple[str, ...], Comparison]]:
     """The best candidates with their p-values and with whom they are confounded."""
-    compared, done = {}, []
-    top = candidates[0].log_evidence
-    first = {candidates[0].name, *[c.name for c in candidates if not c.is_form][:1]}
-    for i, candidate in enumerate(candidates):
-        # The best is always looked at; others only where they could be confused with it.
-        is_near = i < NUM_COMPARED and top - candidate.log_evidence < 2 * DECISIVE
-        if candidate.name in first or is_near:
-            found = compare(trials, candidate.hypothesis.fit, seed)
-            compared[candidate.effects] = found
-            candidate = replace(candidate, p_value=found.p_value)
-        done.append(candidate)
-    names = {c.effects: _rivals(c, done) for c in done}
-    return tuple(replace(c, confounded_with=names[c.effects]) for c in done), compared
-
-
-def _pairs(trials: JointProblem, best: Candidate, others: Sequence[str]) -> list[tuple[str, ...]]:
-    """The best with each of those others whose score stands out most."""
-    pairs = [(*best.effects, name) for name in others]
-    order = np.argsort(-score_tests(trials, best.hypothesis, pairs))
-    return [pairs[i] for i in order[:NUM_JOINED]]
-
-
-def _rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]:
-    """Candidates that explain the data as well as this one."""
-    if candidate.p_value is None:
-        return ()
-    return tuple(
-        other.name
-        for other in all_of
-        if other.effects != candidate.effects
-        and other.p_value is not None
-        and abs(other.log_evidence - candidate.log_evidence) < DECISIVE
-    )
-
-
-def _verdict(candidates: Sequence[Candidate], base: GradientFit, decisive: float) -> Verdict | None:
-    """Named or ambiguous, or unknown where only a form will do; None where nothing does."""
-    if candidates[0].log_evidence < 0:
-        return None
-    compared = [c for c in candidates if c.p_value is not None]
-    names = [c for c in compared if not c.is_form and _explains(c, base)]
-    # A form can bend to much; where it leaves something over, as where engines differ, it is none.
-    forms = [c for c in compared if c.is_form and (c.p_value or 0.0) >= ADEQUATE_P]
-    top = max((c.log_evidence for c in names), default=-np.inf)
-    if forms and forms[0].log_evidence - top > decisive:
-        return Verdict("unknown", (), forms[0].name)
-    best = next((c.log_evidence for c in candidates if not c.is_form), -np.inf)
-    if not names or best - top > decisive:
-        return None
-    equal = [c.name for c in names if top - c.log_evidence < decisive]
-    alike = [c.name for c in forms if abs(top - c.log_evidence) < decisive]
-    if len(equal) == 1 and not alike:
-        return Verdict("named", next(c.effects for c in names if c.name == equal[0]))
-    return Verdict("ambiguous", (*equal, *alike[:1]))
-
-
-def _explains(candidate: Candidate, base: GradientFit) -> bool:
-    """Whether what a candidate leaves unexplained does not matter."""
-    assert candidate.p_value is not None
-    if candidate.p_value >= EXPLAINS_P:
-        return True
-    fit = candidate.hypothesis.fit
-    left, before = (f.chi2 / f.num_values - 1.0 for f in (fit, base))
-    return before > 0 and left < LEFT_SHARE * before
+    compared = {c.effects: compare(trials, c.hypothesis.fit, seed) for c in to_compare(candidates)}
+    done = [
+        replace(c, p_value=compared[c.effects].p_value) if c.effects in compared else c
+        for c in candidates
+    ]
+    return tuple(replace(c, confounded_with=rivals(c, done)) for c in done), compared

@@ -42,7 +42,8 @@ class Sight:
     """What one clip says of the acceleration that one object lacks.
 
     Attributes:
-      time_s, path_m, speed_m_s: `[time]`, of the object.
+      time_s, path_m, speed_m_s: `[time]`, of the object, while it is seen to move; empty where
+        it never is.
       target: `[value]`, see above.
       response: `[value, time]`, d target / d acceleration; s^2/m.
       free_chi2: what the acceleration without a form leaves of `target`'s square.
@@ -97,12 +98,20 @@ class Formula:
 
 
 def find_formula(sights: Sequence[Sight]) -> Formula:
-    """The simplest formula for an object's missing acceleration, the same in all clips."""
+    """The simplest formula for an object's missing acceleration, the same in all clips.
+
+    Without a formula: `NOT_SIMPLE` where the data ask for an acceleration all the same, else
+    `NOTHING`; so also for an object that no clip shows in motion (`path_m` empty in all).
+    """
     target = np.concatenate([sight.target for sight in sights])
     nothing = float(target @ target)
     to_explain = nothing - sum(sight.free_chi2 for sight in sights)
     price = max(float(np.log(np.count_nonzero(target))), WORTH * to_explain)
     log_evidence = sum(sight.log_evidence for sight in sights)
+    without = NOT_SIMPLE if log_evidence > CERTAIN else NOTHING
+    # An acceleration that is never at work, or never shows, has no formula.
+    if not any(np.any(sight.response) for sight in sights):
+        return Formula(without, 0.0)
     found = [fit for terms in _families(sights) for fit in _pursue(sights, target, terms)]
     found = sorted(found, key=lambda fit: fit.cost(price))
     best = found[0]
@@ -113,9 +122,7 @@ def find_formula(sights: Sequence[Sight]) -> Formula:
         others = dict.fromkeys(fit.text for fit in alike[:4] if fit.text != best.text)
         text = "  or  ".join([best.text, *others])
         return Formula(text, share, best.terms, tuple(best.coefficients))
-    if log_evidence > CERTAIN:
-        return Formula(NOT_SIMPLE, share)
-    return Formula(NOTHING, 0.0)
+    return Formula(without, share if without == NOT_SIMPLE else 0.0)
 
 
 class _Fit(NamedTuple):

@@ -7,6 +7,9 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem, with_shared_parameters
 from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.free_quantities import make_free_quantities
+from galileo_jax.model.effects.laws import LAWS
+from galileo_jax.model.effects.nuisances import NUISANCES
 from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import build_scene
 from galileo_jax.observation.observation import Observation
@@ -35,8 +38,23 @@ def make_problem(
     effects: tuple[Effect, ...] = (),
     noise: NoiseModel | None = None,
     motion: str = "planar",
+    free: Sequence[str] = (),
 ) -> Problem:
-    """A clip with a model of it: the base model, or one with effects; `noise`: its own."""
+    """A clip with a model of it: the base model, or one with effects.
+
+    Args:
+      clip: what is declared.
+      observation: what was measured.
+      engine: rolls the model out.
+      effects: in the model, besides the scenario's own laws.
+      noise: of the observation; default: `noise_of` the clip.
+      motion: see `Model`.
+      free: names of declared quantities that are inferred ("gravity").
+
+    Raises:
+      InputError: an effect has no place in the scenario, the engine is not for this model, or
+        a name in `free` is unknown.
+    """
     for effect in effects:
         if effect.name in SCENARIOS[clip.scenario].without:
             raise InputError(
@@ -45,7 +63,13 @@ def make_problem(
             )
     scene = build_scene(clip, observation)
     margin = LONGER if effects else 1.0
-    model = Model(scene, margin * float(observation.times_s[-1]), effects, motion=motion)
+    model = Model(
+        scene,
+        margin * float(observation.times_s[-1]),
+        effects,
+        LAWS + make_free_quantities(free) + NUISANCES,
+        motion=motion,
+    )
     noise = noise or noise_of(clip, scene.surroundings)
     return Problem(observation, model, make_engine(engine, model), clip.path.stem, noise)
 
@@ -57,10 +81,23 @@ def make_joint_problem(
     effects: tuple[Effect, ...] = (),
     noise: NoiseModel | None = None,
     motion: str = "planar",
+    free: Sequence[str] = (),
 ) -> JointProblem:
-    """Clips of the same objects with the same model."""
+    """Clips of the same objects with the same model; arguments and errors as `make_problem`.
+
+    Raises:
+      InputError: besides, clips that declare different gravities and are to tell one.
+    """
+    if "gravity" in free:
+        first = clips[0]
+        for clip in clips[1:]:
+            if clip.gravity != first.gravity:
+                raise InputError(
+                    f"{clip.path}: gravity: {clip.gravity:g}, but {first.path}: "
+                    f"{first.gravity:g}; one gravity is inferred for all clips"
+                )
     problems = [
-        make_problem(clip, observation, engine, effects, noise, motion)
+        make_problem(clip, observation, engine, effects, noise, motion, free)
         for clip, observation in zip(clips, observations, strict=True)
     ]
     return JointProblem(with_shared_parameters(problems))

@@ -126,10 +126,10 @@ def seen(
     """What a camera sees of a motion at its frames' times: `[object, 2, frame]`, m."""
     named = {name: theta[i] for i, name in enumerate(names)}
     for effect in effects:
-        times_s = effect.time(times_s, named, scene)
+        times_s = jnp.asarray(effect.time(times_s, named, scene))
     position, _ = at_times(motion, times_s)
     for effect in effects:
-        position = effect.measure(position, named, scene)
+        position = jnp.asarray(effect.measure(position, named, scene))
     return position
 
 

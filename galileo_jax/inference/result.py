@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax import __version__
+from galileo_jax.inference.confounded import confounded_with_gravity
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.inference.per_mass import (
@@ -19,6 +20,7 @@ from galileo_jax.inference.per_mass import (
 )
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
+from galileo_jax.model.effects.effect import true_surroundings
 from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
@@ -167,12 +169,15 @@ def _derived_by_laws(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[
     if len(trials.problems) != 1:
         return {}
     model = trials.problems[0].model
-    scene = model.scene.surroundings
+    effects = model.effects + model.nuisances
 
     def told(rows: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         found: dict[str, tuple[np.ndarray, str]] = {}
-        for effect in model.effects + model.nuisances:
-            found |= effect.derived(model.by_name(rows), scene)
+        named = model.by_name(rows)
+        scene = true_surroundings(effects, named, model.scene.surroundings)
+        for effect in effects:
+            for name, (values, unit) in effect.derived(named, scene).items():
+                found[name] = np.asarray(values), unit
         return found
 
     z = np.random.default_rng(0).standard_normal((NUM_PRIOR_DRAWS, len(trials.parameters)))
@@ -235,7 +240,12 @@ def make_result(
         if name in table["parameters"]:
             table["parameters"][name]["identified"] = False
     has_surface = trials.problems[0].model.scene.surroundings.has_surface
-    if not table["parameters"].get("pixels_per_metre", {}).get("identified", True):
+    confounded, reason = confounded_with_gravity(table["parameters"], has_surface)
+    for name in confounded:
+        table["parameters"][name]["identified"] = False
+    if reason is not None:
+        notes = notes | {"warnings": [*notes.get("warnings", []), reason]}
+    elif not table["parameters"].get("pixels_per_metre", {}).get("identified", True):
         # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.
         for name, entry in table["parameters"].items():
             entry["identified"] = entry["identified"] and not name.startswith("k")

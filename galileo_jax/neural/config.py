@@ -4,12 +4,18 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from galileo_jax.neural.presets import PRESETS
 from galileo_jax.runtime.errors import InputError
 
 Share = Annotated[float, Field(gt=0, lt=1)]
 Count = Annotated[int, Field(gt=0)]
+
+
+def _known(preset: str) -> str:
+    PRESETS.get(preset)
+    return preset
 
 
 class TrainConfig(BaseModel):
@@ -32,7 +38,7 @@ class TrainConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    preset: Literal["thesis", "galileo"]
+    preset: Annotated[str, AfterValidator(_known)]
     seed: Annotated[int, Field(ge=0)] = 0
     samples: Annotated[int, Field(ge=100)]
     validation_share: Share = 0.1

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +12,19 @@ from galileo_jax.files.atomic_write import replacing, write_json
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Arrays, Trainable
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.progress import report
 
 INDEX = "data.json"
 DATA_KEYS = ("preset", "seed", "engine", "frames")  # what the samples depend on
 
 
-def load_or_make(
-    task: Trainable, config: TrainConfig, folder: Path, on_shard: Callable[[int, int], None]
-) -> Arrays:
-    """All samples of a config, from `folder` or made now.
+def load_or_make(task: Trainable, config: TrainConfig, folder: Path) -> Arrays:
+    """All samples of a config, from `folder` or made now; reports "simulating" after each shard.
 
     Args:
       task: makes samples.
       config: says how many; the same config gives the same samples.
       folder: `shard_NNNNN.npz`, and the settings that they were made with.
-      on_shard: called with (shards ready, shards in all).
 
     Raises:
       InputError: the folder holds samples of other settings.
@@ -48,7 +45,7 @@ def load_or_make(
                 np.savez(temporary, **made)  # pyright: ignore
         with np.load(path) as kept:
             shards.append({name: kept[name] for name in kept.files})
-        on_shard(number + 1, count)
+        report("simulating", (number + 1) / count)
     joined = {name: np.concatenate([shard[name] for shard in shards]) for name in shards[0]}
     return {name: values[: config.samples] for name, values in joined.items()}
 

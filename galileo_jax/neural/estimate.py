@@ -12,6 +12,7 @@ import numpy as np
 
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
+from galileo_jax.model.effects.effect import infers_gravity
 from galileo_jax.model.model import MASS_PRIOR
 from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.checkpoint import load_network
@@ -62,6 +63,8 @@ def cnn_posterior(
         raise InputError("--method cnn: pixels_per_metre is needed; take --method grad")
     if problem.model.effects:
         raise InputError("--method cnn: its network knows no effects; take --method grad")
+    if infers_gravity(problem.model.nuisances):
+        raise InputError("--method cnn: its network takes gravity as declared; take --method grad")
     network = network or trained_network()
     seen = see(problem.observation, scene)
     summary = _summarise(seen)

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 import numpy as np
 from flax import nnx
 
-from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.model.parameters import Uniform
+from galileo_jax.neural.benchmark import BENCHMARKS
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.posterior_network import (
     PosteriorNetwork,
@@ -18,15 +18,15 @@ from galileo_jax.neural.posterior_network import (
     negative_log_density,
     to_u,
 )
+from galileo_jax.neural.presets import PRESETS
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.neural.summary import NUM_CHANNELS, NUM_FEATURES, summarise
 from galileo_jax.neural.task import Arrays
-from galileo_jax.neural.thesis_task import FPS, ThesisTask
 from galileo_jax.neural.world import IDEAL_FRICTION, Truth, draw, targets
+from galileo_jax.runtime.errors import InputError
 
 QUANTITIES = ("k1", "phi", "k2")
 NUM_DRAWS = 1000
-TEST_NOISE_M = 2.2e-5  # 0.02 px at 900 px/m: the tracker's on the shared clips, at most
 INTERVAL = (0.05, 0.95)
 SHRINK = 0.01  # of the features' covariance towards the unit matrix
 USUAL = 0.999
@@ -41,13 +41,25 @@ class Estimates(NamedTuple):
     k2: np.ndarray
 
 
+@PRESETS.register
 class GalileoTask:
     """Data, network and loss of preset `galileo`."""
 
+    name = "galileo"
     loss = staticmethod(negative_log_density)
     shard_size = 8192
 
     def __init__(self, config: TrainConfig):
+        """Takes a config.
+
+        Raises:
+          InputError: its engine is not the rigid one.
+        """
+        if config.engine not in ("auto", "rigid"):
+            raise InputError(
+                f"engine: {config.engine}: preset galileo has another scene in every sample, "
+                "which the rigid engine alone rolls out in batches"
+            )
         self.config = config
 
     def network(self, seed: int, data: Arrays | None = None) -> PosteriorNetwork:
@@ -66,83 +78,21 @@ class GalileoTask:
         return {name: np.concatenate([m[name] for m in made])[:count] for name in made[0]}
 
     def test(self, network: PosteriorNetwork, data: Arrays, seed: int) -> dict[str, float]:
-        """Errors and coverage, in the thesis's setting and on clips of all kinds."""
-        thesis = thesis_clips(jax.random.key(seed), len(data["features"]), TEST_NOISE_M)
-        found = _score(network, thesis, seed, "thesis: ")
+        """Errors and coverage, in every benchmark's setting and on clips of all kinds."""
+        found: dict[str, float] = {}
+        for name, benchmark in BENCHMARKS.items():
+            drawn = benchmark.draw(jax.random.key(seed), len(data["features"]))
+            found |= _score(network, drawn, seed, f"{name}: ")
         clips = {name: values[data["is_ideal"] == 0] for name, values in data.items()}
         return found | _score(network, clips, seed, "clips: ")
 
     def reference(self) -> dict[str, float]:
-        """The bars of the project."""
+        """What is expected in the benchmarks."""
         return {
-            "thesis: k1 MAE": 0.0003,
-            "thesis: k2 MAE": 0.006,
-            "thesis: phi MAE": 0.02,
-        } | {f"thesis: {name} in 90 %": 0.9 for name in QUANTITIES}
-
-
-def thesis_clips(
-    key: jax.Array, count: int, noise_m: float, told_noise_m: float | None = None
-) -> Arrays:
-    """The thesis's setting, seen with a little noise, in the form `GalileoTask.make` gives.
-
-    Args:
-      key: of everything random.
-      count: how many samples.
-      noise_m: of every coordinate.
-      told_noise_m: what the network is told of it; default: the truth.
-
-    Returns:
-      the samples, and with them `collides`: whether object 2 moves by more than 0.1 mm.
-    """
-    setting = ThesisTask(TrainConfig.model_validate(_THESIS))
-    of_theta, of_noise = jax.random.split(key)
-    theta = setting.draw(of_theta, count)
-    clean = setting.positions(theta)
-    seen = clean + noise_m * np.asarray(jax.random.normal(of_noise, clean.shape))
-    made = to_clips(theta, seen, setting.surroundings, told_noise_m or noise_m)
-    collides = np.ptp(clean[:, 1, 0], axis=-1) > 1e-4
-    return made | {"collides": collides}
-
-
-def to_clips(theta: np.ndarray, seen_m: np.ndarray, scene: Surroundings, noise_m: float) -> Arrays:
-    """Samples of an ideal world, in the form `GalileoTask.make` gives.
-
-    Args:
-      theta: `[sample, 4]`, m1, k1, m2, k2.
-      seen_m: `[sample, object, 2, frame]`, centres at the thesis's frame rate.
-      scene: of all of them.
-      noise_m: what the network is told of the noise of every coordinate.
-    """
-    frames = seen_m.shape[-1]
-    missing = ((0, 0), (0, 0), (0, 0), (0, NUM_FRAMES - frames))
-    times = np.arange(NUM_FRAMES) / FPS
-
-    def one(position: jax.Array, theta: jax.Array):
-        clip = Seen(
-            times_s=jnp.asarray(times),
-            position_m=position,
-            mask=jnp.tile(jnp.arange(NUM_FRAMES) < frames, (2, 1)),
-            noise_m=jnp.full(2, noise_m),
-            angle_rad=jnp.asarray(scene.angle_rad),
-            gravity=jnp.asarray(scene.gravity),
-            half_length_m=jnp.asarray(scene.half_length_m),
-            half_height_m=jnp.asarray(scene.half_height_m),
-            is_ideal=jnp.ones(()),
-        )
-        return to_sample(clip, Truth(theta[1], theta[3], theta[0] / theta[2]))
-
-    made = jax.jit(jax.vmap(one))(jnp.asarray(np.pad(seen_m, missing)), jnp.asarray(theta))
-    return {name: np.asarray(values) for name, values in made.items()}
-
-
-_THESIS = {
-    "preset": "thesis",
-    "samples": 100,
-    "batch": 1,
-    "learning_rate": 1.0,
-    "max_epochs": 1,
-}
+            f"{name}: {figure}": value
+            for name, benchmark in BENCHMARKS.items()
+            for figure, value in benchmark.reference.items()
+        }
 
 
 def to_sample(seen: Seen, truth: Truth) -> dict[str, jax.Array]:

@@ -1,25 +1,23 @@
-"""The presets by name."""
+"""The presets of `galileo train` by name: each has its own data, network and loss."""
 
-from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.task import Task
-from galileo_jax.runtime.errors import InputError
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from galileo_jax.runtime.registry import Registry
+
+if TYPE_CHECKING:
+    from galileo_jax.neural.config import TrainConfig
+    from galileo_jax.neural.task import Task
+
+PRESETS: "Registry[Callable[[TrainConfig], Task]]" = Registry(
+    "preset", "presets", "galileo_jax.neural.galileo_task"
+)
 
 
-def make_task(config: TrainConfig) -> Task:
+def make_task(config: "TrainConfig") -> "Task":
     """The task of a config.
 
     Raises:
-      InputError: the preset's data need the rigid engine.
+      InputError: the preset is unknown, or the config does not go with it.
     """
-    if config.preset == "thesis":
-        from galileo_jax.neural.thesis_task import ThesisTask
-
-        return ThesisTask(config)
-    if config.engine not in ("auto", "rigid"):
-        raise InputError(
-            f"engine: {config.engine}: preset galileo has another scene in every sample, "
-            "which the rigid engine alone rolls out in batches"
-        )
-    from galileo_jax.neural.galileo_task import GalileoTask
-
-    return GalileoTask(config)
+    return PRESETS.get(config.preset)(config)

@@ -7,7 +7,6 @@ cosine      the rate stays for a third of all epochs, and falls to zero from the
 
 import math
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +18,16 @@ from flax import nnx
 from galileo_jax.neural.checkpoint import NETWORK, Checkpoints, Progress, State, save_network
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Arrays, Trainable
+from galileo_jax.runtime.progress import report
 
 SAVE_EVERY_S = 15.0
 
 
-def train(
-    task: Trainable,
-    config: TrainConfig,
-    data: Arrays,
-    folder: Path,
-    on_epoch: Callable[[Progress], None],
-) -> Progress:
+def train(task: Trainable, config: TrainConfig, data: Arrays, folder: Path) -> Progress:
     """Trains, or goes on from the folder's latest checkpoint; writes `network.npz`.
 
-    A KeyboardInterrupt is passed on after a checkpoint of the last whole epoch.
+    Reports "training" after every epoch, with the `Progress` as the partial result. Cancelled or
+    interrupted, it leaves a checkpoint of the last whole epoch.
     """
     fresh, held_out = split(data, config)
     network = task.network(config.seed, fresh)
@@ -62,7 +57,7 @@ def train(
                 validation,
                 config,
             )
-            on_epoch(progress)
+            report("training", progress.epoch / config.max_epochs, progress)
             if time.monotonic() - saved_s > SAVE_EVERY_S:
                 checkpoints.save(state, progress)
                 saved, saved_s = progress.epoch, time.monotonic()

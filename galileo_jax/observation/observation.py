@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 NOMINAL_SCALE_PX_PER_M = 500.0
 
@@ -25,12 +26,12 @@ class Observation:
     """
 
     names: tuple[str, ...]
-    times_s: np.ndarray
-    position_m: np.ndarray
-    covariance_m2: np.ndarray
-    mask: np.ndarray
+    times_s: Float[np.ndarray, " frame"]
+    position_m: Float[np.ndarray, "object 2 frame"]
+    covariance_m2: Float[np.ndarray, "object 2 2 frame"]
+    mask: Bool[np.ndarray, "object frame"]
 
     @property
-    def velocity_m_s(self) -> np.ndarray:
+    def velocity_m_s(self) -> Float[np.ndarray, "object 2 frame-1"]:
         """The velocity profile `[object, 2, frame - 1]`, m/s (Galileo's comparison space)."""
         return np.diff(self.position_m, axis=-1) / np.diff(self.times_s)

@@ -172,7 +172,7 @@ def _since_release(model: Model, theta: np.ndarray, times_s: np.ndarray) -> np.n
     """The clip's times as the time since the release, s."""
     named = model.by_name(theta)
     for effect in model.effects + model.nuisances:
-        times_s = effect.time(times_s, named, model.scene.surroundings)
+        times_s = np.asarray(effect.time(times_s, named, model.scene.surroundings))
     return times_s
 
 

@@ -16,8 +16,9 @@ from galileo_jax.report.residuals import worst_stretch_of
 from galileo_jax.report.shell import details, document, figure_section, header, legend
 from galileo_jax.report.statements import meaning, number
 from galileo_jax.results.run import Run
+from galileo_jax.results.shown_parameters import shown_parameters
 
-HEADLINES = re.compile(r"k\d+|mass_ratio(_\d+_\d+)?")
+HEADLINES = re.compile(r"gravity|k\d+|mass_ratio(_\d+_\d+)?")
 
 
 def render(run: Run, fitted: Fitted, figures: Mapping[str, Mapping[str, str]]) -> str:
@@ -36,7 +37,7 @@ def render(run: Run, fitted: Fitted, figures: Mapping[str, Mapping[str, str]]) -
         "<h2>Motion</h2>\n" + "\n".join(figures["motion"].values()),
         figure_section("Velocity", _velocity_caption(), figures["velocity"], legend=key),
         figure_section("Where it fails", _failure_caption(run, fitted), figures["residuals"]),
-        _table("Parameters", {**run.result["parameters"], **run.result.get("derived", {})}),
+        _table("Parameters", shown_parameters(run.result)),
         details("Nuisances", _table("", run.result.get("nuisances", {}), _NUISANCES)),
         figure_section("Posterior", _draws_caption(run), figures["draws"], "narrow"),
         figure_section("Position", _position_caption(fitted), figures["position"], legend=key),
@@ -78,9 +79,8 @@ def _key(run: Run) -> str:
 
 
 def _headlines(run: Run) -> str:
-    known = {**run.result["parameters"], **run.result.get("derived", {})}
     cards = []
-    for name, entry in known.items():
+    for name, entry in shown_parameters(run.result).items():
         if not HEADLINES.fullmatch(name):
             continue
         label = escape(meaning(name) or name)
@@ -156,6 +156,8 @@ def _draws_caption(run: Run) -> str:
 
 
 def _table(heading: str, entries: Mapping[str, Mapping[str, Any]], note: str = "") -> str:
+    if heading and not entries:
+        return f"<h2>{escape(heading)}</h2>\n<p>The model of this motion has none to determine.</p>"
     rows = []
     for name, entry in entries.items():
         sd = entry["sd"]

@@ -5,14 +5,17 @@ import re
 import shlex
 from typing import Any
 
+from galileo_jax.inference.confounded import confounded_with_gravity
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fitted import Fitted
 from galileo_jax.results.run import CLIP, Run
+from galileo_jax.results.shown_parameters import shown_parameters
 
 MEANINGS = {
     "mass_ratio": "m1 / m2",
     "phi": "(m1 - m2) / (m1 + m2)",
     "pixels_per_metre": "scale of the picture",
+    "gravity": "acceleration of free fall",
     "start_velocity_x": "velocity in the first frame, along the travel",
     "start_velocity_y": "velocity in the first frame, upward",
     "start_speed": "speed in the first frame",
@@ -57,7 +60,7 @@ def meaning(name: str) -> str | None:
 def undetermined(run: Run, fitted: Fitted) -> dict[str, str]:
     """Why each main parameter that the clip does not tell is not told, by name."""
     found = {}
-    for name, entry in {**run.result["parameters"], **run.result.get("derived", {})}.items():
+    for name, entry in shown_parameters(run.result).items():
         if not entry["identified"] and name != "phi":
             found[name] = _reason(name, run, fitted)
     return found
@@ -72,6 +75,9 @@ def _reason(name: str, run: Run, fitted: Fitted) -> str:
         if name == "k1":
             return f"nothing moves: k1 is at least tan(angle) = {limit:.3f}, more cannot be said"
         return "nothing moves"
+    confounded, reason = confounded_with_gravity(run.result["parameters"], surroundings.has_surface)
+    if reason is not None and name in confounded:
+        return reason
     if re.fullmatch(r"m\d+", name):
         if run.clip.objects[int(name[1:]) - 1].mass_kg is not None:
             return "declared as weighed; it does not show in the motion"
@@ -173,6 +179,8 @@ def command_again(run: Run) -> str:
     words.append(f"--method {result['method']}")
     if result["effects"]:
         words.append(f"--effects {','.join(result['effects'])}")
+    if result.get("free"):
+        words.append(f"--free {','.join(result['free'])}")
     words += [f"--{key} {result[key]}" for key in ("preset", "sampler") if result.get(key)]
     if run.problem.model.motion != "planar":
         words.append(f"--motion {run.problem.model.motion}")

@@ -17,6 +17,7 @@ from galileo_jax.report.profiles import AXES, position_chart, velocity_chart
 from galileo_jax.report.residuals import residual_chart
 from galileo_jax.report.svg_chart import chart_svg
 from galileo_jax.results.run import Run
+from galileo_jax.results.shown_parameters import shown_parameters
 
 PAGE, PLOTS = "report.html", "plots"
 OURS = ("velocity_", "position_", "residuals_", "pairs", "trace")  # names of plots begin so
@@ -66,7 +67,9 @@ def _charts(run: Run, fitted: Fitted) -> Iterator[tuple[str, Chart]]:
 
 def _draws(run: Run) -> Iterator[tuple[str, str]]:
     """Name and SVG: pairs of parameters and, of chains, their way."""
-    names = [p.name for p in run.problem.parameters if p.role != "nuisance"]
+    main = [p.name for p in run.problem.parameters if p.role != "nuisance"]
+    shown = shown_parameters(run.result)
+    names = [name for name in main if name in shown] or main
     yield "pairs", to_svg(pair_figure(run.posterior, names), "pairs")
     if run.result["method"] == "mh":
         yield "trace", to_svg(trace_figure(run.posterior, names), "trace")

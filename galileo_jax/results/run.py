@@ -21,7 +21,7 @@ from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
-from galileo_jax.model.effects.registry import load_file, load_library, make_effects
+from galileo_jax.model.effects.registry import load_file, make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
@@ -84,10 +84,10 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     clip = load_clip(folder / CLIP)
     observation = read_observation_csv(folder / OBSERVATION)
     posterior = Posterior.from_netcdf(folder / POSTERIOR)
-    load_library()
     for path in result.get("effects_from", []):
         load_file(path)
     effects = make_effects(result["effects"])
     motion = result.get("motion", "planar")
-    problem = make_problem(clip, observation, engine, effects, motion=motion)
+    free = result.get("free", [])
+    problem = make_problem(clip, observation, engine, effects, motion=motion, free=free)
     return Run(folder, clip, problem, posterior, result)

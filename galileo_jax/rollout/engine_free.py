@@ -17,6 +17,7 @@ import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
+from galileo_jax.rollout.event_loop import step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 
 MAX_BOUNCES = 8  # within one recorded step
@@ -135,17 +136,10 @@ def _step(
             body, lambda at, t: rates(at, t, law, scene, rests=False), time_s, jnp.asarray(dt_s)
         )
 
-    def is_left(carry: Any) -> jax.Array:
-        _, left, count = carry
-        return (left > 0) & (count < MAX_BOUNCES)
+    def advance(body: Body, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
+        return _to_bounce(body, time_s, left_s, is_last, law, scene, floor)
 
-    def phase(carry: Any) -> Any:
-        body, left, count = carry
-        is_last = count == MAX_BOUNCES - 1
-        body, spent = _to_bounce(body, time_s + dt_s - left, left, is_last, law, scene, floor)
-        return body, left - spent, count + 1
-
-    return jax.lax.while_loop(is_left, phase, (body, jnp.asarray(dt_s), 0))[0]
+    return step_by_events(advance, body, time_s, dt_s, MAX_BOUNCES)
 
 
 def _to_bounce(

@@ -15,13 +15,14 @@ tests/rollout/test_engines.py.
 """
 
 import functools
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
+from galileo_jax.rollout.event_loop import step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
 
 MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few bounces
@@ -87,17 +88,10 @@ def _step(
 ) -> Bodies:
     """One recorded step, event by event."""
 
-    def is_left(carry: Any) -> jax.Array:
-        _, left, count = carry
-        return (left > 0) & (count < MAX_EVENTS)
+    def advance(bodies: Bodies, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
+        return _to_next_event(bodies, time_s, left_s, is_last, law, scene)
 
-    def phase(carry: Any) -> Any:
-        bodies, left, count = carry
-        is_last = count == MAX_EVENTS - 1
-        bodies, spent = _to_next_event(bodies, time_s + dt_s - left, left, is_last, law, scene)
-        return bodies, left - spent, count + 1
-
-    return jax.lax.while_loop(is_left, phase, (bodies, jnp.asarray(dt_s), 0))[0]
+    return step_by_events(advance, bodies, time_s, dt_s, MAX_EVENTS)
 
 
 def _to_next_event(

@@ -1,5 +1,6 @@
 """The engines by name, and which one `auto` takes."""
 
+from galileo_jax.model.effects.effect import infers_gravity
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.rollout.rollout import Engine
@@ -49,6 +50,8 @@ def _free(name: str, model: Model) -> Engine:
         raise InputError(
             f"engine: {name!r} moves objects in a plane; --motion free is of c or auto"
         )
+    if infers_gravity(model.effects + model.nuisances):
+        raise InputError("free: gravity: --motion free takes it as declared; leave one of them out")
     from galileo_jax.rollout.engine_c_free import EngineCFree
 
     return EngineCFree(model)

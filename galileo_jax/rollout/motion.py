@@ -9,7 +9,7 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from galileo_jax.model.effects.effect import Effect, State, Surroundings
+from galileo_jax.model.effects.effect import Effect, State, Surroundings, true_surroundings
 
 Array = Any
 
@@ -39,7 +39,7 @@ class Dynamics(NamedTuple):
       coefficient: `State` to friction coefficients `[..., object]`.
       drive: `State` to forces along the path but friction, `[..., object]`, N.
       brake: `State` to friction's size `[..., object]`, N.
-      gravity: m/s^2.
+      gravity: `[...]` or a number, m/s^2.
     """
 
     mass: Array
@@ -63,6 +63,7 @@ def dynamics(
     effects: Sequence[Effect], scene: Surroundings, theta: Mapping[str, Array], xp: Any
 ) -> Dynamics:
     """Puts parameters (each `[...]`) and effects together."""
+    scene = true_surroundings(effects, theta, scene)
     count = len(scene.names)
     mass = xp.stack([theta[f"m{i + 1}"] for i in range(count)], axis=-1)
     if scene.has_surface:
@@ -93,7 +94,7 @@ def dynamics(
         return functools.reduce(lambda k, law: law(state, k), laws, friction)
 
     # Once for each rollout: its loop has no need of sines.
-    weight = mass * scene.gravity
+    weight = mass * xp.asarray(scene.gravity)[..., None]
     slopes = ramp[..., None], table[..., None]
     # In the plane gravity has a direction of its own and is no force along the path.
     pulls = [weight * (0.0 if scene.moves_in_plane else xp.sin(slope)) for slope in slopes]

@@ -78,7 +78,8 @@ def make_loads(
 ) -> Loads:
     """What the effects ask for beyond MuJoCo's own ramp, gravity and friction.
 
-    With an inertia M, the declared slope A under the object and MuJoCo's weight M g:
+    With an inertia M, the declared slope A under the object and MuJoCo's weight M g (g the
+    declared gravity):
 
         force along the path     drive - M g sin A
         coefficient of friction  brake / (M g cos A)
@@ -96,7 +97,7 @@ def make_loads(
     def has(hook: str) -> bool:
         return any(getattr(effect, hook)(theta, scene) is not None for effect in effects)
 
-    is_other_body = has("inertia") or has("tilt")
+    is_other_body = has("inertia") or has("tilt") or has("gravity")
     has_foot = scene.has_table and any(scene.comes_down) and (has("foot") or is_other_body)
     angle, weight = scene.angle_rad, law.inertia * scene.gravity
     log_foot = xp.log(xp.clip(law.foot, 0.5, 2.0))[..., None]

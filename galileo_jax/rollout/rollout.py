@@ -1,17 +1,8 @@
-"""One function from parameters to motion, for both engines, with derivatives that hold.
+"""What an engine is, an engine as a function of JAX, and where its objects are at any time.
 
-    rollout(z, steps) -> Trajectory
-
-`z` is the search space of `parameters`. The function can be jitted, vmapped (one call of
-the engine for the whole batch) and differentiated in forward mode. The rigid engine is JAX
-throughout and has JAX's derivatives. MuJoCo's are called back, and their derivative is the
-central difference
-
-    d/dz_i  =  (rollout(z + h_i e_i) - rollout(z - h_i e_i)) / (2 h_i),    h = steps,
-
-all 2 P rollouts in the same engine call as the primal: stiff contacts make the exact
-derivative meaningless (docs/contact.md), so that `steps` must say the scale of interest.
-Parameters that no rollout depends on (clock, camera) cost none.
+The rigid engine is JAX throughout and has JAX's derivatives. MuJoCo's are called back, and have
+none: stiff contacts make the exact derivative meaningless (docs/contact.md). The fit takes
+differences of whole batches at the posterior's scale, with every engine.
 """
 
 from collections.abc import Callable
@@ -20,15 +11,16 @@ from typing import Protocol
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from galileo_jax.model.model import Model
-from galileo_jax.model.parameters import forward
-from galileo_jax.rollout.motion import pitch
 from galileo_jax.rollout.trajectory import Trajectory
 
 JUMP_M_S2 = 30.0  # no steady force accelerates so much
 
-Rollout = Callable[[jax.Array, jax.Array], Trajectory]
+Places = Float[np.ndarray, "batch object 2 record"]
+Motion = tuple[Places, Places]
+"""Centres (m) and velocities (m/s), from the release on, every `Model.record_dt_s`."""
 
 
 class Engine(Protocol):
@@ -37,8 +29,8 @@ class Engine(Protocol):
     name: str
     model: Model
 
-    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """`[batch, parameter]` to centres and velocities `[batch, object, 2, record + 1]`."""
+    def simulate(self, theta: Float[np.ndarray, "batch parameter"]) -> "Motion":
+        """Parameters, in their units, to centres (m) and velocities (m/s)."""
         ...
 
 
@@ -66,62 +58,6 @@ def in_jax(engine: Engine) -> Callable[[jax.Array], tuple[jax.Array, jax.Array]]
         return jax.pure_callback(host, (result, result), theta, vmap_method="broadcast_all")
 
     return call
-
-
-def make_rollout(engine: Engine) -> Rollout:
-    """Returns `rollout(z, steps)`; `z`, `steps`: `[parameter]`.
-
-    Rollouts that failed are NaN. `steps` are in `z`; entries of parameters that are not
-    simulated are ignored.
-    """
-    model = engine.model
-    parameters = model.parameters
-    simulated = np.array([i for i, p in enumerate(parameters) if p.step is not None], int)
-    shape = (len(model.scene.names), 2, model.num_records + 1)
-
-    roll = in_jax(engine)
-
-    def call(zs: jax.Array) -> tuple[jax.Array, jax.Array]:
-        """`[batch, parameter]` to the two `[batch, object, 2, record + 1]`."""
-        return roll(forward(parameters, zs))
-
-    def motion_in_jax(z: jax.Array, steps: jax.Array) -> tuple[jax.Array, jax.Array]:
-        del steps
-        position, velocity = call(z[None])
-        return position[0], velocity[0]
-
-    @jax.custom_jvp
-    def motion(z: jax.Array, steps: jax.Array) -> tuple[jax.Array, jax.Array]:
-        position, velocity = call(z[None])
-        return position[0], velocity[0]
-
-    @motion.defjvp
-    def _(primals, tangents):  # pyright: ignore
-        z, steps = primals
-        dz, _ = tangents
-        h = steps[simulated]
-        offsets = (
-            jnp.zeros((len(simulated), z.shape[0])).at[jnp.arange(len(simulated)), simulated].set(h)
-        )
-        out = call(jnp.concatenate([z[None], z + offsets, z - offsets]))
-        count = len(simulated)
-
-        def slope(values: jax.Array) -> jax.Array:
-            difference = values[1 : 1 + count] - values[1 + count :]
-            jacobian = difference / (2 * h).reshape(-1, 1, 1, 1)
-            return jnp.tensordot(dz[simulated], jacobian, axes=1)
-
-        return (out[0][0], out[1][0]), (slope(out[0]), slope(out[1]))
-
-    is_traceable = hasattr(engine, "traceable")
-    times = np.arange(shape[-1]) * model.record_dt_s
-
-    def rollout(z: jax.Array, steps: jax.Array) -> Trajectory:
-        position, velocity = (motion_in_jax if is_traceable else motion)(z, steps)
-        turned = pitch(jnp.moveaxis(position, -1, 0), model.scene.surroundings)
-        return Trajectory(jnp.asarray(times), position, velocity, jnp.moveaxis(turned, 0, -1))
-
-    return rollout
 
 
 def at_times(trajectory: Trajectory, times_s: jax.Array) -> tuple[jax.Array, jax.Array]:

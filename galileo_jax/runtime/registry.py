@@ -1,66 +1,149 @@
-"""Entries by name: a file that adds one registers it and touches no other file."""
+"""Entries by name: a file that adds one registers it and touches no other file.
 
+readers: Registry[type[Reader]] = Registry("reader", "readers", "galileo_jax.clip.readers")
+
+@readers.register         decorates a class in any file of that package
+readers["tracker"]        imports the package the first time, and looks the name up
+"""
+
+import difflib
 import importlib
 import pkgutil
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import ClassVar, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
+
+from galileo_jax.runtime.errors import InputError
+
+Entry = TypeVar("Entry")
+Registered = TypeVar("Registered")
 
 
-class Named(Protocol):
-    """What a registry holds."""
+class Registry(Generic[Entry]):
+    """Things by their `name`: classes that have one, or instances.
 
-    name: ClassVar[str]
-
-
-Base = TypeVar("Base", bound=Named)
-Entry = TypeVar("Entry", bound=Named)
-
-
-class Registry(Generic[Base]):
-    """Classes by their `name`.
+    The modules that register them are imported when a name is first asked for.
 
     Attributes:
       singular: what one entry is called in messages.
       plural: what several are called.
     """
 
-    def __init__(self, base: type[Base], singular: str, plural: str):
-        del base  # only tells the type checker what `get` returns
+    def __init__(self, singular: str, plural: str, *packages: str, entry_points: str | None = None):
+        """A registry without entries.
+
+        Args:
+          singular: what one entry is called in messages.
+          plural: what several are called.
+          packages: each a package all of whose modules are imported, or a single module.
+          entry_points: a group of installed packages' entry points, which are loaded as well.
+        """
         self.singular, self.plural = singular, plural
-        self._entries: dict[str, type[Base]] = {}
+        self._packages = list(packages)
+        self._entry_points = entry_points
+        self._entries: dict[str, Entry] = {}
+        self._is_loaded = False
 
-    def register(self, entry: type[Entry]) -> type[Entry]:
-        """Class decorator: makes the class known under its `name`."""
-        if entry.name in self._entries:
-            raise ValueError(f"two {self.plural} are named {entry.name!r}")
-        self._entries[entry.name] = entry  # pyright: ignore[reportArgumentType]
-        return entry
-
-    def names(self) -> tuple[str, ...]:
-        """All names, sorted."""
-        return tuple(sorted(self._entries))
-
-    def get(self, name: str) -> type[Base]:
-        """The class of that name.
+    def register(self, entry: Registered) -> Registered:
+        """Makes an entry known under its `name`; decorates a class.
 
         Raises:
-          ValueError: nothing is registered under `name`; the message lists what is.
+          InputError: the name is taken.
         """
+        named: Any = entry
+        if named.name in self._entries:
+            raise InputError(f"two {self.plural} are named {named.name!r}")
+        self._entries[named.name] = named
+        return entry
+
+    def extend(self, package: str) -> None:
+        """Lets another package, or a module, register entries when a name is next asked for."""
+        if package not in self._packages:
+            self._packages.append(package)
+            self._is_loaded = False
+
+    def names(self) -> tuple[str, ...]:
+        """All names, sorted.
+
+        Raises:
+          InputError: an installed package's entry point cannot be loaded.
+        """
+        self._load()
+        return tuple(sorted(self._entries))
+
+    def get(self, name: str) -> Entry:
+        """The entry of that name.
+
+        Raises:
+          InputError: nothing is registered under `name`; the message lists what is.
+        """
+        self._load()
         if name not in self._entries:
-            raise ValueError(f"unknown {self.singular} {name!r}; known: {', '.join(self.names())}")
+            known = self.names()
+            raise InputError(
+                f"unknown {self.singular} {name!r}; known: {', '.join(known)}"
+                f"{did_you_mean(name, known)}"
+            )
         return self._entries[name]
 
+    __getitem__ = get
 
-def load_entries(package: str) -> None:
-    """Imports a package's modules, so that each registers its entry."""
-    for module in pkgutil.iter_modules(importlib.import_module(package).__path__):
-        importlib.import_module(f"{package}.{module.name}")
+    def __contains__(self, name: object) -> bool:
+        return name in self.names()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names())
+
+    def __len__(self) -> int:
+        return len(self.names())
+
+    def values(self) -> tuple[Entry, ...]:
+        """All entries, by name."""
+        return tuple(self._entries[name] for name in self.names())
+
+    def items(self) -> tuple[tuple[str, Entry], ...]:
+        """All names and entries, by name."""
+        return tuple((name, self._entries[name]) for name in self.names())
+
+    def _load(self) -> None:
+        """Imports what registers entries.
+
+        Two threads may do so at once: each module is imported once, by one of them.
+        """
+        if self._is_loaded:
+            return
+        for package in list(self._packages):
+            found = importlib.import_module(package)
+            for module in pkgutil.iter_modules(getattr(found, "__path__", [])):
+                importlib.import_module(f"{package}.{module.name}")
+        if self._entry_points is not None:
+            from importlib import metadata  # only effects have entry points
+
+            for entry in metadata.entry_points(group=self._entry_points):
+                try:
+                    entry.load()
+                except Exception as error:
+                    raise InputError(
+                        f"{self.plural} of {entry.value} (entry point): {in_words(error)}"
+                    ) from error
+        self._is_loaded = True
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """`; did you mean X?` where a known name is near, else nothing."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def in_words(error: Exception) -> str:
+    """An error in one phrase: what an `InputError` says, others with their type."""
+    return str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
 
 
 def entry_names(package: str) -> tuple[str, ...]:
     """The names of a package's entries, sorted, where files are named as their entries.
 
-    Nothing is imported, so that the command line can tell them without JAX.
+    Nothing is imported, so that the command line knows them without JAX.
     """
     folder = Path(__file__).parents[2].joinpath(*package.split("."))
     return tuple(sorted(module.name for module in pkgutil.iter_modules([str(folder)])))

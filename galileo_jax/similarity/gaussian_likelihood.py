@@ -8,7 +8,7 @@ displacements count: for independent tracking errors that is the likelihood of t
 profile with its exact (tridiagonal) covariance, without losing the first frame's noise.
 """
 
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -45,9 +45,6 @@ class Whitening(NamedTuple):
 class GaussianLikelihood:
     """A normalised log-likelihood of positions; see the module."""
 
-    name: ClassVar[str] = "gaussian"
-    is_log_likelihood: ClassVar[bool] = True
-
     @staticmethod
     def prepare(
         observation: Observation, scene: Surroundings, noise: NoiseModel = "camera"
@@ -78,7 +75,7 @@ class GaussianLikelihood:
         return Whitening(
             np.where(mask[:, None], observation.position_m, 0.0),
             inverse_root,
-            basis.reshape(patterns.shape),
+            basis.reshape(len(gain), *patterns.shape[1:]),  # of short tracks fewer than patterns
             gain,
             np.float64(2 * mask.sum()),
         )

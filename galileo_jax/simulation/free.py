@@ -28,7 +28,7 @@ from galileo_jax.rollout.engine_free import (
 )
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.hidden import Hidden
+from galileo_jax.simulation.hidden import Hidden, prior_value
 from galileo_jax.simulation.motion import RECORD_S, Motion
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
 
@@ -188,7 +188,7 @@ def _drawn(parameter: Parameter, rng: np.random.Generator, share: float | None) 
     z = rng.uniform(WEAK_Z, STRONG_Z)
     if share is not None:
         z = WEAK_Z + share * (STRONG_Z - WEAK_Z)
-    return float(parameter.prior.forward(np.asarray(z)))  # pyright: ignore[reportArgumentType]
+    return prior_value(parameter, z)
 
 
 def solve_free(truth: FreeTruth) -> tuple[Motion, tuple[float, ...]]:

@@ -1,14 +1,17 @@
 """Hiding an effect in a truth: how strong it is made where nobody says."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
+import jax
 import numpy as np
 
 from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.effects.registry import load_file, make_effects
 from galileo_jax.model.parameters import Parameter
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.truth import Truth
@@ -73,6 +76,30 @@ class Hidden(NamedTuple):
     strength: float | None = None
 
 
+def make_hidden(
+    effects: Mapping[str, Mapping[str, float]],
+    strength: float | None = None,
+    effects_from: Sequence[str | Path] = (),
+) -> list[Hidden]:
+    """The effects of these names, each with its given values, in alphabetical order.
+
+    Raises:
+      InputError: a name is unknown, or a file registers no effect.
+    """
+    for path in effects_from:
+        load_file(path)
+    return [Hidden(each, effects[each.name], strength) for each in make_effects(list(effects))]
+
+
+def prior_value(parameter: Parameter, z: float) -> float:
+    """The parameter at `z` of its prior; always in single precision, as the first clips were.
+
+    A seed so makes the same clip to the last digit, whatever precision the caller has set.
+    """
+    with jax.enable_x64(False):
+        return float(parameter.prior.forward(np.asarray(z)))  # pyright: ignore[reportArgumentType]
+
+
 def hide(truth: Truth, hidden: Hidden, rng: np.random.Generator) -> Truth:
     """Puts an effect into a truth; an error of the declared angle makes its ramp steeper.
 
@@ -132,7 +159,7 @@ def _draw(
         return float(rng.uniform(low, max(low, high)))
     # One that somebody added: what its prior holds for likely, away from the middle.
     z = (0.3 + 1.2 * share) if name == strength_name else rng.uniform(-1.0, 1.0)
-    return float(parameter.prior.forward(np.asarray(z)))  # pyright: ignore[reportArgumentType]
+    return prior_value(parameter, z)
 
 
 def _between(wanted: Range, share: float) -> float:

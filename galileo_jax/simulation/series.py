@@ -9,6 +9,7 @@ from galileo_jax.clip.schema import Shape
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
+from galileo_jax.runtime import progress
 from galileo_jax.simulation.hidden import Hidden, hide
 from galileo_jax.simulation.motion import Motion, Solver, roll_out
 from galileo_jax.simulation.truth import Truth, draw_truth
@@ -60,6 +61,7 @@ def draw_series(
     trials = [(first, motion)]
     known = [_shared(each, first) for each in hidden]
     while len(trials) < count:
+        progress.report("simulating", len(trials) / count)
         trials.append(
             _try(
                 lambda: _with_hidden(

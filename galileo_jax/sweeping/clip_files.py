@@ -1,7 +1,6 @@
 """The files of a clip: found, told apart by their content, and carried to another machine."""
 
 import hashlib
-import json
 import os
 import tempfile
 from collections.abc import Iterator
@@ -9,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from galileo_jax.clip import physics101
 from galileo_jax.clip.load import find_yaml, has_yaml
+from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.errors import InputError
 
@@ -36,10 +35,10 @@ class ClipFiles:
     @classmethod
     def of(cls, path: Path) -> "ClipFiles":
         """Finds the files of a clip; what is wrong with them is for `load_clip` to say."""
-        if (place := physics101.place_of(path)) and not has_yaml(path):
-            paths = tuple(file for file in (path, place.labels) if file.is_file())
-            digest = _digest([path], json.dumps(_labels(place), sort_keys=True))
-            return cls(path, place.yaml.stem, place.root, paths, digest)
+        if not has_yaml(path) and (source := source_of(path)):
+            found = source.files(path)
+            digest = _digest([path], found.declared)
+            return cls(path, found.name, found.root, found.paths, digest)
         found = dict.fromkeys([path, *_beside(path)])
         paths = tuple(file for file in found if file.is_file())
         root = Path(os.path.commonpath([file.resolve().parent for file in paths]))
@@ -93,15 +92,6 @@ def _beside(path: Path) -> list[Path]:
         return []
     named = [content.get(key) for key in ("video", "track")]
     return [yaml, *(yaml.parent / name for name in named if isinstance(name, str))]
-
-
-def _labels(place: physics101.Place) -> object:
-    """What the labels say of one clip: a label of another does not make it another."""
-    try:
-        labels = physics101.read_labels(place.labels)
-    except InputError:
-        return None
-    return [place.levels[-1], labels.things, [labels.clips.get(level) for level in place.levels]]
 
 
 def _digest(paths: list[Path] | tuple[Path, ...], more: str = "") -> str:

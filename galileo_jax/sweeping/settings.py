@@ -34,7 +34,7 @@ def _entry_of(package: str) -> AfterValidator:
 
 
 Sampler = Annotated[Name, _entry_of("galileo_jax.inference.samplers.library")]
-Similarity = Annotated[Name, _entry_of("galileo_jax.similarity.library")]
+Similarity = Annotated[Name, _entry_of("galileo_jax.thesis.similarities")]
 
 
 class _Settings(BaseModel):

@@ -1,16 +1,14 @@
 """Clips that a sweep makes for itself, with known truth."""
 
-import contextlib
-import io
 from collections.abc import Iterable
 from pathlib import Path
 
-from galileo_jax.commands import simulate
+from galileo_jax.api.simulate import simulate
 from galileo_jax.sweeping.config import Simulated
 
 
 def simulated_clips(folder: Path, wanted: Iterable[Simulated]) -> list[Path]:
-    """Makes clips with `galileo simulate`, those that are there already left as they are.
+    """Makes clips with `simulate`, those that are there already left as they are.
 
     Returns:
       their videos or tracks.
@@ -27,10 +25,11 @@ def simulated_clips(folder: Path, wanted: Iterable[Simulated]) -> list[Path]:
             paths.append(path)
             if all(path.with_suffix(end).is_file() for end in (suffix, ".yaml", ".truth.json")):
                 continue
-            words = ["--seed", str(seed), "--out", str(path)]
-            words += [] if one.video else ["--track-only"]
-            words += ["--effect", one.effect] if one.effect else []
-            words += ["--strength", str(one.strength)] if one.strength is not None else []
-            with contextlib.redirect_stdout(io.StringIO()):
-                simulate.main(words)
+            simulate(
+                path,
+                seed=seed,
+                track_only=not one.video,
+                effects=(one.effect,) if one.effect else (),
+                strength=one.strength,
+            )
     return paths

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 
 @dataclass(frozen=True)
@@ -25,9 +26,9 @@ class Track:
     """
 
     names: tuple[str, ...]
-    times_s: np.ndarray
-    position_px: np.ndarray
-    covariance_px2: np.ndarray
-    angle_rad: np.ndarray
-    is_visible: np.ndarray
+    times_s: Float[np.ndarray, " frame"]
+    position_px: Float[np.ndarray, "object frame 2"]
+    covariance_px2: Float[np.ndarray, "object frame 2 2"]
+    angle_rad: Float[np.ndarray, "object frame"]
+    is_visible: Bool[np.ndarray, "object frame"]
     frame_size_px: tuple[int, int]

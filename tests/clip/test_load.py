@@ -4,14 +4,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from galileo_jax.clip.load import check_clip, load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
-from galileo_jax.clip.yaml_edit import dump
-from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.clip.yaml_file import read_mapping, yaml_text
 from galileo_jax.commands import command, label
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import (
@@ -213,7 +212,7 @@ GARBAGE = st.recursive(
 KEYS = st.sampled_from(sorted(ClipFile.model_fields))
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=200)
 @given(changes=st.dictionaries(KEYS | st.text(max_size=4), GARBAGE, max_size=3))
 def test_garbage_values_give_one_line(changes, tmp_path_factory) -> None:
     folder = tmp_path_factory.getbasetemp() / "garbage"
@@ -225,7 +224,7 @@ def test_garbage_values_give_one_line(changes, tmp_path_factory) -> None:
         assert "clip." in str(error)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(text=st.text(alphabet=st.sampled_from("ab:-[]{}&*!|>'\"#%@`?,. \n\t012<=~"), max_size=40))
 def test_garbage_yaml_gives_one_line(text, tmp_path_factory) -> None:
     path = tmp_path_factory.getbasetemp() / "garbage.yaml"
@@ -253,6 +252,6 @@ def test_aliases_and_deep_nesting_give_one_line(tmp_path: Path) -> None:
 
 def test_dumped_yaml_reads_back(tmp_path: Path) -> None:
     content = read_mapping(build_good(tmp_path))
-    (tmp_path / "new.yaml").write_text(dump(content))
+    (tmp_path / "new.yaml").write_text(yaml_text(content))
     assert read_mapping(tmp_path / "new.yaml") == content
     assert good_video()

@@ -9,14 +9,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.commands import command, compare, diagnose, fit, predict, simulate
+from galileo_jax.commands import command, compare, diagnose, fit, predict
+from galileo_jax.commands import simulate as simulate_command
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import effect_names, make_effects
 from galileo_jax.model.parameters import absent
 from galileo_jax.model.scene.expected import expected
+from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.rollout import in_jax
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.free import FreeTruth, draw_free, solve_free
@@ -197,12 +200,10 @@ def test_wrong_keys_are_said(scenario, extra, message, tmp_path):
 @pytest.mark.parametrize("scenario", FREE)
 def test_simulate_writes_a_track_that_loads(scenario, tmp_path):
     out = tmp_path / "clip.csv"
-    call = ["--scenario", scenario, "--track-only", "--seed", "4", "--out", str(out)]
-    assert command.run(simulate.main, call) == 0
-    truth = json.loads(out.with_suffix(".truth.json").read_text())
+    (truth,) = simulate(out, scenario=scenario, track_only=True, seed=4).truths
     assert load_clip(out).frame_count == truth["frames"]
     assert truth["effect"] == "none"
-    assert fit.read_truth(load_clip(out)) == truth["parameters"]
+    assert true_parameters(load_clip(out)) == truth["parameters"]
 
 
 @pytest.mark.parametrize(
@@ -220,7 +221,7 @@ def test_simulate_writes_a_track_that_loads(scenario, tmp_path):
 )
 def test_wrong_calls_of_simulate_are_said(call, message, tmp_path, capsys):
     out = str(tmp_path / "clip.csv")
-    assert command.run(simulate.main, [*call, "--track-only", "--out", out]) == 2
+    assert command.run(simulate_command.main, [*call, "--track-only", "--out", out]) == 2
     assert message in capsys.readouterr().err
 
 
@@ -228,13 +229,19 @@ def test_wrong_calls_of_simulate_are_said(call, message, tmp_path, capsys):
 @pytest.mark.parametrize("scenario", FREE)
 def test_the_commands_go_through(scenario, tmp_path, capsys):
     out, run = tmp_path / "clip.csv", tmp_path / "run"
-    call = ["--scenario", scenario, "--seed", "4", "--fps", "60", "--track-noise", "0.001"]
-    call += ["--floor"] if "floor" in SCENARIOS[scenario].keys else []
-    assert command.run(simulate.main, [*call, "--track-only", "--out", str(out)]) == 0
+    made = simulate(
+        out,
+        scenario=scenario,
+        seed=4,
+        fps=60.0,
+        track_only=True,
+        track_noise=0.001,
+        floor="floor" in SCENARIOS[scenario].keys,
+    )
     assert command.run(fit.main, [str(out), "--out", str(run)]) == 0
     result = json.loads((run / "result.json").read_text())
     assert result["error"]["chi2_per_dof"] == pytest.approx(1.0, abs=0.35)
-    truth = json.loads(out.with_suffix(".truth.json").read_text())["parameters"]
+    truth = made.truths[0]["parameters"]
     for name, true in truth.items():
         told = result["parameters"][name]
         assert abs(told["mean"] - true) < 4 * told["sd"], name
@@ -247,10 +254,9 @@ def test_the_commands_go_through(scenario, tmp_path, capsys):
 
 def test_the_strength_of_what_is_hidden_counts_without_a_ramp(tmp_path):
     found = []
-    for strength in ("0", "1"):
-        path = tmp_path / f"fall{strength}.csv"
-        call = ["--scenario", "fall", "--track-only", "--effect", "air_drag", "--seed", "1"]
-        assert command.run(simulate.main, [*call, "--strength", strength, "--out", str(path)]) == 0
-        truth = json.loads(path.with_suffix(".truth.json").read_text())
+    for strength in (0.0, 1.0):
+        path = tmp_path / f"fall{strength:g}.csv"
+        given = {"scenario": "fall", "track_only": True, "effects": ["air_drag"], "seed": 1}
+        (truth,) = simulate(path, strength=strength, **given).truths
         found.append(truth["effect_parameters"]["air_drag"])
     assert found[1] > 2 * found[0]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from galileo_jax.clip.load import load_clip
@@ -293,7 +293,7 @@ def test_h5_with_code_in_its_names_is_not_run(tmp_path: Path) -> None:
         clip_beside(path, DLC_KEYS, "block")
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150)
 @given(
     which=st.sampled_from([TRK, DLC, LOGGER, TABLE, make.tracker_multi()]),
     at=st.floats(0, 1),

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from galileo_jax.api import diagnose as api
-from galileo_jax.commands import command, diagnose, simulate
+from galileo_jax.api.simulate import simulate
+from galileo_jax.commands import command, diagnose
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.diagnosis.last_model import by_itself
 from galileo_jax.files.atomic_write import write_json
@@ -94,8 +95,7 @@ def test_a_hypothesis_by_itself_moves_as_in_the_library(trials, tmp_path):
 @pytest.mark.slow
 def test_finds_what_was_hidden(tmp_path, capsys):
     """A csv track with strong air drag: told, added, the error falls, and the run can be read."""
-    words = ["--track-only", "--effect", "air_drag", "--strength", "0.7", "--seed", "3"]
-    assert command.run(simulate.main, [*words, "--out", str(tmp_path / "a.csv")]) == 0
+    simulate(tmp_path / "a.csv", track_only=True, effects=["air_drag"], strength=0.7, seed=3)
     out = tmp_path / "out"
     capsys.readouterr()
     assert command.run(diagnose.main, [str(tmp_path / "a.csv"), "--out", str(out)]) == 0
@@ -103,7 +103,8 @@ def test_finds_what_was_hidden(tmp_path, capsys):
     document = json.loads((out / "diagnosis.json").read_text())
     check_contract(document)
     assert not document["adequate"]
-    assert "air_drag" in document["verdict"]["effects"]
+    assert document["verdict"]["status"] == "named", document["verdict"]
+    assert document["verdict"]["effects"] == ["air_drag"]
     before, after = document["history"][0], document["history"][-1]
     assert after["effects"] == ["air_drag"]
     assert after["chi2_per_dof"] < 1.5 < before["chi2_per_dof"]

@@ -110,7 +110,8 @@ def test_track_of_a_clip(to: str, name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("argv, words", [
     (["none", "--to", "csv"], "none: no such file or folder"),
     (["empty", "--to", "csv"], "empty: no result.json"),
-    (["run", "--to", "xlsx"], "invalid choice: 'xlsx'"),
+    (["run", "--to", "xlsx"], "--to: unknown format 'xlsx'; known: csv, parquet, netcdf"),
+    (["clips/clip.yaml", "--to", "csv", "--fitted"], "--fitted: of a folder written by"),
     (["run"], "--to"),
     (["run", "--to", "csv", "--out", "run/result.json"], "--out: run/result.json"),
     (["torn", "--to", "netcdf"], "torn/posterior.nc: no such file"),
@@ -118,6 +119,8 @@ def test_track_of_a_clip(to: str, name: str, tmp_path: Path) -> None:
 def test_wrong_call_is_one_line(argv: list[str], words: str, tmp_path: Path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     make_run(tmp_path / "run")
+    (tmp_path / "clips").mkdir()
+    build_good_track(tmp_path / "clips")
     (tmp_path / "empty").mkdir()
     (make_run(tmp_path / "torn") / "posterior.nc").unlink()
     assert run(*argv) == 2

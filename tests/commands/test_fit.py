@@ -13,8 +13,9 @@ from rich.progress import Progress
 
 from galileo_jax import report
 from galileo_jax.api.fit import OFF_THE_PLANE
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.commands import command, fit, simulate
+from galileo_jax.commands import command, fit
 from galileo_jax.inference.samplers import driver
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results.run import load_run
@@ -81,10 +82,8 @@ def deviation(entry, truth):
 def simulated(tmp_path_factory):
     """A track by the project's own simulator, and its truth."""
     folder = tmp_path_factory.mktemp("simulated")
-    assert (
-        command.run(simulate.main, ["--track-only", "--seed", "3", "--out", f"{folder}/a.csv"]) == 0
-    )
-    return folder / "a.yaml", json.loads((folder / "a.truth.json").read_text())
+    made = simulate(folder / "a.csv", track_only=True, seed=3)
+    return folder / "a.yaml", made.truths[0]
 
 
 @pytest.fixture(scope="module")
@@ -181,7 +180,8 @@ def test_nothing_moves(tmp_path):
 
 
 @pytest.mark.slow
-def test_one_object(tmp_path):
+def test_one_object(tmp_path, capsys):
+    """Its mass is in the result, as nothing tells it, and is not shown."""
     times = np.arange(40) / 30
     alone = replace(HIT, object2_x_m=None)
     clip = write_clip(tmp_path, solve(alone, times).position_m, times)
@@ -190,6 +190,9 @@ def test_one_object(tmp_path):
     assert result["derived"] == {}
     assert deviation(result["parameters"]["k1"], HIT.friction[0]) < SIGMAS
     assert not result["parameters"]["m1"]["identified"]
+    shown = capsys.readouterr().out
+    assert shown.count("k1") == 1
+    assert "m1" not in shown and "m2" not in shown
 
 
 @pytest.mark.slow
@@ -209,11 +212,9 @@ def test_incline(tmp_path):
 @pytest.mark.slow
 @pytest.mark.video
 def test_a_video(tmp_path):
-    """Rendered, tracked and fitted, all by the commands."""
+    """Rendered, tracked and fitted."""
     video = tmp_path / "clip.mp4"
-    words = ["--seed", "11", "--seconds", "1.4", "--size", "480x270", "--out", str(video)]
-    assert command.run(simulate.main, words) == 0
-    truth = json.loads((tmp_path / "clip.truth.json").read_text())
+    (truth,) = simulate(video, seed=11, seconds=1.4, size=(480, 270)).truths
     result = run_fit(video, tmp_path / "run")
     assert result["parameters"]["k1"]["mean"] == pytest.approx(truth["k1"], abs=K1_ATOL)
     assert result["timings_s"]["track"] > 0

@@ -113,14 +113,28 @@ def test_other_layouts(layout: str, tmp_path: Path) -> None:
     assert yaml.safe_load(path.read_text()) == content
 
 
-def test_lost_comments_are_said(tmp_path: Path, capsys) -> None:
+def test_comments_stay_also_where_all_is_on_one_line(tmp_path: Path, capsys) -> None:
     path = build_good(tmp_path)
     path.write_text(
         "# all on one line\n"
         + yaml.safe_dump(yaml.safe_load(path.read_text()), default_flow_style=True)
     )
     assert run(path, "--point", "object3", 20, 20, "--scenario", "multi") == 0
-    assert "its comments are lost" in capsys.readouterr().err
+    assert capsys.readouterr().err == ""
+    assert path.read_text().startswith("# all on one line\n{")
+    assert len(load_clip(path).objects) == 3
+
+
+def test_lost_comments_are_noted(tmp_path: Path, capsys) -> None:
+    """What a merge key takes over cannot change in one place alone."""
+    path = build_good(tmp_path)
+    before, objects = path.read_text().split("objects:")
+    objects = objects.replace("  - name: object1", "  - &first  # the red one\n    name: object1")
+    objects = objects.replace("  - name: object2", "  - <<: *first\n    name: object2")
+    path.write_text(f"{before}objects:{objects}")
+    assert run(path, "--first-frame", "object1", 2) == 0
+    assert "clip.yaml was written afresh; its comments are lost" in capsys.readouterr().err
+    assert [item.first_frame for item in load_clip(path).objects] == [2, 0]
 
 
 WRONG = {

@@ -9,6 +9,7 @@ from galileo_jax.commands import command, sweep
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping import carry_out
 from tests.clip.broken_clips import build_good_track
+from tests.missing import needed_module
 from tests.report.browser import opened
 
 TRUTH = {"m1": 0.4, "k1": 0.2, "m2": 0.2, "k2": 0.3, "effect": "air_drag"}
@@ -95,7 +96,7 @@ def test_every_cell_is_a_row_and_what_fails_is_told(tmp_path, clips, calls, caps
         folder = tmp_path / "out" / "cells" / row["cell"]
         name = "result.json" if row["status"] == "done" else "failure.json"
         assert [path.name for path in folder.iterdir()] == [name]
-    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet = needed_module("pyarrow.parquet")
     table = parquet.read_table(tmp_path / "out" / "summary.parquet").to_pylist()
     assert [row["cell"] for row in table] == [row["cell"] for row in rows]
     assert table[0]["k1"] == 0.25 and table[0]["converged"] is True

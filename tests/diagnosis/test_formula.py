@@ -1,6 +1,7 @@
 """The formula's search, on sights that are made up: the data see the acceleration itself."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,6 +62,33 @@ def test_two_clips_have_one_formula():
     )
     assert len(alone) == len(both) == 1
     assert alone != both
+
+
+def unseen(log_evidence=-1.0):
+    """A clip in which the object is never seen to move: no times, and nothing that could show."""
+    none = np.zeros(0)
+    target = np.random.default_rng(5).standard_normal(NUM_TIMES)
+    return Sight(none, none, none, target, np.zeros((NUM_TIMES, 0)), NUM_TIMES, log_evidence)
+
+
+def test_what_no_clip_shows_in_motion_has_no_formula():
+    found = find_formula([unseen(), unseen()])
+    assert (found.text, found.terms, found.share_explained) == (NOTHING, (), 0.0)
+    assert find_formula([unseen(log_evidence=50.0)]).text == NOT_SIMPLE
+
+
+def test_what_never_shows_has_no_formula():
+    """Seen to move at some times, but the data do not depend on its acceleration."""
+    blind = replace(sight(lambda t, q, v: 0 * t), response=np.zeros((NUM_TIMES, NUM_TIMES)))
+    assert find_formula([blind]).text == NOTHING
+
+
+def test_a_clip_that_does_not_show_the_object_leaves_the_formula_to_the_others():
+    def drag(t, q, v):
+        return -0.62 * v * abs(v)
+
+    found = find_formula([unseen(), sight(drag)])
+    assert found.text.startswith("-0.6") and found.terms[0].text == "v|v|"
 
 
 def test_nothing_is_nothing():

@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -17,9 +18,12 @@ from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.free_acceleration import FreeAcceleration, splines
 from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.gradient import GradientFitter, Settings
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.effect import State, Surroundings
+from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
+from tests.ramp_model import HIT
 
 NOISE_M = 3.3e-4  # 0.3 px at 900 px/m
 LEAST_COVERED = 0.85  # of the times, by a band for 95 %: neighbours err together
@@ -80,6 +84,20 @@ def test_air_drag_shows_only_in_motion(infer):
     assert at_rest.any()
     assert np.isnan(missing.acceleration_m_s2[at_rest]).all()
     np.testing.assert_array_equal(np.isnan(missing.sd_m_s2), np.isnan(missing.acceleration_m_s2))
+
+
+def test_of_an_object_that_is_never_seen_nothing_is_said():
+    """Object 2 stands somewhere out of the picture."""
+    (problem,) = make_trials([HIT]).problems
+    seen = problem.observation
+    mask = np.stack([np.ones_like(seen.mask[0]), np.zeros_like(seen.mask[1])])
+    trials = JointProblem((replace(problem, observation=replace(seen, mask=mask)),))
+    fit = GradientFitter(trials, Settings(num_exact=0)).fit(seed=0)
+    missing = infer_missing_force(trials, Hypothesis((), fit), seed=0)
+    assert missing.formula == ("a1 = nothing", "a2 = nothing")
+    assert missing.share_explained[1] == 0.0
+    assert np.isnan(missing.acceleration_m_s2[1]).all() and np.isnan(missing.sd_m_s2[1]).all()
+    assert np.isfinite(missing.acceleration_m_s2[0]).any()
 
 
 @pytest.mark.slow

@@ -1,36 +1,45 @@
 """A narrow, bent valley: friction nearly holds object 1, and all hangs on by how much."""
 
-import json
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.commands import command, simulate
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
-from galileo_jax.diagnosis.diagnose import DECISIVE, fitter_of
+from galileo_jax.diagnosis.diagnose import fitter_of
+from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import make_effects
 from tests.precision import in_64_bit
 
 # tan 10 = 0.176; k (1 + a) = 0.062 * 2.7 = 0.166.
-CALL = ["--seed", "157334244", "--angle", "10", "--effect", "stribeck", "--strength", "0.7"]
-CALL += ["--solver", "fine", "--faults", "--track-only", "--track-noise", "3.3e-4", "--fps", "30"]
+CALL: dict[str, Any] = {
+    "seed": 157334244,
+    "angle": 10.0,
+    "effects": ("stribeck",),
+    "strength": 0.7,
+    "solver": "fine",
+    "faults": True,
+    "track_only": True,
+    "track_noise": 3.3e-4,
+}
 
 
 @pytest.fixture
 def slowly_released(tmp_path):
     """Trials of a clip, and the truth's parameters."""
     path = tmp_path / "clip.csv"
-    assert command.run(simulate.main, [*CALL, "--out", str(path)]) == 0
+    made = simulate(path, **CALL)
     forms = tuple(form for form in FORMS if form.name == "force_at_a_time")
     effects = (*make_effects(["stribeck"]), *forms)
     clip = load_clip(path.with_suffix(".yaml"))
     trials = make_joint_problem([clip], [read_observation_csv(path)], effects=effects)
-    truth = json.loads(path.with_suffix(".truth.json").read_text())
+    (truth,) = made.truths
     return trials, truth | truth["effect_parameters"]
 
 

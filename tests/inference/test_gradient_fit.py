@@ -3,17 +3,25 @@
 from dataclasses import replace
 from math import radians
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.model.parameters import inverse
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
 SIGMAS = 4.0
+# How far estimates of k1, k2 and log(m1 / m2) scatter round the truth over tracks that differ in
+# the tracker's noise alone (root mean square over 16 seeds, each fitted from scratch). What else
+# the likelihood allows for, and so the posterior's own sd, is wider: by no more than so much.
+SCATTER_HIT = (4.3e-4, 8.8e-4, 6.9e-3)
+SCATTER_PUSHES = (1.9e-4, 4.9e-3, 2.7e-2)
+NARROWEST, WIDEST = 0.8, 3.0
 STEEPER = replace(HIT, angle_rad=radians(25), release_m=0.4)
 PUSHES = replace(HIT, mass_kg=(0.3, 0.5), friction=(0.22, 0.1))
 QUANTITIES = ("k1", "k2", "log_mass_ratio")
@@ -45,25 +53,40 @@ def alone():
         return trials, fit(trials)
 
 
-def check_truth(experiment, trials, found):
+def check_truth(experiment, scatter, trials, found):
+    """Estimates are as near to the truth as the noise lets them be, and their sd says so."""
     (m1, m2), (k1, k2) = experiment.mass_kg, experiment.friction
-    for name, truth in zip(QUANTITIES, (k1, k2, np.log(m1 / m2)), strict=True):
+    truths = (k1, k2, np.log(m1 / m2))
+    for name, truth, noise in zip(QUANTITIES, truths, scatter, strict=True):
         mean, sd = told(trials, found)[name]
-        assert abs(mean - truth) < SIGMAS * sd, name
+        assert abs(mean - truth) < SIGMAS * noise, name
+        assert NARROWEST * noise < sd < WIDEST * noise, name
+
+
+def fit_from_truth(experiment, trials):
+    """Refined from the truth itself: what a search that starts anywhere must at least find."""
+    values = {"m1": experiment.mass_kg[0], "m2": experiment.mass_kg[1]}
+    values |= {"k1": experiment.friction[0], "k2": experiment.friction[1]}
+    parameters = trials.model_parameters
+    theta = np.array([values.get(p.name, p.absent) for p in parameters])
+    start = np.clip(np.asarray(inverse(parameters, jnp.asarray(theta))), -1.0, 1.0)[None]
+    return GradientFitter(trials).fit_from(start, np.ones(start.shape, bool), np.zeros(1, int))[0]
 
 
 def test_the_truth_comes_back(alone):
     trials, found = alone
     assert found.code is Code.CONVERGED
-    check_truth(HIT, trials, found)
+    check_truth(HIT, SCATTER_HIT, trials, found)
     count = trials.num_values
     assert 0.5 * count < found.chi2 < 1.2 * count, "modes take up some of the values"
-    assert abs(told(trials, found)["k1"][0] - HIT.friction[0]) < 0.005
+    assert found.log_evidence > fit_from_truth(HIT, trials).log_evidence - 0.2
 
 
 def test_the_truth_comes_back_where_objects_part():
     trials = make_trials([PUSHES])
-    check_truth(PUSHES, trials, fit(trials))
+    found = fit(trials)
+    check_truth(PUSHES, SCATTER_PUSHES, trials, found)
+    assert found.log_evidence > fit_from_truth(PUSHES, trials).log_evidence - 0.2
 
 
 def test_same_seed_same_fit(alone):
@@ -76,7 +99,7 @@ def test_same_seed_same_fit(alone):
 def test_two_clips_tell_more_than_one(alone):
     trials = make_trials([HIT, STEEPER])
     found = fit(trials)
-    check_truth(HIT, trials, found)
+    check_truth(HIT, SCATTER_HIT, trials, found)
     spread = {name: sd for name, (_, sd) in told(trials, found).items()}
     before = {name: sd for name, (_, sd) in told(*alone).items()}
     assert all(spread[name] < before[name] for name in QUANTITIES), (spread, before)

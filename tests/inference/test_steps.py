@@ -3,7 +3,7 @@
 import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from scipy.optimize import lsq_linear
 from scipy.special import ndtr
 
@@ -82,7 +82,6 @@ def test_no_step_leaves_the_priors(at, step):
     assert 0 < ndtr(found[0]) < 1
 
 
-@settings(deadline=None)
 @given(st.integers(0, 10_000))
 def test_with_one_edge_in_the_way_the_rest_is_solved_exactly(seed):
     rng = np.random.default_rng(seed)

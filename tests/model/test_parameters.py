@@ -36,7 +36,7 @@ each = pytest.mark.parametrize("name", PRIORS)
 
 
 @each
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(z=st.floats(-4, 4))
 def test_round_trip(name, z):
     prior, _ = PRIORS[name]
@@ -45,7 +45,7 @@ def test_round_trip(name, z):
 
 
 @each
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(z=st.floats(-4, 4), more=st.floats(1e-3, 2))
 def test_keeps_the_order(name, z, more):
     prior, _ = PRIORS[name]

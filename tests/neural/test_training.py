@@ -8,7 +8,8 @@ from galileo_jax.neural.config import load_config
 from galileo_jax.neural.dataset import load_or_make
 from galileo_jax.neural.training import cosine_rate, train
 from galileo_jax.runtime.errors import InputError
-from tests.neural.test_thesis_network import config
+from galileo_jax.runtime.progress import scope
+from tests.thesis.test_network import config
 
 
 class Toy:
@@ -17,7 +18,7 @@ class Toy:
     shard_size = 50
 
     def __init__(self, settings):
-        from galileo_jax.neural.thesis_task import ThesisTask
+        from galileo_jax.thesis.task import ThesisTask
 
         self._task = ThesisTask(settings)
         self.loss = self._task.loss
@@ -32,19 +33,17 @@ class Toy:
         return {"profile": profile, "target": profile[:, :, :20].mean(-1)}
 
 
-def shards(done, total):
-    del done, total
-
-
 def run(folder, settings, stop_after=None):
     toy = Toy(settings)
-    data = load_or_make(toy, settings, folder / "data", shards)
+    data = load_or_make(toy, settings, folder / "data")
 
-    def on_epoch(progress):
+    def on_progress(stage, share, progress):
+        assert stage == "training" and share == progress.epoch / settings.max_epochs
         if progress.epoch == stop_after:
             raise KeyboardInterrupt
 
-    return train(toy, settings, data, folder, on_epoch)
+    with scope(on_progress):
+        return train(toy, settings, data, folder)
 
 
 def test_it_learns_and_leaves_a_network(tmp_path):
@@ -53,7 +52,7 @@ def test_it_learns_and_leaves_a_network(tmp_path):
     assert progress.losses[-1][0] < progress.losses[0][0]
     network, kept = load_network(tmp_path / NETWORK)
     assert kept == config()
-    data = load_or_make(Toy(config()), config(), tmp_path / "data", shards)
+    data = load_or_make(Toy(config()), config(), tmp_path / "data")
     error = np.abs(np.asarray(network(data["profile"][180:])) - data["target"][180:])
     assert np.isclose(np.log(error.mean(axis=0)).mean(), progress.best, rtol=1e-4)
 
@@ -84,10 +83,10 @@ def test_another_config_is_refused(tmp_path):
 
 def test_samples_are_made_once_and_missing_ones_again(tmp_path):
     toy = Toy(config())
-    data = load_or_make(toy, config(), tmp_path, shards)
+    data = load_or_make(toy, config(), tmp_path)
     assert toy.made == 4 and len(data["target"]) == 200
     (tmp_path / "shard_00002.npz").unlink()
-    again = load_or_make(toy, config(), tmp_path, shards)
+    again = load_or_make(toy, config(), tmp_path)
     assert toy.made == 5
     assert np.array_equal(data["profile"], again["profile"])
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
+from tests.missing import is_missing, needed_module
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 QUIET = (
@@ -20,10 +20,10 @@ ALL_DRAWN = (
 
 @contextmanager
 def started() -> Iterator:
-    """The browser; the test is skipped where there is none."""
-    playwright = pytest.importorskip("playwright.sync_api")
+    """The browser; see `missing` for where there is none."""
+    playwright = needed_module("playwright.sync_api")
     if CHROMIUM is None:
-        pytest.skip("no chromium here")
+        is_missing("no chromium here")
     with playwright.sync_playwright() as tools:
         browser = tools.chromium.launch(executable_path=CHROMIUM, args=list(QUIET))
         yield browser

@@ -13,10 +13,11 @@ from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import forward, inverse
 from galileo_jax.rollout.engine_rigid import EngineRigid, roll_out
 from galileo_jax.rollout.motion import LEAST_FRICTION
-from galileo_jax.rollout.rollout import JUMP_M_S2, at_times, make_rollout
+from galileo_jax.rollout.rollout import JUMP_M_S2, at_times
 from galileo_jax.rollout.trajectory import Trajectory
 from tests.ramp_model import HIT, make_model, make_theta
 from tests.reference_ramp import Experiment, solve
+from tests.rollout.rolled import derivatives, rolled
 from tests.rollout.simple_effects import EVERY_KIND, Drag, Spring, Stribeck, Wind
 
 CLOSED_FORM_ATOL = 1e-9  # m and m/s; 1e-14 is typical
@@ -117,23 +118,17 @@ def test_derivatives_are_those_of_the_motion():
     model = replace(make_model(HIT, 1.2), effects=(Drag(), Stribeck()))
     theta = make_theta(model, HIT, {"impact_restitution": 0.01, "drag": 0.05, "stribeck": 0.3})
     z = inverse(model.parameters, jnp.asarray(theta))
-    rollout = make_rollout(EngineRigid(model))
+    engine = EngineRigid(model)
     # No frame within the steps' reach of the foot or the hit, where a difference sees both
     # sides and the derivative one.
-    speed = np.asarray(rollout(z, jnp.zeros(len(z))).velocity_m_s)
+    speed = np.asarray(rolled(engine, z).velocity_m_s)
     jumps = np.flatnonzero(np.abs(np.diff(speed)).max(axis=(0, 1)) > JUMP_M_S2 * model.record_dt_s)
     times = np.arange(1, 36) / 30
     away = np.abs(times[:, None] - jumps * model.record_dt_s).min(axis=1) > REACH_S
     times = jnp.asarray(times[away])
     assert len(jumps) == 2 and len(times) > 30
 
-    def centres(z):
-        return at_times(rollout(z, jnp.zeros(len(z))), times)[0]
-
-    slopes = np.asarray(jax.jit(jax.jacfwd(centres))(z))
-    many = jax.jit(jax.vmap(centres))
-    offsets = STEP_Z * np.eye(len(z))
-    differences = np.asarray(many(z + offsets) - many(z - offsets)) / (2 * STEP_Z)
+    slopes, differences = derivatives(engine, z, times, STEP_Z)
     for i, parameter in enumerate(model.parameters):
         wanted = differences[i]
         if parameter.step is None:
@@ -308,5 +303,5 @@ def test_parameters_outside_jit_and_inside_are_one_path():
     z = inverse(model.parameters, jnp.asarray(make_theta(model, HIT)))
     engine = EngineRigid(model)
     by_call, _ = engine.simulate(np.asarray(forward(model.parameters, z))[None])
-    traced = jax.jit(make_rollout(engine))(z, jnp.zeros(len(z))).position_m
+    traced = jax.jit(lambda z: rolled(engine, z).position_m)(z)
     assert np.asarray(traced) == pytest.approx(by_call[0], abs=CLOSED_FORM_ATOL)

@@ -3,7 +3,6 @@
 import math
 from dataclasses import replace
 
-import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -13,10 +12,10 @@ from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import inverse
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.rollout import at_times, make_rollout
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.solver import STEP_S, STEPS_PER_RECORD, solve
 from tests.rollout.objects import BALL, BOX, ROLLER, WHEEL, model_of, scene_of, speeds, theta_of
+from tests.rollout.rolled import derivatives
 
 G = 9.81
 EXACT_RTOL = 1e-9
@@ -184,16 +183,10 @@ def test_derivatives_are_those_of_the_motion():
     model = model_of(objects, scene_of(objects, 20.0, 0.5, [0.25]), 1.2)
     theta = theta_of(model, [0.5, 0.3], [0.3, 0.1], impact_restitution=0.3)
     z = inverse(model.parameters, jnp.asarray(theta))
-    rollout = make_rollout(EngineRigid(model))
+    engine = EngineRigid(model)
     times = jnp.asarray([0.2, 0.4, 1.1, 1.15])
 
-    def centres(z):
-        return at_times(rollout(z, jnp.zeros(len(z))), times)[0]
-
-    slopes = np.asarray(jax.jit(jax.jacfwd(centres))(z))
-    many = jax.jit(jax.vmap(centres))
-    offsets = STEP_Z * np.eye(len(z))
-    differences = np.asarray(many(z + offsets) - many(z - offsets)) / (2 * STEP_Z)
+    slopes, differences = derivatives(engine, z, times, STEP_Z)
     for i, parameter in enumerate(model.parameters):
         size = np.linalg.norm(differences[i])
         error = np.linalg.norm(slopes[..., i] - differences[i])

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.commands import command, simulate
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.model.parameters import absent
 from galileo_jax.runtime.errors import InputError
@@ -124,10 +124,16 @@ def test_the_library_mends_what_simulate_hides(name, tmp_path, x64):
     from galileo_jax.rollout.engines import make_engine
 
     path = tmp_path / "clip.csv"
-    call = ["--track-only", "--solver", "fine", "--seed", "4", "--track-noise", "1e-5"]
-    call += ["--effect", name, "--strength", "0.7", "--out", str(path)]
-    assert command.run(simulate.main, call) == 0
-    truth = json.loads(path.with_suffix(".truth.json").read_text())
+    made = simulate(
+        path,
+        track_only=True,
+        solver="fine",
+        seed=4,
+        track_noise=1e-5,
+        effects=[name],
+        strength=0.7,
+    )
+    (truth,) = made.truths
     assert truth["effect"] == name
     clip, observed = load_clip(path), read_observation_csv(path)
     errors = {}
@@ -147,8 +153,8 @@ def test_the_library_mends_what_simulate_hides(name, tmp_path, x64):
 
 def test_truth_file_says_what_the_yaml_does_not(tmp_path):
     path = tmp_path / "clip.csv"
-    call = ["--track-only", "--effect", "scale_error:scale_error=0.05", "--effect", "air_drag"]
-    assert command.run(simulate.main, [*call, "--faults", "--series", "2", "--out", str(path)]) == 0
+    effects = {"scale_error": {"scale_error": 0.05}, "air_drag": {}}
+    simulate(path, track_only=True, effects=effects, faults=True, series=2)
     names = sorted(item.name for item in tmp_path.iterdir())
     ends = (".csv", ".truth.json", ".yaml")
     assert names == sorted(f"clip_{i}{end}" for i in (1, 2) for end in ends)

@@ -5,7 +5,8 @@ import time
 
 import pytest
 
-from galileo_jax.commands import command, simulate, sweep
+from galileo_jax.api.simulate import simulate
+from galileo_jax.commands import command, sweep
 from galileo_jax.files.package_data import config_path
 from galileo_jax.sweeping.resources import Resources
 from galileo_jax.sweeping.task import Task
@@ -41,8 +42,7 @@ def rows_of(folder):
 def tracks(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tracks")
     for seed in range(4):
-        words = ["--track-only", "--seed", str(seed), "--out", f"{folder}/track_{seed}.csv"]
-        assert command.run(simulate.main, words) == 0
+        simulate(folder / f"track_{seed}.csv", track_only=True, seed=seed)
     return folder
 
 

@@ -1,10 +1,8 @@
 """What a scenario is: what its clip must declare, along what its objects move, by which laws."""
 
-import importlib
-import pkgutil
 from dataclasses import dataclass
 
-LIBRARY = "galileo_jax.clip.scenarios.library"
+from galileo_jax.runtime.registry import Registry
 
 
 @dataclass(frozen=True)
@@ -35,22 +33,7 @@ class Scenario:
     keys: tuple[str, ...] = ()
 
 
-SCENARIOS: dict[str, Scenario] = {}
-
-
-def register(scenario: Scenario) -> Scenario:
-    """Makes a scenario known under its name.
-
-    Raises:
-      ValueError: the name is taken.
-    """
-    if scenario.name in SCENARIOS:
-        raise ValueError(f"two scenarios are named {scenario.name!r}")
-    SCENARIOS[scenario.name] = scenario
-    return scenario
-
-
-def load_library() -> None:
-    """Registers the library."""
-    for module in pkgutil.iter_modules(importlib.import_module(LIBRARY).__path__):
-        importlib.import_module(f"{LIBRARY}.{module.name}")
+SCENARIOS: Registry[Scenario] = Registry(
+    "scenario", "scenarios", "galileo_jax.clip.scenarios.library"
+)
+register = SCENARIOS.register

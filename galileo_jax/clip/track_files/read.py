@@ -3,15 +3,12 @@
 What the file does not tell is asked for in one line that names the key and its choices.
 """
 
-import importlib
 import math
-import pkgutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.clip import track_files
 from galileo_jax.clip.schema import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, ClipFile, short
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
@@ -160,15 +157,12 @@ def _is_ours(head: bytes) -> bool:
 
 
 def _reader(path: Path, head: bytes) -> type[TrackReader]:
-    for module in pkgutil.iter_modules(track_files.__path__):
-        importlib.import_module(f"{track_files.__name__}.{module.name}")
-    known = [readers.get(name) for name in readers.names()]
-    for reader in known:
+    for reader in readers.values():
         if reader.claims(head):
             return reader
     raise InputError(
         f"{path}: not a track file that is known: csv with time_s, object1_x_m, object1_y_m; "
-        f"{'; '.join(reader.meaning for reader in known)}"
+        f"{'; '.join(reader.meaning for reader in readers.values())}"
     )
 
 

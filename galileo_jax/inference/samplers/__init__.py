@@ -1,6 +1,5 @@
 """Metropolis-Hastings samplers and the driver that runs them."""
 
-from galileo_jax.inference.samplers import thesis
 from galileo_jax.inference.samplers.driver import (
     Progress,
     Settings,
@@ -15,9 +14,6 @@ from galileo_jax.inference.samplers.sampler import (
     LogDensity,
     State,
 )
-from galileo_jax.runtime.registry import load_entries
-
-load_entries("galileo_jax.inference.samplers.library")
 
 __all__ = [
     "AbstractSampler",
@@ -31,5 +27,4 @@ __all__ = [
     "sample",
     "sampler_class",
     "sampler_names",
-    "thesis",
 ]

@@ -10,17 +10,22 @@ the plane of the picture. Hooks see and return numbers along it, positive downhi
 the ramp; in the plane, along the velocity.
 """
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple
 
 import jax
+import numpy as np
+from jaxtyping import Float
 
 from galileo_jax.model.parameters import Parameter
 
-# NumPy or JAX arrays alike; shapes are said in the docstrings.
-Array = Any
-Theta = Mapping[str, Array]
+# NumPy or JAX arrays alike; the leading axes are the batch's.
+AnyArray = np.ndarray | jax.Array
+Array = Float[AnyArray, "..."]
+PerObject = Float[AnyArray, "... object"]
+Theta = Mapping[str, Any]
+"""Parameters by name, each `[...]` (a number, or one for each of a batch)."""
 
 
 class State(NamedTuple):
@@ -34,10 +39,10 @@ class State(NamedTuple):
       is_on_ramp: `[..., object]`.
     """
 
-    path_m: Array
-    speed_m_s: Array
-    time_s: Array
-    is_on_ramp: Array
+    path_m: PerObject
+    speed_m_s: PerObject
+    time_s: Float[AnyArray, ""]
+    is_on_ramp: PerObject
 
 
 class Bounce(NamedTuple):
@@ -56,8 +61,8 @@ class Bounce(NamedTuple):
 
 FALL_LENGTH = "fall_length"  # in `Surroundings.expected`, of a high fall
 
-Force = Callable[[State], Array]
-Friction = Callable[[State, Array], Array]
+Force = Callable[[State], PerObject]
+Friction = Callable[[State, PerObject], PerObject]
 
 _ARRAYS = (
     "angle_rad",
@@ -96,7 +101,7 @@ class Surroundings:
     Attributes:
       names: of the objects.
       angle_rad: the ramp's; of a path straight down pi / 2, in the plane 0.
-      gravity: m/s^2.
+      gravity: m/s^2, as declared; to the hooks of the motion `[...]` where it is inferred.
       half_length_m, half_height_m: `[object]`, along the travel and across it.
       corner_m: `[object]`, x at which each centre's path bends from ramp to table; inf
         without a table.
@@ -194,15 +199,17 @@ class Effect:
         """
         return 1.0
 
-    def start(self, path_m: Array, theta: Theta, scene: Surroundings) -> Array:
+    def start(self, path_m: PerObject, theta: Theta, scene: Surroundings) -> PerObject:
         """Moves the centres at the release along the path: `[..., object]` to the same."""
         return path_m
 
-    def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def start_speed(self, theta: Theta, scene: Surroundings) -> PerObject | None:
         """Returns the speed at the release `[..., object]`, m/s, or None."""
         return None
 
-    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def start_velocity(
+        self, theta: Theta, scene: Surroundings
+    ) -> Float[AnyArray, "... object 2"] | None:
         """Returns the velocity in the plane at the start `[..., object, 2]`, m/s, or None."""
         return None
 
@@ -221,7 +228,7 @@ class Effect:
         """
         return None
 
-    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
+    def inertia(self, theta: Theta, scene: Surroundings) -> PerObject | None:
         """Returns the inertia on top of the mass, as a share of it `[..., object]`, or None."""
         return None
 
@@ -230,6 +237,10 @@ class Effect:
 
         In the plane: how far gravity points forward of the picture's vertical, and 0.
         """
+        return None
+
+    def gravity(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns the acceleration of free fall `[...]`, m/s^2, or None: as declared."""
         return None
 
     def foot(self, theta: Theta, scene: Surroundings) -> Array | None:
@@ -248,10 +259,27 @@ class Effect:
         """Returns what follows from the parameters and is worth telling: name to value and unit."""
         return {}
 
-    def time(self, time_s: Array, theta: Theta, scene: Surroundings) -> Array:
+    def time(
+        self, time_s: Float[AnyArray, " frame"], theta: Theta, scene: Surroundings
+    ) -> Float[AnyArray, " frame"]:
         """Maps the clip's time to the time since the release, s: `[frame]` to `[frame]`."""
         return time_s
 
-    def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
+    def measure(
+        self, position_m: Float[AnyArray, "object 2 frame"], theta: Theta, scene: Surroundings
+    ) -> Float[AnyArray, "object 2 frame"]:
         """Maps true centres to measured ones, `[object, 2, frame]`, m (scale, camera)."""
         return position_m
+
+
+def true_surroundings(effects: Sequence[Effect], theta: Theta, scene: Surroundings) -> Surroundings:
+    """The scene with what the parameters say of gravity in place of what is declared."""
+    for effect in effects:
+        if (gravity := effect.gravity(theta, scene)) is not None:
+            scene = replace(scene, gravity=gravity)
+    return scene
+
+
+def infers_gravity(effects: Sequence[Effect]) -> bool:
+    """Whether one of the effects puts a parameter in place of the declared gravity."""
+    return any(type(effect).gravity is not Effect.gravity for effect in effects)

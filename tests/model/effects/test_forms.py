@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.diagnosis.diagnose import DECISIVE
+from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.model.effects import effect_names
 from galileo_jax.model.effects.effect import State
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
@@ -17,7 +17,7 @@ from galileo_jax.rollout.motion import dynamics
 from tests.model.effects.motion import INCLINE, PAIR
 
 K = np.array([0.2, 0.3])
-STATE = State(np.array([-0.3, 0.1]), np.array([0.5, 0.2]), 0.4, np.array([True, False]))
+STATE = State(np.array([-0.3, 0.1]), np.array([0.5, 0.2]), np.asarray(0.4), np.array([True, False]))
 
 
 def theta(**given):

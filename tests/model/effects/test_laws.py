@@ -93,7 +93,7 @@ def test_static_friction_delays_the_start(extra):
     assert found == pytest.approx(late, abs=SLOW_S)
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(e=st.floats(0.05, 1.0), m1=st.floats(0.1, 2.0), m2=st.floats(0.1, 2.0))
 def test_restitution_is_the_one_named(e, m1, m2):
     experiment = replace(SMOOTH, mass_kg=(m1, m2))
@@ -191,7 +191,7 @@ PATCH = {"friction_patch_start": 0.2, "friction_patch_length": 0.1}
 BRAKE = {"magnetic_brake_start": 0.2, "magnetic_brake_length": 0.1}
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(release=st.floats(0.3, 1.0), rougher=st.floats(0.0, 0.5))
 def test_friction_patch_takes_its_work(release, rougher):
     """Without other friction v^2 / 2 falls by dk g L; what has less than that stops within."""
@@ -227,7 +227,7 @@ def test_surface_friction_is_of_the_table(rougher, k):
     assert np.diff(moving) == pytest.approx(-k * G * motion.times_s[1], abs=EXACT)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(release=st.floats(0.35, 1.0), b=st.floats(0.1, 4.0), mass=st.floats(0.2, 2.0))
 def test_magnetic_brake_takes_the_same_from_every_speed(release, b, mass):
     """dv/dq = -b / m: what passes has lost b L / m; what cannot stops within."""

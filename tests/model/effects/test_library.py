@@ -100,7 +100,7 @@ def engines():
 
 
 @pytest.mark.parametrize("scene", SCENES)
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(
     masses=st.tuples(*[st.floats(0.05, 3.0)] * 2), frictions=st.tuples(*[st.floats(0.0, 0.6)] * 2)
 )

@@ -18,7 +18,7 @@ SCENE = replace(INCLINE, start_m=((0.0, TOP_M),), expected=EXPECTED)
 
 def seen(y: np.ndarray, growth: float) -> np.ndarray:
     place = np.stack([0 * y, y])[None]
-    return Perspective().measure(place, {"perspective": growth}, SCENE)[0, 1]
+    return np.asarray(Perspective().measure(place, {"perspective": growth}, SCENE)[0, 1])
 
 
 @pytest.mark.parametrize(("height_m", "away_m"), [(1.6, 45.0), (40.0, 60.0)])

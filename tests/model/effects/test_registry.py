@@ -59,6 +59,8 @@ def test_effects_are_made_by_name_in_one_order():
 def test_an_unknown_name_lists_the_known():
     with pytest.raises(InputError, match="unknown effect 'drga'; known: air_drag, constant_force"):
         make_effects(["drga"])
+    with pytest.raises(InputError, match=r"table_tilt, viscous_drag; did you mean air_drag\?$"):
+        make_effects(["airdrag"])
 
 
 def test_a_name_given_twice():
@@ -155,6 +157,7 @@ def announce(monkeypatch, value):
         return [entry] if group == registry.ENTRY_POINTS else []
 
     monkeypatch.setattr(importlib.metadata, "entry_points", entry_points)
+    monkeypatch.setattr(registry.effect_registry, "_is_loaded", False)
 
 
 def test_installed_packages_bring_effects(tmp_path, monkeypatch):

@@ -43,7 +43,7 @@ class Liquid(Effect):
         """Buoyancy and drag."""
         if self.name not in scene.laws:
             return None
-        lift = (theta["density_ratio"] * theta["m1"])[..., None] * scene.gravity
+        lift = (theta["density_ratio"] * theta["m1"] * scene.gravity)[..., None]
         constant = theta["liquid_drag"][..., None]
 
         def push(state: State):

@@ -44,7 +44,7 @@ class Spring(Effect):
         mass = theta["m1"][..., None]
         stiffness = mass * (2 * math.pi / theta["period"][..., None]) ** 2
         rubbing = 2 * mass * theta["damping"][..., None]
-        rest, weight = theta["rest"][..., None], mass * scene.gravity
+        rest, weight = theta["rest"][..., None], (theta["m1"] * scene.gravity)[..., None]
 
         def pull(state: State):
             return -stiffness * (state.path_m - rest) - rubbing * state.speed_m_s - weight

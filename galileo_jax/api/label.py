@@ -1,0 +1,94 @@
+"""`label`: what is known about a clip, into the yaml beside it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from galileo_jax.clip.declaration import Declaration
+from galileo_jax.clip.label import LabelledClip, label_clip
+
+
+def label(
+    clip: str | Path,
+    *,
+    scenario: str | None = None,
+    fps: float | None = None,
+    point: Mapping[str, Sequence[float]] | None = None,
+    size: Mapping[str, Sequence[float]] | None = None,
+    shape: Mapping[str, str] | None = None,
+    first_frame: Mapping[str, int | None] | None = None,
+    pixels_per_metre: float | None = None,
+    scale: Sequence[float] | None = None,
+    ramp_angle: float | None = None,
+    ramp: Sequence[float] | None = None,
+    track_units: str | None = None,
+    track_y: str | None = None,
+    track_origin: Sequence[float] | None = None,
+    direction: str | None = None,
+    origin: Sequence[float] | None = None,
+    gravity: float | None = None,
+    level: str = "trial",
+) -> LabelledClip:
+    """Writes what is known about a clip into the yaml beside it, or creates that.
+
+    Comments and order of a yaml that is there stay. Nothing is written unless the result is
+    valid. Pixels: x right, y down, as any image viewer shows them.
+
+    Args:
+      clip: the video, the track file or the yaml.
+      scenario: what the clip shows, such as ramp, incline or fall.
+      fps: true frames per second; a new yaml takes the video's otherwise.
+      point: object name to its centre in its first frame, (x, y), px; a new name adds an
+        object, as do the next three.
+      size: object name to its size, m. box: length, depth, height; cylinder: radius, length;
+        torus: radii; sphere: radius.
+      shape: object name to box (default of a new object), cylinder, torus or sphere.
+      first_frame: object name to the first frame in which it moves by itself, from 0; None: to
+        be found.
+      pixels_per_metre: of the picture.
+      scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
+      ramp_angle: of the ramp, degrees.
+      ramp: (x1, y1, x2, y2): two pixels on the ramp: its angle and direction.
+      track_units: of a track file: m, cm, mm, in, ft or px.
+      track_y: of a track file: whether y points up or down.
+      track_origin: of a track file: the foot of the ramp, (x, y), in its unit and along its
+        axes.
+      direction: of the travel: right or left.
+      origin: the foot of the ramp, (x, y), px.
+      gravity: m/s^2.
+      level: of a clip in folders of Physics 101: about which of them this is declared:
+        scenario, setup, object or trial (points are always of the trial, sizes of the object).
+
+    Returns:
+      The yaml's path, the clip as it is declared now (`clip.warnings` has doubts), and notes.
+
+    Raises:
+      InputError: nothing is declared, or the clip would be wrong; nothing is written then.
+
+    Example:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
+      >>> gx.label("slide.csv", gravity=9.8).clip.gravity
+      9.8
+    """
+    return label_clip(
+        Path(clip),
+        Declaration(
+            scenario=scenario,
+            fps=fps,
+            point=point or {},
+            size=size or {},
+            shape=shape or {},
+            first_frame=first_frame or {},
+            pixels_per_metre=pixels_per_metre,
+            scale=scale,
+            ramp_angle=ramp_angle,
+            ramp=ramp,
+            track_units=track_units,
+            track_y=track_y,
+            track_origin=track_origin,
+            direction=direction,
+            origin=origin,
+            gravity=gravity,
+            level=level,
+        ),
+    )

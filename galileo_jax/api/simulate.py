@@ -1,0 +1,197 @@
+"""`simulate`: a clip with known truth, or a series of them."""
+
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.simulation.clip_writer import write_clips
+from galileo_jax.simulation.motion import Solver
+from galileo_jax.simulation.settings import Settings
+
+Effects = Mapping[str, Mapping[str, float]] | Sequence[str]
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What `simulate` wrote.
+
+    Attributes:
+      clips: the videos or csv tracks, one per trial; `load` takes each.
+      truths: what is true of each, as in its NAME.truth.json (SI units, angles in degrees).
+      paths: every file written: of each clip the video or track, the yaml, the truth.
+    """
+
+    clips: tuple[Path, ...]
+    truths: tuple[dict[str, Any], ...]
+    paths: tuple[Path, ...]
+
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"<Simulated {', '.join(str(clip) for clip in self.clips)}>"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (str(clip), truth["scenario"], truth["effect"])
+            for clip, truth in zip(self.clips, self.truths, strict=True)
+        ]
+        cells = ["".join(f"<td>{html.escape(cell)}</td>" for cell in row) for row in rows]
+        head = "<tr><th>clip</th><th>scenario</th><th>hidden effect</th></tr>"
+        return f"<table>{head}{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
+
+
+@in_float64
+def simulate(
+    out: str | Path,
+    *,
+    seed: int = 0,
+    scenario: str = "ramp",
+    shapes: Sequence[str] | None = None,
+    angle: float = 20.0,
+    seconds: float | None = None,
+    fps: float = 30.0,
+    m1: float | None = None,
+    k1: float | None = None,
+    m2: float | None = None,
+    k2: float | None = None,
+    motion: Literal["planar", "free"] = "planar",
+    z2: float | None = None,
+    solver: Solver = "rigid",
+    values: Mapping[str, float] | None = None,
+    floor: bool = False,
+    series: int | None = None,
+    track_only: bool = False,
+    track_noise: float = 0.0002,
+    effects: Effects = (),
+    strength: float | None = None,
+    effects_from: str | Path | Sequence[str | Path] = (),
+    faults: bool = False,
+    size: tuple[int, int] = (640, 360),
+    direction: Literal["right", "left"] = "right",
+    no_points: bool = False,
+    hand: bool = False,
+    camera_fault: str | Sequence[str] = (),
+    noise: float = 4.0,
+    exposure: float = 0.008,
+    defocus: float = 0.0,
+    missed_frames: int = 0,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Simulated:
+    """Makes a clip with known truth: NAME.mp4 (or NAME.csv), NAME.yaml and NAME.truth.json.
+
+    What is not given is drawn at random; the same seed makes the same files. Either all files
+    are written or none.
+
+    Args:
+      out: DIR/NAME.mp4, or DIR/NAME.csv for a track.
+      seed: of everything that is drawn, 0 or more.
+      scenario: ramp, multi or incline; fall, flight, spring or liquid.
+      shapes: of the objects on a ramp, in the order of the travel (box, cylinder, torus,
+        sphere); round ones roll. None: as many boxes as the scenario has.
+      angle: of the ramp, degrees, 1 to 60.
+      seconds: length of the clip, s. None: until everything is at rest.
+      fps: frames per second, 5 to 1000.
+      m1: mass of object 1, kg, 0.01 to 100. None: drawn.
+      k1: coefficient of friction of object 1, 0 to 2. None: drawn.
+      m2: mass of object 2, kg. None: drawn.
+      k2: coefficient of friction of object 2. None: drawn.
+      motion: "planar"; "free": objects that are hit turn and tip (tracks only).
+      z2: how far object 2 stands off the plane of the motion, towards the camera, m (free
+        motion only).
+      solver: "rigid": the engine that also fits; "fine": small steps, not the engine that fits.
+      values: further parameters of the scenario, such as {"k3": 0.2} or
+        {"floor_restitution": 0.7}, SI units (the command's --set).
+      floor: of a fall or a flight: the object bounces.
+      series: so many trials of the same objects: NAME_1, NAME_2, ...
+      track_only: a csv track in place of the video.
+      track_noise: standard deviation of a track's coordinates, m.
+      effects: what is hidden, in the truth and not in the yaml: names, or name to
+        {parameter: value} in SI units; what is left out is drawn (the command's --effect).
+      strength: of the hidden effects, 0 (weak) to 1 (strong). None: drawn.
+      effects_from: Python files that register further effects.
+      faults: small faults of real clips: release between frames, foot and impact not ideal.
+      size: of the picture, (width, height), px, even numbers.
+      direction: of the travel in the picture.
+      no_points: the yaml does not say where the objects are.
+      hand: a hand lets object 1 go.
+      camera_fault: keystone, roll (how the camera is held), origin, points (of the yaml, off by
+        a few px); one or several.
+      noise: of the sensor, grey levels of 255.
+      exposure: of a frame, s.
+      defocus: standard deviation of the blur, px.
+      missed_frames: so many frames show the one before once more.
+      on_progress: called with the stage, the share done (0 to 1) and None.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Returns:
+      The files and what is true of them.
+
+    Raises:
+      InputError: a value is out of its range, an option has no part in the clip asked for, or
+        a file cannot be written; nothing is written then.
+      Cancelled: `cancel` was set; nothing is written.
+
+    Example:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("slide.csv", seed=1, m1=0.2, track_only=True)
+      >>> made
+      <Simulated slide.csv>
+      >>> made.truths[0]["m1"]
+      0.2
+    """
+    settings = Settings(
+        seed=seed,
+        scenario=scenario,
+        shapes=shapes,
+        angle=angle,
+        seconds=seconds,
+        fps=fps,
+        m1=m1,
+        k1=k1,
+        m2=m2,
+        k2=k2,
+        motion=motion,
+        z2=z2,
+        solver=solver,
+        values=values or {},
+        floor=floor,
+        series=series,
+        track_only=track_only,
+        track_noise=track_noise,
+        effects=_by_name(effects),
+        strength=strength,
+        effects_from=(effects_from,) if isinstance(effects_from, str | Path) else effects_from,
+        faults=faults,
+        size=size,
+        direction=direction,
+        no_points=no_points,
+        hand=hand,
+        camera_fault=(camera_fault,) if isinstance(camera_fault, str) else camera_fault,
+        noise=noise,
+        exposure=exposure,
+        defocus=defocus,
+        missed_frames=missed_frames,
+    )
+    with progress.scope(on_progress, cancel):
+        written = write_clips(Path(out), settings)
+    return Simulated(
+        clips=tuple(one.clip for one in written),
+        truths=tuple(one.truth for one in written),
+        paths=tuple(path for one in written for path in (one.clip, one.yaml, one.truth_file)),
+    )
+
+
+def _by_name(effects: Effects) -> Mapping[str, Mapping[str, float]]:
+    """Parameters by effect; a name alone has none given."""
+    if isinstance(effects, Mapping):
+        return effects
+    names = (effects,) if isinstance(effects, str) else tuple(effects)
+    if len(set(names)) < len(names):
+        raise InputError("--effect: an effect is named twice")
+    return {name: {} for name in names}

@@ -1,0 +1,152 @@
+"""`train`: the neural estimators, and their errors on new samples."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from galileo_jax.files.atomic_write import write_json, write_text
+from galileo_jax.files.package_data import config_path
+from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import check_known
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+
+if TYPE_CHECKING:
+    from galileo_jax.neural.config import TrainConfig
+    from galileo_jax.neural.evaluation import Evaluation
+
+PRESETS = ("thesis", "galileo")
+LEAST = {"samples": 100, "max_epochs": 1, "frames": 25, "seed": 0}
+SHARE_DATA = 0.5  # of the time, about, that goes into the samples
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A finished training.
+
+    Attributes:
+      folder: with network.npz, loss.svg, training.json, and checkpoints to go on from.
+      losses: (training, validation) of every epoch.
+      best_validation_loss: of the network that was saved.
+      seconds: of the call, s.
+      data_seconds: of these, for the samples, s.
+    """
+
+    folder: Path
+    losses: tuple[tuple[float, float], ...]
+    best_validation_loss: float
+    seconds: float
+    data_seconds: float
+
+    def __repr__(self) -> str:
+        """In one line."""
+        epochs, loss = len(self.losses), self.best_validation_loss
+        return f"<Trained {self.folder}: {epochs} epochs, validation loss {loss:.5f}>"
+
+
+@in_float64
+def train(
+    out: str | Path,
+    *,
+    preset: Literal["thesis", "galileo"] = "galileo",
+    config: str | Path | None = None,
+    data: str | Path | None = None,
+    samples: int | None = None,
+    max_epochs: int | None = None,
+    frames: int | None = None,
+    seed: int | None = None,
+    engine: Literal["auto", "rigid", "c", "mjx"] | None = None,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Trained:
+    """Trains a network on simulated samples, or goes on where an earlier call stopped.
+
+    Args:
+      out: folder for the network, its samples and its checkpoints.
+      preset: which network, data and loss.
+      config: a YAML file in place of the preset's own.
+      data: folder of the samples. None: `out`/data.
+      samples: how many, 100 or more. None: the config's, as for all below.
+      max_epochs: the end at the latest.
+      frames: displacements in a profile (thesis: 60 or 110).
+      seed: of samples and weights.
+      engine: that makes the samples (thesis).
+      on_progress: called with the stage, the share done (0 to 1), and in training with epoch,
+        learning rate and losses so far.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Raises:
+      InputError: the config is wrong, or the folder holds samples or checkpoints of another.
+      Cancelled: `cancel` was set; the last whole epoch is saved.
+    """
+    check_known("--preset", "preset", preset, PRESETS)
+    if engine is not None:
+        check_known("--engine", "engine", engine, ENGINES)
+    overrides = {
+        "samples": samples,
+        "frames": frames,
+        "seed": seed,
+        "engine": engine,
+        "max_epochs": max_epochs,
+    }
+    for name, least in LEAST.items():
+        value = overrides[name]
+        if value is not None and not (isinstance(value, int) and value >= least):
+            option = name.replace("_", "-")
+            raise InputError(f"--{option}: '{value}' is no whole number, {least} or more")
+    out = Path(out)
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out: {out} is a file; a folder expected")
+    from galileo_jax.neural.config import load_config
+
+    path = Path(config) if config else config_path(f"train_{preset}.yaml")
+    with progress.scope(on_progress, cancel):
+        return _train(out, load_config(path, **overrides), Path(data or out / "data"))
+
+
+def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
+    from galileo_jax.neural.dataset import load_or_make
+    from galileo_jax.neural.presets import make_task
+    from galileo_jax.neural.training import train as train_network
+    from galileo_jax.report.loss_curve import loss_svg
+
+    task = make_task(config)
+    began = time.perf_counter()
+    with progress.part(0.0, SHARE_DATA):
+        samples = load_or_make(task, config, data_folder)
+    data_s = time.perf_counter() - began
+    with progress.part(SHARE_DATA, 1.0):
+        done = train_network(task, config, samples, out)
+    write_text(out / "loss.svg", loss_svg(done.losses))
+    seconds = time.perf_counter() - began
+    write_json(
+        out / "training.json",
+        {
+            "config": config.model_dump(),
+            "epochs": done.epoch,
+            "best_validation_loss": done.best,
+            "seconds": {"data": round(data_s, 1), "all": round(seconds, 1)},
+        },
+    )
+    return Trained(out, done.losses, done.best, seconds, data_s)
+
+
+@in_float64
+def evaluate_network(network: str | Path) -> "Evaluation":
+    """Tests a trained network on 1,000 new samples (the command's --test).
+
+    Args:
+      network: the folder of a training, where test.json is written, or a network's file.
+
+    Returns:
+      `found`: measure to its value; `reference`: what others reach in the same test.
+
+    Raises:
+      InputError: there is no network of this version.
+    """
+    from galileo_jax.neural import evaluation
+
+    return evaluation.evaluate_network(Path(network))

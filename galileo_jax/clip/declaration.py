@@ -1,0 +1,149 @@
+"""What a user says about a clip, as values of its yaml."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from galileo_jax.runtime.errors import InputError
+
+LEVELS = ("scenario", "setup", "object", "trial")
+"""Folders of Physics 101 about which something can be declared."""
+
+NUMBERS = {
+    "fps": "fps",
+    "ramp_angle": "ramp_angle_deg",
+    "pixels_per_metre": "pixels_per_metre",
+    "gravity": "gravity",
+}
+WORDS = ("scenario", "direction", "track_units", "track_y")
+POINTS = {"origin": "origin_px", "track_origin": "track_origin"}
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """One call of `label`; None and empty mappings say nothing.
+
+    Attributes:
+      scenario: one of `SCENARIOS`.
+      fps: true frames per second.
+      point: object to its centre in its first frame, (x, y), px.
+      size: object to its size, m.
+      shape: object to its shape.
+      first_frame: object to the first frame in which it moves by itself, from 0; None: to be
+        found.
+      pixels_per_metre: of the picture.
+      scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
+      ramp_angle: of the ramp, degrees.
+      ramp: (x1, y1, x2, y2): two pixels on the ramp.
+      track_units: of a track file.
+      track_y: of a track file: whether y points up or down.
+      track_origin: of a track file: the foot of the ramp, (x, y), in its unit.
+      direction: of the travel: right or left.
+      origin: the foot of the ramp, (x, y), px.
+      gravity: m/s^2.
+      level: Physics 101: the folder about which all this is declared.
+    """
+
+    scenario: str | None = None
+    fps: float | None = None
+    point: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    size: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    shape: Mapping[str, str] = field(default_factory=dict)
+    first_frame: Mapping[str, int | None] = field(default_factory=dict)
+    pixels_per_metre: float | None = None
+    scale: Sequence[float] | None = None
+    ramp_angle: float | None = None
+    ramp: Sequence[float] | None = None
+    track_units: str | None = None
+    track_y: str | None = None
+    track_origin: Sequence[float] | None = None
+    direction: str | None = None
+    origin: Sequence[float] | None = None
+    gravity: float | None = None
+    level: str = LEVELS[-1]
+
+    def clip_values(self) -> dict[str, Any]:
+        """The yaml's values that belong to no object, by key.
+
+        Raises:
+          InputError: a value is no number, two pixels are no line, or two options say the same.
+        """
+        for one, other in (("pixels_per_metre", "scale"), ("ramp_angle", "ramp")):
+            if getattr(self, one) is not None and getattr(self, other) is not None:
+                raise InputError(f"{_option(one)}: not allowed with {_option(other)}")
+        values: dict[str, Any] = {}
+        if self.ramp is not None:
+            values |= _ramp(*_numbers("--ramp", self.ramp, 4))
+        if self.scale is not None:
+            numbers = _numbers("--scale", self.scale, 5)
+            values["pixels_per_metre"] = _pixels_per_metre(*numbers)
+        for name, key in POINTS.items():
+            if (point := getattr(self, name)) is not None:
+                values[key] = _numbers(_option(name), point, 2)
+        for name in WORDS:
+            if (word := getattr(self, name)) is not None:
+                values[name] = word
+        for name, key in NUMBERS.items():
+            if (number := getattr(self, name)) is not None:
+                values[key] = _numbers(_option(name), [number], 1)[0]
+        return values
+
+    def object_values(self) -> dict[str, dict[str, Any]]:
+        """The values of each object that is named, by key.
+
+        Raises:
+          InputError: a value is no number, or no frame.
+        """
+        objects: dict[str, dict[str, Any]] = {}
+        for name, shape in self.shape.items():
+            objects.setdefault(name, {})["shape"] = shape
+        for name, size in self.size.items():
+            objects.setdefault(name, {})["size_m"] = _numbers(f"--size {name}", size)
+        for name, point in self.point.items():
+            objects.setdefault(name, {})["point_px"] = _numbers(f"--point {name}", point, 2)
+        for name, frame in self.first_frame.items():
+            if not (frame is None or (isinstance(frame, int) and frame >= 0)):
+                text = str(frame)
+                raise InputError(
+                    f"--first-frame {name}: {text!r} is not a frame number from 0, or null"
+                )
+            objects.setdefault(name, {})["first_frame"] = frame
+        return objects
+
+
+def _option(name: str) -> str:
+    return "--" + name.replace("_", "-")
+
+
+def _numbers(option: str, values: Sequence[Any], count: int | None = None) -> list[float]:
+    if count is not None and len(values) != count:
+        raise InputError(f"{option}: {len(values)} values given; {count} expected")
+    numbers = []
+    for value in values:
+        try:
+            numbers.append(float(value))
+        except (TypeError, ValueError):
+            raise InputError(f"{option}: {value!r} is not a number") from None
+    return numbers
+
+
+def _ramp(x1: float, y1: float, x2: float, y2: float) -> dict[str, Any]:
+    """Angle and direction of a line that falls along the travel."""
+    (high_x, high_y), (low_x, low_y) = sorted([(x1, y1), (x2, y2)], key=lambda point: point[1])
+    dx, dy = low_x - high_x, low_y - high_y
+    if not (math.isfinite(dx) and math.isfinite(dy)) or dx == 0 or dy == 0:
+        raise InputError(
+            f"--ramp: the two pixels differ by {dx:g} and {dy:g}; a sloping line expected"
+        )
+    angle = round(math.degrees(math.atan2(abs(dy), abs(dx))), 3)
+    return {"ramp_angle_deg": angle, "direction": "right" if low_x > high_x else "left"}
+
+
+def _pixels_per_metre(x1: float, y1: float, x2: float, y2: float, metres: float) -> float:
+    distance = math.hypot(x2 - x1, y2 - y1)
+    if not (math.isfinite(distance) and distance > 0):
+        raise InputError("--scale: the two pixels are the same or not finite")
+    if not (math.isfinite(metres) and metres > 0):
+        raise InputError(f"--scale: {metres:g} is not a distance; metres above 0 expected")
+    return round(distance / metres, 3)

@@ -1,0 +1,136 @@
+"""Writing what is known about a clip into the yaml beside it, if the result is valid."""
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.clip.declaration import LEVELS, Declaration
+from galileo_jax.clip.load import (
+    YAML_SUFFIXES,
+    check_belongs,
+    check_clip,
+    find_yaml,
+    has_yaml,
+    with_unused,
+)
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.sources import source_of
+from galileo_jax.clip.track_files.read import is_track
+from galileo_jax.clip.yaml_file import read_mapping, yaml_text
+from galileo_jax.clip.yaml_update import updated_text
+from galileo_jax.files.atomic_write import write_text
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import check_known
+from galileo_jax.video.decode import probe
+
+KEY_ORDER = (
+    "video",
+    "track",
+    "track_units",
+    "track_y",
+    "track_origin",
+    "scenario",
+    "fps",
+    "ramp_angle_deg",
+    "direction",
+    "pixels_per_metre",
+    "origin_px",
+    "gravity",
+    "objects",
+)
+
+
+@dataclass(frozen=True)
+class LabelledClip:
+    """What `label` wrote.
+
+    Attributes:
+      path: of the yaml.
+      clip: as it is declared now.
+      notes: what to know about the writing, one line each.
+    """
+
+    path: Path
+    clip: Clip
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"<LabelledClip {self.path}>"
+
+
+def label_clip(path: Path, declared: Declaration) -> LabelledClip:
+    """Creates or updates the yaml beside a clip; comments and order of an old one stay.
+
+    Raises:
+      InputError: nothing is declared, or the clip would be wrong; nothing is written then.
+    """
+    if not has_yaml(path) and (source := source_of(path)):
+        check_known("--level", "level", declared.level, LEVELS)
+        return source.label(path, declared)
+    if declared.level != LEVELS[-1]:
+        raise InputError(f"--level: {path} is not in folders of Physics 101")
+    yaml_path = _yaml_path(path)
+    is_new = not yaml_path.exists()
+    old = {} if is_new else read_mapping(yaml_path)
+    content, notes = _defaults(path, declared) if is_new else (copy.deepcopy(old), ())
+    values, objects = declared.clip_values(), declared.object_values()
+    if not values and not objects:
+        raise InputError(f"{path}: nothing to write; see galileo label --help")
+    content |= values
+    if objects:
+        content["objects"] = _with_objects(yaml_path, content.get("objects"), objects)
+    clip = with_unused(check_clip(yaml_path, content))
+    check_belongs(clip, path)
+    if is_new:
+        text = yaml_text({key: content[key] for key in KEY_ORDER if key in content})
+    else:
+        text, lost = updated_file(yaml_path, content)
+        notes += lost
+    write_text(yaml_path, text)
+    return LabelledClip(yaml_path, clip, notes)
+
+
+def updated_file(path: Path, content: Mapping[str, Any]) -> tuple[str, tuple[str, ...]]:
+    """A yaml file's text with new values, and a note where its comments are lost."""
+    old_text = path.read_text(encoding="utf-8-sig")
+    text, has_comments = updated_text(old_text, content, KEY_ORDER)
+    is_lost = not has_comments and "#" in old_text
+    return text, (f"{path} was written afresh; its comments are lost",) if is_lost else ()
+
+
+def _yaml_path(clip_path: Path) -> Path:
+    """The clip's yaml: the one that is there, or the one to create."""
+    is_source = clip_path.is_file() and clip_path.suffix.lower() not in YAML_SUFFIXES
+    is_new = is_source and not has_yaml(clip_path)
+    return clip_path.with_suffix(".yaml") if is_new else find_yaml(clip_path)
+
+
+def _defaults(clip_path: Path, declared: Declaration) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """What a new yaml takes from the file beside it, and a note about it."""
+    if is_track(clip_path):
+        return {"track": clip_path.name}, ()
+    if declared.fps is not None:
+        return {"video": clip_path.name}, ()
+    fps = round(probe(clip_path).fps, 4)
+    note = f"fps: {fps:g} taken from the container; slow-motion clips often lie about it"
+    return {"video": clip_path.name, "fps": fps}, (note,)
+
+
+def _with_objects(
+    yaml_path: Path, listed: Any, objects: Mapping[str, Mapping[str, Any]]
+) -> list[Any]:
+    """The list of objects with new values; a name that is not there is added, as a box."""
+    listed = listed or []
+    if not isinstance(listed, list):
+        raise InputError(f"{yaml_path}: objects: a list with one entry per object expected")
+    names = [item.get("name") if isinstance(item, dict) else None for item in listed]
+    for name, values in objects.items():
+        if name in names:
+            listed[names.index(name)] |= values
+        else:
+            listed.append({"name": name, "shape": "box"} | dict(values))
+            names.append(name)
+    return listed

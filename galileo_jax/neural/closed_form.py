@@ -1,0 +1,527 @@
+"""Closed-form estimates of a track, phase by phase: ramp, table, hit, and after the hit.
+
+    ramp     s'' = g (sin a - k1 cos a)          a parabola through the frames on the ramp
+    table    s'' = -k1 g                         another, between foot and hit
+    hit      m1 (v1 - v1') = m2 v2'              momentum, whatever the rebound
+    after    x(t) = x_end - d (t_end - t)^2 / 2, that is  sqrt(2 (x_end - x)) = sqrt(d) (t_end - t):
+             a straight line through the frames that move; d = k2 g, or, where object 1 goes on
+             pushing, (k1 m1 + k2 m2) g / (m1 + m2)
+
+Each phase has constants of its own, so that neither the foot nor a point off the centre nor a
+late release matters. The estimates know nothing of the camera, of a rebound that separates
+the objects for a while, or of how good they are when few frames carry them.
+
+Everything is pure JAX of one clip; a value of a phase that there is not is finite and means
+nothing.
+"""
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from galileo_jax.neural.seen import Seen
+
+AT_FOOT = 1.2  # half lengths either side of the foot where an object stands on two edges
+MOVED_SD, MOVED_M = 6.0, 3e-4  # beyond doubt
+LEAST_FRAMES = 4
+# What a camera does to the two kinds of slopes (discrepancy.py), so that errors start realistic.
+CAMERA_SD_M_S2 = 0.01
+CAMERA_RATIO_SD = 0.02
+FOOT_SD, REBOUND, REBOUND_SD = 0.05, 0.012, 0.02
+NEVER = 10.0  # m/s, the standard deviation of a speed that nothing tells
+
+
+class Estimate(NamedTuple):
+    """A number `[]` and its standard deviation."""
+
+    value: jax.Array
+    sd: jax.Array
+
+
+class Line(NamedTuple):
+    """A fitted parabola `value + slope (t - at) + curve (t - at)^2 / 2`."""
+
+    value: jax.Array
+    slope: jax.Array
+    curve: jax.Array
+    at_s: jax.Array
+    curve_sd: jax.Array
+    slope_sd: jax.Array
+    count: jax.Array
+
+    def __call__(self, time_s: jax.Array) -> jax.Array:
+        """The parabola at a time."""
+        t = time_s - self.at_s
+        return self.value + self.slope * t + self.curve * t**2 / 2
+
+    def speed(self, time_s: jax.Array) -> jax.Array:
+        """Its slope at a time."""
+        return self.slope + self.curve * (time_s - self.at_s)
+
+
+class Decay(NamedTuple):
+    """A motion that comes to rest: `end - rate (stop - t)^2 / 2`, from the line of its root."""
+
+    rate: jax.Array
+    stop_s: jax.Array
+    rate_sd: jax.Array
+
+
+class Setting(NamedTuple):
+    """What is known before anything is fitted.
+
+    Attributes:
+      frame: `[frame]`, 0, 1, ...
+      dt_s: between two frames.
+      sin, cos: of the ramp's angle.
+      imperfect: 0 in an ideal world, 1 where a camera stands between.
+      along_m: `[frame]`, object 1's place along the ramp.
+      corner_m: `[object]`, x at which the centre turns from the ramp's direction to the table's.
+      margin_m: either side of it, where object 1 stands on two edges.
+      moved_m: `[object]`, so far no noise carries.
+    """
+
+    frame: jax.Array
+    dt_s: jax.Array
+    sin: jax.Array
+    cos: jax.Array
+    imperfect: jax.Array
+    along_m: jax.Array
+    corner_m: jax.Array
+    margin_m: jax.Array
+    moved_m: jax.Array
+
+
+class Onset(NamedTuple):
+    """When object 2 begins to move.
+
+    Attributes:
+      place2_m: where it stands before.
+      gone2: `[frame]`, where it has left.
+      frame: the first of them; the number of frames where there is none.
+      is_hit: whether it is sure that it moves.
+      hit_frame: as `frame`, but the number of frames where it is not sure.
+      before: `[frame]`, surely before it.
+    """
+
+    place2_m: jax.Array
+    gone2: jax.Array
+    frame: jax.Array
+    is_hit: jax.Array
+    hit_frame: jax.Array
+    before: jax.Array
+
+
+class Ramp(NamedTuple):
+    """Object 1 on the ramp.
+
+    Attributes:
+      start_m: its first place along the ramp; gone_m: `[frame]`, the way from there.
+      moves: whether it surely slides.
+      is_there: `[frame]`, on the ramp; is_going: those in which it is surely on its way.
+      path: through the latter; at_once: likewise, from `start_m`.
+      friction: of `path`.
+      friction_at_once: as if let go exactly in the first frame; better where that is so.
+      release_s: when it was let go.
+    """
+
+    start_m: jax.Array
+    gone_m: jax.Array
+    moves: jax.Array
+    is_there: jax.Array
+    is_going: jax.Array
+    path: Line
+    at_once: Line
+    friction: Estimate
+    friction_at_once: jax.Array
+    release_s: jax.Array
+
+
+class Table(NamedTuple):
+    """Object 1 on the table, between foot and hit.
+
+    Attributes:
+      is_there: `[frame]`, on the table; is_sliding: those in which it is not at rest.
+      path: through the latter.
+      friction: of `path`.
+      end1_m, rest1: where object 1 is in the end, and in how many frames.
+    """
+
+    is_there: jax.Array
+    is_sliding: jax.Array
+    path: Line
+    friction: Estimate
+    end1_m: jax.Array
+    rest1: jax.Array
+
+
+class After(NamedTuple):
+    """Both objects after the hit.
+
+    Attributes:
+      is_there: `[object, frame]`, measured after it.
+      slides1, slides2: `[frame]`, where they are not at rest.
+      end2_m, rest2: where object 2 is in the end, and in how many frames.
+      root1, root2: the motions that come to rest; free1, free2: parabolas where they do not.
+      rests1, rests2: whether each comes to rest.
+      decay2: object 2's deceleration, m/s^2.
+      way2_m: how far object 2 goes.
+    """
+
+    is_there: jax.Array
+    slides1: jax.Array
+    slides2: jax.Array
+    end2_m: jax.Array
+    rest2: jax.Array
+    root1: Decay
+    root2: Decay
+    free1: Line
+    free2: Line
+    rests1: jax.Array
+    rests2: jax.Array
+    decay2: Estimate
+    way2_m: jax.Array
+
+
+class Hit(NamedTuple):
+    """The hit: its time, and the speeds before and after it, m/s.
+
+    Attributes:
+      time_s: of the hit; latest_s: when object 2 has surely left.
+      reach_m: x of object 1 where the objects touch.
+      from_table, from_ramp: object 1's speed before, by its places on the table, and by its speed
+        at the foot; before1: both together.
+      own1: object 1's speed after, by its own motion.
+      after1: likewise, and by that both leave a nearly plastic hit together.
+      after2: object 2's.
+    """
+
+    time_s: jax.Array
+    latest_s: jax.Array
+    reach_m: jax.Array
+    from_table: Estimate
+    from_ramp: Estimate
+    before1: Estimate
+    own1: Estimate
+    after1: Estimate
+    after2: Estimate
+
+
+class Phases(NamedTuple):
+    """All of them, and what they say.
+
+    Attributes:
+      friction1: object 1's, from ramp and table.
+      ratio: of the masses, m1 / m2; its error is relative.
+      pushes: object 1 goes on pushing object 2.
+      friction2: object 2's.
+    """
+
+    setting: Setting
+    onset: Onset
+    ramp: Ramp
+    table: Table
+    friction1: Estimate
+    after: After
+    hit: Hit
+    ratio: Estimate
+    pushes: jax.Array
+    friction2: Estimate
+
+
+def fit_phases(seen: Seen) -> Phases:
+    """All estimates of one clip."""
+    setting = _setting(seen)
+    onset = _onset(seen, setting)
+    ramp = _ramp(seen, setting, onset)
+    table = _table(seen, setting, onset)
+    friction1 = _friction1(seen, ramp, table)
+    after = _after(seen, setting, onset, table)
+    hit = _hit(seen, setting, onset, ramp, table, friction1, after)
+    ratio = _mass_ratio(setting, hit)
+    # What brakes harder in front of object 1 is pushed by it.
+    pushes = after.decay2.value > seen.gravity * friction1.value
+    friction2 = _friction2(seen, friction1, after, ratio, pushes)
+    return Phases(setting, onset, ramp, table, friction1, after, hit, ratio, pushes, friction2)
+
+
+def parabola(t: jax.Array, y: jax.Array, mask: jax.Array, noise: jax.Array) -> Line:
+    """Least squares through the masked frames; wide errors where they are too few."""
+    weight = mask.astype(y.dtype)
+    count = weight.sum()
+    at = (weight * t).sum() / jnp.maximum(count, 1)
+    span = jnp.sqrt((weight * (t - at) ** 2).sum() / jnp.maximum(count, 1)) + 1e-6
+    u = (t - at) / span
+    design = jnp.stack([jnp.ones_like(u), u, u**2 / 2])
+    ridge = 1e-9 * jnp.eye(3)
+    covariance = jnp.linalg.inv((design * weight) @ design.T + ridge)
+    base = (weight * y).sum() / jnp.maximum(count, 1)
+    c = covariance @ (design @ (weight * (y - base)))
+    sd = noise * jnp.sqrt(jnp.diagonal(covariance))
+    return Line(c[0] + base, c[1] / span, c[2] / span**2, at, sd[2] / span**2, sd[1] / span, count)
+
+
+def decay(t: jax.Array, left: jax.Array, mask: jax.Array, noise: jax.Array) -> Decay:
+    """Fits `sqrt(2 left) = sqrt(rate) (stop - t)`, weighted for equal errors of `left`."""
+    root = jnp.sqrt(2 * jnp.maximum(left, 1e-9))
+    weight = jnp.where(mask, root**2, 0.0)
+    total = jnp.maximum(weight.sum(), 1e-12)
+    at, mean = (weight * t).sum() / total, (weight * root).sum() / total
+    spread = (weight * (t - at) ** 2).sum()
+    slope = (weight * (t - at) * (root - mean)).sum() / jnp.maximum(spread, 1e-12)
+    slope = jnp.minimum(slope, -1e-3)
+    slope_sd = noise / jnp.sqrt(jnp.maximum(spread, 1e-12))
+    return Decay(slope**2, at - mean / slope, 2 * jnp.abs(slope) * slope_sd)
+
+
+def _combine(one: Estimate, other: Estimate) -> Estimate:
+    """The mean by inverse variance."""
+    weight, against = 1 / one.sd**2, 1 / other.sd**2
+    total = weight + against
+    return Estimate((weight * one.value + against * other.value) / total, 1 / jnp.sqrt(total))
+
+
+def _first(mask: jax.Array) -> jax.Array:
+    return jnp.where(mask.any(), jnp.argmax(mask), mask.shape[0])
+
+
+def _at_end(x: jax.Array, mask: jax.Array, noise: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """The mean place of the last frames that stay in one, and how many they are."""
+    last = x.shape[0] - 1 - jnp.argmax(mask[::-1])
+    near = mask & (jnp.abs(x - x[last]) < jnp.maximum(4 * noise, 5e-5))
+    # Only an unbroken rest counts: the same place on the way is no rest.
+    frames = jnp.arange(x.shape[0])
+    away = jnp.where(mask & ~near, frames, -1).max()
+    near = near & (frames > away)
+    count = near.sum()
+    return jnp.where(near, x, 0.0).sum() / jnp.maximum(count, 1), count
+
+
+def _setting(seen: Seen) -> Setting:
+    sin, cos = jnp.sin(seen.angle_rad), jnp.cos(seen.angle_rad)
+    x1, y1 = seen.position_m[0]
+    return Setting(
+        frame=jnp.arange(len(seen.times_s)),
+        dt_s=seen.times_s[1] - seen.times_s[0],
+        sin=sin,
+        cos=cos,
+        imperfect=1.0 - seen.is_ideal,
+        along_m=x1 * cos - y1 * sin,
+        corner_m=seen.half_height_m * jnp.tan(seen.angle_rad / 2),
+        margin_m=AT_FOOT * seen.half_length_m[0],
+        moved_m=jnp.maximum(MOVED_SD * seen.noise_m, MOVED_M),
+    )
+
+
+def _onset(seen: Seen, setting: Setting) -> Onset:
+    """Sure of object 2's motion only after two frames."""
+    x2, mask = seen.position_m[1, 0], seen.mask[1]
+    begin = jnp.where(mask & (jnp.cumsum(mask) <= 5), x2, 0.0).sum() / jnp.maximum(
+        jnp.minimum(mask.sum(), 5), 1
+    )
+    gone = mask & (jnp.abs(x2 - begin) > setting.moved_m[1])
+    first = _first(gone)
+    is_hit = gone.sum() >= 3
+    hit_frame = jnp.where(is_hit, first, len(x2))
+    return Onset(begin, gone, first, is_hit, hit_frame, setting.frame < hit_frame - 1)
+
+
+def _ramp(seen: Seen, setting: Setting, onset: Onset) -> Ramp:
+    """From the first frame in which object 1 is clearly on its way."""
+    t, mask, noise, g = seen.times_s, seen.mask[0], seen.noise_m[0], seen.gravity
+    along, moved = setting.along_m, setting.moved_m[0]
+    sin, cos = setting.sin, setting.cos
+    start = along[jnp.argmax(mask)]
+    gone = along - start
+    end = setting.corner_m[0] - setting.margin_m * cos
+    is_there = mask & (seen.position_m[0, 0] < end) & onset.before
+    going = is_there & (gone > moved)
+    path = parabola(t, along, going, noise)
+    release = path.at_s - path.slope / jnp.where(jnp.abs(path.curve) > 1e-3, path.curve, 1e-3)
+    half_square = jnp.where(going, t**2 / 2, 0.0)
+    from_rest = (half_square * gone).sum() / jnp.maximum((half_square**2).sum(), 1e-12)
+    return Ramp(
+        start_m=start,
+        gone_m=gone,
+        moves=(mask & (gone > jnp.maximum(4 * moved, 0.01))).sum() >= 4,
+        is_there=is_there,
+        is_going=going,
+        path=path,
+        at_once=parabola(t, along - start, going, noise),
+        friction=Estimate(
+            (sin - path.curve / g) / cos,
+            jnp.hypot(path.curve_sd, setting.imperfect * CAMERA_SD_M_S2) / (g * cos),
+        ),
+        friction_at_once=(sin - from_rest / g) / cos,
+        release_s=jnp.clip(release, -0.5, 1.0),
+    )
+
+
+def _table(seen: Seen, setting: Setting, onset: Onset) -> Table:
+    x, mask, noise = seen.position_m[0, 0], seen.mask[0], seen.noise_m[0]
+    is_there = mask & (x > setting.corner_m[0] + setting.margin_m) & onset.before
+    end, rest = _at_end(x, mask, noise)
+    sliding = is_there & (onset.is_hit | (end - x > setting.moved_m[0]) | (rest < 3))
+    path = parabola(seen.times_s, x, sliding, noise)
+    sd = jnp.hypot(path.curve_sd, setting.imperfect * 2 * CAMERA_SD_M_S2) / seen.gravity
+    friction = Estimate(-path.curve / seen.gravity, sd)
+    return Table(is_there, sliding, path, friction, end, rest)
+
+
+def _friction1(seen: Seen, ramp: Ramp, table: Table) -> Estimate:
+    """Both phases that have enough frames, and that object 1 slides at all."""
+    use = [ramp.is_going.sum() >= LEAST_FRAMES, table.is_sliding.sum() >= LEAST_FRAMES]
+    weights = jnp.stack(use) / jnp.stack([ramp.friction.sd, table.friction.sd]) ** 2
+    total = weights.sum()
+    steepest = jnp.tan(seen.angle_rad)
+    middle, width = steepest / 2, steepest / 4
+    both = jnp.stack([ramp.friction.value, table.friction.value])
+    value = (weights @ both + middle / width**2) / (total + 1 / width**2)
+    sd = 1 / jnp.sqrt(total + 1 / width**2)
+    return Estimate(jnp.clip(value, 1e-4, 0.99), sd)
+
+
+def _after(seen: Seen, setting: Setting, onset: Onset, table: Table) -> After:
+    t, mask, noise = seen.times_s, seen.mask, seen.noise_m
+    x1, x2 = seen.position_m[:, 0]
+    is_there = mask & (setting.frame >= onset.frame)
+    end2, rest2 = _at_end(x2, mask[1], noise[1])
+    left2, left1 = end2 - x2, table.end1_m - x1
+    slides2 = is_there[1] & (left2 > setting.moved_m[1]) & onset.gone2
+    slides1 = is_there[0] & (left1 > setting.moved_m[0])
+    root2 = decay(t, left2, slides2, noise[1])
+    free2 = parabola(t, x2, slides2 | (is_there[1] & (rest2 < 3)), noise[1])
+    root1 = decay(t, left1, slides1, noise[0])
+    free1 = parabola(t, x1, slides1 | (is_there[0] & (table.rest1 < 3)), noise[0])
+    rests2 = (rest2 >= 3) & (slides2.sum() >= 2)
+    rate = jnp.where(rests2, root2.rate, -free2.curve)
+    rate_sd = jnp.where(rests2, root2.rate_sd, free2.curve_sd)
+    return After(
+        is_there=is_there,
+        slides1=slides1,
+        slides2=slides2,
+        end2_m=end2,
+        rest2=rest2,
+        root1=root1,
+        root2=root2,
+        free1=free1,
+        free2=free2,
+        rests1=(table.rest1 >= 3) & (slides1.sum() >= 2),
+        rests2=rests2,
+        decay2=Estimate(
+            jnp.clip(rate, 1e-3, seen.gravity),
+            jnp.hypot(rate_sd, setting.imperfect * 2 * CAMERA_SD_M_S2),
+        ),
+        way2_m=jnp.maximum(end2 - onset.place2_m, 1e-5),
+    )
+
+
+def _hit(
+    seen: Seen,
+    setting: Setting,
+    onset: Onset,
+    ramp: Ramp,
+    table: Table,
+    friction1: Estimate,
+    after: After,
+) -> Hit:
+    time, latest = _hit_time(seen, setting, onset, after)
+    reach = onset.place2_m - seen.half_length_m.sum()
+    from_table = _speed_on_table(seen, time, table, friction1)
+    from_ramp = _speed_from_ramp(seen, setting, ramp, friction1, reach)
+    before1 = _combine(from_table, from_ramp)
+    own1 = _own_speed_after(setting, time, after)
+    after2 = _speed2_after(seen, time, after)
+    # A hit is nearly plastic, so that both leave it at almost one speed.
+    rebound, rebound_sd = setting.imperfect * REBOUND, setting.imperfect * REBOUND_SD
+    as_one = Estimate(
+        after2.value - rebound * before1.value, rebound_sd * before1.value + after2.sd
+    )
+    after1 = _combine(own1, as_one)
+    return Hit(time, latest, reach, from_table, from_ramp, before1, own1, after1, after2)
+
+
+def _hit_time(
+    seen: Seen, setting: Setting, onset: Onset, after: After
+) -> tuple[jax.Array, jax.Array]:
+    """Where object 2's parabola leaves its place; and when it has surely left."""
+    t, last = seen.times_s, len(seen.times_s) - 1
+    by_distance = after.root2.stop_s - jnp.sqrt(2 * after.way2_m / after.decay2.value)
+    slope = after.free2.speed(t[jnp.minimum(onset.frame, last)])
+    stood = jnp.where(seen.mask[1] & (setting.frame < onset.frame), t, 0.0).max()
+    earliest = stood - setting.dt_s
+    latest = t[jnp.clip(onset.frame, 0, last)]
+    at_gone = latest - (after.free2(latest) - onset.place2_m) / jnp.maximum(slope, 1e-2)
+    return jnp.clip(jnp.where(after.rests2, by_distance, at_gone), earliest, latest), latest
+
+
+def _own_speed_after(setting: Setting, time: jax.Array, after: After) -> Estimate:
+    """Object 1's speed after the hit by its own motion."""
+    root, free = after.root1, after.free1
+    speed = jnp.where(after.rests1, root.rate * (root.stop_s - time), free.speed(time))
+    sd = jnp.where(
+        after.rests1,
+        speed * root.rate_sd / root.rate,
+        free.slope_sd + setting.dt_s * free.curve_sd,
+    )
+    return Estimate(speed, jnp.where(after.slides1.sum() >= 2, jnp.clip(sd, 1e-4, NEVER), NEVER))
+
+
+def _speed2_after(seen: Seen, time: jax.Array, after: After) -> Estimate:
+    """Object 2's speed after the hit."""
+    rate, way = after.decay2, after.way2_m
+    speed = jnp.where(after.rests2, jnp.sqrt(2 * rate.value * way), after.free2.speed(time))
+    speed = jnp.clip(speed, 1e-3, None)
+    return Estimate(speed, speed * jnp.hypot(0.5 * rate.sd / rate.value, seen.noise_m[1] / way))
+
+
+def _speed_from_ramp(
+    seen: Seen, setting: Setting, ramp: Ramp, friction1: Estimate, reach: jax.Array
+) -> Estimate:
+    """Object 1's speed at the hit, from the ramp's parabola and the friction between."""
+    g, k1, corner = seen.gravity, friction1.value, setting.corner_m[0]
+    at_foot = corner * setting.cos - seen.half_height_m[0] * setting.sin
+    at_foot_speed = ramp.path.slope**2 + 2 * ramp.path.curve * (at_foot - ramp.path.value)
+    at_foot_speed = jnp.sqrt(jnp.maximum(at_foot_speed, 0.0))
+    turned = jnp.maximum(setting.cos - k1 * setting.sin, 0.0)
+    square = jnp.maximum(at_foot_speed * turned, 0.0) ** 2
+    speed = jnp.sqrt(jnp.maximum(square - 2 * k1 * g * (reach - corner), 1e-6))
+    of_foot = setting.imperfect * FOOT_SD * speed
+    return Estimate(speed, of_foot + friction1.sd * g * reach / speed + 5 * seen.noise_m[0])
+
+
+def _speed_on_table(seen: Seen, time: jax.Array, table: Table, friction1: Estimate) -> Estimate:
+    """Object 1's speed at the hit, from a straight line: better than the parabola's, k1 known."""
+    t, g, sliding = seen.times_s, seen.gravity, table.is_sliding
+    lift = friction1.value * g * (t - time) ** 2 / 2
+    flat = jnp.where(sliding, seen.position_m[0, 0] + lift, 0.0)
+    weight = sliding.astype(t.dtype)
+    count = jnp.maximum(weight.sum(), 1.0)
+    mean_t, mean_x = (weight * t).sum() / count, flat.sum() / count
+    spread = (weight * (t - mean_t) ** 2).sum()
+    speed = (weight * (t - mean_t) * (flat - mean_x)).sum() / jnp.maximum(spread, 1e-9)
+    sd = seen.noise_m[0] / jnp.sqrt(jnp.maximum(spread, 1e-9))
+    sd = sd + friction1.sd * g * jnp.abs(mean_t - time)
+    return Estimate(speed, jnp.where(sliding.sum() >= 2, sd, NEVER))
+
+
+def _mass_ratio(setting: Setting, hit: Hit) -> Estimate:
+    """Momentum: what object 1 loses object 2 gets."""
+    v1, v2 = hit.before1, hit.after2
+    lost = jnp.maximum(v1.value - hit.after1.value, 0.003 * jnp.abs(v1.value) + 1e-3)
+    ratio = jnp.clip(v2.value / lost, 3e-3, 300.0)
+    sd = jnp.hypot(v2.sd / v2.value, jnp.hypot(v1.sd, hit.after1.sd) / lost)
+    return Estimate(ratio, jnp.hypot(sd, CAMERA_RATIO_SD * setting.imperfect) + 1e-4)
+
+
+def _friction2(
+    seen: Seen, friction1: Estimate, after: After, ratio: Estimate, pushes: jax.Array
+) -> Estimate:
+    g, k1, (d2, d2_sd) = seen.gravity, friction1.value, after.decay2
+    joint = (d2 * (1 + ratio.value) / g) - k1 * ratio.value
+    value = jnp.where(pushes, joint, d2 / g)
+    joint_sd = d2_sd * (1 + ratio.value)
+    joint_sd = jnp.hypot(joint_sd, (d2 - k1 * g) * ratio.value * ratio.sd) / g
+    sd = jnp.where(pushes, jnp.hypot(joint_sd, ratio.value * friction1.sd), d2_sd / g) + 1e-5
+    return Estimate(jnp.clip(value, 2e-3, 0.98), sd)

@@ -1,0 +1,191 @@
+"""Tracks and fits as csv, parquet or netCDF, for other programs."""
+
+import json
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.files.atomic_write import replacing
+from galileo_jax.files.tables import TABLE_WRITERS, Table
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.errors import InputError
+
+FORMATS = (*TABLE_WRITERS, "netcdf")
+TRACK, PARAMETERS, DRAWS = "track", "parameters", "draws"
+AXES = ("x", "y")
+MEASURED = ("x_m", "y_m", "sd_x_m", "sd_y_m", "correlation")
+OBSERVATION = "observation.csv"
+
+
+def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path]:
+    """Writes the tracks, the parameters' summaries and the draws of a run.
+
+    Args:
+      folder: the run, of one clip or several.
+      out: folder to write to.
+      to: one of `FORMATS`.
+      with_fitted: whether also to write where the fitted model has the objects.
+
+    Returns:
+      the files.
+
+    Raises:
+      InputError: it is no finished run, or a file cannot be written.
+    """
+    result = _result(folder)
+    folders = _clip_folders(folder, result)
+    tracks = {name: read_observation_csv(one / OBSERVATION) for name, one in folders.items()}
+    fitted = {name: _fitted_m(one) for name, one in folders.items()} if with_fitted else {}
+    posterior = folder / "posterior.nc"
+    if not posterior.is_file():
+        raise InputError(f"{posterior}: no such file; a folder written by `galileo fit` expected")
+    if to == "netcdf":
+        path = out / f"{folder.resolve().name}.nc"
+        with _outputs(out), replacing(path) as temporary:
+            shutil.copyfile(posterior, temporary)
+            for name, observation in tracks.items():
+                group = "observed_data" if len(tracks) == 1 else f"observed_data/{name}"
+                _dataset(observation, fitted.get(name)).to_netcdf(
+                    temporary, mode="a", group=group, engine="h5netcdf"
+                )
+        return [path]
+    tables = {
+        TRACK: _track_table(tracks, fitted),
+        PARAMETERS: _parameter_table(result),
+        DRAWS: _draw_table(posterior),
+    }
+    return _write(tables, out, to)
+
+
+def export_tracks(tracks: Mapping[str, Observation], out: Path, to: str) -> list[Path]:
+    """Writes tracks by the names of their clips; see `export_run`."""
+    if to != "netcdf":
+        return _write({TRACK: _track_table(tracks, {})}, out, to)
+    written = []
+    for name, observation in tracks.items():
+        path = out / f"{name}.nc"
+        with _outputs(out), replacing(path) as temporary:
+            _dataset(observation, None).to_netcdf(
+                temporary, mode="w", group="observed_data", engine="h5netcdf"
+            )
+        written.append(path)
+    return written
+
+
+def _write(tables: Mapping[str, Table], out: Path, to: str) -> list[Path]:
+    written = []
+    for name, table in tables.items():
+        path = out / f"{name}.{to}"
+        with _outputs(out):
+            TABLE_WRITERS[to](path, table)
+        written.append(path)
+    return written
+
+
+@contextmanager
+def _outputs(out: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"--out: {out}: {error.strerror or error}") from error
+
+
+def _result(folder: Path) -> dict[str, Any]:
+    path = folder / "result.json"
+    if not path.is_file():
+        raise InputError(f"{folder}: no result.json; a folder written by `galileo fit` expected")
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{path}: not JSON ({error})") from None
+
+
+def _clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
+    """Name and folder of every clip; of several clips each has a folder of its own."""
+    if (folder / OBSERVATION).is_file():
+        return {Path(result["clips"][0]).stem: folder}
+    return {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{OBSERVATION}"))}
+
+
+def _fitted_m(folder: Path) -> np.ndarray:
+    """Where a run's model, at the posterior's mean, has the objects: `[object, 2, frame]`, m."""
+    from galileo_jax.results.run import load_run
+
+    run = load_run(folder)
+    mean = run.posterior.flat().mean(axis=0)
+    columns = [run.posterior.names.index(name) for name in run.problem.model.names]
+    return np.asarray(run.problem.simulate(mean[columns]))
+
+
+def _track_table(tracks: Mapping[str, Observation], fitted_m: Mapping[str, np.ndarray]) -> Table:
+    """One row per clip, object and time; empty where the object was not visible."""
+    table: dict[str, list[Any]] = {}
+    for clip, observed in tracks.items():
+        count = len(observed.times_s)
+        for k, name in enumerate(observed.names):
+            covariance = observed.covariance_m2[k]
+            sd_x, sd_y = np.sqrt(covariance[0, 0]), np.sqrt(covariance[1, 1])
+            columns = {
+                "clip": [clip] * count,
+                "object": [name] * count,
+                "time_s": observed.times_s,
+                "x_m": observed.position_m[k, 0],
+                "y_m": observed.position_m[k, 1],
+                "sd_x_m": sd_x,
+                "sd_y_m": sd_y,
+                "correlation": covariance[0, 1] / (sd_x * sd_y),
+            }
+            if clip in fitted_m:
+                columns["fitted_x_m"], columns["fitted_y_m"] = fitted_m[clip][k]
+            for title, values in columns.items():
+                is_measured = title in MEASURED
+                table.setdefault(title, []).extend(
+                    np.where(observed.mask[k], values, np.nan) if is_measured else values
+                )
+    return table
+
+
+def _parameter_table(result: dict[str, Any]) -> Table:
+    """One row per parameter, with the part of result.json in which it stands."""
+    rows = [
+        {"name": name, "kind": kind, **entry}
+        for kind in ("parameters", "derived", "nuisances")
+        for name, entry in result[kind].items()
+    ]
+    titles = ("name", "kind", "unit", "mean", "sd", "q025", "q975", "identified")
+    return {title: [row.get(title) for row in rows] for title in titles}
+
+
+def _draw_table(posterior: Path) -> Table:
+    """One row per chain and draw, one column per parameter."""
+    from galileo_jax.inference.posterior import Posterior
+
+    found = Posterior.from_netcdf(posterior)
+    chains, draws = found.draws.shape[:2]
+    return {
+        "chain": np.repeat(np.arange(chains), draws),
+        "draw": np.tile(np.arange(draws), chains),
+        **{name: found[name].reshape(-1) for name in found.names},
+        "log_density": found.log_density.reshape(-1),
+    }
+
+
+def _dataset(observed: Observation, fitted_m: np.ndarray | None) -> Any:
+    """ArviZ's `observed_data`: `position_m [object, axis, time]` and its covariance."""
+    import xarray as xr
+
+    place = ("object", "axis", "time_s")
+    data: dict[str, Any] = {
+        "position_m": (place, observed.position_m),
+        "covariance_m2": (("object", "axis", "other_axis", "time_s"), observed.covariance_m2),
+        "is_seen": (("object", "time_s"), observed.mask.astype("i1")),
+    }
+    if fitted_m is not None:
+        data["fitted_position_m"] = (place, fitted_m)
+    axes = {"axis": list(AXES), "other_axis": list(AXES)}
+    return xr.Dataset(data, {"object": list(observed.names), "time_s": observed.times_s, **axes})

@@ -1,0 +1,29 @@
+"""Which of a fit's parameters are shown: those that have a meaning for the motion."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from galileo_jax.inference.per_mass import per_mass_unit
+
+MASS = re.compile(r"m\d+")
+
+
+def shown_parameters(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Entries of parameters and what is derived from them, without a mass that acts on nothing.
+
+    The mass of a single object cancels out of its motion unless something in the model is a
+    force or a force's constant (its unit has a kg or N in it). result.json keeps it all the same.
+
+    Args:
+      result: result.json.
+
+    Returns:
+      entries by name, in the order of result.json.
+    """
+    entries = {**result["parameters"], **result.get("derived", {})}
+    masses = [name for name in entries if MASS.fullmatch(name)]
+    units = [entry["unit"] for name, entry in entries.items() if name not in masses]
+    if len(masses) == 1 and not any(per_mass_unit(unit) for unit in units):
+        del entries[masses[0]]
+    return entries

@@ -1,0 +1,25 @@
+"""Refusing a name that there is not, with the nearest one that there is."""
+
+import difflib
+from collections.abc import Collection
+
+from galileo_jax.runtime.errors import InputError
+
+
+def check_known(option: str, noun: str, name: object, known: Collection[str]) -> None:
+    """Does nothing where `name` is one of `known`.
+
+    Args:
+      option: that it was given to, as the command writes it (--scenario).
+      noun: what it names.
+      name: to be checked.
+      known: all that there are.
+
+    Raises:
+      InputError: it is none of them; one line with the nearest and with all of them.
+    """
+    if name in known:
+        return
+    close = difflib.get_close_matches(str(name), known, n=1)
+    hint = f"did you mean {close[0]}? " if close else ""
+    raise InputError(f"{option}: unknown {noun} {name!r}; {hint}known: {', '.join(known)}")

@@ -1,0 +1,71 @@
+"""From what was asked for to the files of one clip, or of a series."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.simulation.check_settings import checked
+from galileo_jax.simulation.clip_files import TRUTH_SUFFIX, YAML_SUFFIX, all_or_nothing
+from galileo_jax.simulation.free_clip import free_clips
+from galileo_jax.simulation.hidden import make_hidden
+from galileo_jax.simulation.ramp_clip import ramp_clips
+from galileo_jax.simulation.settings import Settings
+
+SHARE_DRAWN = 0.2  # of the time, about, that goes into the motions
+
+
+@dataclass(frozen=True)
+class WrittenClip:
+    """One clip of those written.
+
+    Attributes:
+      clip: the video or the csv track.
+      yaml: what is declared about it.
+      truth_file: what is true.
+      truth: its content.
+    """
+
+    clip: Path
+    yaml: Path
+    truth_file: Path
+    truth: dict[str, Any]
+
+
+def write_clips(out: Path, settings: Settings) -> tuple[WrittenClip, ...]:
+    """Writes NAME.mp4 (or NAME.csv), NAME.yaml, NAME.truth.json; for a series NAME_1 and on.
+
+    Raises:
+      InputError: the settings mean nothing together, an effect has no place in the scene, or a
+        file cannot be written; nothing is written then.
+      Cancelled: the caller asked for it; nothing is written.
+    """
+    if out.suffix != settings.suffix:
+        raise InputError(f"--out: {out.name} does not end in {settings.suffix}")
+    settings = checked(settings)
+    hidden = make_hidden(settings.effects, settings.strength, settings.effects_from)
+    with progress.part(0.0, SHARE_DRAWN):
+        progress.report("simulating", 0.0)
+        if settings.has_ramp:
+            writers = ramp_clips(settings, hidden, out.stem)
+        else:
+            writers = free_clips(settings, hidden)
+    count = len(writers)
+    names = [f"{out.stem}_{i + 1}" if settings.series else out.stem for i in range(count)]
+    try:
+        with progress.part(SHARE_DRAWN, 1.0), all_or_nothing(out.parent) as folder:
+            for i, (name, write) in enumerate(zip(names, writers, strict=True)):
+                with progress.part(i / count, (i + 1) / count):
+                    write(folder / f"{name}{settings.suffix}")
+                    progress.report("writing", 1.0)
+    except OSError as error:
+        raise InputError(f"--out: {out}: {error.strerror or error}") from error
+    return tuple(_written(out.with_name(f"{name}{settings.suffix}")) for name in names)
+
+
+def _written(clip: Path) -> WrittenClip:
+    truth_file = clip.with_suffix(TRUTH_SUFFIX)
+    truth = json.loads(truth_file.read_text(encoding="utf-8"))
+    return WrittenClip(clip, clip.with_suffix(YAML_SUFFIX), truth_file, truth)

@@ -1,0 +1,163 @@
+"""Clips of objects on a ramp: drawn, and then written one by one."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.clip.track_csv import write_observation_csv
+from galileo_jax.observation.observation import Observation
+from galileo_jax.simulation.check_settings import shapes_of
+from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
+from galileo_jax.simulation.declared import Declared
+from galileo_jax.simulation.filming import film_ramp, ramp_camera, ramp_filming
+from galileo_jax.simulation.hidden import Hidden
+from galileo_jax.simulation.motion import LONGEST_S, Motion
+from galileo_jax.simulation.record import truth_record
+from galileo_jax.simulation.series import draw_series
+from galileo_jax.simulation.settings import Settings
+from galileo_jax.simulation.truth import Truth
+from galileo_jax.video import synthetic
+
+BEYOND_TABLE_M = 2.5  # x, where a clip ends; a board alone ends at 0
+SHORTEST_S, AFTER_REST_S = 1.5, 0.4
+OFF_PX = (1.0, 4.0)  # how far a point set by hand is off, where the fault is asked for
+
+
+def ramp_clips(settings: Settings, hidden: Sequence[Hidden], stem: str) -> list[WriteClip]:
+    """Draws the trials; returns what writes each into the file that it is given.
+
+    Raises:
+      InputError: an effect has no place in the scene, or the simulation fails.
+    """
+    looks, things, faults, secrets = np.random.default_rng(settings.seed).spawn(4)
+    fields = {key: getattr(settings, key) for key in ("m1", "k1", "m2", "k2", "z2")}
+    given = {key: value for key, value in fields.items() if value is not None}
+    trials = draw_series(
+        settings.angle,
+        given | dict(settings.values),
+        hidden,
+        settings.series or 1,
+        solver="free" if settings.motion == "free" else settings.solver,
+        things=things,
+        secrets=secrets,
+        frame_s=1 / settings.fps if settings.faults else None,
+        scenario=settings.scenario,
+        shapes=shapes_of(settings),
+    )
+    series = stem if settings.series else None
+    return [
+        partial(
+            _write, settings, truth, motion, looks, faults, seed=settings.seed + i, series=series
+        )
+        for i, (truth, motion) in enumerate(trials)
+    ]
+
+
+def _write(
+    settings: Settings,
+    truth: Truth,
+    motion: Motion,
+    looks: np.random.Generator,
+    faults: np.random.Generator,
+    out: Path,
+    *,
+    seed: int,
+    series: str | None,
+) -> None:
+    """Writes one clip, its yaml and its truth into the folder of `out`."""
+    declared = Declared.of(truth, settings.fps)
+    ends = motion.leaves_s(BEYOND_TABLE_M if truth.surroundings.has_table else 0.0)
+    longest = min(LONGEST_S, ends + declared.release_s)
+    at_rest = motion.rest_s + declared.release_s + AFTER_REST_S
+    seconds = settings.seconds or min(longest, max(SHORTEST_S, at_rest))
+    num_frames = max(2, round(seconds * declared.true_fps))
+    frames = motion.at(declared.taken_s(num_frames))
+    camera = ramp_camera(settings, truth, frames, faults)
+    content = _content(settings, out.name, truth, declared, camera, frames, faults)
+    record = {
+        "name": out.stem,
+        "series": series,
+        **truth_record(truth, declared, motion, frames),
+        "pixels_per_metre_true": camera.pixels_per_metre,
+        "pixels_per_metre_declared": content.get("pixels_per_metre", camera.pixels_per_metre),
+        "world_to_image": camera.world_to_image.tolist(),
+        "image_px": list(camera.size_px),
+        "camera_faults": sorted(settings.camera_fault),
+        "seed": seed,
+    }
+    if settings.track_only:
+        _write_track(out, truth, declared, frames, settings.track_noise, looks)
+    else:
+        filming = ramp_filming(settings, declared, num_frames, faults)
+        record |= film_ramp(out, truth, declared, motion, camera, filming, num_frames, seed)
+    write_yaml_and_truth(out, content, record)
+
+
+def _write_track(
+    out: Path,
+    truth: Truth,
+    declared: Declared,
+    frames: Motion,
+    noise_m: float,
+    rng: np.random.Generator,
+) -> None:
+    """Writes the centres, as the declared scale and clock show them, with normal errors."""
+    error = noise_m * rng.standard_normal(frames.position_m.shape)
+    position = declared.scale * frames.position_m + error
+    count, _, length = position.shape
+    covariance = np.broadcast_to(noise_m**2 * np.eye(2)[None, :, :, None], (count, 2, 2, length))
+    names = tuple(each.name for each in truth.objects)
+    times = np.arange(length) / declared.fps
+    mask = np.ones((count, length), bool)
+    write_observation_csv(out, Observation(names, times, position, covariance, mask))
+
+
+def _content(
+    settings: Settings,
+    name: str,
+    truth: Truth,
+    declared: Declared,
+    camera: synthetic.Camera,
+    frames: Motion,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """What the yaml declares about the clip (DESIGN.md 2.1)."""
+    objects: list[dict[str, Any]] = [
+        {"name": each.name, "shape": each.shape, "size_m": list(each.size_m or ())}
+        | ({} if each.rolls is None else {"rolls": each.rolls})
+        | ({"z_m": each.z_m} if each.z_m else {})
+        for each in truth.objects
+    ]
+    picture: dict[str, Any] = {}
+    if not settings.track_only:
+        off = {
+            fault: _off_px(rng, count) if fault in settings.camera_fault else np.zeros((count, 2))
+            for fault, count in (("origin", 1), ("points", len(objects)))
+        }
+        picture = {
+            "direction": settings.direction,
+            "pixels_per_metre": round(camera.pixels_per_metre / declared.scale, 2),
+            "origin_px": np.round(camera.origin_px + off["origin"][0], 1).tolist(),
+        }
+        if not settings.no_points:
+            points = camera.project(frames.position_m[:, :, 0]) + off["points"]
+            for entry, point in zip(objects, points, strict=True):
+                entry["point_px"] = np.round(point, 1).tolist()
+    return {
+        "track" if settings.track_only else "video": name,
+        "scenario": settings.scenario,
+        "fps": declared.fps,
+        "ramp_angle_deg": declared.ramp_angle_deg,
+        **picture,
+        "gravity": truth.gravity,
+        "objects": objects,
+    }
+
+
+def _off_px(rng: np.random.Generator, count: int) -> np.ndarray:
+    """Errors of points set by hand, `[count, 2]`, in any direction."""
+    size, way = rng.uniform(*OFF_PX, count), rng.uniform(0, 2 * np.pi, count)
+    return size[:, None] * np.stack([np.cos(way), np.sin(way)], axis=1)

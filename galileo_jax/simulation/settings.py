@@ -1,0 +1,102 @@
+"""What `simulate` was asked for: one field per option, with the option's default."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from galileo_jax.clip.schema import Shape
+from galileo_jax.simulation.motion import Solver
+
+SHAPES: dict[str, tuple[Shape, ...]] = {
+    "ramp": ("box", "box"),
+    "multi": ("box", "box", "box"),
+    "incline": ("box",),
+}
+"""Scenarios on a ramp, and the shapes of their objects where none are given."""
+
+FREE_SCENARIOS = ("fall", "flight", "spring", "liquid")
+SCENARIO_NAMES = (*SHAPES, *FREE_SCENARIOS)
+CAMERA_FAULTS = ("keystone", "roll", "origin", "points")
+DIRECTIONS = ("right", "left")
+MOST_OBJECTS = 9  # of a multi
+TRACK_SUFFIX, VIDEO_SUFFIX = ".csv", ".mp4"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One call of `simulate`.
+
+    Attributes:
+      seed: of everything that is drawn; the same seed makes the same files.
+      scenario: one of `SCENARIO_NAMES`.
+      shapes: of the objects on a ramp, in the order of the travel; None: boxes.
+      angle: of the ramp as declared, degrees.
+      seconds: length of the clip, s; None: until everything is at rest.
+      fps: frames per second as declared.
+      m1, m2: masses, kg; None: drawn.
+      k1, k2: coefficients of friction; None: drawn.
+      motion: "planar", or "free": objects that are hit turn and tip (tracks only).
+      z2: how far object 2 stands off the plane, towards the camera, m.
+      solver: see `roll_out`.
+      values: further parameters of the scenario by name, SI units.
+      floor: of a fall or a flight: the object bounces.
+      series: so many trials of the same objects; None: a single clip.
+      track_only: a csv track in place of the video.
+      track_noise: standard deviation of a track's coordinates, m.
+      effects: what is hidden: name to {parameter: value}, SI units; what is missing is drawn.
+      strength: of the hidden effects, 0 (weak) to 1 (strong); None: drawn.
+      effects_from: Python files that register further effects.
+      faults: the small faults of real clips (release between frames, foot and impact not ideal).
+      size: of the picture, (width, height), px.
+      direction: of the travel in the picture.
+      no_points: the yaml does not say where the objects are.
+      hand: a hand lets object 1 go.
+      camera_fault: some of `CAMERA_FAULTS`.
+      noise: of the sensor, grey levels of 255.
+      exposure: of a frame, s.
+      defocus: standard deviation of the blur, px.
+      missed_frames: so many frames show the one before once more.
+    """
+
+    seed: int = 0
+    scenario: str = "ramp"
+    shapes: Sequence[str] | None = None
+    angle: float = 20.0
+    seconds: float | None = None
+    fps: float = 30.0
+    m1: float | None = None
+    k1: float | None = None
+    m2: float | None = None
+    k2: float | None = None
+    motion: str = "planar"
+    z2: float | None = None
+    solver: Solver = "rigid"
+    values: Mapping[str, float] = field(default_factory=dict)
+    floor: bool = False
+    series: int | None = None
+    track_only: bool = False
+    track_noise: float = 0.0002
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    strength: float | None = None
+    effects_from: Sequence[str | Path] = ()
+    faults: bool = False
+    size: tuple[int, int] = (640, 360)
+    direction: Literal["right", "left"] = "right"
+    no_points: bool = False
+    hand: bool = False
+    camera_fault: Sequence[str] = ()
+    noise: float = 4.0
+    exposure: float = 0.008
+    defocus: float = 0.0
+    missed_frames: int = 0
+
+    @property
+    def suffix(self) -> str:
+        """Of the file that is the clip."""
+        return TRACK_SUFFIX if self.track_only else VIDEO_SUFFIX
+
+    @property
+    def has_ramp(self) -> bool:
+        """Whether objects slide on a ramp; otherwise one object falls, flies or hangs."""
+        return self.scenario in SHAPES

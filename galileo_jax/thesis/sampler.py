@@ -1,0 +1,185 @@
+"""The thesis's sampler: short chains of uniform proposals, and the best sample wins."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import ClassVar, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
+from galileo_jax.inference.samplers.driver import Progress, Settings, sample
+from galileo_jax.inference.samplers.sampler import (
+    AbstractSampler,
+    Info,
+    LogDensity,
+    State,
+    turn_of_one,
+)
+
+NUM_CHAINS = 16
+NUM_STEPS = 75
+NARROW = 0.05
+WIDE = 0.5
+WIDE_EVERY = 20
+
+
+class Acceptance(StrEnum):
+    """Which proposals are taken.
+
+    COIN: better ones always, others by a fair coin (the thesis).
+    METROPOLIS: with min(1, p(y) q(x | y) / (p(x) q(y | x))), which samples p.
+    """
+
+    COIN = "coin"
+    METROPOLIS = "metropolis"
+
+
+class Selection(StrEnum):
+    """What the answer is.
+
+    BEST: the sample of highest similarity in all chains (the thesis).
+    LEAST_VARIANCE: the mean of the chain whose variances over the parameters sum to least.
+    """
+
+    BEST = "best"
+    LEAST_VARIANCE = "least_variance"
+
+
+class ThesisState(NamedTuple):
+    """`position` `[dim]` in (0, 1), its `log_density` `[]` and the `num_steps` `[]` made."""
+
+    position: jax.Array
+    log_density: jax.Array
+    num_steps: jax.Array
+
+
+class Thesis(AbstractSampler):
+    """Uniform proposals within 0.05 of each parameter, within 0.5 on every 20th step.
+
+        y_i ~ U(max(0, x_i - w), min(1, x_i + w)),  w = 0.5 if step % 20 == 0 else 0.05
+        keep y if p(y) >= p(x), else if a coin shows heads
+
+    The thesis redraws a parameter until it falls into (0, 1); the distribution is the same.
+    With the coin the chain samples nothing in particular: it is a search, and its draws
+    are no posterior. Near 0 and 1 the proposals are not symmetric; METROPOLIS corrects it.
+    """
+
+    name: ClassVar[str] = "thesis"
+    acceptance: Acceptance = eqx.field(static=True, default=Acceptance.COIN)
+
+    def init(self, position: jax.Array, log_density: LogDensity) -> ThesisState:
+        """The state at `position`, which must lie in (0, 1)."""
+        return ThesisState(position, log_density(position), jnp.zeros((), jnp.int32))
+
+    def turn(self, key: jax.Array, state: ThesisState, log_density: LogDensity):
+        """One step."""
+        return turn_of_one(*self.step(key, state, log_density))
+
+    def step(
+        self, key: jax.Array, state: ThesisState, log_density: LogDensity
+    ) -> tuple[ThesisState, Info]:
+        """One step."""
+        num_steps = state.num_steps + 1
+        half_width = jnp.where(num_steps % WIDE_EVERY == 0, WIDE, NARROW)
+
+        def propose(key, position):
+            low, high = _interval(position, half_width)
+            return jax.random.uniform(key, position.shape, position.dtype, minval=low, maxval=high)
+
+        def proposal_log_density(x, y):
+            low, high = _interval(x, half_width)
+            is_possible = (low <= y) & (y <= high)
+            return jnp.sum(jnp.where(is_possible, -jnp.log(high - low), -jnp.inf))
+
+        if self.acceptance is Acceptance.METROPOLIS:
+            current = State(state.position, state.log_density)
+            moved, info = metropolis_hastings(
+                key, current, log_density, propose, proposal_log_density
+            )
+            return ThesisState(moved.position, moved.log_density, num_steps), info
+
+        proposal_key, coin_key = jax.random.split(key)
+        position = propose(proposal_key, state.position)
+        proposed = log_density(position)
+        is_better = proposed >= state.log_density
+        # A NaN is not better, and no coin makes it acceptable.
+        may_toss = ~jnp.isnan(proposed)
+        is_accepted = is_better | (may_toss & jax.random.bernoulli(coin_key))
+        rate = jnp.where(is_better, 1.0, jnp.where(may_toss, 0.5, 0.0))
+        moved = ThesisState(
+            jnp.where(is_accepted, position, state.position),
+            jnp.where(is_accepted, proposed, state.log_density),
+            num_steps,
+        )
+        return moved, Info(rate, is_accepted)
+
+
+@dataclass(frozen=True)
+class ThesisResult:
+    """The thesis's answer.
+
+    Attributes:
+      estimate: `[dim]`, in (0, 1); a point, without an interval.
+      posterior: all states of all chains; with `Acceptance.COIN` no posterior at all.
+    """
+
+    estimate: np.ndarray
+    posterior: Posterior
+
+
+def infer(
+    key: jax.Array,
+    log_similarity: LogDensity,
+    names: Sequence[str] = ("m1", "k1", "m2", "k2"),
+    *,
+    acceptance: Acceptance = Acceptance.COIN,
+    selection: Selection = Selection.BEST,
+    num_chains: int = NUM_CHAINS,
+    num_steps: int = NUM_STEPS,
+    on_block: Callable[[Progress], None] | None = None,
+) -> ThesisResult:
+    """Runs 16 chains of 75 steps from uniform starts and selects an answer.
+
+    Costs 16 x 76 = 1216 evaluations, whatever happens, where nothing else is asked for.
+
+    Arguments:
+      key: same key, same answer.
+      log_similarity: `[dim] -> []` of the parameters themselves, each in (0, 1).
+      names: of the parameters.
+      acceptance: the thesis's coin, or a true Metropolis-Hastings step.
+      selection: how the answer is taken from the chains.
+      num_chains: the thesis has 16.
+      num_steps: of each, a multiple of 25; the thesis has 75.
+      on_block: called after every 25 steps.
+    """
+    start_key, key = jax.random.split(key)
+    posterior = sample(
+        key,
+        Thesis(acceptance=acceptance),
+        log_similarity,
+        jax.random.uniform(start_key, (num_chains, len(names)), minval=1e-6),
+        names,
+        settings=Settings(warmup_steps=0, block_steps=25, max_steps=num_steps, stops_early=False),
+        on_block=on_block,
+    )
+    return ThesisResult(estimate=select(posterior, selection), posterior=posterior)
+
+
+def select(posterior: Posterior, selection: Selection) -> np.ndarray:
+    """The answer `[dim]` of the chains.
+
+    A better proposal is always kept, so the best state is also the best proposal.
+    """
+    if selection is Selection.BEST:
+        return posterior.flat()[np.argmax(posterior.log_density)]
+    spread = posterior.draws.var(axis=1).sum(axis=-1)
+    return posterior.draws[np.argmin(spread)].mean(axis=0)
+
+
+def _interval(position, half_width):
+    return jnp.maximum(position - half_width, 0.0), jnp.minimum(position + half_width, 1.0)

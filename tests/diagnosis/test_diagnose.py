@@ -1,0 +1,94 @@
+"""The whole loop on tracks that the package simulates: a strong effect is named, none is none."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.track_csv import write_observation_csv
+from galileo_jax.diagnosis.diagnose import diagnose
+from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
+from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.observation.observation import Observation
+from galileo_jax.simulation import Hidden, draw_series
+from tests.precision import in_64_bit
+
+# Of all the library only these: what is near air drag, and what changes the start or the hit.
+CANDIDATES = ("air_drag", "release_delay", "restitution", "viscous_drag")
+AIR_DRAG_KG_M = 0.6
+GIVEN = {"m1": 0.5, "k1": 0.1, "m2": 0.3, "k2": 0.2}
+ANGLE_DEG, FPS, NOISE_M = 20.0, 30.0, 3e-4
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
+def simulated(folder: Path, *hidden: Hidden) -> JointProblem:
+    """Trials of one simulated track of two boxes on a ramp, about 45 frames."""
+    things, secrets, camera = np.random.default_rng(1).spawn(3)
+    ((truth, motion),) = draw_series(
+        ANGLE_DEG, GIVEN, hidden, 1, solver="rigid", things=things, secrets=secrets
+    )
+    times = np.arange(0.0, motion.rest_s + 0.1, 1 / FPS)
+    centres = motion.at(times).position_m
+    count, _, frames = centres.shape
+    observation = Observation(
+        names=tuple(each.name for each in truth.objects),
+        times_s=times,
+        position_m=centres + NOISE_M * camera.standard_normal(centres.shape),
+        covariance_m2=np.tile(NOISE_M**2 * np.eye(2)[None, ..., None], (count, 1, 1, frames)),
+        mask=np.ones((count, frames), bool),
+    )
+    write_observation_csv(folder / "clip.csv", observation)
+    objects = [
+        {"name": each.name, "shape": each.shape, "size_m": list(each.size_m or ())}
+        for each in truth.objects
+    ]
+    declared = {"track": "clip.csv", "scenario": "ramp", "fps": FPS, "ramp_angle_deg": ANGLE_DEG}
+    (folder / "clip.yaml").write_text(yaml.safe_dump(declared | {"objects": objects}))
+    clip = load_clip(folder / "clip.yaml")
+    return make_joint_problem([clip], [observation], effects=make_effects(CANDIDATES))
+
+
+def diagnosed(trials: JointProblem) -> tuple[Diagnosis, list[Round]]:
+    """The diagnosis, and the rounds as they were told of."""
+    rounds: list[Round] = []
+    return diagnose(trials, on_round=rounds.append), rounds
+
+
+def test_a_strong_air_drag_is_named_and_added(tmp_path):
+    (air_drag,) = make_effects(["air_drag"])
+    trials = simulated(tmp_path, Hidden(air_drag, {"air_drag": AIR_DRAG_KG_M}))
+    found, told = diagnosed(trials)
+    assert (found.verdict.status, found.verdict.effects) == ("named", ("air_drag",))
+    before, after = found.rounds
+    assert list(told) == [before, after]
+    assert before.hypothesis.effects == () and after.hypothesis.effects == ("air_drag",)
+    assert before.comparison.p_value < 1e-6 and after.comparison.is_adequate
+    assert after.comparison.error["rmse"] < 0.5 * before.comparison.error["rmse"]
+    # The drag itself is known as far as the mass is, k1 by itself.
+    theta = trials.theta(after.hypothesis.fit.z, after.hypothesis.fit.free)
+    value = dict(zip(trials.names, theta, strict=True))
+    per_mass = value["air_drag"] / value["m1"]
+    assert per_mass == pytest.approx(AIR_DRAG_KG_M / GIVEN["m1"], rel=0.05)
+    assert value["k1"] == pytest.approx(GIVEN["k1"], abs=0.01)
+    best = found.candidates[0]
+    assert best.effects == ("air_drag",) and best.probability > 0.99
+    assert best.p_value == after.comparison.p_value
+    assert best.confounded_with == ()
+
+
+def test_without_an_effect_nothing_is_missing(tmp_path):
+    found, told = diagnosed(simulated(tmp_path))
+    assert (found.verdict.status, found.verdict.effects) == ("none", ())
+    assert list(found.rounds) == told and len(told) == 1
+    assert found.base.is_adequate
+    assert sum(each.probability for each in found.candidates) < 0.2
+    assert {each.name for each in found.candidates} == set(CANDIDATES)
