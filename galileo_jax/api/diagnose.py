@@ -258,7 +258,7 @@ def diagnose(
       InputError: a clip, an effect or an option is wrong.
       Cancelled: `cancel` was set; work stops between two batches.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("drag.csv", seed=3, effects={"air_drag": {}}, strength=0.7,
       ...     track_only=True)
