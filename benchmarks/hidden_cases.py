@@ -15,7 +15,7 @@ import yaml
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.commands import command, simulate
-from galileo_jax.files.atomic_write import write_text
+from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking import track_clip
 from galileo_jax.tracking.to_metres import observe

@@ -30,8 +30,8 @@ import verdicts
 from hidden_cases import Case
 
 from galileo_jax.commands import command
-from galileo_jax.files.atomic_write import write_text
 from galileo_jax.model.effects.registry import effect_names
+from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 
 PIXELS_PER_METRE = 900.0

@@ -23,12 +23,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from benchmarks import tables
 from galileo_jax.commands import command
-from galileo_jax.files.atomic_write import replacing
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.driver import Settings, sample
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.report.figure import style
 from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.thesis.sampler import NUM_CHAINS, NUM_STEPS, Acceptance, Thesis, select
 from galileo_jax.thesis.similarity import AbstractSimilarity, similarity_class
 from galileo_jax.thesis.task import FPS, NAMES, ThesisTask

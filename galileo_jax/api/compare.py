@@ -16,10 +16,10 @@ from galileo_jax.api.track import TrackLike
 from galileo_jax.comparison.compare import Comparison as Compared
 from galileo_jax.comparison.compare import compare as compare_fit
 from galileo_jax.comparison.document import comparison_document
-from galileo_jax.files.atomic_write import write_json
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.runtime import progress
+from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.files.atomic_write import write_json
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
@@ -18,6 +17,7 @@ from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.parameters import inverse
 from galileo_jax.results.run import CHECKPOINT, POSTERIOR, RESULT, Run, save_run
 from galileo_jax.results.stale_outputs import forget_prediction, forget_single_run
+from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 

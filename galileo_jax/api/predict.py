@@ -9,10 +9,10 @@ import numpy as np
 
 from galileo_jax.api.fit_result import Fit
 from galileo_jax.api.run import load_run
-from galileo_jax.files.atomic_write import write_json, write_text
 from galileo_jax.prediction.extrapolate import Motions, answers, extrapolate
 from galileo_jax.results.run import Run
 from galileo_jax.runtime import progress
+from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from galileo_jax.files.atomic_write import write_json, write_text
 from galileo_jax.files.package_data import config_path
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
+from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64

@@ -20,7 +20,7 @@ from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_files.read import is_track
 from galileo_jax.clip.yaml_file import read_mapping, yaml_text
 from galileo_jax.clip.yaml_update import updated_text
-from galileo_jax.files.atomic_write import write_text
+from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.video.decode import probe

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from galileo_jax.clip.track_files.cells import Rows, parse_columns, read_cells
-from galileo_jax.files.atomic_write import write_text
 from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 
 TIME = "time_s"

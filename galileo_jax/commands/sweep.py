@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from galileo_jax import __version__
 from galileo_jax.commands import command
-from galileo_jax.files.atomic_write import write_json
 from galileo_jax.files.package_data import config_path
+from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:

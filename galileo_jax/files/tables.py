@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.files.atomic_write import replacing, write_text
+from galileo_jax.runtime.atomic_write import replacing, write_text
 from galileo_jax.runtime.errors import InputError
 
 Table = Mapping[str, Sequence[Any] | np.ndarray]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from galileo_jax.files.atomic_write import replacing
 from galileo_jax.inference.convergence import arviz, convergence
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
-from galileo_jax.files.atomic_write import replacing
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.compilation_cache import cache_folder
 from galileo_jax.tracking import Track, track_clip
 

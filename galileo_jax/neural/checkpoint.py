@@ -13,8 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from flax import nnx
 
-from galileo_jax.files.atomic_write import replacing
 from galileo_jax.neural.config import TrainConfig
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
 CHECKPOINTS, NETWORK = "checkpoints", "network.npz"

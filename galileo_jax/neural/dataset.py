@@ -8,9 +8,9 @@ from typing import Any
 import jax
 import numpy as np
 
-from galileo_jax.files.atomic_write import replacing, write_json
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Arrays, Trainable
+from galileo_jax.runtime.atomic_write import replacing, write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
 

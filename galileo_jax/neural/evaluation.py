@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import NamedTuple
 
-from galileo_jax.files.atomic_write import write_json
 from galileo_jax.neural.checkpoint import NETWORK, load_network
 from galileo_jax.neural.dataset import make_samples
 from galileo_jax.neural.presets import make_task
+from galileo_jax.runtime.atomic_write import write_json
 
 NUM_TEST = 1000
 TEST_SHARD = 2**30  # beyond any training set's

@@ -10,7 +10,6 @@ import numpy as np
 from galileo_jax.clip.schema import Clip
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.comparison.document import pulled
-from galileo_jax.files.atomic_write import write_text
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import findings
 from galileo_jax.report.along import Along
@@ -19,6 +18,7 @@ from galileo_jax.report.failure import failure_chart
 from galileo_jax.report.plotly_chart import chart_element
 from galileo_jax.report.provenance import provenance
 from galileo_jax.report.shell import document, figure_section, header, items, table
+from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CELLS = 12
 PICTURES = (

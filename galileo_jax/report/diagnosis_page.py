@@ -9,7 +9,6 @@ from typing import Any
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
-from galileo_jax.files.atomic_write import write_text
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import findings
 from galileo_jax.report.along import Along, along_paths
@@ -24,6 +23,7 @@ from galileo_jax.report.shell import document, figure_section, header, items, le
 from galileo_jax.report.statements import number
 from galileo_jax.report.svg_chart import chart_svg
 from galileo_jax.report.write import PLOTS
+from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CANDIDATES = 8
 ONLY_WIDE = ("", "log evidence", "chi2 per dof", "p")  # of the candidates

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from galileo_jax.files.atomic_write import replacing
 from galileo_jax.prediction.extrapolate import Motions, as_measured
 from galileo_jax.report import gl_view
 from galileo_jax.report.figure import style
 from galileo_jax.report.side_view import Still, View, draw, view_of
 from galileo_jax.results.run import Run
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.video import decode
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.files.atomic_write import write_text
 from galileo_jax.report.figure import to_inline
 from galileo_jax.report.shell import document, figure_section, header, table
 from galileo_jax.report.write import PAGE
 from galileo_jax.results.run import Run
+from galileo_jax.runtime.atomic_write import write_text
 
 LEAST_M = 5e-4  # after the clip, that is worth telling
 OVER = "all is at rest when the clip ends, and stays so; what follows happened in the clip"

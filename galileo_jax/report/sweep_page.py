@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.files.atomic_write import write_text
 from galileo_jax.report.plotly_chart import figure_element
 from galileo_jax.report.provenance import versions
 from galileo_jax.report.shell import document, figure_section, header, legend, table
+from galileo_jax.runtime.atomic_write import write_text
 
 COLOURS = ("object2", "object1", "good", "fails", "ink", "soft")
 QUANTITIES = {"k1": "k1", "k2": "k2", "mass_ratio": "m1/m2"}

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.files.atomic_write import write_text
 from galileo_jax.report.animation import animation
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.draws import pair_figure, trace_figure
@@ -18,6 +17,7 @@ from galileo_jax.report.residuals import residual_chart
 from galileo_jax.report.svg_chart import chart_svg
 from galileo_jax.results.run import Run
 from galileo_jax.results.shown_parameters import shown_parameters
+from galileo_jax.runtime.atomic_write import write_text
 
 PAGE, PLOTS = "report.html", "plots"
 OURS = ("velocity_", "position_", "residuals_", "pairs", "trace")  # names of plots begin so

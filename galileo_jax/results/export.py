@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.files.atomic_write import replacing
 from galileo_jax.files.tables import TABLE_WRITERS, Table
 from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
 FORMATS = (*TABLE_WRITERS, "netcdf")

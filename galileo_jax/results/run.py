@@ -16,13 +16,13 @@ import yaml
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
-from galileo_jax.files.atomic_write import write_json, write_text
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.registry import load_file, make_effects
 from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 
 RESULT, OBSERVATION = "result.json", "observation.csv"

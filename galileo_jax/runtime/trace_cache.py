@@ -21,7 +21,7 @@ import jax
 import numpy as np
 from jax.core import Tracer
 
-from galileo_jax.files.atomic_write import replacing
+from galileo_jax.runtime.atomic_write import replacing
 
 FOLDER = "traces"  # in that of JAX's cache
 LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "lineax", "optimistix")

@@ -8,7 +8,7 @@ from typing import Any
 
 from galileo_jax.clip.load import check_clip
 from galileo_jax.clip.yaml_file import yaml_text
-from galileo_jax.files.atomic_write import write_json, write_text
+from galileo_jax.runtime.atomic_write import write_json, write_text
 
 YAML_SUFFIX, TRUTH_SUFFIX = ".yaml", ".truth.json"
 

@@ -21,9 +21,9 @@ import numpy as np
 
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip
-from galileo_jax.files.atomic_write import replacing, write_json
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.atomic_write import replacing, write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.task import Failure
 

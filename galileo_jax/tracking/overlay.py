@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from galileo_jax.files.atomic_write import replacing
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 

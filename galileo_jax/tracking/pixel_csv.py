@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.files.atomic_write import write_text
+from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.tracking.track import Track
 
 

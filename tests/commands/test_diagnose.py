@@ -11,11 +11,11 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.commands import command, diagnose
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.diagnosis.last_model import by_itself
-from galileo_jax.files.atomic_write import write_json
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.results.run import load_run
+from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import BROKEN_CLIPS, build_good_track
 from tests.found import diagnosis_of, fit_of, make_trials

@@ -9,7 +9,7 @@ from zipfile import BadZipFile
 import jax
 import numpy as np
 
-from galileo_jax.files.atomic_write import replacing
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
 Carry = TypeVar("Carry")

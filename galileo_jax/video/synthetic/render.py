@@ -13,7 +13,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from galileo_jax.files.atomic_write import replacing
+from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.video.synthetic.camera import Camera, project
 from galileo_jax.video.synthetic.filming import Filming, Hand
 from galileo_jax.video.synthetic.textures import Body, body_texture, hand_texture, wall, wood
