@@ -28,7 +28,9 @@ class Shown:
 
 def shown_commands(page: str) -> list[Shown]:
     """The console blocks of a page, in order."""
-    return [Shown(found["command"], found["printed"].rstrip("\n")) for found in BLOCK.finditer(page)]
+    return [
+        Shown(found["command"], found["printed"].rstrip("\n")) for found in BLOCK.finditer(page)
+    ]
 
 
 def run(command: str, folder: Path) -> str:
