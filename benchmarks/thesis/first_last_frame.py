@@ -12,7 +12,7 @@ import numpy as np
 import setting
 
 from galileo_jax.commands import command
-from galileo_jax.report.figure import COLOURS
+from galileo_jax.report.style import object_colour, palette
 from galileo_jax.rollout.motion import pitch
 from galileo_jax.thesis.task import RELEASE_M, SIZE_M
 
@@ -52,10 +52,10 @@ def draw_scene(axes, centres: np.ndarray) -> None:
     axes.plot((*foot, 1.2), (up * math.sin(scene.angle_rad), 0.0, 0.0), color="0.6")
     turned = np.asarray(pitch(centres, scene))
     half = 0.5 * np.array([SIZE_M[0], SIZE_M[2]])
-    for centre, angle, colour in zip(centres, turned, COLOURS, strict=True):
+    for i, (centre, angle) in enumerate(zip(centres, turned, strict=True)):
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
-        axes.add_patch(Polygon(centre + corners @ turn.T, color=colour))
+        axes.add_patch(Polygon(centre + corners @ turn.T, color=palette()[object_colour(i)]))
     axes.set(aspect="equal", xlim=(-0.65, 1.2), ylim=(-0.05, 0.35))
 
 

@@ -26,7 +26,6 @@ from galileo_jax.commands import command
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.driver import Settings, sample
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.report.figure import style
 from galileo_jax.runtime import compilation_cache
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.thesis.sampler import NUM_CHAINS, NUM_STEPS, Acceptance, Thesis, select
@@ -179,7 +178,7 @@ def figure(
     """Yields matplotlib axes `[row, column]`; the figure is then OUT/NAME.png."""
     from matplotlib.figure import Figure
 
-    with style(name):
+    with matplotlib_style(name):
         drawn = Figure(figsize=(3.6 * columns, row_in * rows), dpi=110, layout="constrained")
         yield drawn.subplots(rows, columns, squeeze=False)
         with replacing(call.out / f"{name}.png") as temporary:

@@ -16,6 +16,7 @@ from galileo_jax.api.track import TrackLike
 from galileo_jax.comparison.compare import Comparison as Compared
 from galileo_jax.comparison.compare import compare as compare_fit
 from galileo_jax.comparison.document import comparison_document
+from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.runtime import progress
@@ -78,27 +79,23 @@ class Comparison:
     @in_float64
     def plot(self) -> "go.Figure":
         """Measured and fitted motion along the path, with the stretches where it fails shaded."""
-        from galileo_jax.report.along import along_paths
         from galileo_jax.report.figures import comparison_figure
 
-        return comparison_figure(
-            along_paths(self.fit.problem, self.gradient, self.found, self._seed)
-        )
+        return comparison_figure(self._paths())
 
     @in_float64
     def report(self, path: str | Path) -> Path:
         """Writes the page (one HTML file, no network needed)."""
         from galileo_jax.report import comparison_page
-        from galileo_jax.report.along import along_paths
 
         problem, gradient = self.fit.problem, self.gradient
-        page = comparison_page.Compared(
+        page = comparison_page.ComparisonReport(
             self.found,
             problem,
             problem.theta(gradient.z, gradient.free),
             tuple(one.clip for one in self.fit.measurements),
             problem.all_effects,
-            along_paths(problem, gradient, self.found, self._seed),
+            self._paths(),
             self.command,
             self._seed,
         )
@@ -111,6 +108,9 @@ class Comparison:
         self.report(folder / "report.html")
         write_json(folder / "compare.json", self.document)
         return folder
+
+    def _paths(self) -> tuple[PathResiduals, ...]:
+        return path_residuals(self.fit.problem, self.gradient, self.found, self._seed)
 
     @property
     def _seed(self) -> int:

@@ -82,9 +82,9 @@ class Diagnosis:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
-        from galileo_jax.report import findings
+        from galileo_jax.report import diagnosis_text
 
-        return findings.verdict(self.found)
+        return diagnosis_text.verdict(self.found)
 
     @property
     def candidates(self) -> "pd.DataFrame":
@@ -173,9 +173,9 @@ class Diagnosis:
     @property
     def next_command(self) -> str:
         """The command that comes next."""
-        from galileo_jax.report import findings
+        from galileo_jax.report import diagnosis_text
 
-        return findings.how_to_go_on(
+        return diagnosis_text.next_command(
             self.found, list(self.document["clips"]), list(self.effects_from)
         )
 
@@ -184,15 +184,15 @@ class Diagnosis:
         """The error over the rounds, and the candidates' probabilities."""
         from galileo_jax.report.figures import diagnosis_figure
 
-        return diagnosis_figure(self.found, self.document)
+        return diagnosis_figure(self.found)
 
     @in_float64
     def report(self, path: str | Path) -> Path:
         """Writes the page (one HTML file, no network needed) and its plots beside it."""
-        from galileo_jax.report.diagnosis_page import Told, write_diagnosis_page
+        from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
 
         clips = tuple(one.clip for one in self.measurements)
-        page = Told(
+        page = DiagnosisReport(
             self.found,
             self.document,
             self.next_command,

@@ -177,13 +177,22 @@ class Fit:
         return Run(folder, one.clip, self.problem.problems[index], own, result)
 
     @in_float64
-    def plot(self) -> "go.Figure":
-        """Measured and fitted velocities, with residuals in units of the noise below."""
-        from galileo_jax.report.figures import fit_figure
-        from galileo_jax.report.fitted import evaluate
+    def plot(self, clip: str | None = None) -> "go.Figure":
+        """Measured and fitted velocities, with residuals in units of the noise below.
 
-        runs = self.runs(self.folder or Path("."))
-        return fit_figure([evaluate(run, seed=int(self.result["seed"])) for run in runs])
+        Args:
+          clip: which, by name; None: the first.
+
+        Raises:
+          InputError: no such clip.
+        """
+        from galileo_jax.prediction.posterior_predictive import posterior_predictive
+        from galileo_jax.report.figures import fit_figure
+
+        runs = {run.problem.name: run for run in self.runs(self.folder or Path("."))}
+        if (clip := clip or self.names[0]) not in runs:
+            raise InputError(f"no clip {clip!r} in this fit; known: {', '.join(runs)}")
+        return fit_figure(posterior_predictive(runs[clip], int(self.result["seed"])))
 
     @in_float64
     def report(self, path: str | Path) -> tuple[Path, ...]:
@@ -195,7 +204,7 @@ class Fit:
         Returns:
           the pages.
         """
-        from galileo_jax.report.write import write_report
+        from galileo_jax.report.fit_page import write_report
 
         path = Path(path)
         runs = self.runs(self.folder or path.parent)
@@ -220,7 +229,7 @@ class Fit:
         Returns:
           the fit, with its `folder`.
         """
-        from galileo_jax.report.write import PAGE, write_report
+        from galileo_jax.report.fit_page import PAGE, write_report
 
         folder = Path(folder)
         if folder.exists() and not folder.is_dir():

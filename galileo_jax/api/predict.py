@@ -52,9 +52,9 @@ class Prediction:
     @property
     def sentences(self) -> tuple[str, ...]:
         """The answers in words."""
-        from galileo_jax.report.prediction import told
+        from galileo_jax.report.prediction import prediction_lines
 
-        return tuple(told(self.run, self.document))
+        return tuple(prediction_lines(self.run, self.document))
 
     def to_dataframe(self) -> "pd.DataFrame":
         """One row per object and time: median and 95 % interval of the centre, m.
@@ -89,22 +89,21 @@ class Prediction:
         Raises:
           InputError: the folder cannot be written.
         """
-        from galileo_jax.report.continuation import continuation_figure
-        from galileo_jax.report.figure import to_svg
+        from galileo_jax.report.draw import to_svg
         from galileo_jax.report.first_and_last import write_first_and_last
         from galileo_jax.report.prediction import write_prediction
+        from galileo_jax.report.prediction_chart import prediction_chart
 
         out = Path(folder)
         if out.exists() and not out.is_dir():
             raise InputError(f"--out: {out} is a file; a folder expected")
-        document = dict(self.document)
-        svg = to_svg(continuation_figure(self.run, self.motions), "prediction")
+        chart = prediction_chart(self.run, self.motions)
         picture = out / "first_and_last.png"
         try:
-            document["picture"] = write_first_and_last(self.run, self.motions, picture)
-            write_text(out / "prediction.svg", svg)
-            page = write_prediction(out, self.run, document, svg)
-            write_json(out / "prediction.json", document)
+            write_first_and_last(self.run, self.motions, picture)
+            write_text(out / "prediction.svg", to_svg(chart))
+            page = write_prediction(out, self.run, self.document, chart)
+            write_json(out / "prediction.json", self.document)
         except OSError as error:
             raise InputError(f"--out: {out}: {error.strerror or error}") from error
         return out / "prediction.json", out / "prediction.svg", picture, page

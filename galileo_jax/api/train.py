@@ -111,7 +111,8 @@ def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
     from galileo_jax.neural.dataset import load_or_make
     from galileo_jax.neural.presets import make_task
     from galileo_jax.neural.training import train as train_network
-    from galileo_jax.report.loss_curve import loss_svg
+    from galileo_jax.report.draw import to_svg
+    from galileo_jax.report.training_chart import loss_chart
 
     task = make_task(config)
     began = time.perf_counter()
@@ -120,7 +121,7 @@ def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
     data_s = time.perf_counter() - began
     with progress.part(SHARE_DATA, 1.0):
         done = train_network(task, config, samples, out)
-    write_text(out / "loss.svg", loss_svg(done.losses))
+    write_text(out / "loss.svg", to_svg(loss_chart(done.losses)))
     seconds = time.perf_counter() - began
     write_json(
         out / "training.json",

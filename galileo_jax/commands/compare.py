@@ -49,13 +49,13 @@ def main(argv: Sequence[str]) -> int | None:
 def _lines(compared: "Comparison") -> list[str]:
     """The verdict, the worst cells and the nuisances outside their priors."""
     from galileo_jax.comparison.document import pulled
-    from galileo_jax.report import findings
+    from galileo_jax.report import diagnosis_text
 
     names, found = compared.fit.names, compared.found
     several = len(names) > 1
     width = max(len(name) for name in names) + 2 if several else 0
     lines = [
-        findings.adequacy(found, compared.fit.problem.all_effects),
+        diagnosis_text.adequacy(found, compared.fit.problem.all_effects),
         "",
         f"{'clip' if several else '':<{width}}{'object':<10}{'axis':<6}{'phase':<11}"
         f"{'rmse':>8}{'noise':>8} m/s{'z':>7}",
@@ -65,7 +65,7 @@ def _lines(compared: "Comparison") -> list[str]:
             f"{place.clip if several else '':<{width}}{place.object:<10}{place.axis:<6}"
             f"{place.phase:<11}{place.rmse:>8.4f}{place.noise:>8.4f}{place.z:>11.1f}"
         )
-    return lines + [findings.pull_text(pull) for pull in pulled(found)]
+    return lines + [diagnosis_text.pull_text(pull) for pull in pulled(found)]
 
 
 def _parser() -> command.Parser:

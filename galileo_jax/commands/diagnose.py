@@ -64,39 +64,39 @@ def _round_head(first: Mapping[str, Any]) -> str:
 
 def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
     """The last of the rounds, and how the friction coefficients changed since the one before."""
-    from galileo_jax.report import findings
+    from galileo_jax.report import diagnosis_text
 
     row = rows[-1]
     frictions = ""
     for name in FRICTIONS:
         if name not in row:
             continue
-        value = findings.value_text(row[name])
+        value = diagnosis_text.value_text(row[name])
         if len(rows) > 1:
             value += f" ({row[name]['mean'] - rows[-2][name]['mean']:+.4f})"
         frictions += f"  {value:<28}"
     return (
-        f"{findings.effects_text(row['effects']):<26}{row['rmse']:>9.4f}"
-        f"{row['chi2_per_dof']:>10.2f}{findings.p_text(row['p_value']):>9}{frictions}".rstrip()
+        f"{diagnosis_text.effects_text(row['effects']):<26}{row['rmse']:>9.4f}"
+        f"{row['chi2_per_dof']:>10.2f}{diagnosis_text.p_text(row['p_value']):>9}{frictions}".rstrip()
     )
 
 
 def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
     """Candidates, the verdict, and how to go on."""
     from galileo_jax.inference.fits.gradient import BEHIND, Code
-    from galileo_jax.report import findings
+    from galileo_jax.report import diagnosis_text
 
     diagnosis, record = found.found, found.document
     lines = ["", f"{'candidates':<26}{'probability':>12}{'evidence':>12}{'p':>9}  strength"]
     shown = list(zip(diagnosis.candidates, record["candidates"], strict=True))[:NUM_CANDIDATES]
     for made, entry in shown:
-        strengths = findings.strength_texts(made.effects, entry).values()
+        strengths = diagnosis_text.strength_texts(made.effects, entry).values()
         is_behind = diagnosis.candidates[0].log_evidence - entry["score"] > BEHIND
         is_settled = made.hypothesis.fit.code is Code.CONVERGED
         evidence = "far behind" if is_behind and not is_settled else f"{entry['score']:+.1f}"
         lines.append(
             f"{entry['effect']:<26}{entry['probability']:>12.3f}{evidence:>12}"
-            f"{findings.p_text(entry['p_value']):>9}  " + ", ".join(strengths)
+            f"{diagnosis_text.p_text(entry['p_value']):>9}  " + ", ".join(strengths)
         )
     lines += ["", found.sentence]
     if hidden is not None:
@@ -107,7 +107,7 @@ def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
             for name, entry in record["missing_force"]["objects"].items()
         ]
     if "each_clip" in record:
-        lines += findings.each_clip(record["each_clip"])
+        lines += diagnosis_text.each_clip(record["each_clip"])
     for row in record.get("left_one_out", []):
         lines.append(
             f"{row['clip']} predicted from the others: {row['rmse_before']:.4f} m/s, with what was "

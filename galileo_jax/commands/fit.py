@@ -104,7 +104,7 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
         f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
         f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}); {result['status']}"
     )
-    from galileo_jax.report.statements import CHI2_HIGH
+    from galileo_jax.report.fit_text import CHI2_HIGH
 
     if not error["chi2_per_dof"] <= CHI2_HIGH:
         lines.append(

@@ -1,5 +1,8 @@
 """Phases of a motion: where along the way a model fails is half of what is wrong with it."""
 
+from dataclasses import dataclass
+from itertools import pairwise
+
 import numpy as np
 
 from galileo_jax.inference.problem import Problem
@@ -10,6 +13,30 @@ FREE = {"spring": "swing", "liquid": "liquid"}  # by the law that makes it
 PHASES += ("flight", *FREE.values())
 COLLISION_S = 0.05  # either side of the hit
 RESTS_M_S = 2e-3
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A time during which an object moves in one way: one of `PHASES`, on the clip's clock."""
+
+    name: str
+    start_s: float
+    end_s: float
+
+
+def phases_of(labels: np.ndarray, times_s: np.ndarray) -> tuple[Phase, ...]:
+    """The phases of one object, one after the other.
+
+    Args:
+      labels: `[frame]`, indices into `PHASES`.
+      times_s: `[frame]`.
+    """
+    borders = [0, *map(int, np.flatnonzero(np.diff(labels)) + 1), len(labels) - 1]
+    return tuple(
+        Phase(PHASES[labels[start]], float(times_s[start]), float(times_s[end]))
+        for start, end in pairwise(borders)
+        if end > start
+    )
 
 
 def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:

@@ -1,5 +1,5 @@
-"""The report of a run: plots and one self-contained HTML page."""
+"""Charts, pictures of the scene, and self-contained HTML pages of results."""
 
-from galileo_jax.report.write import write_report
+from galileo_jax.report.fit_page import write_report
 
 __all__ = ["write_report"]

@@ -1,10 +1,10 @@
-"""The clip with the measured and the simulated motion over it, and a slider.
+"""The measured and the simulated motion, with a slider.
 
-Of a video its own pictures, of a csv track the scene drawn from the side; page.js moves it.
+Drawn over the frames of the video, or, of a csv track, over the scene from the side; page.js
+moves the shapes.
 """
 
 import json
-import math
 from collections.abc import Mapping
 from html import escape
 
@@ -12,15 +12,15 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.problem import Problem
-from galileo_jax.report.chart import object_colour
-from galileo_jax.report.film import Film, film
-from galileo_jax.report.shell import legend
-from galileo_jax.report.side_view import SLAB_M, View, surfaces, view_of
+from galileo_jax.report.html_page import legend
+from galileo_jax.report.side_view import View, outline, surfaces, view_of
+from galileo_jax.report.style import object_colour
+from galileo_jax.report.video_frames import VideoFrames, sample_frames
 from galileo_jax.rollout.motion import pitch
 
 MM = 1000.0  # per metre: the SVG's units
-SLOWER = 3  # the clip's seconds take so many
-MOST_STEPS = 480  # of the slider, without pictures
+SLOWER = 3  # times slower than the clip
+MOST_STEPS = 480  # of the slider, without a video
 CROSS_PX, DOT_PX, PAGE_PX = 9.0, 1.6, 1000.0  # half a cross, half a dot, on a page so wide
 
 
@@ -28,47 +28,47 @@ def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray
     """One clip's motion.
 
     Args:
-      clip: with a video that is still there, its pictures are shown.
+      clip: where its video is still there, the frames are shown.
       problem: its observation and its scene.
-      predicted_m: centres by what the model is called `[object, 2, frame]`; the last is drawn
-        full, those before it faint.
+      predicted_m: centres `[object, 2, frame]` by the name of the model; the last is drawn
+        filled, those before it dashed.
     """
     observation = problem.observation
     models = list(predicted_m)
     offset = _offset(problem, predicted_m[models[-1]])
-    filmed = _film(clip, len(observation.times_s))
-    # In a picture shapes stand round the point that was followed, in a drawing round the centre.
-    motions = {name: motion + offset * (filmed is not None) for name, motion in predicted_m.items()}
-    motions["measured"] = observation.position_m - offset * (filmed is None)
+    video = _frames(clip, len(observation.times_s))
+    # Over a frame, shapes stand around the tracked point, in a drawing around the centre.
+    motions = {name: motion + offset * (video is not None) for name, motion in predicted_m.items()}
+    motions["measured"] = observation.position_m - offset * (video is None)
     view = view_of(clip, problem.model.scene, np.stack(list(motions.values())))
-    steps = filmed.frames if filmed else range(0, len(observation.times_s), _stride(problem))
+    steps = video.frames if video else range(0, len(observation.times_s), _stride(problem))
     chosen = {name: motion[..., list(steps)] for name, motion in motions.items()}
     data = {
         "times": observation.times_s[list(steps)].round(4).tolist(),
         "motions": {name: _places(problem, motion) for name, motion in chosen.items()},
-        "pictures": list(filmed.pictures) if filmed else [],
+        "pictures": list(video.pictures) if video else [],
         "slower": SLOWER,
     }
     encoded = json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
     name = escape(problem.name, quote=True)
     return (
         f'<figure class="motion" data-clip="{name}">'
-        f"<figcaption>{escape(_caption(filmed))}</figcaption>"
-        f"{_stage(clip, problem, motions, models, view, filmed)}"
+        f"<figcaption>{escape(_caption(video))}</figcaption>"
+        f"{_stage(clip, problem, motions, models, view, video)}"
         f'<div class="controls"><button type="button">Play</button>'
         f'<input type="range" min="0" max="{len(data["times"]) - 1}" value="0" '
-        f'aria-label="time in {name}"><output></output></div>{_legend(problem, models, filmed)}'
+        f'aria-label="time in {name}"><output></output></div>{_legend(problem, models, video)}'
         f'<script type="application/json">{encoded}</script></figure>'
     )
 
 
-def _film(clip: Clip, num_frames: int) -> Film | None:
-    """The pictures; None for a csv track, a clip without a place for its origin, a lost video."""
+def _frames(clip: Clip, num_frames: int) -> VideoFrames | None:
+    """None for a csv track, a clip without a place for its origin, a video that is gone."""
     if clip.video is None or not clip.video.is_file():
         return None
     if clip.origin_px is None and clip.objects[0].point_px is None:
         return None
-    return film(clip.video, num_frames)
+    return sample_frames(clip.video, num_frames)
 
 
 def _stride(problem: Problem) -> int:
@@ -76,7 +76,7 @@ def _stride(problem: Problem) -> int:
 
 
 def _offset(problem: Problem, predicted_m: np.ndarray) -> np.ndarray:
-    """The followed points minus the centres, `[object, 2, 1]`."""
+    """The tracked points minus the centres, `[object, 2, 1]`."""
     observation = problem.observation
     found = np.zeros((len(observation.names), 2, 1))
     for i, seen in enumerate(observation.mask):
@@ -86,34 +86,30 @@ def _offset(problem: Problem, predicted_m: np.ndarray) -> np.ndarray:
     return found
 
 
-def _caption(filmed: Film | None) -> str:
-    if filmed is None:
+def _caption(video: VideoFrames | None) -> str:
+    if video is None:
         return "The scene from the side. Arrow keys move the slider frame by frame."
-    step = filmed.frames[1] - filmed.frames[0] if len(filmed.frames) > 1 else 1
-    every = "" if step == 1 else f" Every {_ordinal(step)} frame is shown."
+    step = video.frames[1] - video.frames[0] if len(video.frames) > 1 else 1
+    every = "" if step == 1 else f" One frame in {step} is shown."
     return (
-        "The clip, with what was followed and what the model does drawn over it."
+        "The clip, with the tracked points and the fitted motion drawn over it."
         f"{every} Arrow keys move the slider frame by frame."
     )
 
 
-def _ordinal(number: int) -> str:
-    return {2: "second", 3: "third"}.get(number, f"{number}th")
-
-
-def _legend(problem: Problem, models: list[str], filmed: Film | None) -> str:
+def _legend(problem: Problem, models: list[str], video: VideoFrames | None) -> str:
     entries = [
         ("fill", object_colour(i), f"{name}, {models[-1]}")
         for i, name in enumerate(problem.observation.names)
     ]
     if len(models) > 1:
         entries.append(("dashed", "soft", ", ".join(models[:-1])))
-    if filmed:
+    if video:
         entries.append(("cross", "ink", "measured"))
         if problem.model.scene.surroundings.has_surface:
             entries.append(("line", "soft", "ramp and table as declared"))
     else:
-        entries.append(("line", "ink", "measured (outline; its way dotted)"))
+        entries.append(("line", "ink", "measured (outline; its path dotted)"))
     return legend(entries)
 
 
@@ -123,37 +119,34 @@ def _stage(
     motions: Mapping[str, np.ndarray],
     models: list[str],
     view: View,
-    filmed: Film | None,
+    video: VideoFrames | None,
 ) -> str:
     """The picture: a canvas for the video's frames, shapes over it."""
     width, height = MM * (view.right_m - view.left_m), MM * (view.top_m - view.bottom_m)
     left = -MM * view.right_m if view.is_mirrored else MM * view.left_m
     turn = ' transform="scale(-1 1)"' if view.is_mirrored else ""
     scene = problem.model.scene
-    ground = "".join(_slab(*one, is_outline=filmed is not None) for one in surfaces(scene, view))
+    bodies = [_body(clip, problem, i) for i in range(len(clip.objects))]
+    ground = "".join(_surface(slab, video is not None) for slab in surfaces(scene, view))
     drawn = [ground, _trails(motions["measured"], DOT_PX * width / PAGE_PX)]
-    for k, model in enumerate(models):
-        for i, declared in enumerate(clip.objects):
+    for model in models:
+        for i, body in enumerate(bodies):
             colour = f"var(--{object_colour(i)})"
-            if k == len(models) - 1:
-                look = f'fill="{colour}" fill-opacity="{0.45 if filmed else 0.8}" stroke="{colour}"'
+            if model == models[-1]:
+                look = f'fill="{colour}" fill-opacity="{0.45 if video else 0.8}" stroke="{colour}"'
             else:
                 look = f'fill="none" stroke="{colour}" stroke-dasharray="4 3"'
-            drawn.append(_shape(model, i, look, _body(problem, i, declared.shape)))
-    for i, declared in enumerate(clip.objects):
+            drawn.append(_shape(model, i, look, body))
+    arm = CROSS_PX * width / PAGE_PX
+    cross = f'<path d="M{-arm:.1f} 0H{arm:.1f}M0 {-arm:.1f}V{arm:.1f}"/>'
+    for i, body in enumerate(bodies):
         look = 'fill="none" stroke="currentColor" stroke-width="1.5"'
-        arm = CROSS_PX * width / PAGE_PX
-        body = (
-            f'<path d="M{-arm:.1f} 0H{arm:.1f}M0 {-arm:.1f}V{arm:.1f}"/>'
-            if filmed
-            else _body(problem, i, declared.shape)
-        )
-        drawn.append(_shape("measured", i, look, body))
-    size = filmed.size_px if filmed else (0, 0)
-    canvas = f'<canvas width="{size[0]}" height="{size[1]}"></canvas>' if filmed else ""
+        drawn.append(_shape("measured", i, look, cross if video else body))
+    size = video.size_px if video else (0, 0)
+    canvas = f'<canvas width="{size[0]}" height="{size[1]}"></canvas>' if video else ""
     names = " and ".join(problem.observation.names)
     return (
-        f'<div class="stage{" filmed" if filmed else ""}" '
+        f'<div class="stage{" filmed" if video else ""}" '
         f'style="aspect-ratio:{width:.1f}/{height:.1f}">{canvas}'
         f'<svg role="img" aria-label="{escape(names, quote=True)}, measured and simulated, at the '
         f"slider's time\" "
@@ -192,27 +185,18 @@ def _places(problem: Problem, motion_m: np.ndarray) -> list[list[list[float] | N
     return found
 
 
-def _body(problem: Problem, index: int, shape: str) -> str:
-    scene = problem.model.scene.surroundings
-    length, height = MM * scene.half_length_m[index], MM * scene.half_height_m[index]
-    if shape == "sphere":
-        return f'<circle r="{length:.1f}"/>'
-    return (
-        f'<rect x="{-length:.1f}" y="{-height:.1f}" width="{2 * length:.1f}" '
-        f'height="{2 * height:.1f}"/>'
-    )
+def _body(clip: Clip, problem: Problem, index: int) -> str:
+    if clip.objects[index].shape == "sphere":
+        return f'<circle r="{MM * problem.model.scene.surroundings.half_length_m[index]:.1f}"/>'
+    return f'<polygon points="{_points(outline(clip, problem.model.scene, index))}"/>'
 
 
-def _slab(corner: tuple[float, float], length_m: float, angle_rad: float, is_outline: bool) -> str:
-    (x, y), far, thick = corner, MM * length_m, MM * SLAB_M
-    dx, dy = far * math.cos(angle_rad), -far * math.sin(angle_rad)
-    x, y = MM * x, -MM * y
-    if is_outline:
-        return (
-            f'<path d="M{x:.1f} {y:.1f}l{dx:.1f} {dy:.1f}" fill="none" stroke="currentColor" '
-            'opacity="0.5"/>'
-        )
-    return (
-        f'<polygon fill="var(--surface)" points="{x:.1f},{y:.1f} {x + dx:.1f},{y + dy:.1f} '
-        f'{x + dx:.1f},{y + dy + thick:.1f} {x:.1f},{y + thick:.1f}"/>'
-    )
+def _surface(slab: np.ndarray, is_line: bool) -> str:
+    if is_line:
+        points = _points(slab[:2])
+        return f'<polyline points="{points}" fill="none" stroke="currentColor" opacity="0.5"/>'
+    return f'<polygon fill="var(--surface)" points="{_points(slab)}"/>'
+
+
+def _points(corners_m: np.ndarray) -> str:
+    return " ".join(f"{MM * x:.1f},{-MM * y:.1f}" for x, y in corners_m)

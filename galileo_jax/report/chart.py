@@ -1,33 +1,30 @@
-"""A chart as a description: what is drawn, in which of the page's colours, and nothing of how.
+"""A chart as a description: what is drawn and in which colours, but not with which library.
 
-`plotly_chart.py` draws it in a page, `svg_chart.py` as a file.
+`draw.py` turns it into a Plotly figure (pages, notebooks) or an SVG document (papers, slides).
 """
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
-from galileo_jax.report.phase import Phase
+from galileo_jax.comparison.phases import Phase
 
-Colour = Literal["object1", "object2", "object3", "ink", "soft", "accent", "fails"]
-
-
-def object_colour(index: int) -> Colour:
-    """Of the object with this index; a fourth has the first's again."""
-    return ("object1", "object2", "object3")[index % 3]
+Values = np.ndarray | Sequence[float] | Sequence[str]  # str: categories
 
 
 @dataclass(frozen=True)
 class Line:
     """A curve through `x` and `y`."""
 
-    x: np.ndarray
-    y: np.ndarray
-    colour: Colour
+    x: Values
+    y: Values
+    colour: str
     name: str
     is_dashed: bool = False
     width_px: float = 1.8
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -37,25 +34,62 @@ class Band:
     x: np.ndarray
     low: np.ndarray
     high: np.ndarray
-    colour: Colour
+    colour: str
     name: str
     opacity: float = 0.3
 
 
 @dataclass(frozen=True)
-class Dots:
+class Points:
     """A mark at each `x`, `y`; with `sd` a bar of 1.96 of it to either side."""
 
-    x: np.ndarray
-    y: np.ndarray
-    colour: Colour
+    x: Values
+    y: Values
+    colour: str
     name: str
     is_hollow: bool = False
     size_px: float = 4.5
     sd: np.ndarray | None = None
+    opacity: float = 1.0
 
 
-Mark = Line | Band | Dots
+@dataclass(frozen=True)
+class Bars:
+    """Bars of these heights at `x`, with texts at their ends; horizontal ones start at x = 0."""
+
+    x: Values
+    height: Values
+    colour: str
+    name: str
+    width: float = 0.6
+    texts: tuple[str, ...] = ()
+    is_horizontal: bool = False
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True)
+class Boxes:
+    """Box plots of the `y` in each category of `x`, with all values as points.
+
+    Attributes:
+      x: of each value.
+      y: values.
+      colour, name: of the series.
+      offset, width: in categories, of series that stand side by side.
+    """
+
+    x: Sequence[str]
+    y: Sequence[float]
+    colour: str
+    name: str
+    offset: float = 0.0
+    width: float = 0.6
+
+
+Mark = Line | Band | Points | Bars | Boxes
+SHADED_PHASES = ("held", "foot", "collision")
+LETTER = 0.021  # of the panel's width, what a letter of a phase's name takes
+NAMES_ROOM = 0.14  # of a panel's height, for the phases' names
 
 
 @dataclass(frozen=True)
@@ -68,9 +102,12 @@ class Panel:
       title: over the axes.
       xlabel: quantity and unit; "" where the panel below has the same axis.
       xlim, ylim: ends of the axes; None = whatever is drawn.
+      is_log_y: the y axis is logarithmic; it has no `ylim` then.
+      has_y_ticks: whether the y axis has numbers.
       phases: named on top; passages between phases are shaded.
-      stretch: of x, where the model fails.
-      at: a level that is drawn as a line.
+      highlight: of x, where the model fails.
+      level: of y, drawn as a line.
+      divider: x at which a line with a name is drawn.
     """
 
     ylabel: str
@@ -79,43 +116,89 @@ class Panel:
     xlabel: str = ""
     xlim: tuple[float, float] | None = None
     ylim: tuple[float, float] | None = None
+    is_log_y: bool = False
+    has_y_ticks: bool = True
     phases: tuple[Phase, ...] = ()
-    stretch: tuple[float, float] | None = None
-    at: float | None = None
+    highlight: tuple[float, float] | None = None
+    level: float | None = None
+    divider: tuple[float, str] | None = None
+
+    @property
+    def spans(self) -> list[tuple[float, float, str, float]]:
+        """What is shaded: start and end in x, colour, opacity."""
+        found = [(p.start_s, p.end_s, "ink", 0.06) for p in self.phases if p.name in SHADED_PHASES]
+        return found + ([(*self.highlight, "fails", 0.3)] if self.highlight else [])
+
+    @property
+    def names(self) -> list[tuple[float, str]]:
+        """The names of the phases that are wide enough for them, and the x of their middles."""
+        if self.xlim is None:
+            return []
+        letter = LETTER * (self.xlim[1] - self.xlim[0])
+        return [
+            ((phase.start_s + phase.end_s) / 2, phase.name)
+            for phase in self.phases
+            if phase.end_s - phase.start_s > letter * len(phase.name)
+        ]
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Panels, one below the other.
+    """Panels in a grid.
 
     Attributes:
       name: of its file.
       label: what is seen, for those who do not see it.
-      panels: they share x where only the last has an `xlabel`.
-      clip: whose time is on x; None = x is not a clip's time.
+      panels: row by row; None leaves a place empty. The panels of a column share x where only
+        the last has an `xlabel`.
+      clip: whose time is on x; None = x is not the time of a clip.
+      columns: of the grid.
+      panel_px: height of a panel; None = as one or several panels usually have it.
     """
 
     name: str
     label: str
-    panels: tuple[Panel, ...]
+    panels: tuple[Panel | None, ...]
     clip: str | None = None
+    columns: int = 1
+    panel_px: int | None = None
+
+    @property
+    def rows(self) -> list[tuple[Panel | None, ...]]:
+        """The grid."""
+        step = self.columns
+        return [self.panels[i : i + step] for i in range(0, len(self.panels), step)]
+
+    @property
+    def marks(self) -> list[Mark]:
+        """Of all panels."""
+        return [mark for panel in self.panels if panel for mark in panel.marks]
 
     @property
     def shares_x(self) -> bool:
-        """Whether all panels have the x axis of the last."""
-        return not any(panel.xlabel for panel in self.panels[:-1])
+        """Whether the panels of a column have the x axis of the last."""
+        return not any(p.xlabel for p in chain.from_iterable(self.rows[:-1]) if p)
 
 
-SHADED = ("held", "foot", "collision")
-LETTER = 0.021  # of the panel's width, what a letter of a phase's name takes
+def side_by_side(name: str, label: str, charts: Sequence[Chart]) -> Chart:
+    """Charts of equally many panels, each one below the other, as the columns of one."""
+    rows = zip(*(chart.panels for chart in charts), strict=True)
+    return Chart(name, label, tuple(chain.from_iterable(rows)), columns=len(charts))
 
 
-def is_named(phase: Phase, xlim: tuple[float, float]) -> bool:
-    """Whether a phase is wide enough for its name."""
-    return phase.end_s - phase.start_s > LETTER * len(phase.name) * (xlim[1] - xlim[0])
+def stacked(name: str, label: str, panels: Iterable[Panel], panel_px: int | None = None) -> Chart:
+    """Panels of one quantity each, one below the other over one x axis."""
+    *upper, last = panels
+    joined = (*(replace(panel, xlabel="") for panel in upper), last)
+    return Chart(name, label, joined, panel_px=panel_px)
 
 
 def time_limits(times_s: np.ndarray) -> tuple[float, float]:
     """The clip's time with a little room."""
     spare = 0.02 * float(times_s[-1] - times_s[0])
     return float(times_s[0]) - spare, float(times_s[-1]) + spare
+
+
+def with_room(low: float, high: float) -> tuple[float, float]:
+    """The ends of an axis with room for the phases' names."""
+    return low, high + NAMES_ROOM * (high - low)

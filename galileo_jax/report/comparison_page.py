@@ -10,36 +10,35 @@ import numpy as np
 from galileo_jax.clip.schema import Clip
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.comparison.document import pulled
+from galileo_jax.comparison.path_residuals import PathResiduals
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.report import findings
-from galileo_jax.report.along import Along
+from galileo_jax.report import diagnosis_text
 from galileo_jax.report.animation import animation
-from galileo_jax.report.failure import failure_chart
-from galileo_jax.report.plotly_chart import chart_element
+from galileo_jax.report.comparison_charts import failure_chart
+from galileo_jax.report.html_page import chart_section, document, header, items, table
 from galileo_jax.report.provenance import provenance
-from galileo_jax.report.shell import document, figure_section, header, items, table
 from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CELLS = 12
-PICTURES = (
-    "Along the path, 0 at the foot: measured (dots) and fitted (line), place and speed; below, "
-    "what is left, in units of the noise: filled along the path, hollow across it, 19 of 20 "
-    "expected in the grey band. Shaded: passages between phases. Yellow: where the model fails "
-    "worst."
+FAILURES = (
+    "Position and speed along the path, 0 at the foot: measured (dots) and fitted (line). Below, "
+    "the residuals in units of the noise: filled along the path, hollow across it; 95 % of noise "
+    "is inside the grey band. Grey: transitions between phases. Yellow: the interval in which the "
+    "model fails worst."
 )
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparisonReport:
     """A comparison and what was compared.
 
     Attributes:
-      comparison: what was found.
+      comparison: the result.
       trials: the model of the clips.
       theta: the fit, `[parameter]`.
       clips: what was fitted.
       effects: of the model.
-      shown: every object along its path.
+      paths: the residuals of every object along its path.
       command: that makes the page again.
       seed: of everything random.
     """
@@ -49,30 +48,30 @@ class Compared:
     theta: np.ndarray
     clips: tuple[Clip, ...]
     effects: tuple[str, ...]
-    shown: tuple[Along, ...]
+    paths: tuple[PathResiduals, ...]
     command: str
     seed: int
 
 
-def write_comparison_page(path: Path, title: str, told: Compared) -> None:
+def write_comparison_page(path: Path, title: str, report: ComparisonReport) -> None:
     """Writes the page of a fitted model with these effects."""
-    comparison, error = told.comparison, told.comparison.error
+    comparison, error = report.comparison, report.comparison.error
     more = (
         f"<p>chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
         f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}).</p>\n"
-        f"{items(findings.pull_text(pull) for pull in pulled(comparison))}\n"
-        f'<p class="soft">The model: {escape(findings.effects_text(told.effects))}.</p>'
+        f"{items(diagnosis_text.pull_text(pull) for pull in pulled(comparison))}\n"
+        f'<p class="soft">The model: {escape(diagnosis_text.effects_text(report.effects))}.</p>'
     )
-    lead = findings.adequacy(comparison, told.effects)
+    lead = diagnosis_text.adequacy(comparison, report.effects)
     sections = [
         header("comparison", title, lead, more, comparison.is_adequate),
-        failures("Where it fails", told.shown),
-        motion(told.clips, told.trials, {"fitted": told.theta}),
-        cells(comparison, several=len(told.clips) > 1),
+        failures("Where the model fails", report.paths),
+        motion(report.clips, report.trials, {"fitted": report.theta}),
+        cells(comparison, several=len(report.clips) > 1),
         provenance(
-            told.command,
-            told.clips,
-            {"engine": told.trials.problems[0].engine.name, "seed": str(told.seed)},
+            report.command,
+            report.clips,
+            {"engine": report.trials.problems[0].engine.name, "seed": str(report.seed)},
         ),
     ]
     write_text(path, document(f"{title}: comparison", sections))
@@ -89,11 +88,9 @@ def motion(clips: Sequence[Clip], trials: JointProblem, theta: Mapping[str, np.n
     return "<h2>Motion</h2>\n" + "\n".join(found)
 
 
-def failures(heading: str, shown: Sequence[Along]) -> str:
-    """Pictures of all objects."""
-    charts = [failure_chart(one) for one in shown]
-    pictures = {chart.name: chart_element(chart) for chart in charts}
-    return figure_section(heading, PICTURES, pictures)
+def failures(heading: str, paths: Sequence[PathResiduals]) -> str:
+    """The charts of all objects."""
+    return chart_section(heading, FAILURES, map(failure_chart, paths))
 
 
 def cells(comparison: Comparison, several: bool) -> str:
@@ -103,10 +100,10 @@ def cells(comparison: Comparison, several: bool) -> str:
         row = [place.object, place.axis, place.phase, f"{place.rmse:.4f}", f"{place.noise:.4f}",
                f"{place.z:.1f}", f"{place.whiteness:.2f}"]  # fmt: skip
         rows.append([escape(cell) for cell in ([place.clip, *row] if several else row)])
-    head = ["object", "axis", "phase", "rmse, m/s", "noise, m/s", "z", "neighbours"]
+    head = ["object", "axis", "phase", "rmse, m/s", "noise, m/s", "z", "autocorrelation"]
     return (
-        "<h2>Worst cells</h2>\n<p>z: the largest of a cell's statistics, in standard deviations "
-        "of what refitted replicates of the model give. Neighbours: correlation of neighbouring "
-        "residuals, about 0 if they are noise.</p>\n"
+        "<h2>Worst cells</h2>\n<p>A cell is one object, axis and phase of the motion. z: the "
+        "largest of its test statistics, in standard deviations over data simulated with the "
+        "fitted model. Autocorrelation: of neighbouring residuals, about 0 for noise.</p>\n"
         + table(["clip", *head] if several else head, rows)
     )

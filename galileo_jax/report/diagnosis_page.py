@@ -1,4 +1,4 @@
-"""The page of a diagnosis: what is missing, how the error fell, and what it looks like."""
+"""The page of a diagnosis: verdict, rounds, candidates, and where the model fails."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,21 +8,19 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.clip.schema import Clip
+from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.report import findings
-from galileo_jax.report.along import Along, along_paths
+from galileo_jax.report import diagnosis_text
 from galileo_jax.report.chart import Chart
+from galileo_jax.report.comparison_charts import before_after_chart
 from galileo_jax.report.comparison_page import cells, failures, motion
-from galileo_jax.report.failure import before_after_chart
-from galileo_jax.report.missing_force import is_told, missing_force_chart
-from galileo_jax.report.plotly_chart import chart_element, figure_element
+from galileo_jax.report.diagnosis_charts import is_known, missing_force_chart, rounds_chart
+from galileo_jax.report.draw import to_svg
+from galileo_jax.report.fit_page import PLOTS
+from galileo_jax.report.fit_text import number
+from galileo_jax.report.html_page import chart_section, document, header, items, legend, table
 from galileo_jax.report.provenance import provenance
-from galileo_jax.report.rounds import HEIGHT_PX, rounds_figure
-from galileo_jax.report.shell import document, figure_section, header, items, legend, table
-from galileo_jax.report.statements import number
-from galileo_jax.report.svg_chart import chart_svg
-from galileo_jax.report.write import PLOTS
 from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CANDIDATES = 8
@@ -31,54 +29,56 @@ BAR = '<div class="bar"><div style="width:{:.1f}%"></div></div>'
 
 
 @dataclass(frozen=True)
-class Told:
-    """A diagnosis and what is said of it.
+class DiagnosisReport:
+    """A diagnosis and what its page says beside it.
 
     Attributes:
-      diagnosis: what was found.
+      diagnosis: the result.
       record: diagnosis.json.
-      go_on: the command that comes next.
-      hidden: what was hidden in a synthetic clip, None where that is not known.
+      next_command: the command to run next.
+      truth: the effect hidden in a synthetic clip, None where that is not known.
       clips: what was diagnosed.
       command: that makes the page again.
-      seed: of the draws in pictures.
+      seed: of the draws in charts.
     """
 
     diagnosis: Diagnosis
     record: Mapping[str, Any]
-    go_on: str
-    hidden: str | None
+    next_command: str
+    truth: str | None
     clips: tuple[Clip, ...]
     command: str
     seed: int
 
 
-def write_diagnosis_page(path: Path, title: str, trials: JointProblem, told: Told) -> None:
-    """Writes the page, and what was left before and after an effect as SVG into plots/."""
-    diagnosis = told.diagnosis
+def write_diagnosis_page(
+    path: Path, title: str, trials: JointProblem, report: DiagnosisReport
+) -> None:
+    """Writes the page, and the residuals before and after each effect as SVG into plots/."""
+    diagnosis = report.diagnosis
     shown = [
-        along_paths(trials, one.hypothesis.fit, one.comparison, told.seed)
+        path_residuals(trials, one.hypothesis.fit, one.comparison, report.seed)
         for one in diagnosis.rounds
     ]
     rounds = list(pairwise(zip(shown, map(_title, diagnosis.rounds), strict=True)))
     added = [(after[1], _before_after(before, after)) for before, after in rounds]
     for chart in (chart for _, charts in added for chart in charts):
-        write_text(path.parent / PLOTS / f"{chart.name}.svg", chart_svg(chart))
+        write_text(path.parent / PLOTS / f"{chart.name}.svg", to_svg(chart))
     sections = [
-        _verdict(title, told),
-        _rounds(told.record["history"]),
-        _candidates(diagnosis, told.record["candidates"]),
-        motion(told.clips, trials, _fitted(trials, diagnosis)),
-        failures(f"Where it fails: {_title(diagnosis.rounds[0])}", shown[0]),
+        _verdict(title, report),
+        _rounds(diagnosis.rounds, report.record["history"]),
+        _candidates(diagnosis, report.record["candidates"]),
+        motion(report.clips, trials, _fitted(trials, diagnosis)),
+        failures(f"Where the model fails: {_title(diagnosis.rounds[0])}", shown[0]),
         *(_added(name, charts) for name, charts in added),
-        _missing(told, trials.problems[0].observation.names),
+        _missing(report, trials.problems[0].observation.names),
         cells(diagnosis.base, several=len(trials.problems) > 1),
-        _each_clip(told.record.get("each_clip")),
-        _left_one_out(told.record.get("left_one_out", [])),
+        _each_clip(report.record.get("each_clip")),
+        _left_one_out(report.record.get("left_one_out", [])),
         provenance(
-            told.command,
-            told.clips,
-            {"engine": trials.problems[0].engine.name, "seed": str(told.seed)},
+            report.command,
+            report.clips,
+            {"engine": trials.problems[0].engine.name, "seed": str(report.seed)},
         ),
     ]
     write_text(path, document(f"{title}: diagnosis", [part for part in sections if part]))
@@ -93,49 +93,44 @@ def _fitted(trials: JointProblem, diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _title(one: Round) -> str:
-    return findings.effects_text(one.hypothesis.effects)
+    return diagnosis_text.effects_text(one.hypothesis.effects)
 
 
-def _verdict(title: str, told: Told) -> str:
-    diagnosis = told.diagnosis
-    hidden = "" if told.hidden is None else f"<p>Truth: {escape(told.hidden)}.</p>\n"
+def _verdict(title: str, report: DiagnosisReport) -> str:
+    diagnosis = report.diagnosis
+    truth = "" if report.truth is None else f"<p>Truth: {escape(report.truth)}.</p>\n"
     more = (
-        f"{hidden}{items(diagnosis.verdict.advice)}\n"
-        f'<p class="soft">Next: <code>{escape(told.go_on)}</code></p>'
+        f"{truth}{items(diagnosis.verdict.advice)}\n"
+        f'<p class="soft">Next: <code>{escape(report.next_command)}</code></p>'
     )
-    is_known = diagnosis.verdict.status != "unknown"
-    return header("diagnosis", title, findings.verdict(diagnosis), more, is_known)
+    is_good = diagnosis.verdict.status != "unknown"
+    return header("diagnosis", title, diagnosis_text.verdict(diagnosis), more, is_good)
 
 
-def _rounds(history: Sequence[Mapping[str, Any]]) -> str:
+def _rounds(rounds: Sequence[Round], history: Sequence[Mapping[str, Any]]) -> str:
     frictions = [name for name in ("k1", "k2") if name in history[0]]
     rows = []
     for row in history:
         rows.append(
             [
-                escape(findings.effects_text(row["effects"])),
+                escape(diagnosis_text.effects_text(row["effects"])),
                 f"{row['rmse']:.4f}",
                 f"{row['chi2_per_dof']:.2f}",
-                escape(findings.p_text(row["p_value"])),
+                escape(diagnosis_text.p_text(row["p_value"])),
                 *(number(row[k]["mean"], row[k]["sd"]) for k in frictions),
             ]
         )
     head = ["model with", "rmse, m/s", "chi2 per dof", "p", *frictions]
-    errors = [float(row["rmse"]) for row in history]
-    label = "velocity error round by round: " + ", ".join(f"{error:.4f} m/s" for error in errors)
-    chart = figure_element(rounds_figure(history), label, HEIGHT_PX)
     key = legend([("fill", "accent", "velocity error"), ("dashed", "ink", "tracking noise alone")])
-    return (
-        "<h2>Rounds</h2>\n<figure><figcaption>The error of the velocity, round by round, and what "
-        "tracking noise alone would leave of it.</figcaption>"
-        f'{key}<div class="stack">{chart}</div></figure>\n{table(head, rows)}'
-    )
+    caption = "The error of the velocity in each round, and what tracking noise alone would give."
+    charts = chart_section("Rounds", caption, [rounds_chart(rounds)], "stack", key)
+    return f"{charts}\n{table(head, rows)}"
 
 
 def _before_after(
-    before: tuple[Sequence[Along], str], after: tuple[Sequence[Along], str]
+    before: tuple[Sequence[PathResiduals], str], after: tuple[Sequence[PathResiduals], str]
 ) -> list[Chart]:
-    """One chart for each object, of two rounds: what is left, and the model's effects."""
+    """One chart for each object, of two rounds: the residuals, and the effects of the model."""
     return [
         before_after_chart(one, two, (before[1], after[1]))
         for one, two in zip(before[0], after[0], strict=True)
@@ -143,35 +138,34 @@ def _before_after(
 
 
 def _added(title_after: str, charts: Sequence[Chart]) -> str:
-    pictures = {chart.name: chart_element(chart) for chart in charts}
-    return figure_section(
+    return chart_section(
         f"Added: {title_after}",
-        "What is left, in units of the noise, on the same axes: filled along the path, hollow "
-        "across it. Yellow: where the model fails worst.",
-        pictures,
+        "Residuals in units of the noise before and after, on the same axes: filled along the "
+        "path, hollow across it. Yellow: the interval in which the model fails worst.",
+        charts,
     )
 
 
 def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -> str:
     rows = []
-    for made, told in zip(diagnosis.candidates, candidates[:NUM_CANDIDATES], strict=False):
-        texts = findings.strength_texts(made.effects, told)
+    for one, entry in zip(diagnosis.candidates, candidates[:NUM_CANDIDATES], strict=False):
+        texts = diagnosis_text.strength_texts(one.effects, entry)
         named = [text if len(texts) == 1 else f"{name} = {text}" for name, text in texts.items()]
         strengths = ", ".join(named)
         rows.append(
             [
-                escape(told["effect"]).replace("_", "_<wbr>").replace("+", "+<wbr>"),
-                BAR.format(100 * told["probability"]),
-                f"{told['probability']:.3f}",
+                escape(entry["effect"]).replace("_", "_<wbr>").replace("+", "+<wbr>"),
+                BAR.format(100 * entry["probability"]),
+                f"{entry['probability']:.3f}",
                 escape(strengths),
-                f"{told['score']:+.1f}",
-                f"{told['chi2_per_dof']:.2f}",
-                escape(findings.p_text(told["p_value"])),
-                escape(", ".join(told["confounded_with"])).replace("_", "_<wbr>"),
+                f"{entry['score']:+.1f}",
+                f"{entry['chi2_per_dof']:.2f}",
+                escape(diagnosis_text.p_text(entry["p_value"])),
+                escape(", ".join(entry["confounded_with"])).replace("_", "_<wbr>"),
             ]
         )
     head = ["effect", "", "probability", "strength", "log evidence", "chi2 per dof", "p",
-            "not told from"]  # fmt: skip
+            "not distinguished from"]  # fmt: skip
     if not any(row[-1] for row in rows):
         head, rows = head[:-1], [row[:-1] for row in rows]
     rest = len(candidates) - len(rows)
@@ -179,31 +173,32 @@ def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -
     return f"<h2>Candidates</h2>\n{table(head, rows, ONLY_WIDE)}\n{note if rest > 0 else ''}"
 
 
-def _missing(told: Told, names: Sequence[str]) -> str:
-    missing = told.diagnosis.missing
+def _missing(report: DiagnosisReport, names: Sequence[str]) -> str:
+    missing = report.diagnosis.missing
     if missing is None:
         return ""
-    pictures, said = {}, []
+    charts, formulas = [], []
     for i, name in enumerate(names):
-        if not is_told(missing, i):
+        if not is_known(missing, i):
             continue
-        pictures[name] = chart_element(missing_force_chart(missing, i, name))
+        charts.append(missing_force_chart(missing, i, name))
         share = missing.share_explained[i]
         explains = f" (explains {100 * share:.0f} % of what is missing)" if share > 0 else ""
-        said.append(f"{name}: {missing.formula[i]}{explains}")
-    return figure_section(
+        formulas.append(f"{name}: {missing.formula[i]}{explains}")
+    return chart_section(
         "The missing force",
-        "The acceleration along the path that the model would need, inferred without a form, with "
-        "its 95 % band, in m/s², of q (m past the foot), v (m/s) and t (s since the release). The "
-        f"simplest formula that fits: {'; '.join(said)}.",
-        pictures,
+        "The acceleration along the path that the model lacks, in m/s², with its 95 % band, "
+        "inferred without assuming a formula. The simplest formula that fits, with q the position "
+        "in m past the foot, v the speed in m/s and t the time in s since the release: "
+        f"{'; '.join(formulas)}.",
+        charts,
     )
 
 
 def _each_clip(record: Mapping[str, Any] | None) -> str:
     if record is None:
         return ""
-    return f"<h2>Each clip by itself</h2>\n{items(findings.each_clip(record))}"
+    return f"<h2>Each clip alone</h2>\n{items(diagnosis_text.each_clip(record))}"
 
 
 def _left_one_out(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -214,6 +209,6 @@ def _left_one_out(rows: Sequence[Mapping[str, Any]]) -> str:
         for row in rows
     ]
     return (
-        "<h2>Each clip predicted from the others</h2>\n<p>Error of the velocity, before and after "
-        "the effect was added.</p>\n" + table(["clip", "before, m/s", "after, m/s"], cells_of)
+        "<h2>Each clip predicted from the others</h2>\n<p>Error of the velocity without and with "
+        "the added effect.</p>\n" + table(["clip", "without, m/s", "with, m/s"], cells_of)
     )

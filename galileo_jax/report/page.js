@@ -6,42 +6,37 @@
 
   // ---- charts
 
-  const AXIS = {
-    automargin: false, gridcolor: "@line", linecolor: "@soft", tickcolor: "@soft", ticks: "outside",
-    ticklen: 4, zeroline: false, nticks: 7, tickfont: { color: "@soft" },
-    title: { font: { color: "@soft", size: 12 }, standoff: 8 },
-  };
   const isTouch = matchMedia("(pointer: coarse)").matches;
 
-  // "@name/opacity" anywhere in a figure becomes the style sheet's colour.
+  // Figures have the colours of light pages, by the style sheet's first rule; dark pages have
+  // others of the same names.
+  const light = document.styleSheets[0].cssRules[0].style;
+  const names = new Map(
+    [...light].filter((name) => light.getPropertyValue(name).trim().startsWith("#"))
+      .map((name) => [triple(light.getPropertyValue(name)), name]),
+  );
+
+  function triple(hex) {
+    return [1, 3, 5].map((i) => parseInt(hex.trim().slice(i, i + 2), 16)).join(",");
+  }
+
   function painted(value, css) {
     if (Array.isArray(value)) return value.map((item) => painted(item, css));
     if (value && typeof value === "object")
       return Object.fromEntries(Object.entries(value).map(([k, v]) => [k, painted(v, css)]));
-    if (typeof value !== "string" || !value.startsWith("@")) return value;
-    const [name, opacity = "1"] = value.slice(1).split("/");
-    const hex = css.getPropertyValue("--" + name).trim();
-    const parts = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
-    return `rgba(${parts.join(",")},${opacity})`;
+    const found = typeof value === "string" && /^rgba\((\d+,\d+,\d+),([\d.]+)\)$/.exec(value);
+    if (!found || !names.has(found[1])) return value;
+    return `rgba(${triple(css.getPropertyValue(names.get(found[1])))},${found[2]})`;
   }
 
   function figureOf(box) {
     const css = getComputedStyle(document.documentElement);
     const { data, layout } = JSON.parse(box.querySelector("script").textContent);
-    const full = {
-      showlegend: false, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { family: css.getPropertyValue("--sans"), size: 12, color: "@ink" },
-      hoverlabel: { bgcolor: "@card", bordercolor: "@line", font: { color: "@ink" } },
-      hovermode: "closest", dragmode: isTouch ? false : "zoom", ...layout,
-    };
-    for (const key of Object.keys(full).filter((k) => /^[xy]axis\d*$/.test(k))) {
-      const upright = key[0] === "y" ? { nticks: 5, showline: false, ticks: "" } : { showgrid: false };
-      full[key] = {
-        ...AXIS, ...upright, fixedrange: isTouch, ...full[key],
-        title: { ...AXIS.title, ...full[key].title },
-      };
-    }
-    return painted({ data, layout: full }, css);
+    layout.font = { family: css.getPropertyValue("--sans") };
+    layout.dragmode = isTouch ? false : "zoom";
+    for (const key of Object.keys(layout).filter((k) => /^[xy]axis\d*$/.test(k)))
+      layout[key].fixedrange = isTouch;
+    return painted({ data, layout }, css);
   }
 
   function draw(box) {

@@ -1,4 +1,4 @@
-"""Where a page comes from: the command, versions, seed, inputs by their hashes."""
+"""The provenance of a page: the command, versions, seed, inputs by their hashes."""
 
 import hashlib
 import platform
@@ -12,7 +12,7 @@ import yaml
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.files.package_data import scene_path
-from galileo_jax.report.shell import details
+from galileo_jax.report.html_page import details
 
 PACKAGES = ("jax", "jaxlib", "mujoco", "numpy", "scipy", "opencv-python-headless")
 
@@ -21,13 +21,13 @@ def provenance(command: str, clips: Iterable[Clip], facts: Mapping[str, str]) ->
     """The last section of a page.
 
     Args:
-      command: that makes it again.
+      command: that makes the page again.
       clips: what it was made from.
       facts: more, plain text: engine, seed, timings, ...
     """
     clips = tuple(clips)
     entries = {
-        "made again by": f"<code>{escape(command)}</code>",
+        "command": f"<code>{escape(command)}</code>",
         **{key: escape(value) for key, value in facts.items()},
         "versions": escape(", ".join(f"{name} {found}" for name, found in versions().items())),
     }
@@ -43,9 +43,9 @@ def provenance(command: str, clips: Iterable[Clip], facts: Mapping[str, str]) ->
         for clip in clips
     )
     return (
-        "<h2>Provenance</h2>\n<p>Inputs are named by their SHA-256: the same hashes, version and "
-        f"seed give the same page.</p>\n<dl>{listed}</dl>\n"
-        + details("What was declared of the clip", f"<pre>{escape(declared)}</pre>")
+        "<h2>Provenance</h2>\n<p>Inputs are identified by their SHA-256: the same hashes, versions "
+        f"and seed give the same page.</p>\n<dl>{listed}</dl>\n"
+        + details("The declaration of the clip", f"<pre>{escape(declared)}</pre>")
     )
 
 

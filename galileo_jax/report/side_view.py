@@ -1,25 +1,25 @@
-"""The scene seen from the side: what part of the world a picture shows, and a drawn picture."""
+"""The scene drawn from the side: which part of it is shown, and the shapes in it.
+
+`animation.py` moves the shapes in a page; `draw_still` makes a picture of them.
+"""
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.model.scene.scene import Scene
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M
-from galileo_jax.report.figure import COLOURS, INK
-from galileo_jax.results.run import Run
+from galileo_jax.report.style import object_colour, palette
 from galileo_jax.rollout.motion import pitch
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 LARGEST_PX = 960
 MARGIN_M = 0.08
 SLAB_M = 0.012  # how thick ramp and table are drawn
-SURFACE = "#b9b4aa"
+CIRCLE_CORNERS = 72
+SUBPIXEL_BITS = 4
 
 
 @dataclass(frozen=True)
@@ -41,16 +41,8 @@ class View:
     is_mirrored: bool
 
 
-@dataclass(frozen=True)
-class Still:
-    """The objects at one instant: centres `[object, 2]`, m, and what to call it."""
-
-    position_m: np.ndarray
-    title: str
-
-
 def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
-    """What the video shows; without one all of `positions_m` `[..., 2, frame]`, NaN left out."""
+    """What the video shows; without a video all of `positions_m` `[..., 2, frame]`, but for NaN."""
     # As in `observe`: without a declared foot the first object's first place is the origin.
     origin = clip.origin_px or clip.objects[0].point_px
     if clip.frame_size_px and origin:
@@ -75,50 +67,70 @@ def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
     return View(float(left), float(right), float(bottom), float(top), *size, is_mirrored)
 
 
-def surfaces(scene: Scene, view: View) -> list[tuple[tuple[float, float], float, float]]:
-    """Ramp and table as (upper end that is nearest the foot, length, angle of its direction).
+def surfaces(scene: Scene, view: View) -> list[np.ndarray]:
+    """Ramp and table as slabs, corners `[4, 2]`, m; none where nothing carries the objects.
 
-    Lengths reach to the view's edges; the angle is counter-clockwise, rad. None in a fall.
+    The first two corners are the ends of the surface; slabs reach to the edges of the view.
     """
     surroundings = scene.surroundings
     angle = surroundings.angle_rad
     if not surroundings.has_surface:
         return []
     if scene.has_table:
-        longest = (-view.left_m) / math.cos(angle)
         start_x = surroundings.start_m[0][0]
-        length = min(longest, -start_x / math.cos(angle) + 2 * surroundings.half_length_m[0])
-        return [((0.0, 0.0), length, math.pi - angle), ((0.0, 0.0), view.right_m, 0.0)]
+        length = min(
+            -view.left_m / math.cos(angle),
+            -start_x / math.cos(angle) + 2 * surroundings.half_length_m[0],
+        )
+        foot = (0.0, 0.0)
+        top = (-length * math.cos(angle), length * math.sin(angle))
+        return [_slab(top, foot), _slab(foot, (view.right_m, 0.0))]
     (x, y), height = surroundings.start_m[0], surroundings.half_height_m[0]
-    foot_x, foot_y = x - height * math.sin(angle), y - height * math.cos(angle)
-    back = (foot_x - view.left_m) / math.cos(angle)
-    length = (view.right_m - view.left_m) / math.cos(angle)
-    top = (foot_x - back * math.cos(angle), foot_y + back * math.sin(angle))
-    return [(top, length, -angle)]
+    x, y = x - height * math.sin(angle), y - height * math.cos(angle)  # under the object
+    ends = [(edge, y - (edge - x) * math.tan(angle)) for edge in (view.left_m, view.right_m)]
+    return [_slab(*ends)]
 
 
-def draw(axes: "Axes", run: Run, still: Still, view: View) -> None:
-    """Draws the scene with plain shapes."""
-    from matplotlib.patches import Circle, Polygon
+def _slab(start: tuple[float, float], end: tuple[float, float]) -> np.ndarray:
+    upper = np.array([start, end])
+    return np.concatenate([upper, upper[::-1] - (0.0, SLAB_M)])
 
-    scene = run.problem.model.scene
-    for (x, y), length, angle in surfaces(scene, view):
-        end = (x + length * math.cos(angle), y + length * math.sin(angle))
-        below = SLAB_M / math.cos(angle)
-        corners = [(x, y), end, (end[0], end[1] - abs(below)), (x, y - abs(below))]
-        axes.add_patch(Polygon(corners, color=SURFACE, linewidth=0))
-    turned = pitch(still.position_m, scene.surroundings)
-    for i, (declared, (x, y)) in enumerate(zip(run.clip.objects, still.position_m, strict=True)):
-        length = scene.surroundings.half_length_m[i]
-        height = scene.surroundings.half_height_m[i]
-        if declared.shape == "sphere":
-            axes.add_patch(Circle((x, y), length, color=COLOURS[i % len(COLOURS)], linewidth=0))
-            continue
-        cos, sin = math.cos(float(turned[i])), math.sin(float(turned[i]))
-        corners = [
-            (x + a * length * cos - b * height * sin, y + a * length * sin + b * height * cos)
-            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-        ]
-        axes.add_patch(Polygon(corners, color=COLOURS[i % len(COLOURS)], linewidth=0))
-    for side in axes.spines.values():
-        side.set(visible=True, color=INK, alpha=0.3)
+
+def outline(clip: Clip, scene: Scene, index: int) -> np.ndarray:
+    """The corners of an object around its centre, before it turns, `[corner, 2]`, m."""
+    length, height = (
+        size[index] for size in (scene.surroundings.half_length_m, scene.surroundings.half_height_m)
+    )
+    if clip.objects[index].shape == "sphere":
+        angle = np.linspace(0.0, 2 * np.pi, CIRCLE_CORNERS, endpoint=False)
+        return length * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length, height)
+
+
+def draw_still(clip: Clip, scene: Scene, view: View, position_m: np.ndarray) -> np.ndarray:
+    """A picture of the objects with their centres at `position_m` `[object, 2]`.
+
+    Returns:
+      `[height, width, 3]`, uint8 RGB.
+    """
+    picture = np.empty((view.height_px, view.width_px, 3), np.uint8)
+    picture[:] = _rgb("card")
+    for slab in surfaces(scene, view):
+        _fill(picture, view, slab, "surface")
+    turned = pitch(position_m, scene.surroundings)
+    for i, (centre, angle) in enumerate(zip(position_m, map(float, turned), strict=True)):
+        cos, sin = math.cos(angle), math.sin(angle)
+        corners = outline(clip, scene, i) @ np.array([[cos, sin], [-sin, cos]]) + centre
+        _fill(picture, view, corners, object_colour(i))
+    return picture[:, ::-1] if view.is_mirrored else picture
+
+
+def _fill(picture: np.ndarray, view: View, corners_m: np.ndarray, colour: str) -> None:
+    scale = view.width_px / (view.right_m - view.left_m)
+    pixels = scale * (corners_m - (view.left_m, view.top_m)) * (1, -1) - 0.5
+    fixed = np.round(pixels * 2**SUBPIXEL_BITS).astype(np.int32)
+    cv2.fillPoly(picture, [fixed], _rgb(colour), cv2.LINE_AA, SUBPIXEL_BITS)
+
+
+def _rgb(colour: str) -> tuple[int, ...]:
+    return tuple(bytes.fromhex(palette()[colour][1:]))

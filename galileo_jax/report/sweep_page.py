@@ -1,4 +1,4 @@
-"""The page of a sweep: errors by effect and by method, what was taken for what, what failed."""
+"""The page of a sweep: errors by effect and method, confusion of effects, failed cells."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.report.plotly_chart import figure_element
+from galileo_jax.report.chart import Boxes, Chart, Panel
+from galileo_jax.report.html_page import chart_section, document, header, legend, table
 from galileo_jax.report.provenance import versions
-from galileo_jax.report.shell import document, figure_section, header, legend, table
 from galileo_jax.runtime.atomic_write import write_text
 
 COLOURS = ("object2", "object1", "good", "fails", "ink", "soft")
 QUANTITIES = {"k1": "k1", "k2": "k2", "mass_ratio": "m1/m2"}
-CHART_PX, CELL_PX = 300, 34
-EACH = {"type": "category", "tickmode": "linear", "dtick": 1}  # an axis that names each category
+BOXES_PX = 190
 MAX_FAILURES = 50  # listed; the table on disk has all
 Row = Mapping[str, Any]
 
@@ -85,26 +84,26 @@ def _errors(
     label: Callable[[Row], str],
 ) -> list[str]:
     """Box plots of the errors of each quantity; of the velocity error where none is known."""
-    figures = {}
+    charts = []
     for name, symbol in QUANTITIES.items():
         known = [row for row in rows if _has_error(row, name)]
         if known:
             values = [abs(row[f"{name}_error"]) for row in known]
             title = f"error of {symbol}"
-            figures[name] = _boxes(title, known, values, category, label)
-    if not figures:
+            charts.append(_boxes(title, known, values, category, label))
+    if not charts:
         known = [row for row in rows if row["rmse"] is not None and row["noise"]]
         if not known:
             return []
         values = [row["rmse"] / row["noise"] for row in known]
-        figures["rmse"] = _boxes("velocity error / noise", known, values, category, label)
+        charts.append(_boxes("velocity error / noise", known, values, category, label))
     names = sorted({label(row) for row in rows})
     key = legend(("dot", COLOURS[i % len(COLOURS)], name) for i, name in enumerate(names))
-    return [figure_section(heading, caption, figures, legend=key)]
+    return [chart_section(heading, caption, charts, legend=key)]
 
 
 def _has_error(row: Row, quantity: str) -> bool:
-    """Whether the truth is known and the clip determines the quantity, as far as that is said."""
+    """Whether the truth is known and the clip determines the quantity, as far as is known."""
     return row[f"{quantity}_error"] is not None and row[f"{quantity}_identified"] is not False
 
 
@@ -114,75 +113,49 @@ def _boxes(
     values: Sequence[float],
     category: Callable[[Row], str | None],
     label: Callable[[Row], str],
-) -> str:
+) -> Chart:
     names = sorted({label(row) for row in rows})
-    data = []
+    is_overlaid = category is label or len(names) == 1
+    width = 0.6 if is_overlaid else 0.8 / len(names)
+    marks = []
     for i, name in enumerate(names):
-        own = [(category(r) or "unknown", v) for r, v in zip(rows, values, strict=True)
-               if label(r) == name]  # fmt: skip
-        colour = COLOURS[i % len(COLOURS)]
-        data.append(
-            {
-                "type": "box",
-                "name": escape(name),
-                "x": [escape(where) for where, _ in own],
-                "y": [float(f"{value:.4g}") for _, value in own],
-                "boxpoints": "all",
-                "jitter": 0.5,
-                "pointpos": 0,
-                "marker": {"color": f"@{colour}", "size": 4},
-                "line": {"color": f"@{colour}", "width": 1},
-                "fillcolor": f"@{colour}/0.15",
-            }
+        own = [j for j, row in enumerate(rows) if label(row) == name]
+        marks.append(
+            Boxes(
+                x=[category(rows[j]) or "unknown" for j in own],
+                y=[values[j] for j in own],
+                colour=COLOURS[i % len(COLOURS)],
+                name=name,
+                offset=0.0 if is_overlaid else width * (i - (len(names) - 1) / 2),
+                width=width,
+            )
         )
-    layout = {
-        "boxmode": "overlay" if category is label or len(names) == 1 else "group",
-        "margin": {"l": 62, "r": 12, "t": 12, "b": 96},
-        "xaxis": {"tickangle": -35, **EACH},
-        "yaxis": {"title": {"text": title}, "rangemode": "tozero"},
-    }
-    return figure_element({"data": data, "layout": layout}, f"{title}, box plots", CHART_PX)
+    panel = Panel(title, tuple(marks), ylim=(0.0, 1.05 * max(values) or 1.0))
+    return Chart(title, f"{title}, box plots", (panel,), panel_px=BOXES_PX)
 
 
 def _confusion(rows: Sequence[Row]) -> list[str]:
-    """What was hidden against what was said."""
-    told = [(row["hidden"], row["verdict"]) for row in rows if row["verdict"] and row["hidden"]]
-    if not told:
+    """The hidden effect against the verdict."""
+    known = [(row["hidden"], row["verdict"]) for row in rows if row["verdict"] and row["hidden"]]
+    if not known:
         return []
-    hidden = sorted({h for h, _ in told})
-    verdicts = sorted({v for _, v in told}, key=lambda v: (v not in hidden, v))
-    count = Counter(told)
-    z = [[count[h, v] for v in verdicts] for h in hidden]
-    figure = {
-        "data": [
-            {
-                "type": "heatmap",
-                "x": [escape(v) for v in verdicts],
-                "y": [escape(h) for h in hidden],
-                "z": z,
-                "text": [[str(n) if n else "" for n in line] for line in z],
-                "texttemplate": "%{text}",
-                "hovertemplate": "hidden %{y}, said %{x}: %{z}<extra></extra>",
-                "colorscale": [[0, "@card"], [1, "@object2"]],
-                "showscale": False,
-                "xgap": 1,
-                "ygap": 1,
-            }
-        ],
-        "layout": {
-            "margin": {"l": 130, "r": 12, "t": 12, "b": 110},
-            "xaxis": {"title": {"text": "said"}, "tickangle": -35, **EACH},
-            "yaxis": {"title": {"text": ""}, "autorange": "reversed", **EACH},
-        },
-    }
+    hidden = sorted({h for h, _ in known})
+    verdicts = sorted({v for _, v in known}, key=lambda v: (v not in hidden, v))
+    count = Counter(known)
+    most = max(count.values())
+    lines = [[escape(h), *(_shaded(count[h, v], most) for v in verdicts)] for h in hidden]
     right = sum(n for (h, v), n in count.items() if h == v)
-    caption = (
-        f"Rows: what was hidden in the clip. Columns: what the diagnosis said. {right} of "
-        f"{len(told)} are named right; none means that nothing is missing."
-    )
-    height = 150 + CELL_PX * len(hidden)
-    element = figure_element(figure, "confusion matrix of hidden and named effects", height)
-    return [figure_section("Hidden and named", caption, {"confusion": element}, "narrow")]
+    return [
+        f"<h2>Hidden and named</h2>\n<p>Rows: the effect hidden in the clip. Columns: the verdict "
+        f"of the diagnosis. {right} of {len(known)} are named right; none means that no effect is "
+        f"missing.</p>\n{table(['', *verdicts], lines)}"
+    ]
+
+
+def _shaded(number: int, most: int) -> str:
+    """The number on a ground that is the darker the larger it is; nothing for 0."""
+    share = round(80 * number / most)
+    return f'<span class="share" style="--share:{share}%">{number}</span>' if number else ""
 
 
 def _methods(rows: Sequence[Row], label: Callable[[Row], str]) -> str:
@@ -216,10 +189,10 @@ def _failures(rows: Sequence[Row]) -> str:
 
 
 def _provenance(command: str) -> str:
-    told = ", ".join(f"{name} {found}" for name, found in versions().items())
+    listed = ", ".join(f"{name} {found}" for name, found in versions().items())
     return (
-        "<h2>Provenance</h2>\n<p>A cell's name is made from its options, its clips' content and "
-        "the version: the same name is the same numbers.</p>\n"
-        f"<dl><dt>made again by</dt><dd><code>{escape(command)}</code></dd>"
-        f"<dt>versions</dt><dd>{escape(told)}</dd></dl>"
+        "<h2>Provenance</h2>\n<p>The name of a cell is made from its options, the content of its "
+        "clips and the version: the same name means the same numbers.</p>\n"
+        f"<dl><dt>command</dt><dd><code>{escape(command)}</code></dd>"
+        f"<dt>versions</dt><dd>{escape(listed)}</dd></dl>"
     )

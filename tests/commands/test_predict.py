@@ -11,9 +11,10 @@ import pytest
 
 from galileo_jax.commands import command, predict
 from galileo_jax.prediction.extrapolate import crossing_s, extrapolate
-from galileo_jax.report import gl_view
-from galileo_jax.report.prediction import is_over, told
-from galileo_jax.report.shell import document, header
+from galileo_jax.report.html_page import document, header
+from galileo_jax.report.prediction import is_over, prediction_lines
+from galileo_jax.report.side_view import draw_still, view_of
+from galileo_jax.report.style import object_colour, palette
 from galileo_jax.results.run import Run
 from tests.oracle_run import HIT, MISS, STILL, make_run
 from tests.ramp_model import make_surroundings
@@ -43,12 +44,6 @@ def same_precision():
     jax.config.update("jax_enable_x64", before)
 
 
-@pytest.fixture
-def drawn_only(monkeypatch):
-    """As on a machine without OpenGL; renders nothing."""
-    monkeypatch.setattr(gl_view, "render", lambda *_: None)
-
-
 def call(run, out, *more):
     words = [str(run.folder), "--seconds", str(SECONDS), "--out", str(out), "--draws", "60"]
     assert command.run(predict.main, [*words, *more]) == 0
@@ -59,7 +54,7 @@ def holds(entry, value, spare):
     return entry["q025"] - spare <= value <= entry["q975"] + spare
 
 
-def test_rest_and_hit_agree_with_the_closed_form(runs, tmp_path, drawn_only, capsys):
+def test_rest_and_hit_agree_with_the_closed_form(runs, tmp_path, capsys):
     found = call(runs["hit"], tmp_path)
     times = np.linspace(0, CLIP_S + SECONDS, 20001)
     exact = solve(HIT, times)
@@ -76,7 +71,7 @@ def test_rest_and_hit_agree_with_the_closed_form(runs, tmp_path, drawn_only, cap
         assert holds(entry["travelled_beyond_clip_m"], beyond, CONTACT_M)
     assert found["hit"]["probability"] == 1
     assert holds(found["hit"]["time_s"], exact.hit_s, CONTACT_S)
-    assert found["num_failed"] == 0 and found["picture"] == "drawn"
+    assert found["num_failed"] == 0
     assert "will it slide? yes" in capsys.readouterr().out
     assert {path.name for path in tmp_path.iterdir()} == {
         "prediction.json",
@@ -86,7 +81,7 @@ def test_rest_and_hit_agree_with_the_closed_form(runs, tmp_path, drawn_only, cap
     }
 
 
-def test_the_report_gets_one_section(runs, tmp_path, drawn_only):
+def test_the_report_gets_one_section(runs, tmp_path):
     report = tmp_path / "report.html"
     report.write_text(document("a fit", [header("fit", "a fit", "It fits."), "<h2>Motion</h2>"]))
     for _ in range(2):
@@ -99,7 +94,7 @@ def test_the_report_gets_one_section(runs, tmp_path, drawn_only):
     assert not (tmp_path / "prediction.html").exists()
 
 
-def test_object_2_stays_where_nothing_reaches_it(runs, tmp_path, drawn_only):
+def test_object_2_stays_where_nothing_reaches_it(runs, tmp_path):
     found = call(runs["miss"], tmp_path)
     assert found["hit"] == {"probability": 0.0, "time_s": None}
     assert found["objects"]["object1"]["slides_probability"] == 1
@@ -108,13 +103,13 @@ def test_object_2_stays_where_nothing_reaches_it(runs, tmp_path, drawn_only):
     assert found["objects"]["object2"]["travelled_m"]["mean"] < 1e-3
 
 
-def test_nothing_slides_on_a_rough_ramp(runs, tmp_path, drawn_only, capsys):
+def test_nothing_slides_on_a_rough_ramp(runs, tmp_path, capsys):
     found = call(runs["still"], tmp_path)
     assert [entry["slides_probability"] for entry in found["objects"].values()] == [0, 0]
     assert capsys.readouterr().out.count("will it slide? no") == 2
 
 
-def test_the_same_seed_gives_the_same_file(runs, tmp_path, drawn_only):
+def test_the_same_seed_gives_the_same_file(runs, tmp_path):
     texts = []
     for name, seed in (("a", "5"), ("b", "5"), ("c", "6")):
         call(runs["hit"], tmp_path / name, "--seed", seed)
@@ -134,15 +129,20 @@ def test_prediction_does_not_depend_on_its_length(runs):
     assert ends[0] == pytest.approx(ends[1], abs=1e-5)
 
 
-def test_rendered_where_there_is_opengl_and_always_a_picture(runs, tmp_path):
-    found = call(runs["hit"], tmp_path)
-    assert found["picture"] in ("rendered", "drawn")
+def test_the_stills_show_where_the_objects_are(runs, tmp_path):
+    """The first still has both objects, in their colours, where the run starts."""
+    run = runs["miss"]
+    call(run, tmp_path)
     assert (tmp_path / "first_and_last.png").read_bytes().startswith(b"\x89PNG")
-
-
-def test_a_renderer_that_dies_is_no_error(runs, tmp_path, monkeypatch):
-    monkeypatch.setattr(gl_view, "_CHILD", "import os; os.abort()")
-    assert call(runs["still"], tmp_path)["picture"] == "drawn"
+    scene, clip = run.problem.model.scene, run.clip
+    start_m = np.array(scene.surroundings.start_m)
+    view = view_of(clip, scene, np.stack([start_m, start_m], axis=-1))
+    picture = draw_still(clip, scene, view, start_m)
+    assert picture.shape == (view.height_px, view.width_px, 3)
+    scale = view.width_px / (view.right_m - view.left_m)
+    for i, (x, y) in enumerate(start_m):
+        column, row = int(scale * (x - view.left_m)), int(scale * (view.top_m - y))
+        assert bytes(picture[row, column]).hex() == palette()[object_colour(i)][1:]
 
 
 def test_what_slides_on_nothing_moves_and_has_a_height():
@@ -158,7 +158,7 @@ def test_what_slides_on_nothing_moves_and_has_a_height():
         problem = SimpleNamespace(
             model=SimpleNamespace(scene=SimpleNamespace(surroundings=surroundings))
         )
-        return "\n".join(told(cast(Run, SimpleNamespace(problem=problem)), found))
+        return "\n".join(prediction_lines(cast(Run, SimpleNamespace(problem=problem)), found))
 
     assert "will it slide?" in said() and "y = " not in said()
     assert "will it move?" in said(rolls=(True, False))

@@ -9,7 +9,7 @@ from galileo_jax.comparison.compare import compare
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip, kind_of
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
-from galileo_jax.report.findings import each_clip as told
+from galileo_jax.report.diagnosis_text import each_clip as told
 from tests.precision import in_64_bit
 
 G, ANGLE, FPS, NOISE_M = 9.81, np.radians(22.0), 60, 3e-4
@@ -95,5 +95,5 @@ def test_it_is_said_in_words():
         "sd_m_s2": [0.01, 0.02],
     }
     first, second = told({"kind": "shared", "clips": [clip]})
-    assert first.startswith("clips: each clip fits by itself")
+    assert first.startswith("clips: each clip alone agrees with the model")
     assert "+0.100 +- 0.010, -0.200 +- 0.020 m/s^2" in second

@@ -7,12 +7,12 @@ import pytest
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import Place
+from galileo_jax.comparison.path_residuals import failing_interval, path_residuals
 from galileo_jax.comparison.phases import PHASES
 from galileo_jax.diagnosis.document import diagnosis_document
-from galileo_jax.report import findings
-from galileo_jax.report.along import along_paths, worst_stretch
-from galileo_jax.report.comparison_page import Compared, write_comparison_page
-from galileo_jax.report.diagnosis_page import Told, write_diagnosis_page
+from galileo_jax.report import diagnosis_text
+from galileo_jax.report.comparison_page import ComparisonReport, write_comparison_page
+from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
 from galileo_jax.report.provenance import digest
 from tests.found import comparison_of, diagnosis_of, fit_of, make_trials
 from tests.precision import in_64_bit
@@ -21,9 +21,9 @@ from tests.report.references import check_needs_nothing_from_outside
 
 STATUSES = ("none", "named", "ambiguous", "unknown")
 SAYS = {
-    "none": "The model is fine",
+    "none": "The model is adequate: no effect is missing",
     "named": "air_drag explains the data (p = 1e-09 without, p = 0.4 with)",
-    "ambiguous": "These cannot be told apart here: air_drag, viscous_drag",
+    "ambiguous": "This clip cannot distinguish between air_drag, viscous_drag",
     "unknown": "see the missing force",
 }
 GO_ON = "galileo fit a.yaml --effects air_drag"
@@ -59,7 +59,7 @@ def clip(trials, folder):
 def write(trials, clip, status: str, page: Path) -> str:
     diagnosis = diagnosis_of(trials, status)
     record = diagnosis_document(trials, diagnosis, 0)
-    told = Told(diagnosis, record, GO_ON, "air_drag", (clip,), AGAIN, 0)
+    told = DiagnosisReport(diagnosis, record, GO_ON, "air_drag", (clip,), AGAIN, 0)
     write_diagnosis_page(page, HOSTILE, trials, told)
     return page.read_text(encoding="utf-8")
 
@@ -94,9 +94,9 @@ def test_opens_in_a_browser(trials, clip, tmp_path, browser):
 
 def test_a_comparison_opens_in_a_browser(trials, clip, tmp_path, browser):
     comparison, fit = comparison_of(trials, 1e-9), fit_of(trials, ())
-    shown = along_paths(trials, fit, comparison, 0)
+    shown = path_residuals(trials, fit, comparison, 0)
     theta = trials.theta(fit.z, fit.free)
-    told = Compared(comparison, trials, theta, (clip,), (), shown, AGAIN, 0)
+    told = ComparisonReport(comparison, trials, theta, (clip,), (), shown, AGAIN, 0)
     path = tmp_path / "report.html"
     write_comparison_page(path, HOSTILE, told)
     with opened(browser, path) as (page, complaints):
@@ -104,7 +104,10 @@ def test_a_comparison_opens_in_a_browser(trials, clip, tmp_path, browser):
         document = page.content()
     assert complaints == []
     assert "The model is not adequate" in document
-    assert "release_instant is bent to -0.05 s, 4.9 standard deviations" in document
+    assert (
+        "release_instant is at -0.05 s, 4.9 prior standard deviations from its prior mean"
+        in document
+    )
     assert "foot_transition" not in document, "inside its prior"
 
 
@@ -115,13 +118,13 @@ def test_the_same_diagnosis_gives_the_same_page(trials, clip, tmp_path):
 
 def test_the_worst_stretch_is_where_the_residuals_were_bent(trials):
     comparison = comparison_of(trials, 1e-9)
-    bent, quiet = along_paths(trials, fit_of(trials, ()), comparison, 0)
+    bent, quiet = path_residuals(trials, fit_of(trials, ()), comparison, 0)
     times = bent.times_s
-    assert bent.stretch_s == pytest.approx((times[10], times[14]))
+    assert bent.failing_s == pytest.approx((times[10], times[14]))
     assert bent.worst is not None and bent.worst.phase == "ramp"
-    assert quiet.stretch_s is None, "object 2 is as the model has it"
-    fine = along_paths(trials, fit_of(trials, ()), comparison_of(trials, 0.5), 0)
-    assert all(one.stretch_s is None for one in fine), "an adequate model fails nowhere"
+    assert quiet.failing_s is None, "object 2 is as the model has it"
+    fine = path_residuals(trials, fit_of(trials, ()), comparison_of(trials, 0.5), 0)
+    assert all(one.failing_s is None for one in fine), "an adequate model fails nowhere"
 
 
 def test_a_stretch_keeps_to_its_phase():
@@ -129,9 +132,9 @@ def test_a_stretch_keeps_to_its_phase():
     white[0, 5:9], white[0, 20:29] = 3.0, 9.0
     labels = np.where(np.arange(30) < 15, PHASES.index("ramp"), PHASES.index("table"))
     place = place_in("ramp")
-    assert worst_stretch(white, labels, np.arange(30.0), place) == (5.0, 8.0)
-    assert worst_stretch(white, labels, np.arange(30.0), place_in("whole")) == (20.0, 28.0)
-    assert worst_stretch(white, labels, np.arange(30.0), place_in("held")) is None
+    assert failing_interval(white, labels, np.arange(30.0), place) == (5.0, 8.0)
+    assert failing_interval(white, labels, np.arange(30.0), place_in("whole")) == (20.0, 28.0)
+    assert failing_interval(white, labels, np.arange(30.0), place_in("held")) is None
 
 
 def place_in(phase: str) -> Place:
@@ -139,7 +142,7 @@ def place_in(phase: str) -> Place:
 
 
 def test_a_fit_at_the_truth_lies_on_the_measured_path(trials):
-    for one in along_paths(trials, fit_of(trials, ()), comparison_of(trials, 0.5), 0):
+    for one in path_residuals(trials, fit_of(trials, ()), comparison_of(trials, 0.5), 0):
         assert np.nanmax(np.abs(one.measured_m - one.predicted_m)) < 6e-3  # its foot is no bevel
         assert (one.low_m <= one.high_m).all()
         assert one.noise_m == pytest.approx(np.full_like(one.noise_m, 2e-4), rel=0.1)
@@ -154,4 +157,4 @@ def test_how_to_go_on(trials):
         "unknown": "galileo diagnose 'a b.yaml' --effects-from my.py --effects-from my_effect.py",
     }
     for status, expected in cases.items():
-        assert findings.how_to_go_on(diagnosis_of(trials, status), clips, mine) == expected
+        assert diagnosis_text.next_command(diagnosis_of(trials, status), clips, mine) == expected

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import Clip
+from galileo_jax.prediction.posterior_predictive import posterior_predictive
 from galileo_jax.report import write_report
 from galileo_jax.report.animation import animation
-from galileo_jax.report.film import BUDGET_BYTES, film
-from galileo_jax.report.fitted import evaluate
+from galileo_jax.report.fit_charts import failing_interval_of
+from galileo_jax.report.fit_text import fit_quality, number, undetermined
+from galileo_jax.report.html_page import document
 from galileo_jax.report.provenance import digest
-from galileo_jax.report.residuals import worst_stretch_of
-from galileo_jax.report.shell import document
-from galileo_jax.report.statements import fit_quality, number, undetermined
+from galileo_jax.report.video_frames import BUDGET_BYTES, sample_frames
 from galileo_jax.results.run import load_run
 from tests.oracle_run import HIT, MISS, PARTS, STILL, make_run
 from tests.reference_ramp import solve
@@ -43,7 +43,7 @@ def test_needs_nothing_from_outside(page):
 
 def test_in_a_browser_the_slider_moves_everything_also_on_a_phone(run, page, browser):
     with opened(browser, run.folder / "report.html") as (shown, complaints):
-        assert shown.locator(".chart").count() == 10
+        assert shown.locator(".chart").count() == 12
         first = places(shown)
         slider = shown.get_by_role("slider")
         slider.focus()
@@ -98,19 +98,20 @@ def filmed(clip: Clip, path: Path) -> Clip:
 
 def test_a_film_is_small_and_evenly_spaced(tmp_path, run):
     filmed(run.clip.model_copy(update={"frame_count": 250}), tmp_path / "clip.mp4")
-    found = film(tmp_path / "clip.mp4", 245)
+    found = sample_frames(tmp_path / "clip.mp4", 245)
     assert found.frames == tuple(range(0, 245, 3)), "at most 120 pictures"
     assert found.size_px == (160, 120), "never larger than it was"
     assert sum(map(len, found.pictures)) < 4 * BUDGET_BYTES / 3
 
 
-def test_the_worst_stretch_is_told_and_noise_has_none(run):
-    fitted = evaluate(run, seed=0)
+def test_the_failing_interval_is_found_and_noise_has_none(run):
+    fitted = posterior_predictive(run, seed=0)
     quiet = np.random.default_rng(0).standard_normal(fitted.residuals.shape)
-    assert worst_stretch_of(replace(fitted, residuals=quiet)) is None
+    assert failing_interval_of(replace(fitted, residuals=quiet)) is None
     quiet[0, 0, 10:16] += 6.0
-    worst = worst_stretch_of(replace(fitted, residuals=quiet))
-    assert worst is not None and (worst.name, worst.axis) == ("object1", "x")
+    found = failing_interval_of(replace(fitted, residuals=quiet))
+    assert found is not None and found[:2] == ("object1", "x")
+    worst = found[2]
     assert (worst.start_s, worst.end_s) == pytest.approx((10 / 30, 15 / 30), abs=1 / 30)
 
 
@@ -123,7 +124,7 @@ def test_states_the_numbers(run, page):
         assert f"<code>{name}</code>" in page
     assert f"{run.result['error']['chi2_per_dof']:.2f}" in page
     assert "--method mh" in page and "--seed 3" in page and run.result["version"] in page
-    assert "only the ratio of the masses shows" in page
+    assert "only the ratio of the masses can be determined" in page
     assert digest(run.clip.track) in page and "mujoco" in page, "inputs and versions"
 
 
@@ -136,7 +137,7 @@ def test_has_every_figure_and_leaves_them_as_files(run, page):
         "pairs",
         "trace",
     }
-    assert page.count('class="chart"') + page.count("<svg") == len(names) + 1, "and the motion"
+    assert page.count('class="chart"') == len(names) and page.count("<svg") == 1, "and the motion"
 
 
 def test_the_same_run_gives_the_same_page(run, page):
@@ -152,18 +153,19 @@ def test_what_an_earlier_fit_left_is_gone_and_the_thesis_is_no_posterior(run):
     thesis = {"method": "grad", "preset": "thesis", "best": {"k1": 0.123}}
     page = write_report(replace(run, result=run.result | thesis)).read_text(encoding="utf-8")
     assert not (run.folder / "plots" / "trace.svg").exists()
-    assert "no posterior" in page and "k1 = 0.123" in page and "--preset thesis" in page
+    assert "not a posterior" in page and "k1 = 0.123" in page and "--preset thesis" in page
 
 
 def test_residuals_are_whitened_and_the_hit_is_found(run):
-    fitted = evaluate(run, seed=0)
+    fitted = posterior_predictive(run, seed=0)
     assert fitted.residuals.std() == pytest.approx(1.0, abs=0.6)
     assert fitted.hits_s[0] == pytest.approx(solve(HIT, np.zeros(1)).hit_s, abs=0.02)
-    assert [phase.name for phase in fitted.phases[0]] == ["ramp", "foot", "table", "after the hit"]
+    found = [phase.name for phase in fitted.phases[0]]
+    assert found == ["at rest", "ramp", "foot", "table", "collision", "after"]
 
 
 def test_the_hit_of_objects_that_part_is_where_the_closed_form_has_it(tmp_path):
-    fitted = evaluate(make_run(tmp_path, PARTS, 1.8), seed=0)
+    fitted = posterior_predictive(make_run(tmp_path, PARTS, 1.8), seed=0)
     assert fitted.hits_s[0] == pytest.approx(solve(PARTS, np.zeros(1)).hit_s, abs=0.02)
 
 
@@ -187,13 +189,13 @@ def test_says_why_a_parameter_is_not_told(tmp_path):
     made = {case: make_run(tmp_path / str(i), case, 1.0) for i, case in enumerate((MISS, STILL))}
     for case, name, why in cases:
         run = not_identified(made[case], name)
-        assert why in undetermined(run, evaluate(run, seed=0))[name]
+        assert why in undetermined(run, posterior_predictive(run, seed=0))[name]
 
 
 @pytest.mark.parametrize(
     ("chi2", "said"),
-    [(0.3, "better than it claims"), (1.1, "size of the tracking noise"), (2, "see the residuals"),
-     (50, "do not trust"), (None, "cannot be told")],
+    [(0.3, "less noise than the tracker states"), (1.1, "size of the tracking noise"),
+     (2, "see where the model fails"), (50, "do not trust"), (None, "cannot be computed")],
 )  # fmt: skip
 def test_chi2_is_put_in_words(chi2, said):
     assert said in fit_quality({"error": {"chi2_per_dof": chi2}})

@@ -11,7 +11,7 @@ from galileo_jax.api.fit_result import make_fit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.measurement.measure import Measurement
-from galileo_jax.report.write import write_report
+from galileo_jax.report import write_report
 from galileo_jax.results.run import Run, load_run
 from galileo_jax.results.stale_outputs import TRACKS, digest, forget_prediction, outdated
 from tests.oracle_run import HIT, make_run

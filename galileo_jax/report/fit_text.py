@@ -1,4 +1,4 @@
-"""What the fit does and does not say, in plain sentences."""
+"""The results of a fit as sentences: its quality, and why a parameter is not determined."""
 
 import math
 import re
@@ -7,7 +7,7 @@ from typing import Any
 
 from galileo_jax.inference.confounded import confounded_with_gravity
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.report.fitted import Fitted
+from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.results.run import CLIP, Run
 from galileo_jax.results.shown_parameters import shown_parameters
 
@@ -32,7 +32,7 @@ MEANINGS = {
     "liquid_drag": "drag constant c of c v|v|",
     "terminal_speed": "speed at which drag and weight balance",
     "declared_angle": "ramp's angle, over what was declared",
-    "foot_transition": "factor on the speed kept at the foot of the ramp",
+    "foot_transition": "factor on the speed after the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
     "release_instant": "release after the first frame",
     "noise_scale": "tracking noise over what the tracker stated",
@@ -43,12 +43,12 @@ OF_OBJECTS = (  # what parameters' names with numbers in them mean
     (re.compile(r"mass_ratio_(\d+)_(\d+)"), "m{} / m{}"),
     (re.compile(r"start_offset_object(\d+)"), "start of object {}, from where it was marked"),
 )
-WEIGHED = ("liquid_drag", "stiffness")  # forces: known as far as the mass is
+FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
 
 
 def meaning(name: str) -> str | None:
-    """What a parameter is, in a phrase; None where only its name tells (effects)."""
+    """What a parameter is, in a phrase; None where its name says it (effects)."""
     for pattern, phrase in OF_OBJECTS:
         if found := pattern.fullmatch(name):
             return phrase.format(*found.groups())
@@ -57,8 +57,8 @@ def meaning(name: str) -> str | None:
     return MEANINGS.get(name)
 
 
-def undetermined(run: Run, fitted: Fitted) -> dict[str, str]:
-    """Why each main parameter that the clip does not tell is not told, by name."""
+def undetermined(run: Run, fitted: PosteriorPredictive) -> dict[str, str]:
+    """Why the clip does not determine a main parameter, by the name of each such parameter."""
     found = {}
     for name, entry in shown_parameters(run.result).items():
         if not entry["identified"] and name != "phi":
@@ -66,52 +66,52 @@ def undetermined(run: Run, fitted: Fitted) -> dict[str, str]:
     return found
 
 
-def _reason(name: str, run: Run, fitted: Fitted) -> str:
+def _reason(name: str, run: Run, fitted: PosteriorPredictive) -> str:
     surroundings = run.problem.model.scene.surroundings
     derived, count = run.result.get("derived", {}), len(surroundings.names)
     ratios = [entry for key, entry in derived.items() if key.startswith("mass_ratio")]
     if not fitted.moves.any():
         limit = math.tan(surroundings.angle_rad)
         if name == "k1":
-            return f"nothing moves: k1 is at least tan(angle) = {limit:.3f}, more cannot be said"
+            return f"nothing moves: k1 is at least tan(angle) = {limit:.3f}, no more is known"
         return "nothing moves"
     confounded, reason = confounded_with_gravity(run.result["parameters"], surroundings.has_surface)
     if reason is not None and name in confounded:
         return reason
     if re.fullmatch(r"m\d+", name):
         if run.clip.objects[int(name[1:]) - 1].mass_kg is not None:
-            return "declared as weighed; it does not show in the motion"
+            return "declared as weighed; the motion does not depend on it"
         if count < 2:
-            return "the mass of a single object does not show in its motion"
+            return "the motion of a single object does not depend on its mass"
         if any(ratio["identified"] for ratio in ratios):
             every, more = ("ratio", "both") if count == 2 else ("ratios", "all")
             return (
-                f"only the {every} of the masses shows in such a clip; "
-                f"doubling {more} changes nothing"
+                f"only the {every} of the masses can be determined from such a clip; "
+                f"doubling {more} leaves the motion the same"
             )
-        return "masses show in a collision only, and there only their ratio"
+        return "only a collision depends on masses, and only on their ratio"
     if f"{name}{SUFFIX}" in derived:
-        return f"only its ratio to the mass shows ({name}{SUFFIX}); weigh the object (mass_kg)"
-    if name in WEIGHED and run.clip.objects[0].mass_kg is None:
-        return "only its ratio to the mass shows; weigh the object (mass_kg)"
+        return f"only its ratio to the mass is determined ({name}{SUFFIX}); declare mass_kg"
+    if name in FORCES and run.clip.objects[0].mass_kg is None:
+        return "only its ratio to the mass is determined; declare mass_kg"
     if name == "pixels_per_metre" and not surroundings.has_surface:
-        return "nothing in this motion tells how long a metre is"
+        return "this motion is the same at any scale"
     if name == "pixels_per_metre":
         return (
-            "on one slope only scale * (sin a - k1 cos a) shows; "
+            "a single slope determines only scale * (sin a - k1 cos a); "
             "declare pixels_per_metre to get the friction"
         )
     if name == "k1" and not surroundings.is_scale_known:
-        return "friction and scale cannot both be told from one slope; declare pixels_per_metre"
+        return "a single slope cannot determine both friction and scale; declare pixels_per_metre"
     if struck := _struck(name):
         if fitted.hits_s[struck - 2] is None:
             return f"object {struck - 1} never hits object {struck}"
-        return f"object {struck} is hit too weakly or too late in the clip to tell"
-    return "the clip narrows it by less than half of what was known before"
+        return f"object {struck} is hit too weakly or too late in the clip"
+    return "its posterior standard deviation is more than half of the prior's"
 
 
 def _struck(name: str) -> int | None:
-    """The object, counted from 1, whose being hit a parameter takes to be told."""
+    """The object, counted from 1, that has to be hit for a parameter to be determined."""
     if name == "mass_ratio":
         return 2
     found = re.fullmatch(r"k(\d+)|mass_ratio_\d+_(\d+)", name)
@@ -123,16 +123,16 @@ def fit_quality(result: dict[str, Any]) -> str:
     """chi2 per degree of freedom and what it means, in one sentence."""
     chi2 = result["error"]["chi2_per_dof"]
     if chi2 is None or not math.isfinite(chi2):
-        return "chi2 per degree of freedom cannot be told."
+        return "chi2 per degree of freedom cannot be computed."
     if chi2 < CHI2_GOOD:
-        said = "The model fits, and the tracker did better than it claims"
+        text = "The model fits, with less noise than the tracker states"
     elif chi2 <= CHI2_HIGH:
-        said = "What the model leaves over is of the size of the tracking noise"
+        text = "The model fits: the residuals have the size of the tracking noise"
     elif chi2 <= CHI2_BAD:
-        said = "The model leaves more over than tracking noise explains; see the residuals"
+        text = "The residuals are larger than tracking noise explains; see where the model fails"
     else:
-        said = "The model does not describe this clip; do not trust its parameters"
-    return f"{said} (chi2 per degree of freedom {chi2:.2f})."
+        text = "The model does not describe this clip; do not trust its parameters"
+    return f"{text} (chi2 per degree of freedom {chi2:.2f})."
 
 
 def fits(result: dict[str, Any]) -> bool:
@@ -144,21 +144,21 @@ def fits(result: dict[str, Any]) -> bool:
 def convergence(run: Run) -> str:
     """Whether the inference converged, in one sentence."""
     status = run.result.get("status")
-    told = status if isinstance(status, str) else run.posterior.status.value
-    if run.result["converged"] and "converged" in told:
-        return f"{told[0].upper()}{told[1:]}."
+    text = status if isinstance(status, str) else run.posterior.status.value
+    if run.result["converged"] and "converged" in text:
+        return f"{text[0].upper()}{text[1:]}."
     word = "Converged" if run.result["converged"] else "Not converged"
-    return f"{word}: {told}."
+    return f"{word}: {text}."
 
 
 def caution(result: dict[str, Any]) -> str | None:
-    """What makes the intervals no intervals, if anything does."""
+    """Why the intervals are not credible intervals, where they are not."""
     if result.get("preset") != "thesis":
         return None
     best = ", ".join(f"{name} = {value:.4g}" for name, value in result.get("best", {}).items())
     return (
-        f"Made with the thesis's sampler; its answer is {best or 'its best sample'}. "
-        "Its draws are no posterior: means and intervals on this page only describe the chains."
+        f"Made with the sampler of the thesis; its estimate is {best or 'its best sample'}. "
+        "Its draws are not a posterior: means and intervals here only describe the chains."
     )
 
 
@@ -172,7 +172,7 @@ def number(value: float | None, sd: float | None) -> str:
     return f"{value:.{min(places, 9)}f}"
 
 
-def command_again(run: Run) -> str:
+def fit_command(run: Run) -> str:
     """The command that makes this run again, from the clip as it was fitted."""
     result = run.result
     words = ["python -m galileo_jax.fit", shlex.quote(str(run.folder / CLIP))]

@@ -1,6 +1,7 @@
-"""A video's frames small enough to be carried by a page."""
+"""Frames of a video: enough of them, small enough, to be carried by a page."""
 
 import base64
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,11 +17,11 @@ QUALITIES = (80, 65, 50, 35)
 
 
 @dataclass(frozen=True)
-class Film:
-    """Pictures of a video.
+class VideoFrames:
+    """Evenly spaced frames of a video.
 
     Attributes:
-      frames: which frames of the video.
+      frames: their numbers.
       pictures: JPEGs, as data URIs.
       size_px: (width, height) of the pictures.
     """
@@ -30,7 +31,7 @@ class Film:
     size_px: tuple[int, int]
 
 
-def film(video: Path, num_frames: int) -> Film:
+def sample_frames(video: Path, num_frames: int) -> VideoFrames:
     """At most 120 evenly spaced ones of the first `num_frames` frames, some 2.5 MB in all.
 
     The first picture decides how much the JPEGs are compressed, so that one frame is in memory
@@ -53,7 +54,14 @@ def film(video: Path, num_frames: int) -> Film:
         frames.append(index)
         encoded = base64.b64encode(_jpeg(frame, size, quality)).decode("ascii")
         pictures.append(f"data:image/jpeg;base64,{encoded}")
-    return Film(tuple(frames), tuple(pictures), size)
+    return VideoFrames(tuple(frames), tuple(pictures), size)
+
+
+def first_and_last_frame(video: Path) -> list[np.ndarray]:
+    """The two frames, `[height, width, 3]`, RGB; one where there are no more."""
+    stream = decode.frames(video)
+    first = next(stream)
+    return [frame[..., ::-1] for frame in (first, *deque(stream, maxlen=1))]
 
 
 def _size(frame: np.ndarray) -> tuple[int, int]:

@@ -1,12 +1,11 @@
-"""What the posterior says of the clip's own frames; all plots read from it."""
+"""The posterior predictive of a clip: simulated positions in its frames, and residuals."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import jax
 import numpy as np
 
-from galileo_jax.comparison.phases import free_phase
+from galileo_jax.comparison.phases import Phase, phases, phases_of
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.prediction.extrapolate import (
@@ -17,7 +16,6 @@ from galileo_jax.prediction.extrapolate import (
     hit_s,
     roll_out,
 )
-from galileo_jax.report.phase import Phase
 from galileo_jax.results.run import Run
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
@@ -25,14 +23,14 @@ NUM_DRAWS = 100
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """The fit in the clip's frames.
+class PosteriorPredictive:
+    """The fit in the frames of the clip.
 
     Attributes:
       observation: what was measured.
-      position_m: `[draw, object, 2, frame]`, predicted positions of the followed points.
+      position_m: `[draw, object, 2, frame]`, predicted positions of the tracked points.
       noise_scale: the factor on the tracker's own noise.
-      offset_m: `[object, 2]`, followed point minus centre; `position_m` contains each draw's.
+      offset_m: `[object, 2]`, tracked point minus centre; `position_m` contains each draw's.
       residuals: `[object, 2, frame]`, in units of the noise; NaN where nothing was measured.
       phases: of each object.
       hits_s: when each object but the last hits the next; None = it does not.
@@ -53,7 +51,7 @@ class Fitted:
         return np.linalg.norm(span, axis=-1) > 2e-3
 
 
-def evaluate(run: Run, seed: int) -> Fitted:
+def posterior_predictive(run: Run, seed: int) -> PosteriorPredictive:
     """Rolls out the posterior's median, for the residuals, and draws, for the bands."""
     problem = run.problem
     observation, surroundings = problem.observation, problem.model.scene.surroundings
@@ -73,18 +71,14 @@ def evaluate(run: Run, seed: int) -> Fitted:
     is_measured = np.broadcast_to(observation.mask[:, None], shown.shape)
     drawn = as_measured(problem.model, draws)
     drawn = drawn + _offset(observation, drawn)[..., None]
-    hits = _hits(centre, surroundings)
-    return Fitted(
+    return PosteriorPredictive(
         observation=observation,
         position_m=drawn,
         noise_scale=noise_scale,
         offset_m=_offset(observation, shown),
         residuals=np.where(is_measured, np.asarray(white), np.nan),
-        phases=tuple(
-            _phases(run, shown[i], i, _first(hits[max(0, i - 1) : i + 1]))
-            for i in range(len(surroundings.names))
-        ),
-        hits_s=hits,
+        phases=tuple(phases_of(labels, frames) for labels in phases(problem, median[0])),
+        hits_s=_hits(centre, surroundings),
     )
 
 
@@ -94,39 +88,12 @@ def _hits(motions: Motions, surroundings: Surroundings) -> tuple[float | None, .
     return tuple(None if np.isnan(one) else one for one in when)
 
 
-def _first(hits_s: tuple[float | None, ...]) -> float | None:
-    return min((hit for hit in hits_s if hit is not None), default=None)
-
-
 def _offset(observation: Observation, predicted_m: np.ndarray) -> np.ndarray:
-    """Followed points minus centres `[..., object, 2, frame]`, median over the frames."""
+    """Tracked points minus centres `[..., object, 2, frame]`, median over the frames."""
     return np.stack(
         [
             np.median((observation.position_m[i] - predicted_m[..., i, :, :])[..., seen], axis=-1)
             for i, seen in enumerate(observation.mask)
         ],
         axis=-2,
-    )
-
-
-def _phases(run: Run, centre_m: np.ndarray, index: int, hit: float | None) -> tuple[Phase, ...]:
-    """Consecutive phases of one object, from its fitted centre `[2, frame]`."""
-    surroundings = run.problem.model.scene.surroundings
-    times = run.problem.observation.times_s
-    corner, half = surroundings.corner_m[index], surroundings.half_length_m[index]
-    if not surroundings.has_surface:
-        labels = np.full(len(times), free_phase(surroundings))
-    elif surroundings.start_m[index][0] < corner:
-        beyond = centre_m[0] - corner  # -inf where there is no table
-        labels = np.select([beyond < -half, beyond < half], ["ramp", "foot"], "table")
-    else:
-        labels = np.full(len(times), "at rest")
-    if hit is not None:
-        labels = np.where(times >= hit, "after the hit", labels)
-    borders = np.flatnonzero(labels[1:] != labels[:-1]) + 1
-    edges = [0, *borders, len(times) - 1]
-    return tuple(
-        Phase(str(labels[start]), float(times[start]), float(times[end]))
-        for start, end in pairwise(edges)
-        if end > start
     )

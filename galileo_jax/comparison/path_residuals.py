@@ -1,26 +1,24 @@
-"""Each object's motion along its path, measured against fitted: what pictures of a failure show."""
+"""Each object's motion along its path, measured and fitted, and the residuals."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, Place
 from galileo_jax.comparison.local_tests import AXES, WHOLE
-from galileo_jax.comparison.phases import PHASES
+from galileo_jax.comparison.phases import PHASES, Phase, phases_of
+from galileo_jax.comparison.worst_interval import worst_interval
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.problem import Problem
-from galileo_jax.report.phase import Phase
-from galileo_jax.report.stretch import strongest
 
 NUM_DRAWS = 60
 MARKED_Z = 3.0  # below it a cell is no place where the model fails
 
 
 @dataclass(frozen=True)
-class Along:
+class PathResiduals:
     """One object of one clip; arrays are `[frame]`.
 
     Attributes:
@@ -28,14 +26,15 @@ class Along:
       title: of a picture: the object, and its clip where there are several.
       index: of the object.
       times_s: of the frames.
-      measured_m: along the path, NaN where it was not seen; 0 at the foot (incline: the start).
-      predicted_m: of the fit; the constant offset of the followed point is in it.
+      measured_m: along the path, NaN where it was not tracked; 0 at the foot (incline: the start);
+        without the constant offset of the tracked point.
+      predicted_m: of the fit.
       low_m, high_m: where 95 % of the posterior's draws are.
       noise_m: tracking error, as the comparison scaled it.
       along, across: residuals along the path and across it, in units of the noise.
       phases: of the motion.
-      stretch_s: where it fails worst, None where it does not.
-      worst: the cell of that stretch.
+      failing_s: the interval in which the model fails worst, None where it does not fail.
+      worst: the cell of that interval.
     """
 
     clip: str
@@ -51,7 +50,7 @@ class Along:
     along: np.ndarray
     across: np.ndarray
     phases: tuple[Phase, ...]
-    stretch_s: tuple[float, float] | None
+    failing_s: tuple[float, float] | None
     worst: Place | None
 
     @property
@@ -60,9 +59,9 @@ class Along:
         return float(np.nanmax(np.abs([self.along, self.across]), initial=0.0))
 
 
-def along_paths(
+def path_residuals(
     trials: JointProblem, fit: GradientFit, comparison: Comparison, seed: int
-) -> tuple[Along, ...]:
+) -> tuple[PathResiduals, ...]:
     """All objects of all clips."""
     drawn = laplace_posterior(trials, fit, seed).flat()
     drawn = drawn[np.random.default_rng(seed).choice(len(drawn), NUM_DRAWS, replace=False)]
@@ -88,24 +87,24 @@ def _object(
     clip: int,
     comparison: Comparison,
     title: str,
-) -> Along:
+) -> PathResiduals:
     observation = problem.observation
-    seen, times = observation.mask[index], observation.times_s
+    is_tracked, times = observation.mask[index], observation.times_s
     tangent = _tangent(problem, index, best[index])
-    difference = np.where(seen, observation.position_m[index] - best[index], np.nan)
-    offset = np.nanmedian(difference, axis=1) if seen.any() else np.zeros(2)
+    difference = np.where(is_tracked, observation.position_m[index] - best[index], np.nan)
+    offset = np.nanmedian(difference, axis=1) if is_tracked.any() else np.zeros(2)
     path = _path(problem, index, best[index], tangent)
     moved = np.einsum("at,bat->bt", tangent, draws[:, index] - best[index])
-    # Each draw, like the fit, up to the constant offset of the point that was followed.
+    # Each draw, like the fit, up to the constant offset of the tracked point.
     moved = moved - np.median(moved, axis=1, keepdims=True)
     low, high = np.quantile(moved, [0.025, 0.975], axis=0) if len(moved) else (0 * path, 0 * path)
     covariance = observation.covariance_m2[index]
     noise = scale * np.sqrt(np.einsum("at,abt,bt->t", tangent, covariance, tangent))
-    white = np.where(seen, comparison.white[clip][index], np.nan)
+    white = np.where(is_tracked, comparison.white[clip][index], np.nan)
     normal = np.stack([-tangent[1], tangent[0]])
     labels = comparison.labels[clip][index]
     worst = _worst(comparison, problem.name, observation.names[index])
-    return Along(
+    return PathResiduals(
         clip=problem.name,
         name=observation.names[index],
         title=title,
@@ -118,32 +117,28 @@ def _object(
         noise_m=noise,
         along=np.sum(tangent * white, axis=0),
         across=np.sum(normal * white, axis=0),
-        phases=_phases(labels, times),
-        stretch_s=None if worst is None else worst_stretch(white, labels, times, worst),
+        phases=phases_of(labels, times),
+        failing_s=None if worst is None else failing_interval(white, labels, times, worst),
         worst=worst,
     )
 
 
-def worst_stretch(
+def failing_interval(
     white: np.ndarray, labels: np.ndarray, times_s: np.ndarray, worst: Place
 ) -> tuple[float, float] | None:
     """When the residuals of a cell deviate most, to one side: the window of largest |sum| / sqrt n.
 
     Args:
-      white: `[2, frame]`, NaN where nothing was seen.
+      white: `[2, frame]`, NaN where nothing was tracked.
       labels: `[frame]`, indices into `PHASES`.
       times_s: `[frame]`.
       worst: the cell.
     """
     values = white[AXES.index(worst.axis)]
-    chosen = np.isfinite(values)
     if worst.phase != WHOLE:
-        chosen &= labels == PHASES.index(worst.phase)
-    frames = np.flatnonzero(chosen)
-    if (window := strongest(values[frames])) is None:
-        return None
-    first, last, _ = window
-    return float(times_s[frames[first]]), float(times_s[frames[last]])
+        values = np.where(labels == PHASES.index(worst.phase), values, np.nan)
+    found = worst_interval(values, times_s)
+    return None if found is None else (found.start_s, found.end_s)
 
 
 def _tangent(problem: Problem, index: int, centre_m: np.ndarray) -> np.ndarray:
@@ -169,12 +164,3 @@ def _worst(comparison: Comparison, clip: str, name: str) -> Place | None:
         return None
     own = [p for p in comparison.where if (p.clip, p.object) == (clip, name) and p.z > MARKED_Z]
     return own[0] if own else None
-
-
-def _phases(labels: np.ndarray, times_s: np.ndarray) -> tuple[Phase, ...]:
-    borders = [0, *map(int, np.flatnonzero(np.diff(labels)) + 1), len(labels) - 1]
-    return tuple(
-        Phase(PHASES[labels[start]], float(times_s[start]), float(times_s[end]))
-        for start, end in pairwise(borders)
-        if end > start
-    )

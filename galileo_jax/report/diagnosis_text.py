@@ -1,13 +1,13 @@
-"""What a comparison and a diagnosis found, in plain sentences: for the terminal and the pages."""
+"""The results of a comparison and of a diagnosis as sentences, for the terminal and the pages."""
 
 import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from galileo_jax.comparison.compare import Comparison, Place, Pull
+from galileo_jax.comparison.compare import Comparison, Pull
 from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.report.statements import number
+from galileo_jax.report.fit_text import number
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
 NO_EFFECTS = "no effects"
@@ -42,54 +42,50 @@ def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
     equals = p_equals(comparison.p_value)
     model = f"with {effects_text(effects)} " if effects else ""
     if comparison.is_adequate:
-        return f"The model {model}is adequate: what it leaves over is noise ({equals})."
+        return f"The model {model}is adequate: its residuals look like noise ({equals})."
     return f"The model {model}is not adequate: the data contradict it ({equals})."
 
 
-def place_text(place: Place) -> str:
-    """One cell in words."""
-    return f"{place.object}, {place.axis}, {place.phase}"
-
-
 def pull_text(pull: Pull) -> str:
-    """One nuisance outside its prior, in words."""
+    """One nuisance parameter outside its prior, as a sentence."""
     unit = "" if pull.unit == "1" else f" {pull.unit}"
     return (
-        f"{pull.parameter} is bent to {pull.value:.4g}{unit}, "
-        f"{abs(pull.z):.1f} standard deviations of its prior away"
+        f"{pull.parameter} is at {pull.value:.4g}{unit}, "
+        f"{abs(pull.z):.1f} prior standard deviations from its prior mean"
     )
 
 
 def verdict(diagnosis: Diagnosis) -> str:
-    """What is missing, in one sentence."""
+    """Which effect the model lacks, in one sentence."""
     found, first = diagnosis.verdict, diagnosis.base
     if found.status == "none":
-        return f"The model is fine: nothing is missing ({p_equals(first.p_value)})."
+        return f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."
     if found.status == "named":
         names = " and ".join(found.effects)
         verb = "explains" if len(found.effects) == 1 else "together explain"
         chosen = {candidate.effects: candidate for candidate in diagnosis.candidates}
         p = chosen[found.effects].p_value if found.effects in chosen else None
-        told = "" if p is None else f" ({p_equals(first.p_value)} without, {p_equals(p)} with)"
-        return f"{names} {verb} the data{told}."
+        both = "" if p is None else f" ({p_equals(first.p_value)} without, {p_equals(p)} with)"
+        return f"{names} {verb} the data{both}."
     if found.status == "ambiguous":
         names = ", ".join(found.effects)
-        return f"These cannot be told apart here: {names}; each of them explains the data."
+        return f"This clip cannot distinguish between {names}; each of them explains the data."
     where = "; see the missing force" if diagnosis.missing is not None else ""
-    return f"Something I do not know: no effect that I know explains the data{where}."
+    return f"No known effect explains the data{where}."
 
 
 CLIPS_KINDS = {
-    "shared": "each clip fits by itself: what they share is not the same in all of them",
-    "some": "some clips fit by themselves, others do not",
-    "alike": "no clip fits by itself; what they miss along the way is the same within its errors",
-    "different": "no clip fits by itself, and each misses something else along the way: "
-    "it does not belong to the place",
+    "shared": "each clip alone agrees with the model: a parameter they share differs between them",
+    "some": "some clips alone agree with the model, others do not",
+    "alike": "no clip alone agrees with the model; the missing acceleration along the path is the "
+    "same in all, within its errors",
+    "different": "no clip alone agrees with the model, and the missing acceleration along the path "
+    "differs between them: it does not depend on position alone",
 }
 
 
 def each_clip(record: Mapping[str, Any]) -> list[str]:
-    """How clips that are not explained together differ: `each_clip` of diagnosis.json."""
+    """How clips that no model explains together differ: `each_clip` of diagnosis.json."""
     found = [f"clips: {CLIPS_KINDS[record['kind']]}"]
     for one in record["clips"]:
         parts = ", ".join(
@@ -97,17 +93,17 @@ def each_clip(record: Mapping[str, Any]) -> list[str]:
             for extra, sd in zip(one["extra_acceleration_m_s2"], one["sd_m_s2"], strict=True)
         )
         found.append(
-            f"{one['clip']}: chi2 {one['chi2_together']:.2f} per value, by itself "
-            f"{one['chi2_alone']:.2f} ({p_equals(one['p_alone'])}); accelerates more than the "
-            f"model of all by {parts} m/s^2 in the quarters of its way"
+            f"{one['clip']}: chi2 per value {one['chi2_together']:.2f} fitted with the others, "
+            f"{one['chi2_alone']:.2f} alone ({p_equals(one['p_alone'])}); acceleration beyond the "
+            f"joint model in each quarter of its path: {parts} m/s^2"
         )
     return found
 
 
-def how_to_go_on(
+def next_command(
     diagnosis: Diagnosis, clips: Sequence[str], effects_from: Sequence[str] = ()
 ) -> str:
-    """The command that comes next."""
+    """The command to run next."""
     files = shlex.join(clips)
     more = "".join(f" --effects-from {shlex.quote(path)}" for path in effects_from)
     found = diagnosis.verdict
@@ -119,20 +115,20 @@ def how_to_go_on(
     return f"galileo fit {files}{more} --effects {','.join(effects)}"
 
 
-def strength_texts(effects: Sequence[str], told: Mapping[str, Any]) -> dict[str, str]:
+def strength_texts(effects: Sequence[str], entry: Mapping[str, Any]) -> dict[str, str]:
     """The strengths of a candidate's effects as text, by name.
 
-    Where nobody weighed the objects, a force is told per mass: its constant is not determined.
+    Where no object was weighed, a force is given per mass: only that is determined.
 
     Args:
       effects: of the candidate.
-      told: its entry in diagnosis.json.
+      entry: of the candidate in diagnosis.json.
     """
-    derived = told.get("derived", {})
+    derived = entry.get("derived", {})
     found = {}
-    for name, entry in strengths(effects, told["parameters"]).items():
-        of_mass = derived.get(f"{name}{SUFFIX}")
-        found[name] = f"{value_text(of_mass)} (over m1)" if of_mass else value_text(entry)
+    for name, strength in strengths(effects, entry["parameters"]).items():
+        per_mass = derived.get(f"{name}{SUFFIX}")
+        found[name] = f"{value_text(per_mass)} (over m1)" if per_mass else value_text(strength)
     return found
 
 

@@ -1,15 +1,18 @@
-"""What all pages are made of: one HTML file that needs nothing else."""
+"""The parts of HTML pages: each page is one file that needs nothing else, not even a network."""
 
 import base64
 import gzip
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from html import escape
 from importlib import resources
 
+from galileo_jax.report.chart import Chart
+from galileo_jax.report.draw import to_plotly
+
 NO_SCRIPT = (
-    '<noscript><p class="warn">Charts and clip need JavaScript; words and tables do not.</p>'
+    '<noscript><p class="warn">Charts and clip need JavaScript; text and tables do not.</p>'
     "</noscript>"
 )
 
@@ -22,20 +25,27 @@ def document(title: str, sections: Iterable[str]) -> str:
     """
     header, *rest = sections
     contents, body = _with_anchors("\n".join(rest))
-    has_charts = 'class="chart"' in body
-    plotly = f'<script type="text/plain" id="plotly">{_plotly()}</script>\n' if has_charts else ""
     script = _asset("page.js")
-    return (
+    return with_plotly(
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>{_asset('page.css')}</style>\n</head>\n<body>\n"
         f"<header>\n{header}\n{contents}\n{NO_SCRIPT}</header>\n<main>\n{body}\n</main>\n"
-        f"{plotly}<script>{script}</script>\n</body>\n</html>\n"
+        f"<script>{script}</script>\n</body>\n</html>\n"
     )
 
 
+def with_plotly(page: str) -> str:
+    """The page with Plotly inlined after its last section, if it has charts and needs it."""
+    if 'class="chart"' not in page or 'id="plotly"' in page:
+        return page
+    before, after = page.rsplit("</main>\n", 1)
+    script = f'<script type="text/plain" id="plotly">{_plotly()}</script>\n'
+    return f"{before}</main>\n{script}{after}"
+
+
 def header(kind: str, title: str, lead: str, more: str = "", is_good: bool = True) -> str:
-    """A page's top: what it is, of what, and in one sentence what came out.
+    """The top of a page: what it is, of which clips, and the result in one sentence.
 
     Args:
       kind: "fit", "diagnosis", ...
@@ -51,28 +61,38 @@ def header(kind: str, title: str, lead: str, more: str = "", is_good: bool = Tru
     )
 
 
-def figure_section(
+def chart_element(chart: Chart) -> str:
+    """The chart as HTML; page.js draws it in the colours of the page."""
+    figure = to_plotly(chart, has_legend=False)
+    encoded = str(figure.to_json()).replace("<", "\\u003c")
+    clock = "" if chart.clip is None else f' data-clip="{escape(chart.clip, quote=True)}"'
+    return (
+        f'<div class="chart" role="img" aria-label="{escape(chart.label, quote=True)}" '
+        f'style="height:{figure.layout.height}px"{clock}>'
+        f'<script type="application/json">{encoded}</script></div>'
+    )
+
+
+def chart_section(
     heading: str,
     caption: str,
-    figures: Mapping[str, str],
+    charts: Iterable[Chart],
     arrangement: str = "grid",
     legend: str = "",
 ) -> str:
-    """A heading, a caption and pictures.
+    """A heading, a caption and charts.
 
     Args:
       heading: of the section.
       caption: plain text.
-      figures: HTML by name.
-      arrangement: "grid": side by side where there is room; "narrow": one below the other.
+      charts: in their order.
+      arrangement: "grid": side by side where there is room; "stack": one below the other.
       legend: HTML, see `legend`.
     """
-    inner = "".join(f'<div class="{arrangement}">{svg}</div>' for svg in figures.values())
-    if arrangement == "grid":
-        inner = f'<div class="grid">{"".join(figures.values())}</div>'
+    drawn = "".join(map(chart_element, charts))
     return (
         f"<h2>{escape(heading)}</h2>\n<figure><figcaption>{escape(caption)}</figcaption>"
-        f"{legend}{inner}</figure>"
+        f'{legend}<div class="{arrangement}">{drawn}</div></figure>'
     )
 
 
@@ -91,7 +111,7 @@ def legend(entries: Iterable[tuple[str, str, str]]) -> str:
 
 
 def details(summary: str, inner: str) -> str:
-    """What is shown when asked for."""
+    """A part that the reader opens."""
     return f"<details><summary>{escape(summary)}</summary>{inner}</details>"
 
 

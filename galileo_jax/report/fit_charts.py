@@ -1,0 +1,184 @@
+"""Charts of a fit: velocities and positions, measured and fitted, and the residuals."""
+
+from typing import Literal
+
+import numpy as np
+
+from galileo_jax.comparison.phases import Phase
+from galileo_jax.comparison.worst_interval import Interval, worst_interval
+from galileo_jax.observation.observation import Observation
+from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
+from galileo_jax.report.chart import (
+    Band,
+    Chart,
+    Line,
+    Panel,
+    Points,
+    stacked,
+    time_limits,
+    with_room,
+)
+from galileo_jax.report.style import object_colour
+
+Quantity = Literal["velocity", "position"]
+UNITS = {"velocity": "m/s", "position": "m"}
+AXES = ("x", "y")
+FAILS_Z = 5.0  # of white noise, the largest of four tracks of 120 frames is over 4.6 in 1 of 100
+SMALLEST_RANGE = 3.3  # of the residuals' axis, in units of the noise
+
+
+def failing_interval_of(fitted: PosteriorPredictive) -> tuple[str, str, Interval] | None:
+    """Object, axis and the worst interval of all; None where none is worse than noise makes it."""
+    found = [
+        (name, axis, interval)
+        for name, both in zip(fitted.observation.names, fitted.residuals, strict=True)
+        for axis, values in zip(AXES, both, strict=True)
+        if (interval := worst_interval(values, fitted.observation.times_s)) is not None
+    ]
+    worst = max(found, key=lambda one: one[2].z, default=None)
+    return worst if worst is not None and worst[2].z > FAILS_Z else None
+
+
+def profile_chart(
+    fitted: PosteriorPredictive, quantity: Quantity, index: int, axis: int, clip: str
+) -> Chart:
+    """The velocity profile or the position of one object along one axis."""
+    name = fitted.observation.names[index]
+    label = f"{quantity} of {name} along {AXES[axis]} against time, measured and fitted"
+    panel = profile_panel(fitted, quantity, index, axis)
+    return Chart(f"{quantity}_{name}_{AXES[axis]}", label, (panel,), clip)
+
+
+def residual_chart(fitted: PosteriorPredictive, index: int, clip: str) -> Chart:
+    """The residuals of one object in units of the noise, both axes."""
+    name = fitted.observation.names[index]
+    label = f"residuals of {name} against time, in units of the noise"
+    return Chart(f"residuals_{name}", label, (fit_residual_panel(fitted, index),), clip)
+
+
+def object_chart(fitted: PosteriorPredictive, index: int) -> Chart:
+    """Both velocities of one object, and its residuals below."""
+    name = fitted.observation.names[index]
+    velocities = (profile_panel(fitted, "velocity", index, axis) for axis in range(len(AXES)))
+    label = f"velocity of {name} against time, measured and fitted, and residuals"
+    return stacked(f"fit_{name}", label, (*velocities, fit_residual_panel(fitted, index)))
+
+
+def track_chart(observation: Observation, axis: int) -> Chart:
+    """The measured positions of all objects along one axis, each with its 95 % interval."""
+    marks = tuple(
+        Points(
+            observation.times_s,
+            observation.position_m[i, axis],
+            object_colour(i),
+            name,
+            sd=np.sqrt(observation.covariance_m2[i, axis, axis]),
+        )
+        for i, name in enumerate(observation.names)
+    )
+    panel = Panel(
+        f"{AXES[axis]}, m", marks, xlabel="time, s", xlim=time_limits(observation.times_s)
+    )
+    return Chart(f"track_{AXES[axis]}", f"measured {AXES[axis]} against time", (panel,))
+
+
+def fit_residual_panel(fitted: PosteriorPredictive, index: int) -> Panel:
+    """The whitened residuals of one object in x and y."""
+    name = fitted.observation.names[index]
+    found = failing_interval_of(fitted)
+    x, y = fitted.residuals[index]
+    return residual_panel(
+        fitted.observation.times_s,
+        {"x": x, "y": y},
+        index,
+        title=f"{name} (filled: x, hollow: y)",
+        phases=fitted.phases[index],
+        highlight=(found[2].start_s, found[2].end_s) if found and found[0] == name else None,
+    )
+
+
+def residual_panel(
+    times_s: np.ndarray,
+    residuals: dict[str, np.ndarray],
+    index: int,
+    *,
+    title: str,
+    phases: tuple[Phase, ...],
+    highlight: tuple[float, float] | None,
+    largest: float = 0.0,
+) -> Panel:
+    """Residuals in units of the noise against time, with the band of 95 % of noise.
+
+    Args:
+      times_s: `[frame]`.
+      residuals: two series `[frame]` by name: drawn filled and hollow.
+      index: of the object.
+      title: of the panel.
+      phases: of the motion.
+      highlight: the interval that fails.
+      largest: of residuals that the axis has to hold, beside these.
+    """
+    (filled_name, filled), (hollow_name, hollow) = residuals.items()
+    largest = max(largest, float(np.nanmax(np.abs([filled, hollow]), initial=0.0)))
+    bound = max(SMALLEST_RANGE, 1.1 * largest)
+    colour, xlim = object_colour(index), time_limits(times_s)
+    two = np.full(2, 2.0)
+    return Panel(
+        ylabel="residual / noise",
+        marks=(
+            Band(np.array(xlim), -two, two, "ink", "95 % of noise", 0.07),
+            Points(times_s, hollow, colour, hollow_name, is_hollow=True),
+            Points(times_s, filled, colour, filled_name),
+        ),
+        title=title,
+        xlabel="time, s",
+        xlim=xlim,
+        ylim=with_room(-bound, bound),
+        phases=phases,
+        highlight=highlight,
+        level=0.0,
+    )
+
+
+def profile_panel(fitted: PosteriorPredictive, quantity: Quantity, index: int, axis: int) -> Panel:
+    """The velocity or the position of one object along one axis, measured and fitted.
+
+    Dark band: the model with the uncertainty of the posterior. Light band: where 95 % of
+    measurements are expected, tracking noise included.
+    """
+    observation = fitted.observation
+    times_s, drawn = observation.times_s, fitted.position_m[:, index, axis]
+    measured = observation.position_m[index, axis]
+    variance = fitted.noise_scale**2 * observation.covariance_m2[index, axis, axis]
+    if quantity == "velocity":
+        step = np.diff(times_s)
+        times_s, drawn = times_s[:-1] + step / 2, np.diff(drawn, axis=-1) / step
+        measured = observation.velocity_m_s[index, axis]
+        variance = (variance[1:] + variance[:-1]) / step**2
+    noise = np.sqrt(variance)
+    colour = object_colour(index)
+    low, median, high = np.quantile(drawn, [0.025, 0.5, 0.975], axis=0)
+    spread = 1.96 * np.sqrt(drawn.var(axis=0) + np.where(np.isfinite(noise), noise, 0.0) ** 2)
+    mean = drawn.mean(axis=0)
+    return Panel(
+        ylabel=f"{quantity}, {UNITS[quantity]}",
+        marks=(
+            Band(times_s, mean - spread, mean + spread, colour, "95 % of measurements", 0.16),
+            Band(times_s, low, high, colour, "95 % of the model", 0.4),
+            Line(times_s, median, colour, "fitted"),
+            Points(times_s, measured, "ink", "measured"),
+        ),
+        title=f"{fitted.observation.names[index]}, {AXES[axis]}",
+        xlabel="time, s",
+        xlim=time_limits(fitted.observation.times_s),
+        ylim=with_room(*_limits(measured, noise)) if np.isfinite(measured).any() else None,
+        phases=fitted.phases[index],
+    )
+
+
+def _limits(values: np.ndarray, noise: np.ndarray) -> tuple[float, float]:
+    """Of an axis that shows all measured values, but not all of a band that is far wider."""
+    known = np.isfinite(values)
+    span = np.ptp(values[known])
+    spare = max(0.1 * span, min(3 * float(np.median(noise[known])), max(0.5 * span, 1e-3)))
+    return float(values[known].min() - spare), float(values[known].max() + spare)

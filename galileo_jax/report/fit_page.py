@@ -1,0 +1,242 @@
+"""The report of a fit: plots as SVG in DIR/plots, the page in DIR/report.html."""
+
+import re
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.prediction.posterior_predictive import PosteriorPredictive, posterior_predictive
+from galileo_jax.report import fit_text
+from galileo_jax.report.animation import animation
+from galileo_jax.report.chart import Chart
+from galileo_jax.report.draw import to_svg
+from galileo_jax.report.fit_charts import (
+    AXES,
+    failing_interval_of,
+    profile_chart,
+    residual_chart,
+)
+from galileo_jax.report.fit_text import meaning, number
+from galileo_jax.report.html_page import chart_section, details, document, header, legend, table
+from galileo_jax.report.posterior_charts import pair_chart, trace_chart
+from galileo_jax.report.provenance import provenance
+from galileo_jax.report.style import object_colour
+from galileo_jax.results.run import Run
+from galileo_jax.results.shown_parameters import shown_parameters
+from galileo_jax.runtime.atomic_write import write_text
+
+PAGE, PLOTS = "report.html", "plots"
+PLOT_NAMES = ("velocity_", "position_", "residuals_", "pairs", "trace")  # they begin so
+HEADLINES = re.compile(r"gravity|k\d+|mass_ratio(_\d+_\d+)?")
+
+
+def write_report(run: Run, page: Path | None = None) -> Path:
+    """Writes a finished fit's page, and its plots (SVG) beside it; returns the page's path.
+
+    Args:
+      run: the fit.
+      page: where to; default: report.html in the run's folder.
+    """
+    page = page or run.folder / PAGE
+    fitted = posterior_predictive(run, seed=int(run.result["seed"]))
+    charts = _charts(run, fitted)
+    files = {chart.name: to_svg(chart) for some in charts.values() for chart in some}
+    for name, svg in files.items():
+        write_text(page.parent / PLOTS / f"{name}.svg", svg)
+    for path in (page.parent / PLOTS).glob("*.svg"):
+        if path.stem.startswith(PLOT_NAMES) and path.stem not in files:  # of an earlier fit
+            path.unlink()
+    write_text(page, _render(run, fitted, charts))
+    return page
+
+
+def _charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
+    """By section of the page."""
+    objects, clip = range(len(fitted.observation.names)), run.problem.name
+    main = [p.name for p in run.problem.parameters if p.role != "nuisance"]
+    shown = shown_parameters(run.result)
+    names = [name for name in main if name in shown] or main
+    draws = [pair_chart(run.posterior, names)]
+    if run.result["method"] == "mh":
+        draws.append(trace_chart(run.posterior, names))
+    both = [(i, axis) for i in objects for axis in range(len(AXES))]
+    return {
+        "velocity": [profile_chart(fitted, "velocity", *one, clip) for one in both],
+        "residuals": [residual_chart(fitted, i, clip) for i in objects],
+        "draws": draws,
+        "position": [profile_chart(fitted, "position", *one, clip) for one in both],
+    }
+
+
+def _render(run: Run, fitted: PosteriorPredictive, charts: Mapping[str, Sequence[Chart]]) -> str:
+    title = ", ".join(Path(clip).name for clip in run.result["clips"])
+    key = _key(run)
+    sections = [
+        _header(title, run) + _headlines(run),
+        _undetermined(run, fitted),
+        _motion(run, fitted),
+        chart_section("Velocity", VELOCITY, charts["velocity"], legend=key),
+        chart_section("Where the model fails", _failure(fitted), charts["residuals"]),
+        _table("Parameters", shown_parameters(run.result)),
+        details("Nuisance parameters", _table("", run.result.get("nuisances", {}), NUISANCES)),
+        chart_section("Posterior", _draws_caption(run), charts["draws"], "stack"),
+        chart_section("Position", _position_caption(fitted), charts["position"], legend=key),
+        _provenance(run),
+    ]
+    return document(f"{title}: fit", sections)
+
+
+def _motion(run: Run, fitted: PosteriorPredictive) -> str:
+    model = ", ".join(run.result["effects"]) or "fitted"
+    centres = np.median(fitted.position_m, axis=0) - fitted.offset_m[..., None]
+    return "<h2>Motion</h2>\n" + animation(run.clip, run.problem, {model: centres})
+
+
+NUISANCES = (
+    "Always free, with narrow priors, so that the intervals above include their uncertainty. "
+    "A nuisance parameter that the clip does not determine has its prior."
+)
+VELOCITY = (
+    "Measured and fitted velocities. Dark band: 95 % of the model, from the uncertainty of the "
+    "posterior. Light band: 95 % of measurements are expected in it. The vertical line is at the "
+    "time of the slider."
+)
+
+
+def _header(title: str, run: Run) -> str:
+    result = run.result
+    effects = ", ".join(result["effects"]) or "none beyond friction and impact"
+    mark = "" if result["converged"] else ' class="warn"'
+    caution = fit_text.caution(result)
+    cautions = [*([caution] if caution else []), *result.get("warnings", [])]
+    warning = "".join(f'<p class="warn">{escape(line)}</p>\n' for line in cautions)
+    more = (
+        f"<p{mark}>{escape(fit_text.convergence(run))}</p>\n{warning}"
+        f'<p class="soft">Method {escape(result["method"])}; effects: {escape(effects)}.</p>\n'
+    )
+    return header("fit", title, fit_text.fit_quality(result), more, fit_text.fits(result))
+
+
+def _key(run: Run) -> str:
+    """What the marks of velocities and positions mean."""
+    names = run.problem.observation.names
+    return legend(
+        [
+            ("dot", "ink", "measured"),
+            *(("line", object_colour(i), f"{name}, fitted") for i, name in enumerate(names)),
+            ("fill", "soft", "dark: 95 % of the model; light: 95 % of measurements"),
+        ]
+    )
+
+
+def _headlines(run: Run) -> str:
+    cards = []
+    for name, entry in shown_parameters(run.result).items():
+        if not HEADLINES.fullmatch(name):
+            continue
+        label = escape(meaning(name) or name)
+        if entry["identified"]:
+            low, high = (number(entry[key], entry["sd"]) for key in ("q025", "q975"))
+            value, note = number(entry["mean"], entry["sd"]), f"{low} to {high} (95 %)"
+        else:
+            value, note = "not determined", "see below"
+        cards.append(
+            f'<div class="card"><span>{label}</span><b>{value}</b><span>{note}</span></div>'
+        )
+    return f'<div class="cards">{"".join(cards)}</div>'
+
+
+def _undetermined(run: Run, fitted: PosteriorPredictive) -> str:
+    reasons = fit_text.undetermined(run, fitted)
+    heading = "What the clip does not determine"
+    if not reasons:
+        return f"<h2>{heading}</h2>\n<p>It determines all main parameters.</p>"
+    by_reason: dict[str, list[str]] = {}
+    for name, reason in reasons.items():
+        by_reason.setdefault(reason, []).append(name)
+    items = "".join(
+        f"<li><strong>{escape(', '.join(meaning(n) or n for n in names))}</strong>: "
+        f"{escape(reason)}.</li>"
+        for reason, names in by_reason.items()
+    )
+    return f"<h2>{heading}</h2>\n<ul>{items}</ul>"
+
+
+def _failure(fitted: PosteriorPredictive) -> str:
+    text = (
+        "Residuals: measured minus fitted, in units of the noise. If the model is right they show "
+        "no pattern, and 95 % of them are inside the grey band. "
+    )
+    found = failing_interval_of(fitted)
+    if found is None:
+        return text + "No interval deviates more than noise does."
+    name, axis, worst = found
+    return (
+        f"{text}Yellow: the interval that deviates most, {name} along {axis} from "
+        f"{worst.start_s:.2f} to {worst.end_s:.2f} s (its mean is {worst.z:.0f} standard errors "
+        "from 0). Run galileo compare to test the model, and galileo diagnose to find the effect "
+        "that it lacks."
+    )
+
+
+def _position_caption(fitted: PosteriorPredictive) -> str:
+    millimetres = np.round(1e3 * fitted.offset_m, 1) + 0.0  # no -0.0
+    names = fitted.observation.names
+    moved = "; ".join(
+        f"{name} ({x:.1f}, {y:.1f}) mm" for name, (x, y) in zip(names, millimetres, strict=True)
+    )
+    return (
+        "The tracked point is not exactly the centre. The fitted curves include this constant "
+        f"offset: {moved}."
+    )
+
+
+def _draws_caption(run: Run) -> str:
+    size = run.posterior.flat().shape[0]
+    text = f"{size} draws of the main parameters."
+    if "m2" in run.posterior.names:
+        text += " One mass against another lies on a straight line: only their ratio is determined."
+    return text
+
+
+def _table(heading: str, entries: Mapping[str, Mapping[str, Any]], note: str = "") -> str:
+    if heading and not entries:
+        return f"<h2>{escape(heading)}</h2>\n<p>The model of this motion has none to determine.</p>"
+    rows = []
+    for name, entry in entries.items():
+        sd = entry["sd"]
+        low, high = number(entry["q025"], sd), number(entry["q975"], sd)
+        unit = "" if entry["unit"] == "1" else escape(entry["unit"])
+        rows.append(
+            [
+                f"<code>{escape(name)}</code>",
+                escape(meaning(name) or ""),
+                f"{number(entry['mean'], sd)} {unit}",
+                number(sd, sd),
+                f"{low} to {high}",
+                "yes" if entry["identified"] else "no",
+            ]
+        )
+    head = ("name", "meaning", "mean", "sd", "95 % interval", "determined")
+    text = f"<p>{escape(note)}</p>" if note else ""
+    top = f"<h2>{escape(heading)}</h2>\n" if heading else ""
+    return f"{top}{text}{table(head, rows, only_wide=('meaning',))}"
+
+
+def _provenance(run: Run) -> str:
+    result = run.result
+    timings = ", ".join(f"{stage} {spent:.1f} s" for stage, spent in result["timings_s"].items())
+    error = result["error"]
+    facts = {
+        "engine": str(result.get("engine", run.problem.engine.name)),
+        "seed": str(result["seed"]),
+        "velocity error": (
+            f"rmse {number(error['rmse'], None)} m/s; tracking noise alone gives "
+            f"{number(error['noise'], None)} m/s"
+        ),
+        "timings": timings,
+    }
+    return provenance(fit_text.fit_command(run), (run.clip,), facts)
