@@ -1,36 +1,18 @@
-"""MkDocs hooks: the help of all commands in reference/commands.md, and how notebooks are run.
+"""MkDocs hooks: the help of all commands in reference/commands.md, and figures in notebooks.
 
-The page of commands is made from the program, so that the two cannot differ. Notebooks run in a
-temporary folder, as they write files.
+The page of commands is made from the program, so that the two cannot differ.
 """
 
 import importlib
 import os
-import tempfile
 from typing import Any
 
 MARK = "<!-- all options -->"
-_FOLDERS: list[tuple[str, tempfile.TemporaryDirectory]] = []
 
 
 def on_startup(**_: Any) -> None:
     """Has notebooks draw their figures as HTML that needs no network."""
     os.environ.setdefault("PLOTLY_RENDERER", "notebook")
-
-
-def on_nav(nav: Any, **_: Any) -> Any:
-    """Goes to a temporary folder before pages are read, and notebooks run."""
-    _FOLDERS.append((os.getcwd(), tempfile.TemporaryDirectory()))
-    os.chdir(_FOLDERS[-1][1].name)
-    return nav
-
-
-def on_env(env: Any, **_: Any) -> Any:
-    """Comes back when all pages are read."""
-    before, folder = _FOLDERS.pop()
-    os.chdir(before)
-    folder.cleanup()
-    return env
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
