@@ -26,6 +26,7 @@ from galileo_jax.commands import command
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.driver import Settings, sample
 from galileo_jax.neural.config import TrainConfig
+from galileo_jax.report.style import matplotlib_style
 from galileo_jax.runtime import compilation_cache
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.thesis.sampler import NUM_CHAINS, NUM_STEPS, Acceptance, Thesis, select

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
+from scipy.stats import qmc
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
@@ -264,8 +265,7 @@ def _beside(
 
 def _latin(generator: np.random.Generator, size: int, num: int) -> np.ndarray:
     """A Latin hypercube in the unit cube, `[point, axis]`."""
-    ranks = np.array([generator.permutation(size) for _ in range(num)]).reshape(num, size).T
-    return (ranks + generator.random(ranks.shape)) / size
+    return qmc.LatinHypercube(num, rng=generator).random(size)
 
 
 def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int) -> np.ndarray:

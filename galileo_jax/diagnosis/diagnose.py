@@ -37,7 +37,7 @@ from galileo_jax.diagnosis.verdict import (
     verdict_of,
     verdict_of_pairs,
 )
-from galileo_jax.inference.fits.gradient import GradientFitter, Settings
+from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.model.effects.forms import FORM_NAMES
@@ -130,8 +130,8 @@ def diagnose(
 
 
 def fitter_of(trials: JointProblem) -> GradientFitter:
-    """What fits all hypotheses: with linear steps, many at once."""
-    return GradientFitter(trials, Settings(num_exact=0))
+    """What fits all hypotheses."""
+    return GradientFitter(trials)
 
 
 def _candidates(

@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.prediction.posterior_predictive import PosteriorPredictive, posterior_predictive
+from galileo_jax.prediction.posterior_predictive import (
+    PosteriorPredictive,
+    posterior_predictive,
+)
 from galileo_jax.report import fit_text
 from galileo_jax.report.animation import animation
 from galileo_jax.report.chart import Chart

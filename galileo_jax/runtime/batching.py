@@ -1,6 +1,7 @@
 """Batches and lengths of any size through programs compiled for a few."""
 
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -14,6 +15,7 @@ SPARE_MODES = 128  # beside one per object and frame
 MOTIONS = (16, 64)  # of batches of rollouts
 # Three parts a quarter as large, side by side, are done sooner than a large one a quarter empty.
 FILLED = 0.75
+_LAPACK = threading.Lock()
 
 
 def rounded_up(size: int, multiple: int) -> int:
@@ -53,6 +55,22 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
     with ThreadPoolExecutor(num_cores()) as pool:
         parts = list(pool.map(lambda cut: part(*cut), _cuts(count, sizes)))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)
+
+
+def one_at_a_time(function: Callable[..., Any]) -> Callable[..., Any]:
+    """`function`, a compiled program, run by one thread of the process at a time, to its end.
+
+    For programs that hold LAPACK routines over a batch (`vmap` of a Cholesky factor, QR, inverse).
+    On a CPU each of these waits, on a thread of XLA's pool, for work that it hands to the same
+    pool: as many of them side by side as the pool has threads wait for ever (jaxlib 0.10,
+    `ParallelBatchMap`; seen with two fits in two threads on two cores).
+    """
+
+    def alone(*args: Any) -> Any:
+        with _LAPACK:
+            return jax.block_until_ready(function(*args))
+
+    return alone
 
 
 def num_cores() -> int:

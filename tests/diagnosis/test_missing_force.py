@@ -18,7 +18,7 @@ from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.free_acceleration import FreeAcceleration, splines
 from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.fits.gradient import GradientFitter, Settings
+from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.effect import State, Surroundings
 from tests.oracle_trials import make_trials
@@ -92,7 +92,7 @@ def test_of_an_object_that_is_never_seen_nothing_is_said():
     seen = problem.observation
     mask = np.stack([np.ones_like(seen.mask[0]), np.zeros_like(seen.mask[1])])
     trials = JointProblem((replace(problem, observation=replace(seen, mask=mask)),))
-    fit = GradientFitter(trials, Settings(num_exact=0)).fit(seed=0)
+    fit = GradientFitter(trials).fit(seed=0)
     missing = infer_missing_force(trials, Hypothesis((), fit), seed=0)
     assert missing.formula == ("a1 = nothing", "a2 = nothing")
     assert missing.share_explained[1] == 0.0

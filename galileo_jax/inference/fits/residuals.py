@@ -10,8 +10,8 @@ from galileo_jax.inference.fits.programs import (
     ClipArrays,
     Kind,
     Padded,
+    Quadratic,
     jacobian_batch,
-    solve,
     white_batch,
 )
 from galileo_jax.inference.joint_problem import JointProblem, in_units
@@ -54,13 +54,10 @@ class Slopes(NamedTuple):
     """Residuals of points and how they change.
 
     Attributes:
-      motions: for each clip (position, velocity, slope of position, slope of velocity), the slopes
-        `[point, free parameter, object, 2, record]`.
       jacobian: for each clip `[point, value, model parameter]`; 0 where pinned.
       white: for each clip `[point, value]`.
     """
 
-    motions: tuple[tuple[np.ndarray, ...], ...]
     jacobian: list[np.ndarray]
     white: list[np.ndarray]
 
@@ -152,10 +149,6 @@ class Residuals:
         """chi2 / 2 and the prior's part, `[point]`."""
         return cost(self.whites(points), points.z)
 
-    def costs_of(self, z: np.ndarray, points: Batch) -> np.ndarray:
-        """`costs` of several z of each point, `[point, z, model parameter]`: `[point, z]`."""
-        return cost(self.whites_of(z, points), z)
-
     def whites(self, points: Batch) -> list[np.ndarray]:
         """Whitened residuals, `[point, value]`, clip by clip."""
         white = []
@@ -170,12 +163,6 @@ class Residuals:
             )
         return white
 
-    def whites_of(self, z: np.ndarray, points: Batch) -> list[np.ndarray]:
-        """Residuals of several z of each point, `[point, z, value]`, clip by clip."""
-        owner = np.repeat(np.arange(len(z)), z.shape[1])
-        whites = self.whites(points.take(owner)._replace(z=z.reshape(len(owner), -1)))
-        return [white.reshape(*z.shape[:2], -1) for white in whites]
-
     def slopes(self, points: Batch, steps: np.ndarray, is_central: bool) -> Slopes:
         """By differences: of motions by rollouts, of clock and camera by JAX.
 
@@ -187,7 +174,7 @@ class Residuals:
         index = _free_index(points.free)
         padded = np.pad(self._is_simulated, (0, 1))
         signs = (1.0, -1.0) if is_central else (1.0,)
-        motions, jacobians, whites = [], [], []
+        jacobians, whites = [], []
         for c, clip in enumerate(self.clips):
             own = np.pad(np.isin(np.arange(self._count), clip.column), (0, 1))
             point, slot = np.nonzero(padded[index] & own[index])
@@ -217,25 +204,7 @@ class Residuals:
             full = np.zeros((len(points.z), white.shape[1], self._count + 1))
             np.put_along_axis(full, index[:, None], jacobian, axis=2)
             jacobians.append(full[..., :-1])
-            motions.append(motion)
-        return Slopes(tuple(motions), jacobians, whites)
-
-    def solved(self, points: Batch, slopes: Slopes, dampings: np.ndarray) -> np.ndarray:
-        """The damped problems with motion linear, clock and camera exact: for few points.
-
-        Returns:
-          `[point, damping, model parameter]`, z.
-        """
-        size = np.sqrt(1 + sum(np.sum(j**2, axis=1) for j in slopes.jacobian))
-        index = _free_index(points.free)
-        size = np.take_along_axis(np.pad(size, [(0, 0), (0, 1)]), index, axis=1)
-        kinds = tuple(clip.kind for clip in self.clips)
-        arrays = tuple(clip.arrays for clip in self.clips)
-        return in_chunks(
-            POINTS[:1],
-            lambda *rows: solve(kinds, dampings, *rows, arrays),
-            *(size, points.z, points.free, points.noise, index, slopes.motions),
-        )
+        return Slopes(jacobians, whites)
 
     def _simulate(self, clip: FittedClip, z: np.ndarray, free: np.ndarray, noise: np.ndarray):
         """`[point, ...]`: parameters in their units, centres and velocities."""
@@ -248,6 +217,14 @@ class Residuals:
 def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
     """chi2 / 2 of residuals of several clips and the prior's part, over the last axis."""
     return 0.5 * (sum(np.sum(w**2, axis=-1) for w in white) + np.sum(z**2, axis=-1))
+
+
+def quadratic(slopes: Slopes, z: np.ndarray) -> Quadratic:
+    """The cost round points z `[point, model parameter]`."""
+    pairs = list(zip(slopes.jacobian, slopes.white, strict=True))
+    gradient = z + sum(np.einsum("pvi,pv->pi", j, w) for j, w in pairs)
+    normal = np.eye(z.shape[1]) + sum(np.swapaxes(j, 1, 2) @ j for j, _ in pairs)
+    return Quadratic(z, cost(slopes.white, z), gradient, normal)
 
 
 def _free_index(free: np.ndarray) -> np.ndarray:

@@ -1,0 +1,128 @@
+"""Levenberg-Marquardt from many points at once: optimistix's steps, rollouts in batches.
+
+optimistix's own loop would compile the rollout, and with MuJoCo's engines it cannot. So its parts
+(`programs.propose`) decide where to look next, and what they need to know of that place (residuals
+and their slopes) comes from one batch of rollouts for all points. A point that has settled leaves
+the batch.
+
+Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from galileo_jax.inference.fits.programs import Quadratic, propose
+from galileo_jax.inference.fits.residuals import POINTS, Batch, Residuals, Slopes, quadratic
+from galileo_jax.runtime.batching import in_chunks, one_at_a_time
+
+# Of a parameter's coarse step. The rigid engine rounds below its own; MuJoCo's contacts are rough
+# below theirs; above the largest a step may leave a plateau (nothing moves) over its edge, and the
+# plateau would look steep.
+SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
+CATCHES_UP = 0.1  # what the next step must promise of what one is behind
+
+
+class GiveUp(NamedTuple):
+    """Which points are not worth following.
+
+    Attributes:
+      owner: `[point]`, whose each is; those of one owner are rivals.
+      behind: nats behind the best rival, if the next step promises little of it.
+      price: `[point]`, what belongs to the cost beside chi2 / 2 and the prior's part.
+    """
+
+    owner: np.ndarray
+    behind: float
+    price: Any = 0.0
+
+    def __call__(self, cost: np.ndarray, promised: np.ndarray) -> np.ndarray:
+        """Which, `[point]`, by their costs and what the next steps promise, `[point]`, nats."""
+        total = cost + self.price
+        lowest = np.full(self.owner.max() + 1, np.inf)
+        np.minimum.at(lowest, self.owner, total)
+        behind = total - lowest[self.owner]
+        return (behind > self.behind) & (promised < CATCHES_UP * behind)
+
+
+class Descended(NamedTuple):
+    """Where points arrived.
+
+    Attributes:
+      best: the points and their costs.
+      first_cost: `[point]`, where they began.
+      widths: `[point, model parameter]`, half a conditional sd, see `Descent.half_sd`.
+      is_settled: `[point]`; False where steps ran out or it was given up.
+      num_steps: how many there were.
+    """
+
+    best: Quadratic
+    first_cost: np.ndarray
+    widths: np.ndarray
+    is_settled: np.ndarray
+    num_steps: int
+
+
+@dataclass(frozen=True)
+class Descent:
+    """Levenberg-Marquardt on the residuals of trials.
+
+    Attributes:
+      residuals: of the trials.
+      coarse_steps: `[model parameter]`, as `JointProblem.coarse_steps`.
+      is_smooth: whether motion is smooth at every scale: slopes are then taken over small steps.
+    """
+
+    residuals: Residuals
+    coarse_steps: np.ndarray
+    is_smooth: bool
+
+    def __call__(
+        self, points: Batch, enough: float, max_steps: int, give_up: GiveUp | None = None
+    ) -> Descended:
+        """Descends until a step promises to lower the cost by less than `enough` nats."""
+        count, size = points.z.shape
+        eye = np.tile(np.eye(size), (count, 1, 1))
+        best = Quadratic(points.z.copy(), np.full(count, np.inf), np.zeros((count, size)), eye)
+        proposed, widths = points.z.copy(), np.tile(self.coarse_steps, (count, 1))
+        region, promised, first_cost = np.ones(count), np.full(count, np.inf), best.cost
+        active, num_steps = np.arange(count), 0
+        while active.size and num_steps < max_steps:
+            there = points.take(active)._replace(z=proposed[active])
+            slopes = self.slopes(there, widths[active])
+            widths[active] = self.half_sd(slopes)
+            new = quadratic(slopes, there.z)
+            own = Quadratic(*(leaf[active] for leaf in best))
+            is_first = np.full(len(active), num_steps == 0)
+            region[active], accepts, proposed[active], promised[active] = in_chunks(
+                POINTS, one_at_a_time(propose), region[active], is_first, own, new
+            )
+            for leaf, value in zip(best, new, strict=True):
+                leaf[active[accepts]] = value[accepts]
+            if num_steps == 0:
+                first_cost = best.cost.copy()
+            num_steps += 1
+            goes_on = ~(promised < enough)
+            if give_up is not None:
+                goes_on &= ~give_up(best.cost, promised)
+            active = active[goes_on[active]]
+        is_settled = promised < enough
+        return Descended(best, first_cost, widths, is_settled, num_steps)
+
+    def slopes(self, points: Batch, widths: np.ndarray) -> Slopes:
+        """Over small steps where motion is smooth, else over `widths` `[point, parameter]`."""
+        if self.is_smooth:
+            widths = np.tile(SMALLEST_STEP * self.coarse_steps, (len(points.z), 1))
+        return self.residuals.slopes(points, widths, is_central=not self.is_smooth)
+
+    def half_sd(self, slopes: Slopes) -> np.ndarray:
+        """Difference steps in z: half a conditional sd, within what slopes are good for.
+
+        Conditional, the others held: along a ridge (all masses by the same factor) the
+        marginal sd is large, and differences over it would bend the ridge.
+        """
+        squares = sum(np.sum(j**2, axis=1) for j in slopes.jacobian)
+        smallest = SMALLEST_STEP if self.is_smooth else SMALLEST_ROUGH_STEP
+        half = 0.5 / np.sqrt(1 + squares)
+        return np.clip(half, smallest * self.coarse_steps, LARGEST_STEP * self.coarse_steps)

@@ -1,0 +1,91 @@
+"""From where a search ended to the mode: fitted noise scales, and proof that it has settled."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from galileo_jax.inference.fits.descent import CATCHES_UP, Descent, GiveUp
+from galileo_jax.inference.fits.residuals import Batch, Residuals
+from galileo_jax.inference.joint_problem import NOISE_SD
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+
+MAX_ROUNDS = 6
+DRIFT = 0.1  # of a noise scale, in a round: more has not settled
+SHARE_PROMISED = 0.2  # of what counts as settled: a round ends where a step promises less
+BEHIND = 100.0  # nats: a fit so far behind another, and not catching up, is left where it is
+
+
+class Polished(NamedTuple):
+    """Modes.
+
+    Attributes:
+      points: with fitted noise scales.
+      widths: `[point, model parameter]`, steps of differences at the posterior's scale, in z.
+      is_settled: `[point]`.
+      num_steps: how many it took.
+    """
+
+    points: Batch
+    widths: np.ndarray
+    is_settled: np.ndarray
+    num_steps: int
+
+
+def polish(descent: Descent, points: Batch, settled: float, max_steps: int) -> Polished:
+    """Descends again and again, each time with noise scales that suit the residuals.
+
+    Each round begins with no damping to speak of, so that one that was stuck in a curved valley
+    sets off anew: settled is who gains less than `settled` nats in all of a round.
+
+    Args:
+      descent: of the trials.
+      points: where the search ended.
+      settled: nats.
+      max_steps: of one round.
+    """
+    z, noise = points.z.copy(), points.noise.copy()
+    count, size = z.shape
+    normal, widths = np.tile(np.eye(size), (count, 1, 1)), np.tile(descent.coarse_steps, (count, 1))
+    is_settled, total = np.zeros(count, bool), np.full(count, np.inf)
+    active, num_steps = np.arange(count), 0
+    num_values = np.array([clip.data.whitening.num_values for clip in descent.residuals.clips])
+    for _ in range(MAX_ROUNDS):
+        here = Batch(z, points.free, noise).take(active)
+        used = size - np.trace(np.linalg.inv(normal[active]), axis1=1, axis2=2)
+        scales = noise_scales(descent.residuals, here, used)
+        drifts = np.abs(scales / noise[active] - 1).max(axis=1) > DRIFT
+        noise[active] = scales
+        price = np.log(noise) @ num_values  # what the noise scales cost
+        give_up = GiveUp(np.zeros(len(active), int), BEHIND, price[active])
+        found = descent(here._replace(noise=scales), SHARE_PROMISED * settled, max_steps, give_up)
+        z[active], normal[active], widths[active] = found.best.z, found.best.normal, found.widths
+        num_steps += found.num_steps
+        total[active] = found.best.cost + price[active]
+        gains = found.first_cost - found.best.cost
+        is_settled[active] = (gains < settled) & ~drifts & found.is_settled
+        behind = total[active] - total.min()
+        gives_up = (behind > BEHIND) & (gains < CATCHES_UP * behind)
+        active = active[~is_settled[active] & ~gives_up]
+        if not active.size:
+            break
+    return Polished(Batch(z, points.free, noise), widths, is_settled, num_steps)
+
+
+def noise_scales(residuals: Residuals, points: Batch, used: np.ndarray) -> np.ndarray:
+    """The noise scales that residuals ask for, `[point, clip]`.
+
+    Args:
+      residuals: of the trials.
+      points: where.
+      used: `[point]`, how many numbers' worth of the data the parameters take up.
+    """
+    wide = 1 / (2 * NOISE_SD**2)  # the prior, at 1, is worth this many values
+    num_values = sum(float(clip.data.whitening.num_values) for clip in residuals.clips)
+    scales = np.empty_like(points.noise)
+    for c, (clip, white) in enumerate(zip(residuals.clips, residuals.whites(points), strict=True)):
+        data, before = clip.data.whitening, points.noise[:, c]
+        degrees = np.array([float(GaussianLikelihood.degrees(scale, data)) for scale in before])
+        left = np.maximum(degrees - used * float(data.num_values) / num_values, 1.0)
+        total = np.sum((white * before[:, None]) ** 2, axis=1)
+        scales[:, c] = np.sqrt((total + wide) / (left + wide))
+    return scales

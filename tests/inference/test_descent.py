@@ -1,0 +1,108 @@
+"""Levenberg-Marquardt over batches of rollouts."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from scipy.special import ndtr
+
+from galileo_jax.inference.fits.descent import Descent, GiveUp
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
+from galileo_jax.inference.fits.starts import scattered_starts
+from tests.oracle_trials import make_trials
+from tests.precision import in_64_bit
+from tests.ramp_model import HIT
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
+class Banana:
+    """Rosenbrock's valley in z1 and z2, and a third parameter of no effect; no rollouts."""
+
+    def slopes(self, points: Batch, steps: np.ndarray, is_central: bool) -> Slopes:
+        z = points.z
+        white = np.stack([10 * (z[:, 1] - z[:, 0] ** 2), 3 - z[:, 0]], axis=1)
+        jacobian = np.zeros((len(z), 2, 3))
+        jacobian[:, 0, 0], jacobian[:, 0, 1], jacobian[:, 1, 0] = -20 * z[:, 0], 10, -1
+        return Slopes([np.where(points.free[:, None], jacobian, 0.0)], [white])
+
+
+def batch(*z, free: np.ndarray | bool = True):
+    z = np.array(z, float)
+    return Batch(z, np.broadcast_to(free, z.shape), np.ones((len(z), 1)))
+
+
+def descend(points, enough=1e-9, max_steps=200, give_up=None):
+    return Descent(Banana(), np.ones(3), is_smooth=True)(points, enough, max_steps, give_up)  # pyright: ignore
+
+
+def expected_minimum():
+    def residuals(z):
+        return np.concatenate([[10 * (z[1] - z[0] ** 2), 3 - z[0]], z])
+
+    return least_squares(residuals, [1.0, 1.0], xtol=1e-15, ftol=1e-15, gtol=1e-15)
+
+
+def test_every_start_of_a_batch_arrives_at_the_end_of_a_curved_valley():
+    points = batch([-1.2, 1.0, 0.5], [2.0, -1.0, 0.0], [0.0, 0.0, 3.0])
+    found = descend(points)
+    best = expected_minimum()
+    assert found.is_settled.all()
+    np.testing.assert_allclose(found.best.z[:, :2], np.tile(best.x, (3, 1)), atol=1e-4)
+    np.testing.assert_allclose(found.best.z[:, 2], 0.0, atol=1e-4)
+    np.testing.assert_allclose(found.best.cost, best.cost, atol=1e-8)
+    white = Banana().slopes(points, np.ones(3), False).white
+    np.testing.assert_allclose(found.first_cost, cost(white, points.z))
+
+
+def test_costs_never_rise_with_more_steps():
+    costs = [descend(batch([-1.2, 1.0, 0.0]), max_steps=n).best.cost[0] for n in range(1, 20)]
+    assert all(np.diff(costs) <= 0) and costs[-1] < costs[0]
+
+
+def test_steps_that_run_out_are_told():
+    found = descend(batch([-1.2, 1.0, 0.0]), max_steps=2)
+    assert found.num_steps == 2 and not found.is_settled.any()
+
+
+def test_pinned_parameters_stay():
+    free = np.array([True, False, True])
+    found = descend(batch([-1.2, 0.0, 1.0], free=free))
+    assert found.best.z[0, 1] == 0.0
+    assert found.is_settled.all()
+
+
+def test_only_who_is_behind_a_rival_and_does_not_catch_up_is_given_up():
+    give_up = GiveUp(np.array([0, 0, 0, 1]), behind=20.0, price=np.array([0.0, 0.0, 0.0, 1e3]))
+    cost_nats, promised = np.array([1.0, 30.0, 30.0, 500.0]), np.array([0.1, 1.0, 9.0, 0.1])
+    assert give_up(cost_nats, promised).tolist() == [False, True, False, False]
+    alone = GiveUp(np.zeros(2, int), behind=20.0, price=np.array([0.0, 25.0]))
+    assert alone(np.array([1.0, 1.0]), np.zeros(2)).tolist() == [False, True]
+
+
+def test_scattered_starts_fill_every_range_once():
+    trials = make_trials([HIT])
+    names = [p.name for p in trials.model_parameters]
+    starts = scattered_starts(trials, np.ones(len(names), bool), 32, seed=3)
+    strata = np.sort(np.floor(32 * ndtr(starts[:, names.index("m1")])))
+    np.testing.assert_array_equal(strata, np.arange(32))
+    assert starts.std(axis=0)[[p.role == "nuisance" for p in trials.model_parameters]].max() == 0
+    again = scattered_starts(trials, np.ones(len(names), bool), 32, seed=3)
+    np.testing.assert_array_equal(starts, again)
+
+
+@pytest.mark.parametrize("edge", [-3.9, -3.0])
+def test_a_fit_comes_back_from_the_edge(edge):
+    """Where a coefficient of friction no longer moves with z."""
+    trials = make_trials([HIT])
+    fitter = GradientFitter(trials)
+    best = fitter.fit(0)
+    count = len(trials.model_parameters)
+    start = best.z[:count].copy()
+    start[[p.name for p in trials.model_parameters].index("k1")] = edge
+    (found,) = fitter.fit_from(start[None], best.free[None, :count], np.zeros(1, int))
+    assert found.log_evidence == pytest.approx(best.log_evidence, abs=0.5)
