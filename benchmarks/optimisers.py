@@ -285,14 +285,13 @@ def _compare(name: str, scenes: Sequence[Scene], methods: dict[str, Method]) -> 
     least = np.full(len(scenes), np.inf)
     for s, scene in enumerate(scenes):
         for method, run in methods.items():
-            first = begin = time.process_time()
-            if s == 0:  # scenes of a kind share programs
-                run(scene.trials, scene.starts)
-                begin = time.process_time()
+            first = time.process_time()
+            run(scene.trials, scene.starts)
+            begin = time.process_time()
             ends = run(scene.trials, scene.starts)
             took, count = time.process_time() - begin, counts[method]
             count.cpu_s += took
-            count.compile_s += max(begin - first - took, 0.0)
+            count.compile_s += begin - first - took
             count.rollouts += ends.num_rollouts
             noise, costs = _noise_and_costs(scene.trials, ends.z)
             rolled, data = _program(scene.trials)

@@ -17,8 +17,8 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnose import diagnose as run_loop
 from galileo_jax.diagnosis.diagnose import fitter_of
+from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
-from galileo_jax.diagnosis.diagnosis import Round, Verdict
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.last_model import by_itself
 from galileo_jax.inference.build_problem import make_joint_problem
@@ -337,7 +337,23 @@ def _diagnosed(
             raise InputError(f"{clips[0].path}: {one.hypothesis.fit.code}")
         progress.report("compared", share, {"round": history_row(problem, one, seed)})
 
-    found = run_loop(problem, seed=seed, add=add, on_stage=on_stage, on_round=on_round)
+    def on_candidate(one: Candidate) -> None:
+        row = {
+            "effect": one.name,
+            "score": one.log_evidence,
+            "probability": one.probability,
+            **{key: one.error[key] for key in ("rmse", "chi2_per_dof")},
+        }
+        progress.report("fitted", share, {"candidate": row})
+
+    found = run_loop(
+        problem,
+        seed=seed,
+        add=add,
+        on_stage=on_stage,
+        on_round=on_round,
+        on_candidate=on_candidate,
+    )
     record = diagnosis_document(problem, found, seed)
     document = {
         "clips": [clip.source for clip in clips],

@@ -50,6 +50,7 @@ def diagnose(
     add: str = "auto",
     on_stage: Callable[[str], None] = lambda _: None,
     on_round: Callable[[Round], None] = lambda _: None,
+    on_candidate: Callable[[Candidate], None] = lambda _: None,
 ) -> Diagnosis:
     """Diagnoses trials whose models have the whole library.
 
@@ -60,7 +61,8 @@ def diagnose(
       add: "auto": add what the verdict names, until the model is adequate or nothing helps;
         "none": only say what is missing; a name: add that effect, whatever the verdict.
       on_stage: told what is being done.
-      on_round: told each round of the loop.
+      on_round: called with each round of the loop.
+      on_candidate: called with each candidate when it is fitted, the best first.
 
     Raises:
       ValueError: `add` names no effect of the trials' models.
@@ -78,6 +80,8 @@ def diagnose(
     on_stage(f"fitting {len(library)} candidates")
     singles = [(name,) for name in trials.all_effects]
     candidates = _candidates(fitter, base, singles, seed)
+    for candidate in candidates:
+        on_candidate(candidate)
     if add not in ("auto", "none"):
         chosen = next(c for c in candidates if c.effects == (add,))
         rounds.append(Round(chosen.hypothesis, compare(trials, chosen.hypothesis.fit, seed)))
@@ -98,6 +102,8 @@ def diagnose(
         if pairs:
             pairs = with_largest_scores(pairs, score_tests(trials, best.hypothesis, pairs))
             joined = _candidates(fitter, best.hypothesis, pairs, seed, base)
+            for candidate in joined:
+                on_candidate(candidate)
             joined, compared_pairs = _compared(trials, joined, seed)
             compared |= compared_pairs
         verdict = verdict_of_pairs(joined, best, base.misfit, decisive)

@@ -20,6 +20,7 @@ from galileo_jax.neural.galileo_task import Estimates, estimate
 from galileo_jax.neural.posterior_network import PosteriorNetwork
 from galileo_jax.neural.seen import Seen, see
 from galileo_jax.neural.summary import DECLARED, Summary, summarise
+from galileo_jax.runtime.batching import one_at_a_time
 from galileo_jax.runtime.errors import InputError
 
 TRAINED = Path(__file__).parent / "trained" / "galileo.npz"
@@ -67,7 +68,7 @@ def cnn_posterior(
         raise InputError("--method cnn: its network takes gravity as declared; take --method grad")
     network = network or trained_network()
     seen = see(problem.observation, scene)
-    summary = _summarise(seen)
+    summary = one_at_a_time(_summarise)(seen)
     found = _estimate(network, seen, summary, seed)
     theta = _complete(trials, found, seed)
     middle = np.zeros(len(trials.names))

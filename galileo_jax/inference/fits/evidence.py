@@ -5,8 +5,9 @@ from enum import StrEnum
 
 import numpy as np
 
+from galileo_jax.inference.fits.polish import Polished
 from galileo_jax.inference.fits.programs import FAILED
-from galileo_jax.inference.fits.residuals import Batch, Residuals, Slopes, cost, quadratic
+from galileo_jax.inference.fits.residuals import Residuals, Slopes, cost, quadratic
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
@@ -58,47 +59,42 @@ class GradientFit:
 
 
 def laplace_fits(
-    trials: JointProblem,
-    residuals: Residuals,
-    points: Batch,
-    steps: np.ndarray,
-    is_settled: np.ndarray,
-    num_steps: int,
+    trials: JointProblem, residuals: Residuals, found: Polished, stats: dict[str, float]
 ) -> list[GradientFit]:
     """The normal approximations round modes.
 
     Args:
       trials: what was fitted.
       residuals: of the trials.
-      points: the modes.
-      steps: `[point, model parameter]`, of differences, in z.
-      is_settled: `[point]`.
-      num_steps: that it took.
+      found: the modes.
+      stats: as `GradientFit.stats`.
     """
-    slopes = residuals.slopes(points, steps, is_central=True)
+    slopes = residuals.slopes(found.points, found.widths, is_central=True)
+    stats = stats | {"num_rollouts": residuals.num_rollouts}
+    normal = quadratic(slopes, found.points.z).normal
     return [
-        _laplace_fit(trials, residuals, points, slopes, i, steps[i], bool(is_settled[i]), num_steps)
-        for i in range(len(points.z))
+        _laplace_fit(trials, residuals, found, slopes, own, stats, i)
+        for i, own in enumerate(normal)
     ]
 
 
 def _laplace_fit(
     trials: JointProblem,
     residuals: Residuals,
-    points: Batch,
+    found: Polished,
     slopes: Slopes,
+    normal: np.ndarray,
+    stats: dict[str, float],
     i: int,
-    steps: np.ndarray,
-    is_settled: bool,
-    num_steps: int,
 ) -> GradientFit:
-    """That of point i."""
+    """That of mode i, whose J^T J + 1 is `normal`."""
+    points = found.points
     z, scale, clips = points.z[i], points.noise[i], residuals.clips
     white = [w[i] for w in slopes.white]
-    covariance = _covariance(slopes, points, i, residuals)
+    covariance = _covariance(normal, points.free[i], scale, residuals)
     free = np.append(points.free[i], np.ones(len(scale), bool))
     failed = max(float(np.abs(w).max()) for w in white) >= FAILED
-    code = Code.CONVERGED if is_settled else Code.STEP_LIMIT
+    code = Code.CONVERGED if found.is_settled[i] else Code.STEP_LIMIT
     rows = [clip.unpadded(j[i]) for clip, j in zip(clips, slopes.jacobian, strict=True)]
     is_nuisance = np.array([p.role == "nuisance" for p in trials.model_parameters])
     return GradientFit(
@@ -108,22 +104,23 @@ def _laplace_fit(
         chi2=sum(float(np.sum((w * s) ** 2)) for w, s in zip(white, scale, strict=True)),
         log_evidence=_log_evidence(z, scale, white, covariance[np.ix_(free, free)], residuals),
         num_values=trials.num_values,
-        steps=steps,
+        steps=found.widths[i],
         jacobian=np.concatenate(rows),
         code=Code.FAILED if failed else code,
-        stats={"num_steps": num_steps, "num_rollouts": residuals.num_rollouts},
+        stats=dict(stats),
         pull=float(np.sum(z[is_nuisance] ** 2)),
     )
 
 
-def _covariance(slopes: Slopes, points: Batch, i: int, residuals: Residuals) -> np.ndarray:
-    """Of z at point i, noise scales last; 0 where pinned."""
-    count, own = points.z.shape[1], np.flatnonzero(points.free[i])
-    whole = np.zeros((count + len(residuals.clips),) * 2)
-    normal = quadratic(slopes, points.z).normal[i]
+def _covariance(
+    normal: np.ndarray, free: np.ndarray, scale: np.ndarray, residuals: Residuals
+) -> np.ndarray:
+    """Of z, noise scales last; 0 where pinned."""
+    count, own = len(free), np.flatnonzero(free)
+    whole = np.zeros((count + len(scale),) * 2)
     whole[np.ix_(own, own)] = np.linalg.inv(normal[np.ix_(own, own)])
-    for c, (clip, scale) in enumerate(zip(residuals.clips, points.noise[i], strict=True)):
-        degrees = float(GaussianLikelihood.degrees(scale, clip.data.whitening))
+    for c, (clip, s) in enumerate(zip(residuals.clips, scale, strict=True)):
+        degrees = float(GaussianLikelihood.degrees(s, clip.data.whitening))
         whole[count + c, count + c] = 1 / (1 + 2 * degrees * NOISE_SD**2)
     return whole
 
