@@ -3,7 +3,7 @@
 One sled on the scene's ramp in MuJoCo's C engine. For each setting: the error of the sliding
 acceleration as an error of the friction coefficient, the largest hop off the surface, how far
 an object creeps in 2 s that friction should hold, and the least change of friction that the
-distance slid follows smoothly. Used by docs/contact.md.
+distance slid follows smoothly. Used by docs/explanation/contact.md.
 
     python -m benchmarks.contact
 """

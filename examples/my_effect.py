@@ -1,9 +1,9 @@
 """Cubic drag, F = -c v^3: an effect of one's own, for `--effects-from examples/my_effect.py`."""
 
-from galileo_jax.model.effects import Effect, LogNormal, Parameter, register
+from galileo_jax import Effect, LogNormal, Parameter, register_effect
 
 
-@register
+@register_effect
 class CubicDrag(Effect):
     """Drag of all objects that grows with the cube of the speed."""
 

@@ -18,7 +18,7 @@ def effects(effects_from: Sequence[str | Path] = ()) -> "pd.DataFrame":
     Raises:
       InputError: a file is wrong.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> "air_drag" in gx.effects().index
       True
@@ -38,7 +38,7 @@ def effects(effects_from: Sequence[str | Path] = ()) -> "pd.DataFrame":
 def scenarios() -> "pd.DataFrame":
     """The scenes a clip can show, by name: `meaning`.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> "ramp" in gx.scenarios().index
       True

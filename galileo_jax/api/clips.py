@@ -23,7 +23,7 @@ def load(clip: str | Path | Mapping[str, Any], *, pixels_per_metre: float | None
     Raises:
       InputError: one line that names the file, the key, the value and what would be right.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("incline.csv", scenario="incline", seed=1, track_only=True)
       >>> gx.load("incline.csv").scenario

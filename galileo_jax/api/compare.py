@@ -156,7 +156,7 @@ def compare(
       InputError: a clip or an effect is wrong, or a `Fit` is given with another model.
       Cancelled: `cancel` was set.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("ramp.csv", seed=1, track_only=True)
       >>> check = gx.compare(gx.fit("ramp.csv"))

@@ -240,7 +240,7 @@ def diagnose(
     """Asks which effect is missing, adds it, and shows how the error falls.
 
     Every effect of the library is fitted together with masses, frictions and nuisances; evidence
-    ranks them and charges for every parameter (docs/diagnosis.md).
+    ranks them and charges for every parameter (docs/explanation/diagnosis.md).
 
     Args:
       tracks: a track or several (trials of the same objects); a clip or a file is tracked first.
@@ -258,7 +258,7 @@ def diagnose(
       InputError: a clip, an effect or an option is wrong.
       Cancelled: `cancel` was set; work stops between two batches.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("drag.csv", seed=3, effects={"air_drag": {}}, strength=0.7,
       ...     track_only=True)

@@ -48,7 +48,7 @@ def export(
     Raises:
       InputError: there is no such clip or run, or a file cannot be written.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
       >>> [path.name for path in gx.export("slide.csv", to="csv", out="tables").paths]

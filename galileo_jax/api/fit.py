@@ -124,7 +124,7 @@ def fit(
       InputError: a clip, an effect or an option is wrong.
       Cancelled: `cancel` was set; work stops between two batches.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("ramp.csv", seed=1, track_only=True)
       >>> fit = gx.fit("ramp.csv", seed=0)

@@ -38,7 +38,7 @@ class Fit:
       problem: the model of them.
       posterior: draws of all parameters, in their units.
       result: result.json: `parameters`, `derived`, `nuisances`, `error`, ...; the keys are in
-        docs/files.md.
+        docs/reference/result_files.md.
       z_best: `[parameter]`, the best fit, in the search space; None of a run that an
         earlier version wrote.
       gradient: the gradient fit that the posterior came from; None where there was none.

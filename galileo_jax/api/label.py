@@ -64,7 +64,7 @@ def label(
     Raises:
       InputError: nothing is declared, or the clip would be wrong; nothing is written then.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
       >>> gx.label("slide.csv", gravity=9.8).clip.gravity

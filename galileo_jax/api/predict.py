@@ -142,7 +142,7 @@ def predict(
       InputError: no run there, a fit of several clips, or a time or number out of range.
       Cancelled: `cancel` was set.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
       >>> ahead = gx.predict(gx.fit("slide.csv"), seconds=0.5)

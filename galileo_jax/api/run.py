@@ -27,7 +27,7 @@ def load_run(folder: str | Path, *, engine: str = "auto") -> Fit:
     Raises:
       InputError: no such run, or a file of it is damaged; names the file.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
       >>> saved = gx.fit("slide.csv").save("runs/slide")

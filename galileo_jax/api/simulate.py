@@ -137,7 +137,7 @@ def simulate(
         a file cannot be written; nothing is written then.
       Cancelled: `cancel` was set; nothing is written.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("slide.csv", seed=1, m1=0.2, track_only=True)
       >>> made

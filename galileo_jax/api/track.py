@@ -178,7 +178,7 @@ def track(
       InputError: an object cannot be found or followed; the clip is wrong.
       Cancelled: `cancel` was set.
 
-    Example:
+    Examples:
       >>> import galileo_jax as gx
       >>> made = gx.simulate("slide.csv", scenario="incline", seed=1, track_only=True)
       >>> list(gx.track("slide.csv").to_dataframe().columns)

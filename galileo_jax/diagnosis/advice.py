@@ -62,7 +62,8 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
         return (
             *known,
             "look at the missing acceleration against time, speed and place: an effect of your own "
-            "takes ten lines (docs/effects.md), then run diagnose with --effects-from",
+            "takes ten lines (docs/how-to/write_an_effect.md), then run diagnose with "
+            "--effects-from",
         )
     if verdict.status != "ambiguous":
         return ()

@@ -2,8 +2,8 @@
 
 Real faces are not quite square and real friction not quite constant: the impulse of a hit is
 taken to be known within a few tenths of a per cent, friction within half a per cent after it and
-1e-4 before. Chosen in view of the clips in docs/benchmarks.md, whose tracking is good to
-hundredths of a pixel; an interval from the likelihood alone would there be too narrow.
+1e-4 before. Chosen in view of the clips in docs/explanation/benchmarks.md, whose tracking is good
+to hundredths of a pixel; an interval from the likelihood alone would there be too narrow.
 """
 
 import re

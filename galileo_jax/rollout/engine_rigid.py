@@ -10,8 +10,8 @@ the two until they are equal; then the body rolls, and what holds it there is as
 that takes, or all there is: too little, and it slips. Boxes are bodies whose rim never moves: to
 stop is to end slipping. So the
 motion is a continuous function of the parameters and JAX's derivatives of it are right, which
-those through compliant contacts are not (docs/contact.md). MuJoCo's engines are the check:
-tests/rollout/test_engines.py.
+those through compliant contacts are not (docs/explanation/contact.md). MuJoCo's engines are the
+check: tests/rollout/test_engines.py.
 """
 
 import functools

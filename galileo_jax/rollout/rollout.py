@@ -1,8 +1,8 @@
 """What an engine is, an engine as a function of JAX, and where its objects are at any time.
 
 The rigid engine is JAX throughout and has JAX's derivatives. MuJoCo's are called back, and have
-none: stiff contacts make the exact derivative meaningless (docs/contact.md). The fit takes
-differences of whole batches at the posterior's scale, with every engine.
+none: stiff contacts make the exact derivative meaningless (docs/explanation/contact.md). The fit
+takes differences of whole batches at the posterior's scale, with every engine.
 """
 
 from collections.abc import Callable

@@ -47,4 +47,4 @@ def test_several_clips_are_only_asked_for_where_there_is_one():
 
 def test_where_nothing_is_open_nothing_is_asked_for():
     assert advice(Verdict("named", ("air_drag",)), RAMP, 1) == ()
-    assert "docs/effects.md" in advice(Verdict("unknown", ()), FALL, 1)[0]
+    assert "docs/how-to/write_an_effect.md" in advice(Verdict("unknown", ()), FALL, 1)[0]

@@ -1,4 +1,4 @@
-"""What a user needs to write an effect: see docs/effects.md."""
+"""What a user needs to write an effect: see docs/how-to/write_an_effect.md."""
 
 from galileo_jax.model.effects.effect import (
     Array,

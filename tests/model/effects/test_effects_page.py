@@ -1,4 +1,4 @@
-"""docs/effects.md says what is there."""
+"""docs/reference/effects.md and docs/how-to/write_an_effect.md say what is there."""
 
 import ast
 import re
@@ -9,7 +9,8 @@ from galileo_jax.model.effects.registry import ENTRY_POINTS
 from tests.model.effects.motion import LIBRARY, PAIR
 
 ROOT = Path(__file__).resolve().parents[3]
-PAGE = (ROOT / "docs" / "effects.md").read_text()
+PAGE = (ROOT / "docs" / "reference" / "effects.md").read_text()
+GUIDE = (ROOT / "docs" / "how-to" / "write_an_effect.md").read_text()
 
 
 def test_every_effect_has_its_row():
@@ -24,13 +25,13 @@ def test_every_effect_has_its_row():
 
 
 def test_the_example_on_the_page_is_the_file():
-    (shown,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    (shown,) = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
     file = (ROOT / "examples" / "my_effect.py").read_text()
     assert _without_docstrings(shown) == _without_docstrings(file)
 
 
 def test_the_entry_point_group():
-    assert f'[project.entry-points."{ENTRY_POINTS}"]' in PAGE
+    assert f'[project.entry-points."{ENTRY_POINTS}"]' in GUIDE
 
 
 def _without_docstrings(source: str) -> str:
