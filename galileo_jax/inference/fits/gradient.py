@@ -9,7 +9,7 @@
 Compiled code (`programs.py`) never holds a rollout: JAX's cache keeps it between runs, whichever
 the engine, and clips share it: all that differs between them is data. A single far start ends in
 a side valley in most cases (the time of the collision decides which frames compare with which);
-the scattered starts cost one batch. Which optimiser, and why: docs/optimiser.md.
+the scattered starts cost one batch. Which optimiser, and why: docs/explanation/optimiser.md.
 """
 
 from collections.abc import Callable, Sequence
