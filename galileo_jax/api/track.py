@@ -185,7 +185,9 @@ def track(
       ['object', 'time_s', 'x_m', 'y_m', 'sd_x_m', 'sd_y_m', 'is_visible']
     """
     with progress.scope(on_progress, cancel):
-        return _tracked(as_clip(clip, pixels_per_metre))
+        found = _tracked(as_clip(clip, pixels_per_metre))
+        progress.report("tracked", 1.0)
+        return found
 
 
 def _tracked(clip: Clip) -> Track:

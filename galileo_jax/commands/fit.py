@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
 from galileo_jax.commands.progress_display import progress_display
-from galileo_jax.results.shown_parameters import shown_parameters
 from galileo_jax.results.stale_outputs import PREDICTION, outdated
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.engine_names import MOTIONS
@@ -84,6 +83,7 @@ def main(argv: Sequence[str]) -> int | None:
 def table(found: "Fit", truth: Mapping[str, float]) -> str:
     """What the user asked for, in a few lines; with a column for the truth if it is known."""
     from galileo_jax.inference.per_mass import SUFFIX
+    from galileo_jax.results.shown_parameters import shown_parameters
 
     result: Mapping[str, Any] = found.result
     shown = shown_parameters(result)

@@ -237,7 +237,7 @@ def spreadsheets(draw: st.DrawFn) -> Callable[[str], bytes]:
     return save
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(seed=st.integers(0, 2**32 - 1), is_isotropic=st.booleans(), save=spreadsheets())
 def test_what_a_spreadsheet_saves_again_is_the_same(
     seed: int, is_isotropic: bool, save: Callable[[str], bytes], tmp_path_factory

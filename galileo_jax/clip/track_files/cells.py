@@ -15,6 +15,7 @@ import numpy as np
 
 from galileo_jax.runtime.errors import InputError
 
+EMPTY = "empty; a row of titles and numbers expected"
 SEPARATORS = ("\t", ";", ",")
 SEPARATOR_LINE = re.compile(r"sep=([\t;,])\s*", re.IGNORECASE)  # Excel's own first line
 COMMA_IN_NUMBER = re.compile(r"[-+]?\d+,\d*(e[-+]?\d+)?", re.IGNORECASE)
@@ -64,12 +65,14 @@ def read_cells(path: Path) -> Rows:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     rows = _split(path, decoded(content))
     if not rows:
-        raise InputError(f"{path}: empty; a row of titles and numbers expected")
+        raise InputError(f"{path}: {EMPTY}")
     if all(not any(row[1:]) for _, row in rows) and any(m in rows[0][1][0] for m in SEPARATORS):
         # A spreadsheet that took each line for one cell puts quotes round it, or empty cells after.
         mark = separator(rows[0][1][0])
         rows = [(line, _cells(path, line, row[0], mark)) for line, row in rows]
         rows = [(line, row) for line, row in rows if any(row)]
+        if not rows:
+            raise InputError(f"{path}: {EMPTY}")
     return rows
 
 
