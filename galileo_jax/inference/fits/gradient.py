@@ -167,5 +167,5 @@ class GradientFitter:
 
     def _polish(self, points: Batch, num_steps: int) -> list[GradientFit]:
         found = polish(self._descent, points, self._settled, self.settings.max_polish_steps)
-        stats = {"num_steps": num_steps + found.num_steps}
+        stats: dict[str, float] = {"num_steps": num_steps + found.num_steps}
         return laplace_fits(self.trials, self._residuals, found, stats)
