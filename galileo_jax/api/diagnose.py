@@ -20,7 +20,7 @@ from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
-from galileo_jax.diagnosis.last_model import by_itself
+from galileo_jax.diagnosis.restricted_fit import restricted_fit
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.joint_problem import JointProblem
@@ -153,7 +153,7 @@ class Diagnosis:
             self.problem.problems[0].engine.name,
             make_effects(last.effects),
         )
-        gradient = by_itself(last.fit, self.problem, part)
+        gradient = restricted_fit(last.fit, self.problem, part)
         notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
         notes["status"] = gradient.code.value
         if self.effects_from:

@@ -16,7 +16,7 @@ from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.parameters import inverse
 from galileo_jax.results.run import CHECKPOINT, POSTERIOR, RESULT, Run, save_run
-from galileo_jax.results.stale_outputs import forget_prediction, forget_single_run
+from galileo_jax.results.stale_outputs import remove_single_clip_run, remove_stale_prediction
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
@@ -234,12 +234,12 @@ class Fit:
         folder = Path(folder)
         if folder.exists() and not folder.is_dir():
             raise InputError(f"--out: {folder} is a file; a folder expected")
-        forget_prediction(folder)
+        remove_stale_prediction(folder)
         several = len(self.measurements) > 1
         if several:
-            forget_single_run(folder)
+            remove_single_clip_run(folder)
         for run, one in zip(self.runs(folder), self.measurements, strict=True):
-            forget_prediction(run.folder)
+            remove_stale_prediction(run.folder)
             save_run(run.folder, one.clip, one.observation, run.posterior, run.result)
             if report:
                 write_report(run, run.folder / PAGE)

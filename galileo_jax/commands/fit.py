@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
 from galileo_jax.commands.progress_display import progress_display
-from galileo_jax.results.stale_outputs import PREDICTION, outdated
+from galileo_jax.results.stale_outputs import PREDICTION, stale_documents
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.engine_names import MOTIONS
 from galileo_jax.runtime.registry import entry_names
@@ -72,7 +72,7 @@ def main(argv: Sequence[str]) -> int | None:
             f"{out}: the earlier fit's prediction is gone; make it again: galileo predict {out} "
             "--seconds S"
         )
-    warn(outdated(out, [one.observation for one in measured]))
+    warn(stale_documents(out, [one.observation for one in measured]))
     doubts = {doubt for one in measured for doubt in one.doubts}
     warn(line for line in found.warnings if line not in doubts)
     pages = [out] if len(measured) == 1 else [out / one.name for one in measured]

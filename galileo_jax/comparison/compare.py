@@ -21,7 +21,7 @@ from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.result import NOISE_SCALE_RANGE, error_of, told_scale
+from galileo_jax.inference.result import NOISE_SCALE_RANGE, error_of, reported_noise_scale
 
 NUM_REPLICATES = 200
 ADEQUATE_P = 0.01
@@ -173,7 +173,10 @@ def _place(
     follows = np.diff(index) == 1
     dt = np.diff(observation.times_s[index])[follows]
     speed = np.diff(residual)[follows] / dt
-    variance = told_scale(trials, theta, cell.clip) ** 2 * observation.covariance_m2[i, a, a, index]
+    variance = (
+        reported_noise_scale(trials, theta, cell.clip) ** 2
+        * observation.covariance_m2[i, a, a, index]
+    )
     noise = (variance[1:] + variance[:-1])[follows] / dt**2
     white = measured[cell.clip][0, cell.index]
     neighbours = float(np.sum(white[1:] * white[:-1]) / max(np.sum(white**2), 1e-12))

@@ -23,7 +23,7 @@ from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
-from galileo_jax.diagnosis.left_out import left_out_rmse
+from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.diagnosis.pairs import pairs_with, with_largest_scores
 from galileo_jax.diagnosis.verdict import (
@@ -125,8 +125,8 @@ def diagnose(
     left_out: tuple[tuple[str, float, float], ...] = ()
     if len(trials.problems) > 1 and len(rounds) > 1:
         on_stage("predicting each clip from the others")
-        before = left_out_rmse(trials, rounds[0].hypothesis)
-        after = left_out_rmse(trials, rounds[-1].hypothesis)
+        before = leave_one_out_rmse(trials, rounds[0].hypothesis)
+        after = leave_one_out_rmse(trials, rounds[-1].hypothesis)
         left_out = tuple(zip((p.name for p in trials.problems), before, after, strict=True))
     each: tuple[EachClip, ...] = ()
     if len(trials.problems) > 1:

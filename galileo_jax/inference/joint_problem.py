@@ -20,7 +20,7 @@ import numpy as np
 
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import LogNormal, Parameter, PriorTable
-from galileo_jax.runtime.trace_cache import kept
+from galileo_jax.runtime.trace_cache import trace_cached
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
@@ -187,7 +187,7 @@ class JointProblem:
         return jnp.where(jnp.isfinite(total), total, -jnp.inf)
 
 
-@kept(num_static=0)
+@trace_cached(num_static=0)
 def in_units(priors: PriorTable, z: jax.Array) -> jax.Array:
     """`PriorTable.forward`, compiled."""
     return priors.forward(z)

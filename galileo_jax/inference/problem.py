@@ -17,7 +17,7 @@ from galileo_jax.rollout.rollout import Engine, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.runtime.batching import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
 from galileo_jax.runtime.progress import check_cancelled
-from galileo_jax.runtime.trace_cache import kept
+from galileo_jax.runtime.trace_cache import trace_cached
 from galileo_jax.similarity.gaussian_likelihood import (
     GaussianLikelihood,
     NoiseModel,
@@ -141,7 +141,7 @@ def _seen_one(kind, theta, position, velocity, times_s, scene):
     return seen(effects, names, theta, motion, times_s, scene)
 
 
-@kept(num_static=1)
+@trace_cached(num_static=1)
 def _seen_batch(kind, theta, position, velocity, times_s, scene):
     return jax.vmap(lambda t, p, v: _seen_one(kind, t, p, v, times_s, scene))(
         theta, position, velocity

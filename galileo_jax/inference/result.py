@@ -88,7 +88,7 @@ def velocity_error(
     }
 
 
-def told_scale(trials: JointProblem, theta: np.ndarray, clip: int) -> float:
+def reported_noise_scale(trials: JointProblem, theta: np.ndarray, clip: int) -> float:
     """The fitted noise scale of a clip, as far as noise explains it."""
     return float(np.clip(trials.noise_scale(theta, clip), *NOISE_SCALE_RANGE))
 
@@ -109,7 +109,7 @@ def error_of(
     """
     scales, predictions, chi2, count = [], [], pull, 0.0
     for clip, problem in enumerate(trials.problems):
-        scale = told_scale(trials, theta, clip)
+        scale = reported_noise_scale(trials, theta, clip)
         predicted = problem.simulate(trials.of_clip(theta, clip))
         chi2 += float(np.sum(problem.whiten(predicted, scale) ** 2))
         count += float(GaussianLikelihood.degrees(scale, problem.data))

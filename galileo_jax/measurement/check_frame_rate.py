@@ -40,7 +40,7 @@ class ApparentGravity:
     is_least: bool = False
 
 
-def clock_doubt(clip: Clip, observation: Observation) -> str | None:
+def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
     """One line where the frame rate is off by a factor, with the likely one; None elsewhere."""
     found = apparent_gravity(clip, observation)
     if found is None or found.value <= 0:

@@ -44,7 +44,7 @@ def needs_foot(clip: Clip) -> bool:
     return SCENARIOS[clip.scenario].has_table and in_pixels and clip.origin_px is None
 
 
-def foot_of_path(clip: Clip, observation: Observation) -> np.ndarray:
+def infer_foot(clip: Clip, observation: Observation) -> np.ndarray:
     """Where the ramp meets the table, `[2]`, m, in the observation's axes.
 
     Args:

@@ -31,7 +31,7 @@ def needs_sizes(clip: Clip) -> bool:
     return has_table and any(item.size_m is None for item in clip.objects)
 
 
-def sizes_of_track(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:
+def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[float, ...]]:
     """`size_m` by name of the objects that have none.
 
     Args:

@@ -47,7 +47,7 @@ def needs_slope(clip: Clip) -> bool:
     return SCENARIOS[clip.scenario].has_ramp and clip.ramp_angle_deg is None
 
 
-def slope_of_path(clip: Clip, observation: Observation) -> Slope:
+def infer_slope(clip: Clip, observation: Observation) -> Slope:
     """The slope of the way that the first object takes down the ramp.
 
     Raises:

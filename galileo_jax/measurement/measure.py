@@ -6,12 +6,12 @@ from typing import Any
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
-from galileo_jax.measurement.check_frame_rate import clock_doubt
-from galileo_jax.measurement.infer_foot import foot_of_path, needs_foot
-from galileo_jax.measurement.infer_sizes import SIZE_SD_M, needs_sizes, sizes_of_track
-from galileo_jax.measurement.infer_slope import Slope, needs_slope, slope_of_path
+from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
+from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
+from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
+from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.track_cache import track_once
-from galileo_jax.measurement.truncate_at_stop import until_arrest
+from galileo_jax.measurement.truncate_at_stop import truncate_at_stop
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
@@ -77,8 +77,8 @@ def measure(clip: Clip) -> Measurement:
         whole, pixels = observed(clip)
         measured = Measurement(clip, whole, whole, pixels)
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
-    doubt = clock_doubt(measured.clip, measured.observation)
-    observation, end_s = until_arrest(measured.clip, measured.observation)
+    doubt = frame_rate_doubt(measured.clip, measured.observation)
+    observation, end_s = truncate_at_stop(measured.clip, measured.observation)
     if end_s is not None:
         remarks.append(
             f"{clip.path}: {observation.names[0]} is stopped by something after {end_s:.3f} s; "
@@ -110,7 +110,7 @@ def _with_foot(clip: Clip, remarks: list[str]) -> Clip:
     """The clip with the foot of its ramp, from a first look at the path."""
     assert clip.pixels_per_metre is not None  # check_scale requires it of a ramp
     first_look, _ = observed(_without_sizes(clip, origin_px=(0.0, 0.0)))
-    point = foot_of_path(clip, first_look)
+    point = infer_foot(clip, first_look)
     sign = 1.0 if clip.direction == "right" else -1.0
     x, y = (float(value) * clip.pixels_per_metre for value in point)
     origin = (round(sign * x, 1), round(-y, 1))
@@ -139,9 +139,9 @@ def _with_slope(clip: Clip, remarks: list[str]) -> Measurement:
     if clip.video is not None:
         # The object's outline stands along the ramp: a first look, without it, tells how steep.
         first_look, _ = observed(_without_sizes(clip))
-        clip = _inclined(clip, slope_of_path(clip, first_look))
+        clip = _inclined(clip, infer_slope(clip, first_look))
     observation, pixels = observed(clip)
-    slope = slope_of_path(clip, observation)
+    slope = infer_slope(clip, observation)
     clip = _inclined(clip, slope)
     remarks.append(
         f"{clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "
@@ -154,7 +154,7 @@ def _with_slope(clip: Clip, remarks: list[str]) -> Measurement:
 def _with_sizes(measured: Measurement, remarks: list[str]) -> Measurement:
     """The measurement with sizes from the heights of the paths and the distance at the hit."""
     clip = measured.clip
-    found = sizes_of_track(clip, measured.observation)
+    found = infer_sizes(clip, measured.observation)
     objects = tuple(
         item.model_copy(update={"size_m": found.get(item.name, item.size_m)})
         for item in clip.objects

@@ -36,7 +36,7 @@ def can_be_arrested(clip: Clip) -> bool:
     return is_board or (clip.scenario == "fall" and not clip.has_floor)
 
 
-def until_arrest(clip: Clip, observation: Observation) -> tuple[Observation, float | None]:
+def truncate_at_stop(clip: Clip, observation: Observation) -> tuple[Observation, float | None]:
     """The observation without what follows a stop, and when its last frame is, s.
 
     Returns:

@@ -32,7 +32,7 @@ def digest(observation: Observation) -> str:
     return found.hexdigest()[:16]
 
 
-def forget_prediction(folder: Path) -> bool:
+def remove_stale_prediction(folder: Path) -> bool:
     """Removes what `predict` wrote of the fit that lay in `folder`; returns whether it had."""
     found = _document(folder / PREDICTION)
     if not found.keys() >= PREDICTION_KEYS:
@@ -42,14 +42,14 @@ def forget_prediction(folder: Path) -> bool:
     return True
 
 
-def forget_single_run(folder: Path) -> None:
+def remove_single_clip_run(folder: Path) -> None:
     """Removes what makes `folder` the run of one clip, where now several are fitted together."""
     if (folder / "result.json").is_file() and (folder / "clip.yaml").is_file():
         for name in RUN_FILES:
             (folder / name).unlink(missing_ok=True)
 
 
-def outdated(folder: Path, observations: Sequence[Observation]) -> list[str]:
+def stale_documents(folder: Path, observations: Sequence[Observation]) -> list[str]:
     """One sentence for every comparison and diagnosis below `folder` of other tracks."""
     now = [digest(observation) for observation in observations]
     told = []

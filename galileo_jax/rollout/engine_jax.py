@@ -11,7 +11,7 @@ from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.devices import over_devices
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
-from galileo_jax.runtime.trace_cache import kept
+from galileo_jax.runtime.trace_cache import trace_cached
 
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
 
@@ -58,7 +58,7 @@ class EngineJax:
         )
 
 
-@kept(num_static=5)
+@trace_cached(num_static=5)
 def _roll_out_batch(
     roll_out: Callable[..., Motion],
     effects: tuple[Effect, ...],

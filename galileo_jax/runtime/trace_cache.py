@@ -1,8 +1,8 @@
 """Jitted functions that are traced once per machine, not once per process.
 
 JAX's persistent cache keeps what XLA makes of a program, but every process still traces it in
-Python first: seconds for a Levenberg-Marquardt step. A `kept` function leaves the traced program
-(`jax.export`) beside that cache; later processes read it in tens of milliseconds.
+Python first: seconds for a Levenberg-Marquardt step. A `trace_cached` function leaves the traced
+program (`jax.export`) beside that cache; later processes read it in tens of milliseconds.
 
 A program is found by its name, its static arguments, the shapes of the others, and a hash of all
 code that it could depend on: this package's sources and the versions of the libraries below.
@@ -32,18 +32,18 @@ LAPACK = tuple(
 )
 
 
-def kept(num_static: int) -> Callable[[Callable[..., Any]], "Kept"]:
+def trace_cached(num_static: int) -> Callable[[Callable[..., Any]], "TraceCached"]:
     """Decorates a function of `num_static` static arguments, then PyTrees of arrays.
 
     It returns arrays, or tuples of them, and is jitted as it is where its program cannot be kept:
     inside another trace, on several devices, with JAX's cache off, or where a static argument
     comes from outside this package (a user's effect, which may change unseen).
     """
-    return lambda function: Kept(function, num_static)
+    return lambda function: TraceCached(function, num_static)
 
 
-class Kept:
-    """See `kept`."""
+class TraceCached:
+    """See `trace_cached`."""
 
     def __init__(self, function: Callable[..., Any], num_static: int):
         functools.update_wrapper(self, function)

@@ -10,7 +10,7 @@ from galileo_jax.api import diagnose as api
 from galileo_jax.api.simulate import simulate
 from galileo_jax.commands import command, diagnose
 from galileo_jax.diagnosis.document import diagnosis_document
-from galileo_jax.diagnosis.last_model import by_itself
+from galileo_jax.diagnosis.restricted_fit import restricted_fit
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects
@@ -83,13 +83,13 @@ def test_a_hypothesis_by_itself_moves_as_in_the_library(trials, tmp_path):
     run = make_run(tmp_path, HIT, 1.6)
     problem = make_problem(run.clip, run.problem.observation, "rigid", make_effects(["air_drag"]))
     part, fit = JointProblem((problem,)), fit_of(trials, ("air_drag",))
-    alone = by_itself(fit, trials, part)
+    alone = restricted_fit(fit, trials, part)
     assert alone.free.all()
     assert alone.jacobian.shape == (part.num_values, len(part.model_parameters))
     whole = trials.problems[0].simulate(trials.of_clip(trials.theta(fit.z, fit.free), 0))
     np.testing.assert_array_equal(problem.simulate(part.of_clip(part.theta(alone.z), 0)), whole)
     with pytest.raises(ValueError, match="has not"):
-        by_itself(fit_of(trials, ("viscous_drag",)), trials, part)
+        restricted_fit(fit_of(trials, ("viscous_drag",)), trials, part)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import yaml
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.measurement.check_frame_rate import apparent_gravity, clock_doubt
+from galileo_jax.measurement.check_frame_rate import apparent_gravity, frame_rate_doubt
 from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import Observation
 from tests.oracle_run import HIT, make_run
@@ -55,14 +55,14 @@ def test_the_right_clock_is_not_doubted(make, tmp_path):
     clip, seen = make(tmp_path)
     found = apparent_gravity(clip, seen)
     assert found is not None and found.value == pytest.approx(9.81, rel=0.15)
-    assert clock_doubt(clip, seen) is None
+    assert frame_rate_doubt(clip, seen) is None
 
 
 @pytest.mark.parametrize("make", [ramp, fall])
 @pytest.mark.parametrize("factor", [0.125, 0.5, 2.0, 10.0])
 def test_a_factor_is_told_with_the_likely_rate(make, factor, tmp_path):
     clip, seen = make(tmp_path)
-    told = clock_doubt(*off(clip, seen, factor))
+    told = frame_rate_doubt(*off(clip, seen, factor))
     assert told is not None
     assert f"fps: {factor * FPS:g}, but" in told and "likely fps: " in told
     likely = float(told.split("likely fps: ")[1].split()[0])
@@ -71,16 +71,16 @@ def test_a_factor_is_told_with_the_likely_rate(make, factor, tmp_path):
 
 def test_the_container_is_believed_where_gravity_agrees(tmp_path):
     clip, seen = fall(tmp_path)
-    told = clock_doubt(*off(clip, seen, 10.0, container=61.0))
+    told = frame_rate_doubt(*off(clip, seen, 10.0, container=61.0))
     assert told is not None and "likely fps: 61, as the container says" in told
-    told = clock_doubt(*off(clip, seen, 10.0, container=30.0))
+    told = frame_rate_doubt(*off(clip, seen, 10.0, container=30.0))
     assert told is not None and "container says" not in told
 
 
 @pytest.mark.parametrize("gravity", [5.0, 9.0, 15.0])
 def test_drags_and_small_errors_are_not_taken_for_it(gravity, tmp_path):
     clip, seen = fall(tmp_path, gravity)
-    assert clock_doubt(clip, seen) is None
+    assert frame_rate_doubt(clip, seen) is None
 
 
 def test_a_measurement_has_it(tmp_path):
@@ -88,4 +88,4 @@ def test_a_measurement_has_it(tmp_path):
     clip, seen = off(clip, seen, 10.0)
     write_observation_csv(tmp_path / "fall.csv", seen)
     (doubt,) = measure(clip).doubts
-    assert doubt == clock_doubt(clip, seen) and "likely fps: 60" in doubt
+    assert doubt == frame_rate_doubt(clip, seen) and "likely fps: 60" in doubt

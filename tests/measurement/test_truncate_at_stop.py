@@ -7,7 +7,7 @@ import pytest
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import measure
-from galileo_jax.measurement.truncate_at_stop import arrest_frame, until_arrest
+from galileo_jax.measurement.truncate_at_stop import arrest_frame, truncate_at_stop
 from galileo_jax.observation.observation import Observation
 
 NOISE_M = 1e-4
@@ -81,6 +81,6 @@ def test_a_declared_floor_is_in_the_scene(tmp_path):
     """What bounces on it is not cut off."""
     clip = load_clip(write_clip(tmp_path, "fall", "floor: true\n"))
     seen = slid(np.append(1.2 * np.arange(1, 60) / 60, np.zeros(5)), 60.0)
-    assert until_arrest(clip, seen) == (seen, None)
+    assert truncate_at_stop(clip, seen) == (seen, None)
     bare = clip.model_copy(update={"floor": False})
-    assert until_arrest(bare, seen)[1] == pytest.approx(59 / 60)
+    assert truncate_at_stop(bare, seen)[1] == pytest.approx(59 / 60)

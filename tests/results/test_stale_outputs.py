@@ -13,7 +13,12 @@ from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.report import write_report
 from galileo_jax.results.run import Run, load_run
-from galileo_jax.results.stale_outputs import TRACKS, digest, forget_prediction, outdated
+from galileo_jax.results.stale_outputs import (
+    TRACKS,
+    digest,
+    remove_stale_prediction,
+    stale_documents,
+)
 from tests.oracle_run import HIT, make_run
 from tests.precision import in_64_bit
 
@@ -71,7 +76,7 @@ def test_a_new_fit_takes_the_earlier_ones_prediction_away(tmp_path):
 @pytest.mark.parametrize("content", [{"version": "0.1"}, ["a list"], {}])
 def test_what_is_not_ours_stays(tmp_path, content):
     write_predicted(tmp_path, content)
-    assert not forget_prediction(tmp_path)
+    assert not remove_stale_prediction(tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == set(PREDICTED)
 
 
@@ -90,8 +95,8 @@ def test_a_diagnosis_of_another_track_is_told_of(tmp_path):
     (tmp_path / "diagnosis").mkdir()
     document = {"clips": ["a.csv"], TRACKS: [digest(seen)]}
     (tmp_path / "diagnosis" / "diagnosis.json").write_text(json.dumps(document))
-    assert outdated(tmp_path, [seen]) == []
-    (told,) = outdated(tmp_path, [moved])
+    assert stale_documents(tmp_path, [seen]) == []
+    (told,) = stale_documents(tmp_path, [moved])
     assert "diagnosis: made of an earlier track" in told and "galileo diagnose a.csv" in told
     unseen = replace(seen, position_m=np.where(seen.mask[:, None], seen.position_m, np.nan))
     assert digest(unseen) == digest(seen)

@@ -7,8 +7,8 @@ import pytest
 from jax.experimental.compilation_cache import compilation_cache
 
 from galileo_jax.model.effects.library.air_drag import AirDrag
-from galileo_jax.runtime.trace_cache import FOLDER, Kept
-from galileo_jax.runtime.trace_cache import kept as public_decorator
+from galileo_jax.runtime.trace_cache import FOLDER, TraceCached
+from galileo_jax.runtime.trace_cache import trace_cached as public_decorator
 
 CACHE, SWITCH = "jax_compilation_cache_dir", "jax_enable_compilation_cache"
 
@@ -33,14 +33,14 @@ class Traced:
         return x**power + rest["y"], x.sum()
 
 
-def fresh() -> tuple[Kept, Traced]:
+def fresh() -> tuple[TraceCached, Traced]:
     """As another process would have it: nothing but the folder remembers."""
     traced = Traced()
 
     def function(power, x, rest):
         return traced(power, x, rest)
 
-    return Kept(function, 1), traced
+    return TraceCached(function, 1), traced
 
 
 X, REST = np.arange(3.0), {"y": 2.0}

@@ -18,7 +18,7 @@ from galileo_jax.inference.problem import seen
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.parameters import PriorTable
 from galileo_jax.rollout.trajectory import Trajectory
-from galileo_jax.runtime.trace_cache import kept
+from galileo_jax.runtime.trace_cache import trace_cached
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 
 # Damping is lowered where a step brought three quarters of what it promised: the textbook's value
@@ -84,7 +84,7 @@ def white_of(kind: Kind, theta, position, velocity, noise, data: Any, scene):
     return jnp.where(jnp.abs(white) < FAILED, white, FAILED)
 
 
-@kept(num_static=1)
+@trace_cached(num_static=1)
 def white_batch(kind: Kind, theta, position, velocity, noise, data, scene):
     """Whitened residuals of many motions, `[point, value]`."""
     return jax.vmap(lambda t, p, v, n: white_of(kind, t, p, v, n, data, scene))(
@@ -103,7 +103,7 @@ def _white_near(kind: Kind, u, z, free, index, noise, motion, clip: ClipArrays):
     return white_of(kind, theta, position, velocity, noise, clip.data, clip.scene)
 
 
-@kept(num_static=1)
+@trace_cached(num_static=1)
 def jacobian_batch(kind: Kind, z, free, noise, index, p, v, dp, dv, clip):
     """Residuals `[point, value]` and their slopes `[point, value, free parameter]`."""
 
@@ -119,7 +119,7 @@ def jacobian_batch(kind: Kind, z, free, noise, index, p, v, dp, dv, clip):
     return jax.vmap(one)(z, free, noise, index, p, v, dp, dv)
 
 
-@kept(num_static=0)
+@trace_cached(num_static=0)
 def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
     """Whether proposals are accepted, and the next ones: one step of Levenberg-Marquardt.
 

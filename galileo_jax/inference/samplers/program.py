@@ -7,7 +7,7 @@ import equinox as eqx
 import jax
 import numpy as np
 
-from galileo_jax.runtime.trace_cache import kept
+from galileo_jax.runtime.trace_cache import trace_cached
 
 
 class Program(eqx.Module):
@@ -48,7 +48,7 @@ def compiled(function: Callable[..., Any], like: Any, log_density: Any, *args: A
     return jax.tree.unflatten(jax.tree.structure(like), leaves)
 
 
-@kept(num_static=3)
+@trace_cached(num_static=3)
 def _leaves_of(function, code, kinds, arrays, args):
     del kinds  # a sampler from outside the package may change unseen
     return tuple(jax.tree.leaves(function(Program(code, arrays), *args)))

@@ -16,7 +16,7 @@ from galileo_jax.inference.result import velocity_error
 from galileo_jax.model.parameters import Parameter
 
 
-def left_out_rmse(trials: JointProblem, hypothesis: Hypothesis) -> tuple[float, ...]:
+def leave_one_out_rmse(trials: JointProblem, hypothesis: Hypothesis) -> tuple[float, ...]:
     """Per clip, the rmse (m/s) of its velocities as the other clips predict them."""
     return tuple(_one(trials, hypothesis, clip) for clip in range(len(trials.problems)))
 

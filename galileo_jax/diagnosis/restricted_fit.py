@@ -8,7 +8,7 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 
 
-def by_itself(fit: GradientFit, whole: JointProblem, part: JointProblem) -> GradientFit:
+def restricted_fit(fit: GradientFit, whole: JointProblem, part: JointProblem) -> GradientFit:
     """The same fit in the parameters of fewer effects; those left out are pinned in it.
 
     Args:
