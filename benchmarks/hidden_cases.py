@@ -1,20 +1,18 @@
 """The exam's cases: a grid of our own, or clips that lie in a folder."""
 
-import contextlib
-import io
 import itertools
 import json
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.commands import command, simulate
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking import track_clip
@@ -42,14 +40,14 @@ class Case:
       yamls: the clips' yamls, a NAME.truth.json beside each.
       effect: what is hidden in them, as the truth says it.
       strength: of our own clips, 0 to 1; None where it is not known or nothing is hidden.
-      recipe: the call of `simulate` that makes the clips; empty if they are there.
+      recipe: the arguments of `simulate` that make the clips; None if they are there.
     """
 
     name: str
     yamls: tuple[Path, ...]
     effect: str
     strength: float | None = None
-    recipe: tuple[str, ...] = ()
+    recipe: Mapping[str, Any] | None = None
 
 
 def grid(
@@ -72,30 +70,29 @@ def grid(
     for effect, strength, seed in [*cells, *(("none", None, i) for i in range(num_none))]:
         level = "" if strength is None else f"_{round(100 * strength)}"
         name = f"{effect}{level}_{seed}"
-        call = ["--out", str(folder / f"{name}.csv"), "--track-only", "--solver", "fine"]
-        call += [
-            "--faults",
-            "--seed",
-            str(zlib.crc32(name.encode())),
-            "--angle",
-            str(ANGLES_DEG[seed % 3]),
-        ]
-        call += ["--track-noise", repr(noise_m), "--fps", repr(fps)]
-        if series:
-            call += ["--series", str(series)]
+        recipe: dict[str, Any] = {
+            "out": folder / f"{name}.csv",
+            "track_only": True,
+            "solver": "fine",
+            "faults": True,
+            "seed": zlib.crc32(name.encode()),
+            "angle": ANGLES_DEG[seed % 3],
+            "track_noise": noise_m,
+            "fps": fps,
+            "series": series,
+        }
         if strength is not None:
-            call += ["--effect", effect, "--strength", repr(strength)]
+            recipe |= {"effects": {effect: {}}, "strength": strength}
         if effect in EXOTICS:
-            call += ["--effects-from", str(EXOTIC_FILE)]
+            recipe["effects_from"] = [EXOTIC_FILE]
         names = [f"{name}_{i + 1}" for i in range(series)] if series else [name]
         yamls = tuple(folder / f"{each}.yaml" for each in names)
-        yield Case(name, yamls, effect, strength, tuple(call))
+        yield Case(name, yamls, effect, strength, recipe)
 
 
-def make_clips(recipe: Sequence[str]) -> int:
+def make_clips(recipe: Mapping[str, Any]) -> None:
     """Runs `simulate`, in a process of its own: exotic effects stay out of the diagnosis's."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        return command.run(simulate.main, recipe)
+    simulate(**recipe)
 
 
 def folder_cases(folder: Path, series: int | None, only: str) -> list[Case]:

@@ -12,8 +12,6 @@ line is JSON.
 """
 
 import argparse
-import contextlib
-import io
 import json
 import math
 import multiprocessing
@@ -86,14 +84,10 @@ def main(argv: Sequence[str]) -> int | None:
 
 
 def run_diagnosis(yamls: Sequence[Path], out: Path, seed: int) -> dict[str, Any]:
-    """What `galileo diagnose --add auto` writes about clips; its printing is kept in `out`."""
-    from galileo_jax.commands import diagnose
+    """The diagnosis of clips, saved in `out` as `galileo diagnose` saves it."""
+    from galileo_jax.api.diagnose import diagnose
 
-    said = io.StringIO()
-    options = ["--add", "auto", "--seed", str(seed), "--out", str(out)]
-    with contextlib.redirect_stdout(said):
-        diagnose.main([*map(str, yamls), *options])
-    write_text(out / "said.txt", said.getvalue())
+    diagnose(list(yamls), seed=seed).save(out)
     return json.loads((out / "diagnosis.json").read_text())
 
 
@@ -115,13 +109,15 @@ def _with_clips(cases: Sequence[Case], kept: dict[str, Any]) -> Iterator[Case]:
     wanted = [case for case in cases if case.recipe and case.name not in kept]
     missing = [case for case in wanted if not all(path.is_file() for path in case.yamls)]
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        made: dict[str, Future[int]] = {
-            case.name: pool.submit(hidden_cases.make_clips, case.recipe) for case in missing
+        made: dict[str, Future[None]] = {
+            case.name: pool.submit(hidden_cases.make_clips, case.recipe)
+            for case in missing
+            if case.recipe is not None
         }
         try:
             for case in cases:
-                if case.name in made and made[case.name].result():
-                    raise InputError(f"galileo simulate {' '.join(case.recipe)} fails")
+                if case.name in made:
+                    made[case.name].result()  # raises what `simulate` raised
                 yield case
         finally:
             pool.shutdown(cancel_futures=True)

@@ -19,9 +19,7 @@ Seconds are of the processor, without compilation. A slope by forward mode count
 """
 
 import argparse
-import contextlib
 import functools
-import io
 import json
 import tempfile
 import time
@@ -37,9 +35,10 @@ import optimistix as optx
 import synthetic_tracks
 from scipy.optimize import minimize_scalar
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.commands import command, simulate
+from galileo_jax.commands import command
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.density import Part, Rolled
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
@@ -56,8 +55,15 @@ NOISE_M = 0.3 / 900
 NUM_SCATTERED, NUM_REFINED = 64, 4
 FOUND_NATS = 0.5
 NUM_NOISE_UPDATES, MAX_STEPS, TOLERANCE = 3, 100, 1e-4
-VALLEY = ["--angle", "10", "--effect", "stribeck", "--solver", "fine", "--faults", "--track-only"]
-VALLEY += ["--track-noise", "3.3e-4", "--fps", "30"]
+VALLEY: dict[str, Any] = {
+    "angle": 10.0,
+    "effects": {"stribeck": {}},
+    "solver": "fine",
+    "faults": True,
+    "track_only": True,
+    "track_noise": 3.3e-4,
+    "fps": 30.0,
+}
 STRENGTHS = (0.7, 0.65, 0.9)
 FIRST_VALLEY_SEED = 157334244  # that of tests/diagnosis/test_narrow_valley.py
 
@@ -126,9 +132,8 @@ def valley_scenes(num: int) -> Iterator[Scene]:
     for i in range(num):
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "clip.csv"
-            recipe = ["--seed", str(FIRST_VALLEY_SEED + i), "--strength", str(STRENGTHS[i % 3])]
-            with contextlib.redirect_stdout(io.StringIO()):
-                command.run(simulate.main, [*VALLEY, *recipe, "--out", str(path)])
+            seed, strength = FIRST_VALLEY_SEED + i, STRENGTHS[i % 3]
+            simulate(path, seed=seed, strength=strength, **VALLEY)
             clip, observation = load_clip(path.with_suffix(".yaml")), read_observation_csv(path)
             truth = json.loads(path.with_suffix(".truth.json").read_text())
         trials = make_joint_problem([clip], [observation], effects=make_effects(["stribeck"]))

@@ -23,7 +23,8 @@ import numpy as np
 import yaml
 from scipy.optimize import minimize_scalar
 
-from galileo_jax.commands import command, diagnose, fit
+import galileo_jax as gx
+from galileo_jax.commands import command
 from galileo_jax.results.run import Run, load_run
 from galileo_jax.runtime.errors import InputError
 
@@ -135,10 +136,11 @@ def study(
     drop = without_the_stop(drop)
     track = str(write_clip(call.folder, name, drop, known))
     gravity, found = call.folder / f"{name}.gravity", call.folder / f"{name}.diagnosis"
-    print(f"\n$ galileo fit {track} --out {gravity}")
-    fit.main([track, "--out", str(gravity)])
-    print(f"\n$ galileo diagnose {track} --out {found}")
-    diagnose.main([track, "--out", str(found)])
+    fitted = gx.fit(track)
+    fitted.save(gravity)
+    diagnosis = gx.diagnose(track)
+    diagnosis.save(found)
+    print(f"\n{name}: {fitted!r}\n{diagnosis.rounds.to_string()}\n{diagnosis.sentence}")
     document = json.loads((found / "diagnosis.json").read_text(encoding="utf-8"))
     verdict = document["verdict"]
     before, after = rmse_m(load_run(gravity)), rmse_m(load_run(found / "model"))
