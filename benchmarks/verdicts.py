@@ -58,7 +58,7 @@ def judge(truth: str, library: Sequence[str], diagnosis: Mapping[str, Any]) -> S
     Args:
       truth: "none", or names joined by "+", as in NAME.truth.json.
       library: the names that the diagnosis knew.
-      diagnosis: what diagnosis.json holds (DESIGN.md 2.4).
+      diagnosis: what diagnosis.json holds (docs/reference/result_files.md).
     """
     there = frozenset() if truth == "none" else frozenset(truth.split("+"))
     kind: Kind = "none" if not there else "library" if there <= set(library) else "exotic"

@@ -1,4 +1,7 @@
-"""The command that does what a call of the API did: pages and messages say how to go on."""
+"""The shell command that repeats a call of the API.
+
+Reports and messages show it as provenance and as the next step.
+"""
 
 import shlex
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What `fit` returns: the posterior, and everything that is made of it."""
+"""`Fit`, the result of `fit`: the posterior, and tables, figures and files derived from it."""
 
 import re
 from collections.abc import Mapping

@@ -1,7 +1,8 @@
-"""What one core can do while another tracks the video: import, and compile the programs.
+"""Imports JAX and compiles programs on one core while another core tracks the video.
 
-Programs are compiled for a clip that looks as the tracked one will: as many frames, as many
-objects, the same laws. Where it turns out otherwise (sizes that were null), only time is lost.
+Programs are compiled for a clip with the expected number of frames, objects and laws. If the
+tracked clip differs (for example because sizes were null), they are compiled again and only time is
+lost.
 """
 
 import contextlib

@@ -1,7 +1,7 @@
-"""Can the objects stand where the clip says they stand?
+"""Checks that the declared object positions are physically possible.
 
-Marked points are clicked by eye and the declared angle and scale may be a little off (that
-is for the fit to find out), so only what no such error explains is called wrong.
+Positions are clicked by eye, and angle and scale may be slightly wrong (the fit allows for that).
+Only contradictions larger than such errors are refused.
 """
 
 import itertools

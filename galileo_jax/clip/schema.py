@@ -1,8 +1,8 @@
-"""The clip: a video or csv track and what is declared about it (DESIGN.md 2.1).
+"""The clip: a video or a track, and the scene that its yaml file describes.
 
-`ClipFile` is what stands in the yaml; `Clip` adds what loading found out. Each value is
-checked for its type, its range and the usual mistakes of units. What takes several values
-or the video to judge is checked in `load` and `placement`.
+`ClipFile` has the keys of the yaml (docs/reference/clip_yaml.md); `Clip` adds what loading found
+out. Each value is checked for type, range and common unit mistakes. Checks that need several
+values, or the video, are in `load` and `placement`.
 """
 
 import math

@@ -7,8 +7,8 @@ calibrated without assuming that the rollout is linear or the tests independent,
 for having looked in many places (Westfall and Young 1993; arXiv 2412.15100). Beyond what the
 replicates reach, a Gumbel distribution fitted to them is used.
 
-Nuisances count as well: one that is pulled many of its prior's standard deviations away is a
-failure of the model that residuals no longer show.
+A nuisance parameter that lies many prior standard deviations from its prior mean also counts as a
+failure, because the residuals no longer show that misfit.
 """
 
 from dataclasses import dataclass

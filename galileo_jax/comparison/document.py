@@ -1,4 +1,7 @@
-"""compare.json: a comparison in the contract's words (DESIGN.md 2.4)."""
+"""Builds compare.json from a comparison.
+
+The keys are listed in docs/reference/result_files.md.
+"""
 
 from dataclasses import asdict
 from typing import Any

@@ -1,9 +1,9 @@
 """Local tests: statistics of whitened residuals, cell by cell.
 
-A cell is an object, an axis and a phase. In each of them a model that is right leaves white
-unit noise; what is missing shows as too much of it (power), as a smooth deviation (the energy
-in the slowest cosines) or as neighbours that agree (whiteness). Whole tracks are looked at in
-the same way, because a deviation may span phases.
+A cell is one object, one axis and one phase. If the model is right, its residuals there are
+independent standard normal numbers. Each kind of misfit has a statistic: too large residuals
+(power), a smooth deviation (energy in the slowest cosines), correlated neighbours (whiteness).
+Whole tracks are tested too, because a deviation may extend over several phases.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,7 @@
-"""Phases of a motion: where along the way a model fails is half of what is wrong with it."""
+"""Divides a motion into phases (on the ramp, at the foot, after the hit, ...).
+
+In which phase a model fails is a strong hint at what it lacks.
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise

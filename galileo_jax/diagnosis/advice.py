@@ -1,4 +1,4 @@
-"""What measurement would tell apart what this one does not."""
+"""Advice: which further measurement would separate effects that this clip cannot separate."""
 
 from galileo_jax.comparison.phases import free_phase
 from galileo_jax.diagnosis.diagnosis import Verdict

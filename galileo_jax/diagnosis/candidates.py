@@ -1,16 +1,16 @@
 """Candidates: every effect of the library as a hypothesis, all fitted in one batch.
 
-For each candidate first a score test, at no strength at all: how much would the misfit fall
-along the effect's slope, what the other parameters take up already left out? It needs one
-rollout each. Then a joint fit with all other parameters, from several starts, and the evidence
-of the hypothesis by Laplace's method: it charges for every parameter by how much of its prior
-the data rule out.
+For each candidate, a score test is computed first: how much the misfit would decrease along the
+derivative with respect to the effect's strength, after removing what the other parameters can
+absorb. It needs one rollout per candidate. Then the effect is fitted together with all other
+parameters, from several starting points, and the evidence is computed by Laplace's method. The
+evidence charges for every parameter, according to how much of its prior the data exclude.
 
-Where an effect is (its place, moment, wavelength) is a question with many wrong answers near
-the right one. Two kinds of starts answer it: scattered ones; and matched ones, the shapes whose
-slopes at no strength take most of the misfit away (a matched filter: the score test over all
-shapes). The best of either kind is refined. Then all start once more, matched to what the best
-candidate explains, with all else where that one has it.
+The position, time or wavelength of an effect has many local optima near the right value. Two kinds
+of starting points deal with this: scattered ones, and matched ones, whose derivative at zero
+strength removes most of the misfit (a matched filter: the score test over all shapes). The best of
+either kind are refined. Finally every candidate starts once more from values that reproduce the
+motion of the best candidate, with all other parameters as in that candidate.
 """
 
 from collections.abc import Sequence

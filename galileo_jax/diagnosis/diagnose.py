@@ -4,10 +4,11 @@
 2. Fit every effect of the library as a candidate, in one batch; rank by evidence (Laplace),
    which charges for every parameter and, through the candidates' equal shares of the
    prior, for how many were tried. Compare the best with the data, too.
-3. Candidates that are adequate and whose evidence is within a factor of the best's cannot
-   be told from it: one is named, several are ambiguous. The rules stand in `verdict`.
-   The forms without a name (`effects/forms`) are candidates, too: what they explain as well is
-   not named, and what they alone explain is unknown. They are twenty times less likely ahead.
+3. Adequate candidates whose evidence is close to that of the best cannot be distinguished
+   from it. If there is only one, it is named; several are ambiguous (rules: `verdict`).
+   The forms without a physical name (`model/effects/forms`) compete as well: an effect is not
+   named if a form explains the data as well, and if only a form explains them, the verdict is
+   unknown. Forms have prior odds of 1 to 20.
 4. Where no single effect is adequate, the best is joined by those whose slopes stand out most.
 5. Where no pair is adequate either, the verdict is unknown, and the missing force is
    inferred without a form (`missing_force`).

@@ -1,4 +1,7 @@
-"""What a diagnosis says: diagnosis.json by contract (DESIGN.md 2.4), and what pictures need."""
+"""The result of a diagnosis: what diagnosis.json holds, and what figures need.
+
+The keys of the file are listed in docs/reference/result_files.md.
+"""
 
 from dataclasses import dataclass
 from typing import Literal

@@ -1,4 +1,7 @@
-"""diagnosis.json by contract (DESIGN.md 2.4)."""
+"""Builds diagnosis.json from a diagnosis.
+
+The keys are listed in docs/reference/result_files.md.
+"""
 
 from collections.abc import Sequence
 from typing import Any

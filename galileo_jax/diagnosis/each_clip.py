@@ -1,13 +1,14 @@
-"""Where clips together do not fit: each of them against the model of all, and by itself.
+"""For clips that no common model explains: compares each with the common model and its own fit.
 
 Against the model of all, a clip's acceleration differs by a_j in each of NUM_PARTS equal parts of
 the way that object 1 goes in it; its start (the instant of the release) is its own:
 
     observed - predicted = sum_j a_j d_j(t) + tau v(t),    d_j'' = 1 in part j, 0 elsewhere
 
-by least squares, with the tracker's errors alone: what a camera's pitch may take up shows. What is
-left is smooth, so that standard deviations are widened by its size and by sqrt((1 + r) / (1 - r)),
-r: the correlation of neighbours.
+The coefficients come from least squares with the tracker's errors alone, so effects that a camera
+tilt could absorb remain visible. Remaining residuals are smooth, so the standard deviations are
+multiplied by the residuals' size and by sqrt((1 + r) / (1 - r)), where r is the correlation of
+neighbours.
 """
 
 from dataclasses import dataclass

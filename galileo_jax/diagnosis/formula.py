@@ -2,11 +2,11 @@
 
     target = response f(t, v, q) + unit noise,      f = sum of few terms of a dictionary
 
-`target` is what the data say (whitened residuals, all that friction, masses and nuisances can
-explain taken out), `response` how an acceleration at each time shows in it, so that no inferred
-curve, smoothed and with errors that hang together, stands in between. Terms are chosen by
-orthogonal matching pursuit and their number by BIC, a scanned wavelength, place or width
-counting as one more parameter.
+`target` are the whitened residuals after projecting out everything that friction, masses and
+nuisance parameters can explain. `response` maps an acceleration at each time to these residuals.
+The formula is therefore fitted to the data and not to the inferred curve, which is smoothed and has
+correlated errors. Terms are chosen by orthogonal matching pursuit and their number by BIC, a
+scanned wavelength, place or width counting as one more parameter.
 
 Source: Pati, Rezaiifar and Krishnaprasad (1993), 10.1109/ACSSC.1993.342465 (matching pursuit);
 Brunton, Proctor and Kutz (2016), 10.1073/pnas.1517384113 (laws by sparse regression); Schwarz

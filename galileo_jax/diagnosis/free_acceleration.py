@@ -2,8 +2,8 @@
 
     a(t) = sum_k B_k(t) w_k,    w = L z,    B_k cubic B-splines,    L L' = Matern-3/2 covariance
 
-No candidate of the library but what is left to say when none of them explains the data. The
-covariance between knots makes it smooth; `z`, the parameters, are independent.
+It is not a candidate; it is shown when no candidate explains the data. The covariance between knots
+makes it smooth; the parameters `z` are independent.
 
 Source: de Boor, A Practical Guide to Splines (2001); Rasmussen and Williams, Gaussian
 Processes for Machine Learning (2006), section 4.2.

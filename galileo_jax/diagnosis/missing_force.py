@@ -2,9 +2,10 @@
 
     1. The hypothesis and a smooth acceleration of every object (`FreeAcceleration`) are fitted
        together, from the hypothesis' fit.
-    2. A constant of it is what a little less friction does, and the data cannot say which. So it
-       is not the knots that are told but what the whole model accelerates more than the
-       hypothesis' own fit does, along the fitted motion: this the data do say.
+    2. A constant acceleration is equivalent to slightly less friction, and the data cannot
+       separate the two. Therefore the spline itself is not reported, but the difference between
+       the accelerations of the complete model and of the hypothesis' own fit along the fitted
+       motion, which the data do determine.
     3. A formula is sought that together with the hypothesis explains the data (`formula`). If
        there is one, friction and all else are put where they are with it, and the acceleration
        is told over these: -0.6 v|v| is then 0 at rest, and not negative or positive by what

@@ -1,4 +1,7 @@
-"""A hypothesis by itself: the fit as the model with only its effects would have found it."""
+"""Converts a hypothesis of a diagnosis to the fit of the model with only its effects.
+
+A hypothesis is the model with all effects, most of them fixed at zero.
+"""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""From clips and observations to the inverse problem: scene, effects, engine and noise model."""
+"""Builds the inverse problem of clips and observations: scene, effects, engine, noise model."""
 
 from collections.abc import Sequence
 

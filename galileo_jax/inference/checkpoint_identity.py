@@ -1,4 +1,7 @@
-"""What chains sample, in one hash: a checkpoint of anything else is refused."""
+"""A hash of everything that determines the sampled posterior.
+
+A checkpoint with another hash is refused.
+"""
 
 import hashlib
 import json

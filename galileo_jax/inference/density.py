@@ -1,4 +1,6 @@
-"""The posterior density of trials as a program that clips share: data and scene are its arguments.
+"""The posterior density as a compiled program that all clips share.
+
+The data and the scene are its arguments.
 
 `JointProblem.log_density` with the shapes of the gradient fit's programs (`fits/residuals.py`).
 """

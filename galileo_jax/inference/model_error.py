@@ -1,9 +1,9 @@
-"""What a simulator of rigid bodies does not know, added to every posterior.
+"""Model error: how much real bodies differ from ideal rigid ones, added to every posterior.
 
-Real faces are not quite square and real friction not quite constant: the impulse of a hit is
-taken to be known within a few tenths of a per cent, friction within half a per cent after it and
-1e-4 before. Chosen in view of the clips in docs/explanation/benchmarks.md, whose tracking is good
-to hundredths of a pixel; an interval from the likelihood alone would there be too narrow.
+Faces are not exactly square and friction is not exactly constant. The impulse of a hit is taken to
+be known to a few tenths of a per cent, friction to half a per cent after the hit and to 1e-4 before
+it. Chosen in view of the clips in docs/explanation/benchmarks.md, whose tracking is good to
+hundredths of a pixel; an interval from the likelihood alone would there be too narrow.
 """
 
 import re

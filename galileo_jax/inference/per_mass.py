@@ -1,7 +1,7 @@
-"""Force constants per mass: all that a motion tells of a force where no object was weighed.
+"""Force constants divided by mass.
 
-In F = m a a drag, a spring or a push counts as F / m. Without a known mass the constant of a force
-(kg/m, kg/s, N/m, N) is as unknown as the mass is, and only the constant over m1 is told.
+If no object was weighed, the motion determines only this ratio: in F = m a, a drag, spring or push
+enters as F / m, so the constant itself (kg/m, kg/s, N/m, N) is as uncertain as the mass.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,7 @@
-"""result.json: the numbers of a fit by contract (DESIGN.md 2.3)."""
+"""Builds result.json from a fit.
+
+The keys are listed in docs/reference/result_files.md.
+"""
 
 import re
 from collections.abc import Mapping, Sequence

@@ -4,9 +4,9 @@
 
 In a fall or a flight gravity is what the path bends by. On a ramp with a table it is
 (a + d cos A) / sin A, a the acceleration down the ramp, d the deceleration on the table: constant
-friction drops out. Without a table a / sin A, which friction makes smaller: it can only be too
-large. Effects that nobody declared change these by tens of per cent, a wrong clock by its square,
-so that only factors are told of.
+friction drops out. Without a table only a / sin A is available; friction lowers it, so only values
+that are too large are reported. Effects that were not declared change gravity by tens of per cent,
+a wrong frame rate by the square of its factor. Only large factors are therefore reported.
 """
 
 import math

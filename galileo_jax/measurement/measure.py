@@ -1,4 +1,7 @@
-"""From a clip to what was measured: positions in metres, and what nobody had declared."""
+"""Measures a clip: object positions in metres, and what its yaml leaves open.
+
+The yaml may leave open the angle, the origin and sizes.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,8 +1,8 @@
-"""What is stopped by something that is not in the scene: where the run ends.
+"""Cuts a track where something that is not in the scene stops the motion.
 
-At the end of a board stands a stop, under a drop lies the ground. A model without them must not
-be judged by what is seen after the hit. In a fall without a declared floor and on a board without
-a table, a run ends at step i if the speed the way it went
+A board may end at a stop, and below a dropped object is the ground. Neither is part of the scene,
+so the track is cut there. In a fall without a declared floor, and on a board without a table, the
+track ends at step i if, with v_i the speed in the direction of motion,
 
     v_i < SLOWED v,   and no v_j > SLOWED v after it,   v = median of steps i - 2, i - 3, i - 4
     v_(i-2) > STEADY v                                  (what brakes slows down step by step)

@@ -1,6 +1,6 @@
 """A run: what `fit` leaves in its folder, and what later commands read from it.
 
-DIR/result.json       numbers, by contract (DESIGN.md 2.3)
+DIR/result.json       numbers; its keys: docs/reference/result_files.md
 DIR/observation.csv   the track in metres with its covariance
 DIR/clip.yaml         the clip as fitted, overrides included
 DIR/posterior.nc      draws of all parameters (ArviZ InferenceData)

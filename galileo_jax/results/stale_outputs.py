@@ -1,8 +1,8 @@
-"""What other commands left in a run's folder, and whether a new fit makes it wrong.
+"""Which outputs of other commands a new fit makes out of date.
 
-A prediction continues the fit that lay there: with a new fit it is wrong, and one command makes
-it again, so that its files go. A comparison and a diagnosis say of the clip what they say, whatever
-is fitted later: they stay, and are told of where they were made of another track.
+A prediction belongs to the previous fit, so its files are removed; one command makes it again. A
+comparison or a diagnosis is a statement about the clip and is kept, with a warning if it was made
+from a different track.
 """
 
 import hashlib

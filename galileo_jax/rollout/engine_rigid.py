@@ -5,13 +5,12 @@ in that coordinate, with exact contact, the motion has no stiffness at all: betw
 midpoint step of 1/240 s is exact for constant friction and second order for every other law,
 and the events (the foot, a hit, an end of slipping) are met at their time, not at the next step.
 
-A round body has a second speed, its rim's. Coulomb's friction acts against the slip between
-the two until they are equal; then the body rolls, and what holds it there is as much friction as
-that takes, or all there is: too little, and it slips. Boxes are bodies whose rim never moves: to
-stop is to end slipping. So the
-motion is a continuous function of the parameters and JAX's derivatives of it are right, which
-those through compliant contacts are not (docs/explanation/contact.md). MuJoCo's engines are the
-check: tests/rollout/test_engines.py.
+A round body has a second speed, that of its rim. Coulomb friction acts against the difference (the
+slip) until it is zero. Then the body rolls as long as the friction needed for rolling does not
+exceed the available friction. A body that slides is treated as one whose rim never moves, so coming
+to rest is the end of slipping. The motion is a continuous function of the parameters and JAX's
+derivatives of it are correct; those through soft contacts are not (docs/explanation/contact.md).
+MuJoCo's engines are the check: tests/rollout/test_engines.py.
 """
 
 import functools

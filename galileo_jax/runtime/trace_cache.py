@@ -1,8 +1,8 @@
-"""Jitted functions that are traced once per machine, not once per process.
+"""Stores traced programs on disk: a function is traced once per machine, not once per process.
 
-JAX's persistent cache keeps what XLA makes of a program, but every process still traces it in
-Python first: seconds for a Levenberg-Marquardt step. A `trace_cached` function leaves the traced
-program (`jax.export`) beside that cache; later processes read it in tens of milliseconds.
+JAX's persistent cache stores compiled programs, but each process still has to trace them in Python
+(seconds for a Levenberg-Marquardt step). A function decorated with `trace_cached` writes its traced
+program (`jax.export`) beside that cache; later processes load it in tens of milliseconds.
 
 A program is found by its name, its static arguments, the shapes of the others, and a hash of all
 code that it could depend on: this package's sources and the versions of the libraries below.

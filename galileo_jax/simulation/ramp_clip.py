@@ -124,7 +124,7 @@ def _content(
     frames: Motion,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
-    """What the yaml declares about the clip (DESIGN.md 2.1)."""
+    """What the yaml declares about the clip (docs/reference/clip_yaml.md)."""
     objects: list[dict[str, Any]] = [
         {"name": each.name, "shape": each.shape, "size_m": list(each.size_m or ())}
         | ({} if each.rolls is None else {"rolls": each.rolls})

@@ -17,7 +17,7 @@ from galileo_jax.simulation.truth import Truth, draw_truth
 NUM_TRIES = 12
 FARTHEST_M = 2.0  # an object beyond it left the table
 
-# Where in their priors real clips lie (DESIGN.md 2.6): what no verdict may be made of.
+# Range of the nuisance parameters in real clips: no verdict may result from them.
 KEPT_AT_FOOT, REBOUND, RELEASE_FRAMES = (0.96, 1.0), (0.0, 0.04), (-0.3, 0.3)
 
 

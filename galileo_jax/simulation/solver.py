@@ -9,10 +9,9 @@ of `rollout/motion.py` (the effects act there and nowhere else),
 
 Where a body rolls, p opposes or stops its slip v+ - u+, and turns its rim: u+ - u = -p / (beta m).
 
-Forces are taken in the middle of the step, foretold with the last step's acceleration. An
-impact in mid-step is put at its time by the speeds before and after it; at the foot a step is
-split.
-A clip made by the engine that later fits it would be no exam.
+Forces are evaluated at the middle of the step, predicted with the acceleration of the previous
+step. A hit within a step is placed at its time from the speeds before and after; at the foot the
+step is divided. A clip simulated by the same engine that fits it would be no independent test.
 
 Source: J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988),
 doi:10.1007/978-3-7091-2624-0_1.

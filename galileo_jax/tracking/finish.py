@@ -1,4 +1,4 @@
-"""From fitted poses to a track: what is visible, where its point is, and how well that is known."""
+"""Converts fitted poses to a track: visibility, the followed point's position and uncertainty."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

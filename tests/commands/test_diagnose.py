@@ -41,7 +41,7 @@ def trials(tmp_path_factory):
 
 
 def check_contract(document):
-    """DESIGN.md 2.4."""
+    """The keys that docs/reference/result_files.md lists for diagnosis.json."""
     assert isinstance(document["adequate"], bool)
     assert 0 <= document["p_value"] <= 1
     assert all(set(place) >= PLACE for place in document["where"])

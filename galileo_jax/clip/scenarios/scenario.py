@@ -1,4 +1,4 @@
-"""What a scenario is: what its clip must declare, along what its objects move, by which laws."""
+"""A scenario: the keys that its clip must declare, its objects' path, and the laws of motion."""
 
 from dataclasses import dataclass
 

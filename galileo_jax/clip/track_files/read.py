@@ -1,6 +1,7 @@
-"""From a track file, ours or another tool's, to an observation in metres.
+"""Converts a track file (our own csv or another program's) to an observation in metres.
 
-What the file does not tell is asked for in one line that names the key and its choices.
+If the file does not contain a necessary quantity, the error message names the yaml key and its
+possible values.
 """
 
 import math

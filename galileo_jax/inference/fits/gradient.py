@@ -6,10 +6,11 @@
     3. The same with fitted noise scales, until a new round gains nothing (`polish.py`).
     4. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace (`evidence.py`).
 
-Compiled code (`programs.py`) never holds a rollout: JAX's cache keeps it between runs, whichever
-the engine, and clips share it: all that differs between them is data. A single far start ends in
-a side valley in most cases (the time of the collision decides which frames compare with which);
-the scattered starts cost one batch. Which optimiser, and why: docs/explanation/optimiser.md.
+Compiled code (`programs.py`) contains no rollout. JAX can therefore cache it for every engine, and
+all clips share it; clips differ only in the data they pass in. From a single distant starting point
+the search usually ends in a local optimum, because the time of the collision decides which frames
+are compared; scattered starting points cost only one batch. Which optimiser, and why:
+docs/explanation/optimiser.md.
 """
 
 from collections.abc import Callable, Sequence

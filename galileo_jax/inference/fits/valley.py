@@ -2,12 +2,11 @@
 
     z = mode + R (u + B u^2 + C u^3)        R R^T the covariance; B, C strictly lower triangular
 
-Columns of R are the covariance's eigenvectors, the softest first. Along a soft direction the data
-leave so much room that the others, told a hundred times better, are led aside: by several of their
-standard deviations, where object 2 hardly slides. There a normal proposal, whatever its
-covariance, is hardly ever accepted. B and C lead it along. A direction bends stiffer ones only, so
-that the map has an inverse everywhere and a constant determinant: densities of u and z are the
-same but for a factor.
+The columns of R are the eigenvectors of the covariance, least determined direction first. Along
+such a direction the well-determined ones shift by several of their own standard deviations (for
+example if object 2 hardly slides). A normal proposal with any covariance is then almost always
+rejected. B and C describe this shift. Each direction shifts only better-determined ones, so the map
+is invertible and its determinant constant: the densities of u and z differ by a constant factor.
 
 How far a direction must be moved follows from the misfit's slopes G (in u, with the mode's
 Jacobian) where another, j, is moved by h = 2 standard deviations, two rollouts each:

@@ -2,9 +2,9 @@
 
     c = C_d rho A / 2,    b = c v,   v = sqrt(g h), of the middle of the fall
 
-At the end of a fall of more than some metres it holds a tenth of a light ball's weight or more,
-every time, while scales and frame rates are off by several per cent in few clips. Which form it
-takes is left to the data.
+After a fall of more than a few metres, air drag on a light ball is a tenth of its weight or more in
+every clip, whereas scale and frame rate are wrong by several per cent only in a few clips. The data
+decide which form of drag fits.
 
 Source: Hoerner, Fluid-Dynamic Drag (1965), chapter 3: spheres have C_d 0.1 (fast and rough) to
 0.5, perforated ones up to 1.

@@ -1,7 +1,8 @@
-"""What a look at a clip suggests of its laws' parameters: the middles and widths of priors.
+"""Rough estimates from the track of a scenario's parameters: centre and width of their priors.
 
-The widths are many times what the fit will tell. A search must begin somewhere: a swing whose
-period is off by a half has a misfit that says nothing of where to go.
+The widths are many times larger than the uncertainty of the fit. They are needed because a search
+must start near the answer: with a period that is wrong by half, the misfit of an oscillation does
+not point towards the right one.
 """
 
 import math

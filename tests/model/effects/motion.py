@@ -21,7 +21,7 @@ from galileo_jax.rollout.trajectory import Trajectory
 from tests.ramp_model import HIT, make_model, make_surroundings, make_theta
 from tests.reference_ramp import Experiment
 
-# DESIGN.md 2.5.
+# The effects that docs/reference/effects.md lists.
 LIBRARY = (
     "air_drag",
     "constant_force",

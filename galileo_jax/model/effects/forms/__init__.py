@@ -1,4 +1,4 @@
-"""Forms without a name: how a force may depend on time, place and speed, and no effect says so.
+"""Forms: general ways a force can depend on time, place or speed, without a physical name.
 
 The library's effects are certain dependences: on two powers of the speed (drags) or near rest
 (Stribeck), on a place (a patch). The rest of that table stands here,

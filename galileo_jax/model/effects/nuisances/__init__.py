@@ -1,6 +1,7 @@
 """Nuisances: always free, with tight priors, never a verdict while inside them.
 
-They are effects like any other; only their parameters' role differs (DESIGN.md 2.6).
+They are effects like any other; only their parameters' role differs
+(`nuisances` in docs/reference/result_files.md).
 """
 
 from galileo_jax.model.effects.effect import Effect
