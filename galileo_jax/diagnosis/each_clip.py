@@ -7,8 +7,8 @@ the way that object 1 goes in it; its start (the instant of the release) is its 
 
 The coefficients come from least squares with the tracker's errors alone, so effects that a camera
 tilt could absorb remain visible. Remaining residuals are smooth, so the standard deviations are
-multiplied by the residuals' size and by sqrt((1 + r) / (1 - r)), where r is the correlation of
-neighbours.
+multiplied by the residuals' size (if it is more than one) and by sqrt((1 + r) / (1 - r)), where r
+is the correlation of neighbours.
 """
 
 from dataclasses import dataclass
