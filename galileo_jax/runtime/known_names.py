@@ -20,6 +20,6 @@ def check_known(option: str, noun: str, name: object, known: Collection[str]) ->
     """
     if name in known:
         return
-    close = difflib.get_close_matches(str(name), known, n=1, cutoff=0.7)
+    close = difflib.get_close_matches(str(name), known, n=1)
     hint = f"did you mean {close[0]}? " if close else ""
     raise InputError(f"{option}: unknown {noun} {name!r}; {hint}known: {', '.join(known)}")

@@ -131,7 +131,7 @@ class Registry(Generic[Entry]):
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """`; did you mean X?` where a known name is near, else nothing."""
-    near = difflib.get_close_matches(name, list(known), n=1, cutoff=0.7)
+    near = difflib.get_close_matches(name, list(known), n=1)
     return f"; did you mean {near[0]}?" if near else ""
 
 
