@@ -1,6 +1,5 @@
 """The `galileo` console script: `galileo VERB ...` is `python -m galileo_jax.VERB ...`."""
 
-import difflib
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -9,6 +8,7 @@ import galileo_jax
 from galileo_jax import __version__
 from galileo_jax.commands import command
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import did_you_mean
 
 VERBS = (
     ("fit", "estimate masses and friction from clips"),
@@ -44,13 +44,8 @@ def main(argv: Sequence[str]) -> int | None:
         print(f"galileo {__version__}")
         return 0
     if verb not in dict(VERBS):
-        near = difflib.get_close_matches(verb, dict(VERBS), n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise InputError(
-            f"unknown verb {verb!r}{hint} {_known()}"
-            if hint
-            else f"unknown verb {verb!r}; {_known()}"
-        )
+        hint = did_you_mean(verb, dict(VERBS)) or ";"
+        raise InputError(f"unknown verb {verb!r}{hint} {_known()}")
     return import_module(f"galileo_jax.commands.{verb}").main(rest)
 
 

@@ -16,7 +16,7 @@ from galileo_jax.clip.track_files.read import FileTrack, is_track, read_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.registry import did_you_mean
+from galileo_jax.runtime.known_names import did_you_mean
 from galileo_jax.video import decode
 
 YAML_SUFFIXES = (".yaml", ".yml")

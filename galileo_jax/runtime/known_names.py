@@ -1,7 +1,7 @@
 """Refusing a name that there is not, with the nearest one that there is."""
 
 import difflib
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 from galileo_jax.runtime.errors import InputError
 
@@ -20,6 +20,11 @@ def check_known(option: str, noun: str, name: object, known: Collection[str]) ->
     """
     if name in known:
         return
-    close = difflib.get_close_matches(str(name), known, n=1)
-    hint = f"did you mean {close[0]}? " if close else ""
-    raise InputError(f"{option}: unknown {noun} {name!r}; {hint}known: {', '.join(known)}")
+    hint = did_you_mean(str(name), known) or ";"
+    raise InputError(f"{option}: unknown {noun} {name!r}{hint} known: {', '.join(known)}")
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """`; did you mean X?` where a known name is near, else nothing."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"; did you mean {near[0]}?" if near else ""

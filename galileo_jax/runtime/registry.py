@@ -6,14 +6,14 @@ readers: Registry[type[Reader]] = Registry("reader", "readers", "galileo_jax.cli
 readers["tracker"]        imports the package the first time, and looks the name up
 """
 
-import difflib
 import importlib
 import pkgutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import did_you_mean
 
 Entry = TypeVar("Entry")
 Registered = TypeVar("Registered")
@@ -127,12 +127,6 @@ class Registry(Generic[Entry]):
                         f"{self.plural} of {entry.value} (entry point): {in_words(error)}"
                     ) from error
         self._is_loaded = True
-
-
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """`; did you mean X?` where a known name is near, else nothing."""
-    near = difflib.get_close_matches(name, list(known), n=1)
-    return f"; did you mean {near[0]}?" if near else ""
 
 
 def in_words(error: Exception) -> str:
