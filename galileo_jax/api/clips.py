@@ -4,8 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from galileo_jax.clip.load import check_clip, load_clip, with_unused
 from galileo_jax.clip.schema import Clip
+from galileo_jax.runtime.errors import InputError
 
 
 def load(clip: str | Path | Mapping[str, Any], *, pixels_per_metre: float | None = None) -> Clip:
@@ -53,8 +56,15 @@ ClipLike = Clip | str | Path | Mapping[str, Any]
 def as_clip(clip: ClipLike, pixels_per_metre: float | None = None) -> Clip:
     """A clip that is loaded already, or loads it."""
     if isinstance(clip, Clip):
-        changed = {} if pixels_per_metre is None else {"pixels_per_metre": pixels_per_metre}
-        return clip.model_copy(update=changed)
+        if pixels_per_metre is None:
+            return clip
+        try:
+            return Clip.model_validate({**dict(clip), "pixels_per_metre": pixels_per_metre})
+        except ValidationError as error:
+            reason = error.errors()[0]["msg"]
+            raise InputError(
+                f"{clip.path}: pixels_per_metre (given in the call): {reason}"
+            ) from None
     return load(clip, pixels_per_metre=pixels_per_metre)
 
 

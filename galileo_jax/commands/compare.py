@@ -35,7 +35,7 @@ def main(argv: Sequence[str]) -> int | None:
             effects_from=call.effects_from,
             engine=call.engine,
             seed=call.seed,
-            pixels_per_metre=call.pixels_per_metre if runs else None,
+            pixels_per_metre=call.pixels_per_metre,
             on_progress=display,
         )
         display("writing the page", 1.0)

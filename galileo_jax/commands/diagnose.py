@@ -30,6 +30,7 @@ def main(argv: Sequence[str]) -> int | None:
             effects_from=call.effects_from,
             engine=call.engine,
             seed=call.seed,
+            pixels_per_metre=call.pixels_per_metre,
             on_progress=_RoundPrinter(display),
         )
         print("\n".join(_lines(found, hidden)))

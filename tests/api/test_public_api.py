@@ -226,3 +226,12 @@ def test_a_clip_built_in_python_and_a_saved_track(video, folder, monkeypatch):
     )
     assert len(track.to_dataframe()) == 2 * track.clip.frame_count
     assert "air_drag" in gx.effects().index and "ramp" in gx.scenarios().index
+
+
+def test_a_scale_given_for_a_loaded_clip_is_checked_and_repeated(video):
+    """It stands in the command on the page, and a wrong one is refused."""
+    clip = gx.load(video)
+    with pytest.raises(gx.InputError, match="pixels_per_metre"):
+        gx.track(clip, pixels_per_metre=-3.0)
+    scale = clip.pixels_per_metre
+    assert f"--pixels-per-metre {scale}" in gx.compare(clip, pixels_per_metre=scale).command
