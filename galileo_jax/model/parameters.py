@@ -140,6 +140,11 @@ class Parameter:
     per_clip: bool = False
     multiplies: str | None = None
 
+    @property
+    def is_positive(self) -> bool:
+        """Whether it cannot be negative and is of no known size: 0 is at the end of its prior."""
+        return isinstance(self.prior, HalfNormal | LogNormal) and self.absent == 0.0
+
 
 def joined(one: Parameter, other: Parameter) -> Parameter:
     """`one`, with room for what `other` allows: two scenes may show different parts of a way."""
