@@ -47,6 +47,7 @@ def fit_of(trials: JointProblem, effects: tuple[str, ...]) -> GradientFit:
         code=Code.CONVERGED,
         stats={},
         pull=1.0,
+        num_pulled=0.5,
     )
 
 
@@ -67,7 +68,7 @@ def comparison_of(trials: JointProblem, p_value: float) -> Comparison:
         Pull("release_instant", -0.05, "s", -4.9),
         Pull("foot_transition", 1.01, "1", 0.2),
     )
-    return Comparison(p_value, places, pulls, ERROR, (label,), (white,))
+    return Comparison(p_value, places, pulls, ERROR, (label,), (white,), (1.0,), False)
 
 
 def candidate_of(trials: JointProblem, name: str, probability: float, rivals: tuple[str, ...] = ()):

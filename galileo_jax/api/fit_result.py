@@ -15,7 +15,7 @@ from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.parameters import inverse
-from galileo_jax.results.run import CHECKPOINT, POSTERIOR, RESULT, Run, save_run
+from galileo_jax.results.run import BEST, CHECKPOINT, POSTERIOR, RESULT, Run, save_run
 from galileo_jax.results.stale_outputs import remove_single_clip_run, remove_stale_prediction
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
     from arviz import InferenceData
-
-BEST = "z_best"  # in the posterior's provenance
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,11 +161,13 @@ class Fit:
         """One clip of a joint fit, with the joint posterior of its parameters."""
         one, alone = self.measurements[index], self.problem.alone(index)
         columns = self.problem.columns_of(index)
+        z = self._z()[columns]
         own = self.posterior.chosen(columns, alone.names)
+        own = replace(own, provenance={**own.provenance, BEST: [float(value) for value in z]})
         result = make_result(
             alone,
             own,
-            self._z()[columns],
+            z,
             clips=[one.clip.source],
             method=str(self.result["method"]),
             seed=int(self.result["seed"]),

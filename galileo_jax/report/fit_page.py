@@ -170,8 +170,8 @@ def _undetermined(run: Run, fitted: PosteriorPredictive) -> str:
 
 def _failure(fitted: PosteriorPredictive) -> str:
     text = (
-        "Residuals: measured minus fitted, in units of the noise. If the model is right they show "
-        "no pattern, and 95 % of them are inside the grey band. "
+        "Residuals: measured minus fitted, in units of the stated noise. If the model and that "
+        "are right they show no pattern, and 95 % of them are inside the grey band. "
     )
     found = failing_interval_of(fitted)
     if found is None:

@@ -37,7 +37,8 @@ class GradientFit:
         values as in `Problem.whiten`; 0 where pinned.
       code: how it ended.
       stats: rollouts and steps it took.
-      pull: how far the nuisances are from what is expected: the sum of their squared `prior_deviations`.
+      pull: how far the nuisances are from what is expected: the sum of the squares of their
+        `prior_deviations`.
       num_pulled: how many numbers' worth of the data the nuisances were fitted with.
     """
 
