@@ -24,8 +24,8 @@ NUM_CELLS = 12
 FAILURES = (
     "Position and speed along the path, 0 at the foot: measured (dots) and fitted (line). Below, "
     "the residuals in units of the stated noise: filled along the path, hollow across it; 95 % of "
-    "noise is inside the grey band. Grey: transitions between phases. Yellow: the interval in which the "
-    "model fails worst."
+    "noise is inside the grey band. Grey: transitions between phases. Yellow: the interval in "
+    "which the model fails worst."
 )
 
 
