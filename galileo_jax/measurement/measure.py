@@ -13,6 +13,7 @@ from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
+from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.measurement.truncate_at_stop import truncate_at_stop
 from galileo_jax.observation.observation import Observation
@@ -106,7 +107,7 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         assert clip.track is not None  # load_clip requires one of the two
         return read_track(clip.path, clip.track, clip, clip.fps).observation, None
     pixels = track_once(clip)
-    return observe(clip, pixels), pixels
+    return with_noise_at_rest(observe(clip, pixels)), pixels
 
 
 def _with_foot(clip: Clip, remarks: list[str]) -> Clip:

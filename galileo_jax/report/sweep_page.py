@@ -96,7 +96,7 @@ def _errors(
     category: Callable[[Row], str | None],
     label: Callable[[Row], str],
 ) -> list[str]:
-    """Box plots of the errors of each quantity; of chi2 per degree of freedom where none is known."""
+    """Box plots of each quantity's errors; of chi2 per degree of freedom where none is known."""
     charts = []
     for name, symbol in QUANTITIES.items():
         known = [row for row in rows if _has_error(row, name)]
