@@ -78,6 +78,7 @@ def candidate_of(trials: JointProblem, name: str, probability: float, rivals: tu
         error=ERROR | {"chi2_per_dof": 1.0},
         score_z=5.0,
         log_evidence=np.log(probability) + 40.0,
+        log_prior=-2.8,
         probability=probability,
         p_value=0.4 if probability > 0.01 else None,
         confounded_with=rivals,
