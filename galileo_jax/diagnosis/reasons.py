@@ -152,15 +152,11 @@ def only_a_form(form: Candidate, name: Candidate | None) -> Reason:
 def contested(best: Candidate, rival: Candidate, needed: float) -> Reason:
     """A rival explains the data about as well."""
     behind = best.log_odds - rival.log_odds
-    said = (
-        f"only {times_text(behind)} less probable than"
-        if behind > 0
-        else f"{times_text(-behind)} as probable as"
-    )
+    first, second = (best, rival) if behind >= 0 else (rival, best)
     return Reason(
         "contested",
-        f"{rival.name} explains the data, too, and is {said} {best.name} "
-        f"({times_text(needed)} would decide).",
+        f"{rival.name} explains the data, too: {first.name} is {times_text(abs(behind))} as "
+        f"probable as {second.name}, and only {times_text(needed)} would decide.",
         {
             "hypothesis": best.name,
             "rival": rival.name,
