@@ -52,7 +52,6 @@ from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
-from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.samplers import dispersed_starts, sample
 from galileo_jax.inference.samplers.driver import Settings
 from galileo_jax.inference.samplers.library.random_walk import RandomWalk
@@ -313,7 +312,7 @@ def fit_mh_fixed(track: Track, same: Same, seed: int) -> Answer:
         settings=Settings(warmup_steps=0, max_steps=1000, stops_early=False),
     )
     seconds += time.perf_counter() - began
-    theta = add_model_error(trials.theta(posterior.draws), trials.names, seed)
+    theta = trials.theta(posterior.draws)
     rollouts = fit.stats["num_rollouts"] + posterior.stats["num_evaluations"]
     return Answer(quantities(trials, theta), seconds, rollouts, posterior.is_converged)
 
@@ -330,8 +329,7 @@ def fit_smc(track: Track, same: Same, seed: int) -> Answer:
     began = time.perf_counter()
     population = temper(jax.random.key(seed), likelihood_of(trials), len(trials.names))
     seconds = time.perf_counter() - began
-    theta = add_model_error(trials.theta(population.z), trials.names, seed)
-    draws = quantities(trials, theta[None])
+    draws = quantities(trials, trials.theta(population.z)[None])
     return Answer(draws, seconds, population.num_evaluations, True)
 
 

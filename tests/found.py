@@ -69,7 +69,7 @@ def comparison_of(trials: JointProblem, p_value: float) -> Comparison:
         Pull("release_instant", -0.05, "s", -4.9),
         Pull("foot_transition", 1.01, "1", 0.2),
     )
-    return Comparison(p_value, places, pulls, ERROR, (label,), (white,))
+    return Comparison(p_value, places, pulls, ERROR, (label,), (white,), (1.0,), False)
 
 
 def candidate_of(trials: JointProblem, name: str, probability: float, rivals: tuple[str, ...] = ()):
@@ -111,7 +111,7 @@ def diagnosis_of(trials: JointProblem, status: str) -> Diagnosis:
             status,  # pyright: ignore
             effects,
             advice=("film <it> again",) if effects else (),
-            reasons=(reasons.without_an_effect(first.comparison.p_value),),
+            reasons=reasons.without_effects(first.comparison),
         ),
         missing=_missing() if status == "unknown" else None,
     )

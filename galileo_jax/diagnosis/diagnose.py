@@ -96,7 +96,7 @@ def diagnose(
         rounds.append(Round(chosen.hypothesis, compare(trials, chosen.hypothesis.fit, seed)))
         on_round(rounds[-1])
     is_adequate = first.comparison.is_adequate
-    why = (reasons.without_an_effect(first.comparison.p_value),)
+    why = reasons.without_effects(first.comparison)
     if is_nothing_missing(is_adequate, candidates):
         why = (*why, reasons.nothing_convinces(best_named(candidates), CONVINCING))
         return Diagnosis(tuple(rounds), candidates, Verdict("none", (), reasons=why))
@@ -172,7 +172,7 @@ def _candidates(
             Candidate(
                 effects=hypothesis.effects,
                 hypothesis=hypothesis,
-                error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_used, fit.pull),
+                error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
                 score_z=float(score),
                 log_evidence=fit.log_evidence - base.fit.log_evidence,
                 log_prior=log_prior(_odds(trials, hypothesis), len(library)),

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import exp, log
 
-from galileo_jax.comparison.compare import ADEQUATE_P
+from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
@@ -29,25 +29,39 @@ def times_text(nats: float) -> str:
     return f"10^{nats / log(10):.0f} times"
 
 
-def without_an_effect(p_value: float) -> Reason:
-    """Whether the data contradict the model without effects."""
-    is_adequate = p_value >= ADEQUATE_P
+def without_effects(comparison: Comparison) -> tuple[Reason, ...]:
+    """Whether the data contradict the model without effects, and whether the stated noise.
+
+    Args:
+      comparison: of the model without effects; its p-value is that with noise of the size that
+        is there.
+    """
+    p_value, is_adequate = comparison.p_value, comparison.is_adequate
     said = "do not contradict" if is_adequate else "contradict"
-    return Reason(
+    found = Reason(
         "adequate_without_effects" if is_adequate else "contradicted_without_effects",
         f"The data {said} the model without effects: {p_equals(p_value)}, "
         f"and {ADEQUATE_P:g} is needed.",
         {"p_value": p_value, "least_p_value": ADEQUATE_P},
     )
+    if not comparison.is_noise_misstated:
+        return (found,)
+    return noise_misstated(comparison.noise_scale), found
 
 
-def noise_misstated(noise_scale: float) -> Reason:
-    """The errors are not as large as was stated."""
+def noise_misstated(noise_scale: Sequence[float]) -> Reason:
+    """The errors look like noise, but not of the size that was stated.
+
+    Args:
+      noise_scale: of each clip, the errors' size over what is stated.
+    """
+    low, high = min(noise_scale), max(noise_scale)
+    times = f"{high:.2g}" if f"{low:.2g}" == f"{high:.2g}" else f"{low:.2g} to {high:.2g}"
     return Reason(
         "noise_misstated",
-        f"The errors of the positions are {noise_scale:.2g} times what was stated, and otherwise "
+        f"The errors of the positions are {times} times as large as was stated, and otherwise "
         "look like noise.",
-        {"noise_scale": noise_scale},
+        {"noise_scale_least": low, "noise_scale_largest": high},
     )
 
 

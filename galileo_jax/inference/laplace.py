@@ -4,7 +4,6 @@ import numpy as np
 
 from galileo_jax.inference.fits.gradient import Code, GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior, Status
 
 NUM_DRAWS = 4000
@@ -23,7 +22,7 @@ def laplace_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Post
     z[:, fit.free] += normal @ root.T
     return Posterior(
         names=trials.names,
-        draws=add_model_error(trials.theta(z, fit.free), trials.names, seed)[None],
+        draws=trials.theta(z, fit.free)[None],
         log_density=-0.5 * np.sum(normal**2, axis=1)[None],
         status=Status.CONVERGED if fit.code is Code.CONVERGED else Status.STEP_LIMIT,
         stats=fit.stats,

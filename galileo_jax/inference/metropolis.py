@@ -15,7 +15,6 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.valley import along, scattered, valley_round
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.model_error import add_model_error
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import IDENTIFIED_SD_Z
 from galileo_jax.inference.samplers import sample, sampler_class
@@ -96,6 +95,4 @@ def metropolis_posterior(
     )
     count = posterior.stats["num_evaluations"] + residuals.num_rollouts
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
-    return posterior.mapped(
-        lambda u: add_model_error(trials.theta(valley(u)), trials.names, seed), trials.names
-    )
+    return posterior.mapped(lambda u: trials.theta(valley(u)), trials.names)

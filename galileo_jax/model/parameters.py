@@ -140,6 +140,11 @@ class Parameter:
     per_clip: bool = False
     multiplies: str | None = None
 
+    @property
+    def is_positive(self) -> bool:
+        """Whether it cannot be negative and is of no known size: 0 is at the end of its prior."""
+        return isinstance(self.prior, HalfNormal | LogNormal) and self.absent == 0.0
+
 
 def joined(one: Parameter, other: Parameter) -> Parameter:
     """`one`, with room for what `other` allows: two scenes may show different parts of a way."""
@@ -193,3 +198,19 @@ def inverse(parameters: Sequence[Parameter], theta: jax.Array) -> jax.Array:
 def absent(parameters: Sequence[Parameter]) -> np.ndarray:
     """The vector `[parameter]` at which nothing but the scene is there."""
     return np.array([p.absent for p in parameters])
+
+
+def prior_deviations(parameters: Sequence[Parameter], z: np.ndarray) -> np.ndarray:
+    """How many prior standard deviations nuisances are from what is expected of them.
+
+    Args:
+      parameters: in the order of `z`.
+      z: `[parameter]`.
+
+    Returns:
+      `[parameter]`; 0 of all that are no nuisances, and of one that is most likely 0 and smaller
+      than its prior's median.
+    """
+    is_nuisance = np.array([p.role == "nuisance" for p in parameters])
+    is_one_sided = np.array([isinstance(p.prior, HalfNormal) for p in parameters])
+    return np.where(is_nuisance, np.where(is_one_sided, np.maximum(z, 0.0), z), 0.0)

@@ -10,10 +10,10 @@ Positions stand along one dimension `measurement`, as gaps (NaN) are allowed nei
 by `az.plot_ppc`; its coordinates `clip`, `object`, `axis`, `frame` and `time_s` say what is what.
 
 Leave-one-out weighs draws by 1 / p(y_i | y_-i), so that a few draws far out would decide. Those of
-`--method grad` come from a normal approximation, and all contain the simulator's own errors
-(`inference/model_error.py`). So for `log_likelihood` they are drawn again, with the weights
-posterior density over the density that they were drawn from, smoothed (PSIS). The attribute
-`importance_pareto_k` says whether that was possible: above 0.7 `az.loo` is not to be trusted.
+`--method grad` come from a normal approximation. So for `log_likelihood` draws are drawn again,
+with the weights posterior density over the density that they were drawn from, smoothed (PSIS). The
+attribute `importance_pareto_k` says whether that was possible: above 0.7 `az.loo` is not to be
+trusted.
 
 Source: Vehtari, Simpson, Gelman, Yao and Gabry (2024), Pareto smoothed importance sampling, Journal
 of Machine Learning Research 25(72); Magnusson, Andersen, Jonasson and Vehtari (2019), Bayesian

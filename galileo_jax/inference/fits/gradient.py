@@ -16,7 +16,6 @@ docs/explanation/optimiser.md.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
@@ -28,7 +27,6 @@ from galileo_jax.inference.fits.polish import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.fits.starts import scattered_starts
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.model.parameters import inverse
 
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
@@ -73,8 +71,7 @@ class GradientFitter:
         self._settled = settings.settled if is_smooth else settings.settled_if_rough
         parameters = trials.model_parameters
         is_nuisance = np.array([p.role == "nuisance" for p in parameters])
-        zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
-        self._is_positive_nuisance = is_nuisance & ~np.isfinite(zero)
+        self._is_positive_nuisance = is_nuisance & [p.is_positive for p in parameters]
 
     def compile(self) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes."""

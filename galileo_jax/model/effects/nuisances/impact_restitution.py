@@ -3,11 +3,11 @@
 from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.parameters import HalfNormal, Parameter
 
-# Most plastic impacts return about a hundredth; Bullet's boxes, told to be plastic, up to 0.05.
-# More than a tenth is an effect with a name, restitution.
-PRIOR = LogNormal(median=0.01, sd=0.8)
+# Some impacts are plastic to the last digit, most return about a hundredth; Bullet's boxes, told
+# to be plastic, up to 0.05. More than a tenth is an effect with a name, restitution.
+PRIOR = HalfNormal(0.04)
 
 
 class ImpactRestitution(Effect):

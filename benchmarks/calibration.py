@@ -1,0 +1,207 @@
+"""Do intervals hold, and for which truths? `python benchmarks/calibration.py --sort bullet`.
+
+Random ramp experiments (10 to 30 degrees; boxes, masses, frictions and distances as `simulate`
+draws them), moved by one of four engines, seen by a tracker of 0.05 px at 900 px/m and 30 or 60
+frames a second, and fitted from there as `galileo fit` does.
+
+    exact    the rigid engine: the model itself, its nuisances at their centres
+    fine     `simulate --solver fine --faults`: another solver, a foot and a hit that are not ideal
+    mujoco   the scene in MuJoCo (`--engine c`), whose contacts are soft
+    bullet   boxes in PyBullet, as in the thesis (optional: `pip install -e '.[bullet]'`)
+
+Bars, per quantity: rms of error / sd in 0.85 to 1.15, 92 to 98 % of truths in the 95 % interval.
+`bent` is the share of tracks with a nuisance two or more of its prior's sd away from the middle.
+The last line is JSON.
+"""
+
+import argparse
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tables
+
+from galileo_jax.api.compare import compare
+from galileo_jax.api.fit import fit
+from galileo_jax.api.fit_result import Fit
+from galileo_jax.api.track import Track
+from galileo_jax.clip.schema import Clip
+from galileo_jax.commands import command
+from galileo_jax.measurement.measure import Measurement
+from galileo_jax.model.model import Model
+from galileo_jax.model.scene.scene import compile_scene
+from galileo_jax.observation.observation import Observation
+from galileo_jax.rollout.engines import make_engine
+from galileo_jax.simulation import Truth, draw_truth, roll_out
+from galileo_jax.simulation.series import draw_series
+
+ANGLES_DEG = (10.0, 30.0)
+NOISE_M = 0.05 / 900
+FRAME_RATES = (30.0, 60.0)
+LONGEST_S, AFTER_REST_S = 3.0, 0.1
+RMS, INSIDE = (0.85, 1.15), (0.92, 0.98)
+QUANTITIES = ("k1", "k2", "log ratio")
+BULLET_STEP_S = 1 / 240
+NUM, NUM_QUICK = 200, 24
+UNLIKELY = 0.01  # a p below it is an alarm
+
+Path2 = Callable[[np.ndarray], np.ndarray]
+
+
+def main(argv: Sequence[str]) -> int | None:
+    call = _parser().parse_args(argv)
+    num = call.num or (NUM_QUICK if call.quick else NUM)
+    tables.row("track", ("k1 z", "k2 z", "ratio z", "chi2/dof", "p"))
+    rows: list[dict[str, Any]] = []
+    for seed in range(call.seed, call.seed + num):
+        truth, track = make_track(call.sort, seed)
+        found = fit(track, method=call.method, seed=seed)
+        row = scored(found, truth)
+        row["p"] = compare(found).p_value if call.compare else math.nan
+        rows.append(row)
+        z = [row[name]["z"] for name in QUANTITIES]
+        tables.row(str(seed), [*z, row["chi2"], row["p"] if call.compare else None])
+    print()
+    tables.row(f"{num} tracks, {call.sort}", ("median err", "median sd", "rms", "mean z", "in 95%"))
+    figures, missed = {}, []
+    for name in QUANTITIES:
+        figures[name] = summary([row[name] for row in rows])
+        tables.row(name, list(figures[name].values()))
+        for what, (low, high) in (("rms", RMS), ("in_95", INSIDE)):
+            if not low <= figures[name][what] <= high:
+                missed.append(f"{name} {what} {figures[name][what]:.3g} not in {low} to {high}")
+    figures["chi2"] = float(np.median([row["chi2"] for row in rows]))
+    figures["alarms"] = float(np.mean([row["p"] < UNLIKELY for row in rows]))
+    print(f"chi2/dof, median: {figures['chi2']:.3g}")
+    if call.compare:
+        print(f"p < {UNLIKELY}: {figures['alarms']:.1%}")
+    print("bars missed: " + ("; ".join(missed) or "none"))
+    options = {"sort": call.sort, "method": call.method, "num": num, "seed": call.seed}
+    tables.finish("calibration", options | figures | {"bars_missed": missed})
+    return None
+
+
+def make_track(sort: str, seed: int) -> tuple[Truth, Track]:
+    """One experiment and what a tracker sees of it."""
+    rng = np.random.default_rng([seed, 91])
+    angle = float(rng.uniform(*ANGLES_DEG))
+    fps = float(rng.choice(FRAME_RATES))
+    if sort == "fine":
+        secrets = np.random.default_rng([seed, 92])
+        ((truth, moved),) = draw_series(
+            angle, {}, (), 1, solver="fine", things=rng, secrets=secrets, frame_s=1 / fps
+        )
+        rest_s = moved.rest_s
+    else:
+        truth = draw_truth(rng, angle, {})
+        moved = roll_out(truth)
+        rest_s = moved.rest_s
+    times = np.arange(1 + math.ceil(min(rest_s + AFTER_REST_S, LONGEST_S) * fps)) / fps
+    if sort in ("exact", "fine"):
+        released = truth.effect_values.get("release_instant", 0.0)
+        centres = moved.at(np.maximum(times - released, 0.0)).position_m
+    else:
+        centres = {"mujoco": in_mujoco, "bullet": in_bullet}[sort](truth, times)
+    return truth, seen(truth, centres + NOISE_M * rng.standard_normal(centres.shape), fps, seed)
+
+
+def seen(truth: Truth, position_m: np.ndarray, fps: float, seed: int) -> Track:
+    """Positions `[object, 2, frame]`, m, as a track of a clip that declares the truth's scene."""
+    count, _, frames = position_m.shape
+    covariance = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, ..., None], (count, 2, 2, frames))
+    observation = Observation(
+        names=tuple(each.name for each in truth.objects),
+        times_s=np.arange(frames) / fps,
+        position_m=position_m,
+        covariance_m2=covariance.copy(),
+        mask=np.ones((count, frames), bool),
+    )
+    clip = Clip(
+        path=Path(f"made_{seed}.yaml"),
+        track=Path(f"made_{seed}.csv"),
+        scenario="ramp",
+        fps=fps,
+        ramp_angle_deg=truth.ramp_angle_deg,
+        objects=truth.objects,
+        frame_count=frames,
+    )
+    return Track(clip, None, Measurement(clip, observation, observation))
+
+
+def in_mujoco(truth: Truth, times_s: np.ndarray) -> np.ndarray:
+    """The centres in MuJoCo's C engine, `[object, 2, frame]`, m."""
+    shapes = [each.shape for each in truth.objects]
+    scene = compile_scene(truth.surroundings, shapes, truth.objects)
+    model = Model(scene, float(times_s[-1]), (), nuisances=())
+    theta = np.array([[truth.theta[name] for name in model.names]])
+    position = make_engine("c", model).simulate(theta)[0][0]
+    return between(position, model.record_dt_s, times_s)
+
+
+def in_bullet(truth: Truth, times_s: np.ndarray) -> np.ndarray:
+    """The centres of boxes in PyBullet, `[object, 2, frame]`, m."""
+    import bullet_scene
+    import pybullet  # pyright: ignore
+
+    client = pybullet.connect(pybullet.DIRECT)
+    steps = math.ceil(times_s[-1] / BULLET_STEP_S)
+    path = bullet_scene.roll_out(truth, steps, client)
+    pybullet.disconnect(client)
+    return between(np.moveaxis(path, 0, -1), BULLET_STEP_S, times_s)
+
+
+def between(position_m: np.ndarray, step_s: float, times_s: np.ndarray) -> np.ndarray:
+    """Positions `[object, 2, step]` at other times, linear in between."""
+    known_s = step_s * np.arange(position_m.shape[-1])
+    rows = position_m.reshape(-1, len(known_s))
+    found = [np.interp(times_s, known_s, row) for row in rows]
+    return np.reshape(found, (*position_m.shape[:-1], len(times_s)))
+
+
+def scored(found: Fit, truth: Truth) -> dict[str, Any]:
+    """Each quantity's error, sd, z and whether its 95 % interval holds the truth."""
+    draws = found.posterior
+    (m1, m2), (k1, k2) = truth.mass_kg, truth.friction
+    pairs = (
+        ("k1", draws["k1"], k1),
+        ("k2", draws["k2"], k2),
+        ("log ratio", np.log(draws["m1"] / draws["m2"]), math.log(m1 / m2)),
+    )
+    row: dict[str, Any] = {"chi2": found.result["error"]["chi2_per_dof"]}
+    for name, values, true in pairs:
+        low, high = np.quantile(values, (0.025, 0.975))
+        error, sd = float(values.mean() - true), float(values.std())
+        inside = bool(low <= true <= high)
+        row[name] = {"error": error, "sd": sd, "z": error / sd, "inside": inside}
+    row["nuisances"] = {name: entry["mean"] for name, entry in found.result["nuisances"].items()}
+    return row
+
+
+def summary(entries: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """Of one quantity over all tracks."""
+    z = np.array([entry["z"] for entry in entries])
+    return {
+        "median": float(np.median([abs(entry["error"]) for entry in entries])),
+        "median_sd": float(np.median([entry["sd"] for entry in entries])),
+        "rms": float(np.sqrt(np.mean(z**2))),
+        "mean_z": float(z.mean()),
+        "in_95": float(np.mean([entry["inside"] for entry in entries])),
+    }
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="calibration.py", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--sort", choices=("exact", "fine", "mujoco", "bullet"), default="exact")
+    parser.add_argument("--method", choices=("grad", "mh", "cnn"), default="grad")
+    parser.add_argument("--num", type=command.whole_number(1), help=f"tracks (default {NUM})")
+    parser.add_argument("--quick", action="store_true", help=f"{NUM_QUICK} tracks")
+    parser.add_argument("--seed", type=command.whole_number(0), default=0, help="of the first")
+    parser.add_argument("--compare", action="store_true", help="p of each, too (takes longer)")
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(command.run(main))
