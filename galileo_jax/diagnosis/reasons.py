@@ -5,6 +5,7 @@ from math import exp, log
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason
+from galileo_jax.inference.result import NOISE_SCALE_RANGE
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
 PLAIN_ODDS = 1000.0  # larger odds are told as a power of ten
@@ -30,7 +31,7 @@ def times_text(nats: float) -> str:
 
 
 def without_effects(comparison: Comparison) -> tuple[Reason, ...]:
-    """Whether the data contradict the model without effects, and whether the stated noise.
+    """Whether the data contradict the model without effects, and if not, the size of the noise.
 
     Args:
       comparison: of the model without effects; its p-value is that with noise of the size that
@@ -44,9 +45,9 @@ def without_effects(comparison: Comparison) -> tuple[Reason, ...]:
         f"and {ADEQUATE_P:g} is needed.",
         {"p_value": p_value, "least_p_value": ADEQUATE_P},
     )
-    if not comparison.is_noise_misstated:
-        return (found,)
-    return noise_misstated(comparison.noise_scale), found
+    scales, (low, high) = comparison.noise_scale, NOISE_SCALE_RANGE
+    is_misstated = is_adequate and not low <= min(scales) <= max(scales) <= high
+    return (noise_misstated(scales), found) if is_misstated else (found,)
 
 
 def noise_misstated(noise_scale: Sequence[float]) -> Reason:
@@ -59,8 +60,7 @@ def noise_misstated(noise_scale: Sequence[float]) -> Reason:
     times = f"{high:.2g}" if f"{low:.2g}" == f"{high:.2g}" else f"{low:.2g} to {high:.2g}"
     return Reason(
         "noise_misstated",
-        f"The errors of the positions are {times} times as large as was stated, and otherwise "
-        "look like noise.",
+        f"The errors of the positions look like noise {times} times as large as was stated.",
         {"noise_scale_least": low, "noise_scale_largest": high},
     )
 

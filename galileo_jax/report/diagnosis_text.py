@@ -6,7 +6,7 @@ from typing import Any
 
 from galileo_jax.comparison.compare import Comparison, Pull
 from galileo_jax.diagnosis.diagnosis import Diagnosis
-from galileo_jax.diagnosis.reasons import noise_misstated, p_equals
+from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fit_text import number
@@ -48,9 +48,9 @@ def verdict(diagnosis: Diagnosis) -> str:
     """Which effect the model lacks, in one sentence."""
     found, first = diagnosis.verdict, diagnosis.base
     if found.status == "none":
-        noise = noise_misstated(first.noise_scale).sentence
-        begin = noise if first.is_noise_misstated else "The model is adequate."
-        return f"{begin} No effect is missing ({p_equals(first.p_value)})."
+        noise = [why.sentence for why in found.reasons if why.rule == "noise_misstated"]
+        adequate = f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."
+        return " ".join([adequate, *noise])
     if found.status == "named":
         names = " and ".join(found.effects)
         verb = "explains" if len(found.effects) == 1 else "together explain"

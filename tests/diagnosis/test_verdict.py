@@ -54,6 +54,7 @@ def candidate(
         code=Code.CONVERGED,
         stats={},
         pull=0.0,
+        num_pulled=0.0,
     )
     hypothesis = Hypothesis(effects, fit)
     evidence = fit.log_evidence
