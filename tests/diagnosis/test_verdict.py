@@ -406,6 +406,6 @@ def test_a_pair_that_is_named_is_added_whole():
 
 
 def test_of_the_unknown_the_best_name_is_shown_if_it_helps():
-    form, helps = candidate(FORM, 60.0), candidate("air_drag", 10.0 + EDGE, log_prior=0.0)
+    form, helps = candidate(FORM, 60.0), candidate("air_drag", 8.0 + EDGE, log_prior=-2.0)
     assert to_add(Verdict("unknown", (), FORM), (form, helps)) is helps
     assert to_add(Verdict("unknown", ()), (form, replace(helps, log_evidence=10.0))) is None
