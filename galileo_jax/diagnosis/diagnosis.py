@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import softmax
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.candidates import Hypothesis
@@ -155,4 +155,4 @@ class Diagnosis:
     @property
     def probability_none(self) -> float:
         """That no effect is missing; with those of the candidates it sums to 1."""
-        return float(np.exp(-logsumexp([0.0, *(c.log_odds for c in self.candidates)])))
+        return float(softmax([0.0, *(c.log_odds for c in self.candidates)])[0])

@@ -23,7 +23,8 @@ def pairs_to_try(
     """
     promise = np.array([c.log_evidence for c in singles])[:, None] + gains
     found: dict[frozenset[str], tuple[int, tuple[str, str]]] = {}
-    for i, j in zip(*np.unravel_index(np.argsort(-promise, axis=None), promise.shape), strict=True):
+    for at in np.argsort(-promise, axis=None):
+        i, j = divmod(int(at), len(library))
         (first,), second = singles[i].effects, library[j]
         if first != second and len(found) < NUM_PAIRS:
             found.setdefault(frozenset((first, second)), (i, (first, second)))
