@@ -23,8 +23,10 @@ EXOTICS = (
     "exotic_bump",
     "exotic_drying",
     "exotic_dying_wind",
+    "exotic_growing_force",
     "exotic_gust",
     "exotic_heating",
+    "exotic_magnet",
     "exotic_ripple",
     "exotic_root_drag",
 )

@@ -6,24 +6,13 @@ from typing import Any
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.diagnosis import Diagnosis
+from galileo_jax.diagnosis.reasons import p_equals
+from galileo_jax.diagnosis.reasons import p_text as p_text
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.inference.result import NOISE_SCALE_RANGE
 from galileo_jax.report.fit_text import number
 
-SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
 NO_EFFECTS = "no effects"
-
-
-def p_text(p: float | None) -> str:
-    """A p-value without places that mean nothing."""
-    if p is None:
-        return ""
-    return f"< {SMALLEST_P:.0e}" if p < SMALLEST_P else f"{p:.2g}"
-
-
-def p_equals(p: float) -> str:
-    """The same with its name."""
-    return f"p {p_text(p)}" if p < SMALLEST_P else f"p = {p_text(p)}"
 
 
 def effects_text(effects: Sequence[str]) -> str:
@@ -61,7 +50,9 @@ def verdict(diagnosis: Diagnosis) -> str:
     """Which effect the model lacks, in one sentence."""
     found, first = diagnosis.verdict, diagnosis.base
     if found.status == "none":
-        return f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."
+        noise = [why.sentence for why in found.reasons if why.rule == "noise_misstated"]
+        adequate = f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."
+        return " ".join([adequate, *noise])
     if found.status == "named":
         names = " and ".join(found.effects)
         verb = "explains" if len(found.effects) == 1 else "together explain"
