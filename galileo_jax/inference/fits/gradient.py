@@ -14,10 +14,11 @@ docs/explanation/optimiser.md.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
+from scipy.stats import chi2
 
 from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
 from galileo_jax.inference.fits.evidence import Code as Code
@@ -26,12 +27,26 @@ from galileo_jax.inference.fits.evidence import laplace_fits
 from galileo_jax.inference.fits.polish import BEHIND as BEHIND
 from galileo_jax.inference.fits.polish import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
-from galileo_jax.inference.fits.starts import scattered_starts
+from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
+from galileo_jax.inference.fits.stages import before_moving
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
+
+CHANCE, SECOND_STARTS, SECOND_REFINED, TRIED, UNKNOWN_SD = 1e-3, 128, 16, 4, 0.5
+
+
+def _apart(ends, num):
+    """Those of different cost, best first."""
+    order = np.argsort(ends.cost)
+    kept = []
+    for i in order:
+        if all(ends.cost[i] - ends.cost[j] > 0.5 for j in kept) and ends.cost[i] < ends.cost[order[0]] + BEHIND_IN_SEARCH:
+            kept.append(i)
+    return np.array(kept[:num])
 
 
 @dataclass(frozen=True)
@@ -100,11 +115,56 @@ class GradientFitter:
         free = self.trials.free(effects)[: self._count]
         on_stage("searching")
         scattered = scattered_starts(self.trials, free, self.settings.num_starts, seed)
-        starts = self._batch(scattered, free)
-        best = np.argsort(self._residuals.costs(starts))[: self.settings.num_refined]
-        found = self._search(starts.take(best), np.arange(len(best)))
+        fit = self._best_of(scattered, free, self.settings.num_refined, on_stage)
+        if self._is_explained(fit):
+            return fit
+        on_stage("searching on")
+        starts = np.concatenate([
+            self._by_stages(free, seed),
+            scattered_starts(self.trials, free, SECOND_STARTS, seed + 1),
+        ])
+        other = self._best_of(starts, free, SECOND_REFINED, on_stage)
+        fit = max(fit, other, key=lambda one: one.log_evidence)
+        if not self._is_explained(fit) and fit.code is Code.CONVERGED:
+            fit = replace(fit, code=Code.MISFIT)
+        return fit
+
+    def _best_of(self, starts, free, num, on_stage) -> GradientFit:
+        """From the best starts."""
+        points = self._batch(starts, free)
+        best = np.argsort(self._residuals.costs(points))[:num]
+        found = self._search(points.take(best), np.zeros(len(best), int))
         on_stage("refining")
-        return self._best_variant(found.best.z[np.argmin(found.best.cost)], free, found.num_steps)
+        ends = _apart(found.best, TRIED)
+        fits = self._polish(self._batch(found.best.z[ends], free), found.num_steps)
+        fit = max(fits, key=lambda one: one.log_evidence)
+        return self._best_variant(fit.z[:self._count], free, found.num_steps)
+
+    def _is_explained(self, fit: GradientFit) -> bool:
+        degrees = sum(float(GaussianLikelihood.degrees(1.0, c.data.whitening)) for c in self._residuals.clips)
+        return bool(chi2.sf(fit.chi2, max(degrees - fit.num_used, 1.0)) > CHANCE)
+
+    def _by_stages(self, free, seed):
+        centres, unknown = absent_z(self.trials)[None], None
+        is_main = free & np.array([p.role != "nuisance" for p in self.trials.model_parameters])
+        unknown = is_main[None]
+        for index in range(1, max(len(p.observation.names) for p in self.trials.problems)):
+            short = before_moving(self.trials, index)
+            if short is None:
+                continue
+            fitter = GradientFitter(short, self.settings)
+            points = fitter._batch(
+                scattered_round(self.trials, centres, unknown, self.settings.num_starts, seed), free)
+            best = np.argsort(fitter._residuals.costs(points))[:self.settings.num_refined]
+            found = fitter._search(points.take(best), np.zeros(len(best), int))
+            self._residuals.num_rollouts += fitter._residuals.num_rollouts
+            ends = _apart(found.best, TRIED)
+            centres = found.best.z[ends]
+            variance = np.diagonal(np.linalg.inv(found.best.normal[ends]), axis1=1, axis2=2)
+            unknown = is_main & (variance > UNKNOWN_SD ** 2)
+        if not unknown.any():
+            return centres
+        return scattered_round(self.trials, centres, unknown, SECOND_STARTS, seed)
 
     def refit(self, fit: GradientFit) -> GradientFit:
         """Fits again from a fit, with its positive nuisances moved: the better of both."""
