@@ -102,14 +102,18 @@ def main(argv: Sequence[str]) -> int | None:
         ends.append(fit_scene(draw_scene(seed), call.seed))
         if ends[-1].behind > SIDE_VALLEY_NATS:
             print(_line(ends[-1]), flush=True)
+        if call.out:
+            with Path(call.out).open("a") as file:
+                file.write(json.dumps(_row(ends[-1])) + "\n")
     stuck = [end for end in ends if end.behind > SIDE_VALLEY_NATS]
     unsaid = [end for end in stuck if end.fit.code.name == "CONVERGED"]
     codes = {name: 0 for name in sorted({end.fit.code.name for end in ends})}
     for end in ends:
         codes[end.fit.code.name] += 1
     cpu = np.array([end.cpu_s for end in ends])
-    print(f"\n{len(stuck)} of {len(ends)} in a side valley ({100 * len(stuck) / len(ends):.2f} %; "
-          f"the bar: {100 * BAR} %), {len(unsaid)} of them said to have converged; {codes}")  # fmt: skip
+    share = f"{100 * len(stuck) / len(ends):.2f} %; the bar: {100 * BAR} %"
+    print(f"\n{len(stuck)} of {len(ends)} in a side valley ({share}), "
+          f"{len(unsaid)} of them said to have converged; {codes}")  # fmt: skip
     print(f"CPU s per fit: mean {cpu.mean():.2f}, median {np.median(cpu):.2f}, "
           f"95 % below {np.quantile(cpu, 0.95):.2f}")  # fmt: skip
     worst = sorted(ends, key=lambda end: -end.behind)
@@ -128,14 +132,6 @@ def main(argv: Sequence[str]) -> int | None:
             "rollouts_mean": np.mean([end.num_rollouts for end in ends]),
         },
     )
-    if call.out:
-        rows = [
-            {"seed": end.scene.seed, "behind": end.behind, "code": end.fit.code.name,
-             "chi2_per_value": end.fit.chi2 / end.fit.num_values, "cpu_s": end.cpu_s,
-             "rollouts": end.num_rollouts}
-            for end in ends
-        ]  # fmt: skip
-        Path(call.out).write_text(json.dumps(rows, indent=0))
     return None
 
 
@@ -166,9 +162,7 @@ def draw_scene(seed: int) -> Scene:
         names=tuple(each.name for each in objects),
         times_s=times,
         position_m=clean + noise * rng.standard_normal(clean.shape),
-        covariance_m2=np.broadcast_to(
-            noise**2 * np.eye(2)[None, ..., None], (2, 2, 2, num)
-        ).copy(),
+        covariance_m2=np.broadcast_to(noise**2 * np.eye(2)[None, ..., None], (2, 2, 2, num)).copy(),
         mask=np.ones((2, num), bool),
     )
     clip = Clip(
@@ -241,6 +235,18 @@ def _line(end: Ended) -> str:
             f"{end.behind:.1f} nats behind")  # fmt: skip
 
 
+def _row(end: Ended) -> dict[str, float | str]:
+    """For `--out`."""
+    return {
+        "seed": end.scene.seed,
+        "behind": end.behind,
+        "code": end.fit.code.name,
+        "chi2_per_value": end.fit.chi2 / end.fit.num_values,
+        "cpu_s": end.cpu_s,
+        "rollouts": end.num_rollouts,
+    }
+
+
 def _print_chains(end: Ended, seed: int) -> None:
     """Of one scene, what the fit and `mh` say: truth, mean and sd by each."""
     names, trials = end.scene.trials.names, end.scene.trials
@@ -263,7 +269,7 @@ def _parser() -> command.Parser:
     parser.add_argument("--seeds", type=int, nargs="*", help="of the scenes, in place of these")
     parser.add_argument("--seed", type=int, default=0, help="of the fits")
     parser.add_argument("--chains", type=int, default=0, help="so many of the worst are sampled")
-    parser.add_argument("--out", help="a file for a line of JSON per scene")
+    parser.add_argument("--out", help="a file to which a line of JSON per scene is added")
     return parser
 
 

@@ -1,11 +1,10 @@
-"""Starts of a search found phase by phase: before a hit, motion tells less, and in no side valley.
+"""Trials as seen before a hit: what one phase of the motion tells, without side valleys.
 
-When a hit comes depends on all that happened before, and which frames compare with which depends
-on when it comes. So trials are first fitted as they were seen before another object moves, which
-tells the friction of the first alone; from there on only what that leaves open is scattered. Growing
-horizons are how parameters of differential equations are fitted that no start is near enough to
-(C. Michalik, R. Hannemann, W. Marquardt, Incremental single shooting, Comput. Chem. Eng. 33 (2009),
-10.1016/j.compchemeng.2009.02.002).
+When a hit comes depends on all that happened before, and which frames compare with which depends on
+when it comes. Before it only the friction of what moves counts, and a search cannot miss it; what
+that leaves open is searched for next. So growing spans of time fit parameters of differential
+equations that no start is near enough to (C. Michalik, R. Hannemann, W. Marquardt, Incremental
+single shooting, preprint AICES-2009-8, RWTH Aachen, 2009).
 """
 
 from dataclasses import replace

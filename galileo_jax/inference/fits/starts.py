@@ -57,7 +57,7 @@ def _in_range(trials: JointProblem, index: int, share: np.ndarray) -> np.ndarray
         return share
     scene = trials.problems[0].model.scene.surroundings
     if parameter.name != "k1":
-        return 0.5 * share + 0.01
+        return 0.5 * share**2 + 0.01  # as many between 0.01 and 0.13 as above
     # Above tan(angle) nothing slides and every start looks alike.
     steepest = min(float(np.tan(scene.angle_rad)), 0.98)
     if not (any(scene.rolls) and scene.rolls[0]):
