@@ -16,7 +16,7 @@ class Code(StrEnum):
     """How a fit ended; the value is the sentence for the user."""
 
     CONVERGED = "the fit converged"
-    MISFIT = "the fit converged, but leaves more than noise explains, as did a second search"
+    MISFIT = "the fit converged, but not to within the noise, nor did a second search; try diagnose"
     STEP_LIMIT = "the fit has not settled; try another --seed or --method mh"
     FAILED = "no rollout succeeded; check the clip's geometry"
 

@@ -41,7 +41,7 @@ def scattered_round(
       `[start, model parameter]`, z.
     """
     turn = np.arange(num) % len(centres)
-    some = np.flatnonzero(is_scattered.any(axis=0))
+    some = np.flatnonzero(is_scattered.any(axis=0)).tolist()
     shares = qmc.LatinHypercube(len(some), rng=np.random.default_rng(seed)).random(num)
     starts = centres[turn].copy()
     for i, share in zip(some, shares.T, strict=True):
