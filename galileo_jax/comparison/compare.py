@@ -24,8 +24,8 @@ from galileo_jax.comparison.bootstrap import replicates, whitened
 from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
-from galileo_jax.inference.result import NOISE_SCALE_RANGE, error_of
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
+from galileo_jax.inference.result import error_of
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 from galileo_jax.similarity.noise_scale import errors_at, fitted_mode_size, fitted_noise_scale

@@ -39,11 +39,6 @@ FREE_SCALE_WARNING = (
     "nothing in this motion tells the scale: give --pixels-per-metre to have lengths in metres"
 )
 
-# Fitted noise over what the tracker states: so far a tracker may be wrong about it. Beyond, the
-# statement is wrong or what is left is no noise.
-NOISE_SCALE_RANGE = (0.5, 1.5)
-
-
 PULLED_Z = 3.0  # of a nuisance's prior standard deviations; one in four hundred is by chance
 
 

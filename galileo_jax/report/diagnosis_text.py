@@ -8,8 +8,8 @@ from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.inference.result import NOISE_SCALE_RANGE
 from galileo_jax.report.fit_text import number
 
 NO_EFFECTS = "no effects"
