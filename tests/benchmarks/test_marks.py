@@ -1,0 +1,30 @@
+"""k1 of ramps drawn by eye: benchmarks/marks.py at small size."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import galileo_jax as gx
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "benchmarks"))
+
+import marks  # noqa: E402
+
+NUM_CLIPS = 8
+# Of so many z the rms is outside in one of a hundred draws.
+RMS_RANGE = (0.41, 1.66)
+
+
+def test_k1_of_a_drawn_ramp_is_as_good_as_it_says(tmp_path: Path) -> None:
+    zs, exact = [], []
+    for seed in range(5000, 5000 + NUM_CLIPS):
+        track, truth = marks.drawn_clip(tmp_path, seed)
+        found = gx.fit(track).parameters["k1"]
+        zs.append((found["mean"] - truth["k1"]) / found["sd"])
+        if len(exact) < 2:
+            gx.label(track, **marks.EXACT)
+            taken = gx.fit(track).parameters["k1"]
+            exact.append(found["sd"] / taken["sd"])
+    assert RMS_RANGE[0] < np.sqrt(np.mean(np.square(zs))) < RMS_RANGE[1]
+    assert min(exact) > 2
