@@ -23,7 +23,6 @@ from galileo_jax.clip.track_csv import read_observation_csv, write_observation_c
 from galileo_jax.commands import command
 
 ANGLES_DEG, BASES_PX = (10.0, 30.0), (100.0, 400.0)
-EXACT = {"ramp_angle_sd": 0.0, "pixels_per_metre_sd": 0.0, "origin_sd": 0.0}
 BAR = (0.8, 1.2)
 
 
@@ -35,7 +34,7 @@ def main(argv: Sequence[str]) -> int | None:
         for seed in range(call.seed, call.seed + call.clips):
             track, truth = drawn_clip(Path(folder), seed)
             found = gx.fit(track, seed=seed).parameters["k1"]
-            gx.label(track, **EXACT)
+            take_as_exact(track)
             taken = gx.fit(track, seed=seed).parameters["k1"]
             errors.append(found["mean"] - truth["k1"])
             zs.append(errors[-1] / found["sd"])
@@ -75,6 +74,11 @@ def drawn_clip(folder: Path, seed: int) -> tuple[Path, dict]:
     position = seen.position_m * ratio + shift[:, None]
     write_observation_csv(path, replace(seen, position_m=position))
     return path, truth
+
+
+def take_as_exact(track: Path) -> None:
+    """Declares angle, scale and foot to be known exactly."""
+    gx.label(track, ramp_angle_sd=0.0, pixels_per_metre_sd=0.0, origin_sd=0.0)
 
 
 def _parser() -> argparse.ArgumentParser:

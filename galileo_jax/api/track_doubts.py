@@ -16,6 +16,11 @@ FAR = 1000.0
 """chi2 per degree of freedom: residuals of thirty standard deviations on average. Few effects
 leave as much; a track of something else does."""
 
+UNCERTAINTY_OF = {
+    "ramp_angle_deg": "ramp_angle_sd_deg",
+    "pixels_per_metre": "pixels_per_metre_sd",
+}
+
 
 def with_track_doubts(
     measurements: Sequence[Measurement], result: Mapping[str, Any]
@@ -86,9 +91,7 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
     slope, off = math.tan(math.radians(clip.ramp_angle_deg)), math.sqrt(2) * CLICK_SD_PX / way_px
     change = {"ramp_angle_deg": (1 + k1 * slope) * off, "pixels_per_metre": (slope - k1) * off}
     by = " and ".join(f"{abs(change[key]):.2g}" for key in exact)
-    keys = " and ".join(
-        key.replace("_deg", "_sd_deg").replace("metre", "metre_sd") for key in exact
-    )
+    keys = " and ".join(UNCERTAINTY_OF[key] for key in exact)
     return (
         f"{text}; half a pixel at either end of a line as long as object 1's way down the ramp "
         f"({way_px:.0f} px) changes k1 by {by}: declare {keys} to have that in its interval"

@@ -25,7 +25,7 @@ def test_k1_of_a_drawn_ramp_is_as_good_as_it_says(
         found = gx.fit(track).parameters["k1"]
         zs.append((found["mean"] - truth["k1"]) / found["sd"])
         if len(exact) < 2:
-            gx.label(track, **marks.EXACT)
+            marks.take_as_exact(track)
             taken = gx.fit(track).parameters["k1"]
             exact.append(found["sd"] / taken["sd"])
     assert RMS_RANGE[0] < np.sqrt(np.mean(np.square(zs))) < RMS_RANGE[1]
