@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
+from galileo_jax.api.track_doubts import taken_as_exact, with_track_doubts
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
@@ -75,6 +76,11 @@ class Fit:
     def warnings(self) -> tuple[str, ...]:
         """What to know before the fit is trusted, one line each."""
         return tuple(self.result.get("warnings", ()))
+
+    @property
+    def taken_as_exact(self) -> tuple[str, ...]:
+        """Of each video the marks without an uncertainty, and how much of k1 hangs on them."""
+        return tuple(self.result.get("taken_as_exact", ()))
 
     def summary(self) -> "pd.DataFrame":
         """One row per parameter: `kind, mean, sd, q025, q975, unit, identified`.
@@ -302,6 +308,10 @@ def make_fit(
         timings_s={key: round(value, 3) for key, value in timings.items()},
         notes={**notes, **inferred(measurements)},
     )
+    result = with_track_doubts(measurements, result)
+    friction = result["parameters"].get("k1", {}).get("mean")
+    if exact := [text for one in measurements if (text := taken_as_exact(one, friction))]:
+        result["taken_as_exact"] = exact
     return Fit(measurements, problem, posterior, result, z_best, gradient)
 
 

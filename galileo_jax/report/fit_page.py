@@ -119,6 +119,9 @@ def _header(title: str, run: Run) -> str:
     more = (
         f"<p{mark}>{escape(fit_text.convergence(run))}</p>\n{warning}"
         f'<p class="soft">Method {escape(result["method"])}; effects: {escape(effects)}.</p>\n'
+        + "".join(
+            f'<p class="soft">{escape(line)}.</p>\n' for line in result.get("taken_as_exact", [])
+        )
     )
     return header("fit", title, fit_text.fit_quality(result), more, fit_text.fits(result))
 

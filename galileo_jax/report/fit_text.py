@@ -33,6 +33,7 @@ MEANINGS = {
     "liquid_drag": "drag constant c of c v|v|",
     "terminal_speed": "speed at which drag and weight balance",
     "declared_angle": "ramp's angle, over what was declared",
+    "declared_scale": "share by which lengths are measured too long",
     "foot_transition": "factor on the speed after the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
     "release_instant": "release after the first frame",
