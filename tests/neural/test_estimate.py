@@ -101,7 +101,7 @@ def test_angle_and_scale_known_within_so_much_widen_the_frictions(x64):
     exact, _, _ = cnn_posterior(trials_of(HIT), seed=0)
     sds = {"ramp_angle_sd_deg": 0.5, "pixels_per_metre": 500.0, "pixels_per_metre_sd": 10.0}
     posterior, _, _ = cnn_posterior(trials_of(HIT, **sds), seed=0)
-    k1, k2 = HIT.friction
+    k1, _ = HIT.friction
     slope = np.tan(HIT.angle_rad)
     added = np.hypot((1 + k1 * slope) * np.deg2rad(0.5), (slope - k1) * 0.02)
     assert posterior["k1"].std() == pytest.approx(np.hypot(exact["k1"].std(), added), rel=0.05)

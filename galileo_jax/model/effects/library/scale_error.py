@@ -4,6 +4,9 @@
 
 Starts were read from the measured track, so that the true ones are start / (1 + s); sizes
 were measured with a ruler and stay.
+
+Source: Hartley and Zisserman, Multiple View Geometry (2004), chapter 6 (a camera square to
+a plane scales it).
 Confused with: frame_rate (both act like another gravity, g (1 + s) against g (1 + r)^2);
 rolling; on one slope k1 and ramp_angle.
 """
