@@ -7,7 +7,7 @@ frames a second, and fitted from there as `galileo fit` does.
     exact    the rigid engine: the model itself, its nuisances at their centres
     fine     `simulate --solver fine --faults`: another solver, a foot and a hit that are not ideal
     mujoco   the scene in MuJoCo (`--engine c`), whose contacts are soft
-    bullet   boxes in PyBullet, as in the thesis (optional: `pip install -e '.[bullet]'`)
+    bullet   boxes in PyBullet, in small steps (optional: `pip install -e '.[bullet]'`)
 
 Bars, per quantity: rms of error / sd in 0.85 to 1.15, 92 to 98 % of truths in the 95 % interval.
 `bent` is the share of tracks with a nuisance two or more of its prior's sd away from the middle.
@@ -43,7 +43,6 @@ FRAME_RATES = (30.0, 60.0)
 LONGEST_S, AFTER_REST_S = 3.0, 0.1
 RMS, INSIDE = (0.85, 1.15), (0.92, 0.98)
 QUANTITIES = ("k1", "k2", "log ratio")
-BULLET_STEP_S = 1 / 240
 NUM, NUM_QUICK = 200, 24
 UNLIKELY = 0.01  # a p below it is an alarm
 
@@ -146,10 +145,10 @@ def in_bullet(truth: Truth, times_s: np.ndarray) -> np.ndarray:
     import pybullet  # pyright: ignore
 
     client = pybullet.connect(pybullet.DIRECT)
-    steps = math.ceil(times_s[-1] / BULLET_STEP_S)
-    path = bullet_scene.roll_out(truth, steps, client)
+    steps = math.ceil(times_s[-1] / bullet_scene.FINE_STEP_S)
+    path = bullet_scene.roll_out(truth, steps, client, is_fine=True)
     pybullet.disconnect(client)
-    return between(np.moveaxis(path, 0, -1), BULLET_STEP_S, times_s)
+    return between(np.moveaxis(path, 0, -1), bullet_scene.FINE_STEP_S, times_s)
 
 
 def between(position_m: np.ndarray, step_s: float, times_s: np.ndarray) -> np.ndarray:
