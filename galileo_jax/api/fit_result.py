@@ -114,8 +114,9 @@ class Fit:
         """One row per clip, object and frame: measured minus the best fit.
 
         `clip, object, time_s`; `x_m, y_m` (m) without the constant distance of the followed point
-        from the centre; `x_white, y_white`: whitened, in units of the noise at its fitted scale
-        (independent, standard normal if the model is right). NaN where an object was not seen.
+        from the centre; `x_white, y_white`: the tracking errors that the fit leaves, in units of
+        the stated noise (independent, standard normal if model and statement are right). NaN
+        where an object was not seen.
         """
         return self._residuals()
 
@@ -128,8 +129,7 @@ class Fit:
         for c, problem in enumerate(self.problem.problems):
             seen = problem.observation
             predicted = problem.simulate(self.problem.of_clip(theta, c))
-            scale = self.problem.noise_scale(theta, c)
-            white = problem.whiten(predicted, scale).reshape(predicted.shape)
+            white = problem.tracking_errors(predicted).reshape(predicted.shape)
             for k, name in enumerate(seen.names):
                 is_seen = seen.mask[k]
                 left = np.where(is_seen, seen.position_m[k] - predicted[k], np.nan)

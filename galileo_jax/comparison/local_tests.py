@@ -63,23 +63,24 @@ def find_cells(clip: int, names: Sequence[str], mask: np.ndarray, labels: np.nda
     return found
 
 
-def statistics(white: np.ndarray, cell: Cell) -> np.ndarray:
+def statistics(white: np.ndarray, cell: Cell, least: float) -> np.ndarray:
     """Power, slowness and whiteness of one cell, each about normal if the model is right.
 
     Args:
-      white: `[replicate, value]`, whitened residuals of the clip.
+      white: `[replicate, value]`, residuals of the clip.
       cell: where to look.
+      least: the sum of squares that noise alone gives there. Where there is less, neighbours that
+        go together count against it: a tracker's faint memory is no physics.
 
     Returns:
       `[replicate, 3]`; sums of squares as their cube roots (Wilson and Hilferty 1931).
     """
     values = white[:, cell.index]
-    count = len(cell.index)
-    slow = min(MAX_SLOW, max(1, int(SLOW_SHARE * count)))
+    slow = min(MAX_SLOW, max(1, int(SLOW_SHARE * len(cell.index))))
     spectrum = np.asarray(dct(values, axis=1, norm="ortho"))[:, :slow]
     power = np.cbrt(np.mean(values**2, axis=1))
     slowness = np.cbrt(np.mean(spectrum**2, axis=1))
     neighbours = np.sum(values[:, 1:] * values[:, :-1], axis=1)
-    # Against the stated noise where there is less: a tracker's faint memory is no physics.
-    whiteness = neighbours / np.maximum(np.sum(values**2, axis=1), count)
+    squares = np.sum(values**2, axis=1)
+    whiteness = neighbours / np.where(neighbours > 0, np.maximum(squares, least), squares)
     return np.stack([power, slowness, whiteness], axis=1)

@@ -30,8 +30,9 @@ class PathResiduals:
         without the constant offset of the tracked point.
       predicted_m: of the fit.
       low_m, high_m: where 95 % of the posterior's draws are.
-      noise_m: tracking error, as the comparison scaled it.
-      along, across: residuals along the path and across it, in units of the noise.
+      noise_m: tracking error, as stated.
+      along, across: tracking errors that the fit leaves, along the path and across it, in units
+        of the stated noise.
       phases: of the motion.
       failing_s: the interval in which the model fails worst, None where it does not fail.
       worst: the cell of that interval.
@@ -71,10 +72,9 @@ def path_residuals(
         best = problem.simulate(trials.of_clip(theta, clip))
         draws = problem.simulate_batch(trials.of_clip(drawn, clip))
         draws = draws[np.isfinite(draws).all(axis=(1, 2, 3))]
-        scale = trials.noise_scale(theta, clip)
         for i, name in enumerate(problem.observation.names):
             title = name if len(trials.problems) == 1 else f"{problem.name}, {name}"
-            found.append(_object(problem, i, best, draws, scale, clip, comparison, title))
+            found.append(_object(problem, i, best, draws, clip, comparison, title))
     return tuple(found)
 
 
@@ -83,7 +83,6 @@ def _object(
     index: int,
     best: np.ndarray,
     draws: np.ndarray,
-    scale: float,
     clip: int,
     comparison: Comparison,
     title: str,
@@ -99,7 +98,7 @@ def _object(
     moved = moved - np.median(moved, axis=1, keepdims=True)
     low, high = np.quantile(moved, [0.025, 0.975], axis=0) if len(moved) else (0 * path, 0 * path)
     covariance = observation.covariance_m2[index]
-    noise = scale * np.sqrt(np.einsum("at,abt,bt->t", tangent, covariance, tangent))
+    noise = np.sqrt(np.einsum("at,abt,bt->t", tangent, covariance, tangent))
     white = np.where(is_tracked, comparison.white[clip][index], np.nan)
     normal = np.stack([-tangent[1], tangent[0]])
     labels = comparison.labels[clip][index]

@@ -163,7 +163,7 @@ def _candidates(
             Candidate(
                 effects=found[i].effects,
                 hypothesis=found[i],
-                error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_used, fit.pull),
+                error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
                 score_z=float(scores[i]),
                 log_evidence=float(evidence[i]),
                 probability=float(probability[i]),

@@ -94,6 +94,14 @@ class Problem:
         difference = self.data.observed_m - predicted_m
         return GaussianLikelihood.whiten_batch(difference, noise_scale, self.data)
 
+    def tracking_errors(self, predicted_m: np.ndarray, noise_scale: float = 1.0) -> np.ndarray:
+        """The tracking errors that a prediction leaves, in units of their sd.
+
+        Args and returns as `whiten`; see `GaussianLikelihood.tracking_errors`.
+        """
+        difference = self.data.observed_m - predicted_m
+        return GaussianLikelihood.tracking_errors(difference, noise_scale, self.data)
+
 
 def with_shared_parameters(problems: Sequence[Problem]) -> tuple[Problem, ...]:
     """The problems of several clips, with one prior for each of the parameters they share."""

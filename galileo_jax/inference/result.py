@@ -24,7 +24,7 @@ from galileo_jax.inference.per_mass import (
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.effect import true_surroundings
-from galileo_jax.model.parameters import inverse
+from galileo_jax.model.parameters import inverse, prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 # In z every prior is a standard normal: above this the data told less than half.
@@ -39,8 +39,8 @@ FREE_SCALE_WARNING = (
     "nothing in this motion tells the scale: give --pixels-per-metre to have lengths in metres"
 )
 
-# Of the tracker's own noise: errors are told at the fitted scale within this range. The tracker
-# knows its noise within thirty per cent, so that beyond the upper bound it is no noise.
+# Fitted noise over what the tracker states: so far a tracker may be wrong about it. Beyond, the
+# statement is wrong or what is left is no noise.
 NOISE_SCALE_RANGE = (0.5, 1.5)
 
 
@@ -56,28 +56,27 @@ def summarise(draws: np.ndarray) -> dict[str, float]:
 
 
 def velocity_error(
-    problems: Sequence[Problem], predicted_m: Sequence[np.ndarray], noise_scale: Sequence[float]
+    problems: Sequence[Problem], predicted_m: Sequence[np.ndarray]
 ) -> dict[str, float]:
     """How far predicted and measured velocity profiles are apart, m/s.
 
     Args:
       problems: with the observations.
       predicted_m: of each clip `[object, 2, frame]`, the fitted centres.
-      noise_scale: of each clip.
 
     Returns:
-      rmse; noise (what tracking errors alone would give); l1 (mean absolute) and l2 (root of
+      rmse; noise (what the stated tracking errors alone would give); l1 (mean absolute) and l2 (root of
       the summed squares, per profile as in the thesis).
     """
     residuals, noises = [np.zeros(0)], [np.zeros(0)]
-    for problem, predicted, scale in zip(problems, predicted_m, noise_scale, strict=True):
+    for problem, predicted in zip(problems, predicted_m, strict=True):
         observation = problem.observation
         dt = np.diff(observation.times_s)
         both = observation.mask[:, 1:] & observation.mask[:, :-1]
         residual = np.diff(observation.position_m - predicted, axis=-1) / dt
         both = np.broadcast_to(both[:, None], residual.shape)
         variance = np.diagonal(observation.covariance_m2, axis1=1, axis2=2)
-        variance = scale**2 * np.moveaxis(variance, -1, 1)
+        variance = np.moveaxis(variance, -1, 1)
         residuals.append(residual[both])
         noises.append(((variance[..., 1:] + variance[..., :-1]) / dt**2)[both])
     values, noise = np.concatenate(residuals), np.concatenate(noises)
@@ -91,35 +90,28 @@ def velocity_error(
     }
 
 
-def reported_noise_scale(trials: JointProblem, theta: np.ndarray, clip: int) -> float:
-    """The fitted noise scale of a clip, as far as noise explains it."""
-    return float(np.clip(trials.noise_scale(theta, clip), *NOISE_SCALE_RANGE))
-
-
 def error_of(
-    trials: JointProblem, theta: np.ndarray, num_used: float, pull: float = 0.0
+    trials: JointProblem, theta: np.ndarray, num_fitted: float, pull: float = 0.0
 ) -> dict[str, float]:
     """`velocity_error` and chi2 per degree of freedom at parameters `theta` `[parameter]`.
 
     The same in result.json, compare.json and diagnosis.json: what the model leaves over, in
-    units of the noise that the fit asks for within `NOISE_SCALE_RANGE` of the tracker's own.
+    units of the noise that the tracker states, which is the same for every model of a track.
 
     Args:
       trials: the clips.
       theta: in the parameters' units, noise scales last.
-      num_used: how many numbers' worth the parameters were fitted with.
-      pull: of the nuisances, which are data, too: the sum of their squared prior deviations.
+      num_fitted: how many numbers' worth the parameters were fitted with, nuisances left out.
+      pull: of the nuisances, which are data, too: the sum of their squared `prior_deviations`.
     """
-    scales, predictions, chi2, count = [], [], pull, 0.0
+    predictions, chi2, count = [], pull, 0.0
     for clip, problem in enumerate(trials.problems):
-        scale = reported_noise_scale(trials, theta, clip)
         predicted = problem.simulate(trials.of_clip(theta, clip))
-        chi2 += float(np.sum(problem.whiten(predicted, scale) ** 2))
-        count += float(GaussianLikelihood.degrees(scale, problem.data))
-        scales.append(scale)
+        chi2 += float(np.sum(problem.tracking_errors(predicted) ** 2))
+        count += float(GaussianLikelihood.degrees(1.0, problem.data))
         predictions.append(predicted)
-    error = velocity_error(trials.problems, predictions, scales)
-    error["chi2_per_dof"] = chi2 / max(count - num_used, 1.0)
+    error = velocity_error(trials.problems, predictions)
+    error["chi2_per_dof"] = chi2 / max(count - num_fitted, 1.0)
     return error
 
 
@@ -256,10 +248,10 @@ def make_result(
         said = [*notes.get("warnings", []), unscaled]
         notes = notes | {"warnings": list(dict.fromkeys(said))}
     # Every parameter takes from the residuals what the data told of it.
-    effective = float(np.sum(1 - np.clip(spread[: len(trials.model_parameters)] ** 2, 0, 1)))
-    nuisance = [p.role == "nuisance" for p in trials.model_parameters]
-    pull = float(np.sum(z_best[: len(nuisance)][nuisance] ** 2))
-    error = error_of(trials, trials.theta(z_best), effective, pull)
+    is_fitted = np.array([p.role != "nuisance" for p in trials.model_parameters])
+    told = 1 - np.clip(spread[: len(is_fitted)] ** 2, 0, 1)
+    pull = float(np.sum(prior_deviations(trials.model_parameters, z_best[: len(is_fitted)]) ** 2))
+    error = error_of(trials, trials.theta(z_best), float(np.sum(told[is_fitted])), pull)
     status = {"converged": posterior.is_converged, **notes}
     return {
         "clips": clips,

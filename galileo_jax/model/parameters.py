@@ -198,3 +198,19 @@ def inverse(parameters: Sequence[Parameter], theta: jax.Array) -> jax.Array:
 def absent(parameters: Sequence[Parameter]) -> np.ndarray:
     """The vector `[parameter]` at which nothing but the scene is there."""
     return np.array([p.absent for p in parameters])
+
+
+def prior_deviations(parameters: Sequence[Parameter], z: np.ndarray) -> np.ndarray:
+    """How many prior standard deviations nuisances are from what is expected of them.
+
+    Args:
+      parameters: in the order of `z`.
+      z: `[parameter]`.
+
+    Returns:
+      `[parameter]`; 0 of all that are no nuisances, and of one that is most likely 0 and smaller
+      than its prior's median.
+    """
+    is_nuisance = np.array([p.role == "nuisance" for p in parameters])
+    is_one_sided = np.array([isinstance(p.prior, HalfNormal) for p in parameters])
+    return np.where(is_nuisance, np.where(is_one_sided, np.maximum(z, 0.0), z), 0.0)

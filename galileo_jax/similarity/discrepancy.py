@@ -227,20 +227,24 @@ def _drift(
     return found
 
 
-def crossing_sd_m(observation: Observation, scene: Surroundings) -> np.ndarray:
-    """Extra error `[object, frame]`, m, while an object lies across the foot.
+def crossings(observation: Observation, scene: Surroundings) -> np.ndarray:
+    """Modes of each single frame in which an object lies across the foot, as `modes`.
 
     A box then rests on two edges, its centre above the point mass's path by up to
     (length / 4) sin(angle); half of that is taken as the standard deviation.
     """
     position = np.nan_to_num(observation.position_m)
-    extra = np.zeros((position.shape[0], position.shape[2]))
+    found = [np.zeros((0, *position.shape))]
     for i, comes_down in enumerate(scene.comes_down):
         if comes_down:
             share = _share_past_foot(position[i, 0], scene, i)
+            frames = np.flatnonzero((share > 0) & (share < 1) & observation.mask[i])
+            own = np.zeros((2, len(frames), *position.shape))
             size = scene.half_length_m[i] / 4 * math.sin(scene.angle_rad)
-            extra[i] = size * np.where((share > 0) & (share < 1), 1.0, 0.0)
-    return extra
+            for axis in range(2):
+                own[axis, np.arange(len(frames)), i, axis, frames] = size
+            found.extend(own)
+    return np.concatenate(found)
 
 
 def _share_past_foot(x: np.ndarray, scene: Surroundings, i: int) -> np.ndarray:

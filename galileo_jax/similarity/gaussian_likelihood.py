@@ -16,7 +16,7 @@ import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import crossing_sd_m, modes, offsets
+from galileo_jax.similarity.discrepancy import crossings, modes, offsets
 
 NoiseModel = Literal["camera", "bodies", "tracker"]
 
@@ -60,13 +60,12 @@ class GaussianLikelihood:
         """
         mask = observation.mask
         covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
-        if noise != "tracker":
-            extra = crossing_sd_m(observation, scene) ** 2
-            covariance += extra[:, :, None, None] * np.eye(2)
-            patterns = modes(observation, scene, is_filmed=noise == "camera")
-        else:
-            patterns = np.stack(offsets(observation))
         covariance[~mask] = np.eye(2)
+        if noise == "tracker":
+            patterns = np.stack(offsets(observation))
+        else:
+            patterns = modes(observation, scene, is_filmed=noise == "camera")
+            patterns = np.concatenate([patterns, crossings(observation, scene)])
         inverse_root = np.linalg.inv(np.linalg.cholesky(covariance)) * mask[..., None, None]
         inverse_root = np.moveaxis(inverse_root, 1, -1)
         patterns = np.einsum("oijt,mojt->moit", inverse_root, patterns)
@@ -98,6 +97,27 @@ class GaussianLikelihood:
         return (y - ((y @ basis.T) * shrink) @ basis) / noise_scale
 
     @staticmethod
+    def tracking_errors(
+        difference_m: np.ndarray, noise_scale: float, data: Whitening
+    ) -> np.ndarray:
+        """The tracking errors in a difference, in units of their sd: `[..., value]`.
+
+        s L^T C^-1 r: what the modes take up is left out, and nothing else. The one residual that
+        comparisons, pictures and chi2 per degree of freedom are made of; if the model is right
+        the sum of its squares is `degrees` less what the parameters take up.
+
+        Args:
+          difference_m: `[..., object, 2, frame]`, observed minus predicted.
+          noise_scale: in units of what the tracker states; 1 where residuals are shown.
+          data: the observation's covariance, decomposed.
+        """
+        y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
+        y = y.reshape(*difference_m.shape[:-3], -1)
+        basis = data.basis.reshape(len(data.gain), -1)
+        share = data.gain**2 / (noise_scale**2 + data.gain**2)
+        return (y - ((y @ basis.T) * share) @ basis) / noise_scale
+
+    @staticmethod
     def log_density(predicted_m: jax.Array, noise_scale: jax.Array, data: Whitening) -> jax.Array:
         """Log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
         difference = jnp.asarray(data.observed_m) - predicted_m
@@ -109,6 +129,12 @@ class GaussianLikelihood:
     def degrees(noise_scale: Any, data: Whitening) -> Any:
         """How many numbers tell of the tracker's noise: the measured less those the modes take."""
         return data.num_values - (data.gain**2 / (noise_scale**2 + data.gain**2)).sum()
+
+    @staticmethod
+    def information(noise_scale: Any, data: Whitening) -> Any:
+        """Fisher's, of the noise scale's logarithm."""
+        share = noise_scale**2 / (noise_scale**2 + data.gain**2)
+        return 2 * (data.num_values - len(data.gain) + (share**2).sum())
 
     @staticmethod
     def log_determinant(noise_scale: Any, data: Whitening) -> Any:

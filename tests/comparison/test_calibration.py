@@ -12,7 +12,7 @@ from galileo_jax.comparison.compare import compare
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
-from galileo_jax.similarity.discrepancy import crossing_sd_m, modes
+from galileo_jax.similarity.discrepancy import crossings, modes
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -53,11 +53,9 @@ def draw_imperfections(trials, seed):
     """What the likelihood allows for beside the tracker's noise: modes, and the foot."""
     (problem,) = trials.problems
     seen, scene = problem.observation, problem.model.scene.surroundings
-    generator = np.random.default_rng([seed, 8])
-    patterns = modes(seen, scene)
-    common = np.tensordot(generator.standard_normal(len(patterns)), patterns, axes=1)
-    crossing = crossing_sd_m(seen, scene)[:, None]
-    return common + crossing * generator.standard_normal(seen.position_m.shape)
+    patterns = np.concatenate([modes(seen, scene), crossings(seen, scene)])
+    normal = np.random.default_rng([seed, 8]).standard_normal(len(patterns))
+    return np.tensordot(normal, patterns, axes=1)
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from galileo_jax.inference.fits.polish import Polished
 from galileo_jax.inference.fits.programs import FAILED
 from galileo_jax.inference.fits.residuals import Residuals, Slopes, cost, quadratic
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
+from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 
@@ -36,7 +37,8 @@ class GradientFit:
         values as in `Problem.whiten`; 0 where pinned.
       code: how it ended.
       stats: rollouts and steps it took.
-      pull: how far the nuisances are from their priors' middle: the sum of their squared z.
+      pull: how far the nuisances are from what is expected: the sum of their squared `prior_deviations`.
+      num_pulled: how many numbers' worth of the data the nuisances were fitted with.
     """
 
     z: np.ndarray
@@ -50,6 +52,12 @@ class GradientFit:
     code: Code
     stats: dict[str, float]
     pull: float
+    num_pulled: float
+
+    @property
+    def num_fitted(self) -> float:
+        """`num_used` by all but the nuisances, whose pulls count as data."""
+        return self.num_used - self.num_pulled
 
     @property
     def num_used(self) -> float:
@@ -97,6 +105,7 @@ def _laplace_fit(
     code = Code.CONVERGED if found.is_settled[i] else Code.STEP_LIMIT
     rows = [clip.unpadded(j[i]) for clip, j in zip(clips, slopes.jacobian, strict=True)]
     is_nuisance = np.array([p.role == "nuisance" for p in trials.model_parameters])
+    pulled = points.free[i] & is_nuisance
     return GradientFit(
         z=np.append(z, np.log(scale) / NOISE_SD),
         free=free,
@@ -108,7 +117,8 @@ def _laplace_fit(
         jacobian=np.concatenate(rows),
         code=Code.FAILED if failed else code,
         stats=dict(stats),
-        pull=float(np.sum(z[is_nuisance] ** 2)),
+        pull=float(np.sum(prior_deviations(trials.model_parameters, z) ** 2)),
+        num_pulled=float(np.sum(1 - np.diag(covariance)[: len(z)][pulled])),
     )
 
 
@@ -120,8 +130,8 @@ def _covariance(
     whole = np.zeros((count + len(scale),) * 2)
     whole[np.ix_(own, own)] = np.linalg.inv(normal[np.ix_(own, own)])
     for c, (clip, s) in enumerate(zip(residuals.clips, scale, strict=True)):
-        degrees = float(GaussianLikelihood.degrees(s, clip.data.whitening))
-        whole[count + c, count + c] = 1 / (1 + 2 * degrees * NOISE_SD**2)
+        information = float(GaussianLikelihood.information(s, clip.data.whitening))
+        whole[count + c, count + c] = 1 / (1 + information * NOISE_SD**2)
     return whole
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from galileo_jax.inference.fits.descent import CATCHES_UP, Descent, GiveUp
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.noise_scale import fitted_noise_scale
 
 MAX_ROUNDS = 6
 DRIFT = 0.1  # of a noise scale, in a round: more has not settled
@@ -79,13 +79,10 @@ def noise_scales(residuals: Residuals, points: Batch, used: np.ndarray) -> np.nd
       points: where.
       used: `[point]`, how many numbers' worth of the data the parameters take up.
     """
-    wide = 1 / (2 * NOISE_SD**2)  # the prior, at 1, is worth this many values
     num_values = sum(float(clip.data.whitening.num_values) for clip in residuals.clips)
     scales = np.empty_like(points.noise)
     for c, (clip, white) in enumerate(zip(residuals.clips, residuals.whites(points), strict=True)):
-        data, before = clip.data.whitening, points.noise[:, c]
-        degrees = np.array([float(GaussianLikelihood.degrees(scale, data)) for scale in before])
-        left = np.maximum(degrees - used * float(data.num_values) / num_values, 1.0)
-        total = np.sum((white * before[:, None]) ** 2, axis=1)
-        scales[:, c] = np.sqrt((total + wide) / (left + wide))
+        data = clip.data.whitening
+        own = used * float(data.num_values) / num_values
+        scales[:, c] = fitted_noise_scale(white, points.noise[:, c], own, NOISE_SD, data)
     return scales

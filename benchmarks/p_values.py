@@ -1,0 +1,105 @@
+"""Are the p-values of `compare` uniform under the model? And is the noise scale right?
+
+    python benchmarks/p_values.py [--num 400] [--trials 1] [--seed 0] [--noise camera]
+
+Tracks of the rigid engine with the tracker's noise as stated; what the likelihood allows for beside
+it (its modes, and the nuisances) is either not there ("centre") or drawn from its prior ("drawn").
+"""
+
+import argparse
+import time
+from dataclasses import replace
+from typing import get_args
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy import stats
+from synthetic_tracks import make_case
+
+from galileo_jax.comparison.compare import compare
+from galileo_jax.inference.fits.gradient import GradientFitter, Settings
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.problem import Problem, with_shared_parameters
+from galileo_jax.model.parameters import inverse
+from galileo_jax.similarity.discrepancy import crossings, modes
+from galileo_jax.similarity.gaussian_likelihood import NoiseModel
+
+NOISE_M = 5e-5  # a twentieth of a pixel at 1000 px/m
+LEVELS = (0.01, 0.05, 0.5)
+
+
+def main() -> None:
+    """Prints a row per case."""
+    jax.config.update("jax_enable_x64", True)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--num", type=int, default=400)
+    parser.add_argument("--trials", type=int, default=1, help="clips of each problem")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--noise", choices=get_args(NoiseModel), action="append")
+    args = parser.parse_args()
+    print(f"{'noise':<8} {'modes':<7} {'KS p':>6} {'<.01':>6} {'<.05':>6} {'<.5':>6}"
+          f" {'chi2':>6} {'scale':>6} {'CPU s':>6}")  # fmt: skip
+    for noise in args.noise or get_args(NoiseModel):
+        for is_drawn in (False, True):
+            begin = time.process_time()
+            rows = [one(noise, is_drawn, args.trials, [args.seed, i]) for i in range(args.num)]
+            p, chi2, scale = np.array(rows).T
+            below = " ".join(f"{np.mean(p < level):6.3f}" for level in LEVELS)
+            each = (time.process_time() - begin) / args.num
+            print(f"{noise:<8} {'drawn' if is_drawn else 'centre':<7} "
+                  f"{stats.kstest(p, 'uniform').pvalue:6.3f} {below} {np.mean(chi2):6.3f} "
+                  f"{np.median(scale):6.3f} {each:6.2f}", flush=True)  # fmt: skip
+
+
+def one(noise: NoiseModel, is_drawn: bool, num_clips: int, seed: list[int]) -> tuple[float, ...]:
+    """p-value, chi2 per degree of freedom and noise scale of one fitted problem."""
+    rng = np.random.default_rng(seed)
+    case = make_case(int(rng.integers(1 << 30)), "exact", NOISE_M)
+    clips, thetas = zip(
+        *(made(case.problem, case.values, noise, is_drawn, rng) for _ in range(num_clips)),
+        strict=True,
+    )
+    trials = JointProblem(with_shared_parameters(clips))
+    truth = np.zeros(len(trials.model_parameters))
+    for theta, column in zip(thetas, trials.columns, strict=True):
+        truth[column] = theta
+    z = np.asarray(inverse(trials.model_parameters, jnp.asarray(truth)))
+    z = np.clip(z, -3.0, 3.0)[None]
+    fitter = GradientFitter(trials, Settings(max_steps=0))
+    fit = fitter.fit_from(z, np.ones(z.shape, bool), np.zeros(1, int))[0]
+    found = compare(trials, fit, int(rng.integers(1 << 30)))
+    return found.p_value, found.error["chi2_per_dof"], found.noise_scale[0]
+
+
+def made(
+    problem: Problem,
+    values: dict[str, float],
+    noise: NoiseModel,
+    is_drawn: bool,
+    rng: np.random.Generator,
+) -> tuple[Problem, np.ndarray]:
+    """A clip of that experiment, measured as its likelihood says, and its true parameters."""
+    model, seen = problem.model, problem.observation
+    theta = np.array([values.get(p.name, p.absent) for p in model.parameters])
+    if is_drawn:
+        for i, parameter in enumerate(model.parameters):
+            if parameter.role == "nuisance":
+                theta[i] = float(parameter.prior.forward(jnp.asarray(rng.standard_normal())))
+    position = problem.simulate(theta)
+    if is_drawn and noise != "tracker":
+        # Offsets first: where the picture shows an object decides which frames cross the foot.
+        scene, is_filmed = model.scene.surroundings, noise == "camera"
+        for patterns in (
+            lambda now: modes(now, scene, is_filmed),
+            lambda now: crossings(now, scene),
+        ):
+            found = patterns(replace(seen, position_m=position))
+            position = position + np.tensordot(rng.standard_normal(len(found)), found, axes=1)
+    position = position + NOISE_M * rng.standard_normal(position.shape)
+    measured = replace(seen, position_m=position)
+    return replace(problem, observation=measured, noise=noise), theta
+
+
+if __name__ == "__main__":
+    main()

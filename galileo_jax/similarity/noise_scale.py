@@ -1,0 +1,69 @@
+"""How large the tracking errors are, by the likelihood of what a model leaves over.
+
+With C = s^2 D + U U^T, of whose modes the amplitudes are a and the gains g (see
+`gaussian_likelihood.Whitening`), the log-likelihood is stationary in s where
+
+    sum of (tracking errors at s)^2  =  degrees(s) - used,
+
+the squares and the count both without what the modes take up.
+
+Source: MacKay (1992), Bayesian interpolation, Neural Computation 4, 415 (the fixed point).
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from galileo_jax.similarity.gaussian_likelihood import Whitening
+
+NUM_ITERATIONS = 100
+
+
+def fitted_noise_scale(
+    white: Float[np.ndarray, "point value"],
+    noise_scale: Float[np.ndarray, " point"],
+    used: Float[np.ndarray, " point"],
+    prior_sd: float,
+    data: Whitening,
+) -> Float[np.ndarray, " point"]:
+    """The most probable noise scales.
+
+    Args:
+      white: residuals, whitened at `noise_scale`.
+      noise_scale: what they were whitened at.
+      used: how many numbers' worth of the data the parameters take up.
+      prior_sd: of the scale's logarithm, about 0.
+      data: the observation's covariance, decomposed.
+    """
+    variance, gain2 = noise_scale[:, None] ** 2, data.gain**2
+    modes = (white @ data.basis.reshape(len(gain2), -1).T) ** 2
+    rest = np.maximum(np.sum(white**2, axis=1) - np.sum(modes, axis=1), 0.0) * variance[:, 0]
+    amplitude2 = modes * (variance + gain2)
+    wide = 1 / (2 * prior_sd**2)  # the prior, at 1, is worth this many values
+    for _ in range(NUM_ITERATIONS):
+        share = variance / (variance + gain2)
+        degrees = data.num_values - np.sum(1 - share, axis=1)
+        total = rest + np.sum(amplitude2 * share**2, axis=1)
+        left = np.maximum(degrees - used, 1.0)
+        variance = ((total + wide) / (left + wide))[:, None]
+    return np.sqrt(variance[:, 0])
+
+
+def errors_at(
+    white: Float[np.ndarray, "point value"],
+    noise_scale: Float[np.ndarray, " point"],
+    other_scale: Float[np.ndarray, " point"],
+    data: Whitening,
+) -> Float[np.ndarray, "point value"]:
+    """`GaussianLikelihood.tracking_errors` at another noise scale, from whitened residuals.
+
+    Args:
+      white: residuals, whitened at `noise_scale`.
+      noise_scale: what they were whitened at.
+      other_scale: at which the tracking errors are wanted.
+      data: the observation's covariance, decomposed.
+    """
+    basis, gain2 = data.basis.reshape(len(data.gain), -1), data.gain**2
+    before, after = noise_scale[:, None], other_scale[:, None]
+    modes = white @ basis.T
+    errors = modes * np.sqrt(before**2 + gain2) * after / (after**2 + gain2)
+    return (white - modes @ basis) * (before / after) + errors @ basis
