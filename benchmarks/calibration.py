@@ -174,9 +174,7 @@ def scored(found: Fit, truth: Truth) -> dict[str, Any]:
         error, sd = float(values.mean() - true), float(values.std())
         inside = bool(low <= true <= high)
         row[name] = {"error": error, "sd": sd, "z": error / sd, "inside": inside}
-    row["nuisances"] = {
-        name: entry["mean"] for name, entry in found.result["nuisances"].items()
-    }
+    row["nuisances"] = {name: entry["mean"] for name, entry in found.result["nuisances"].items()}
     return row
 
 

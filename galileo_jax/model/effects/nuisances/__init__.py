@@ -5,6 +5,7 @@ They are effects like any other; only their parameters' role differs
 """
 
 from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.effects.nuisances.contact_gap import ContactGap
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
@@ -18,6 +19,7 @@ NUISANCES: tuple[Effect, ...] = (
     FootTransition(),
     DeclaredAngle(),
     ImpactRestitution(),
+    ContactGap(),
     ReleaseInstant(),
     PixelScale(),
     Perspective(),
