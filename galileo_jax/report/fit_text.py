@@ -34,6 +34,7 @@ MEANINGS = {
     "declared_angle": "ramp's angle, over what was declared",
     "foot_transition": "factor on the speed after the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
+    "contact_gap": "by how much further apart objects touch when they meet again",
     "release_instant": "release after the first frame",
     "noise_scale": "tracking noise over what the tracker stated",
 }
