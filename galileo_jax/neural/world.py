@@ -17,7 +17,12 @@ import jax
 import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Surroundings
-from galileo_jax.model.effects.nuisances import NUISANCES, foot_transition, impact_restitution
+from galileo_jax.model.effects.nuisances import (
+    NUISANCES,
+    contact_gap,
+    foot_transition,
+    impact_restitution,
+)
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.rollout.engine_rigid import roll_out
@@ -39,7 +44,7 @@ NOISE_SCALE_SD = 0.3
 NUM_WAVES = 8
 NAMES = (
     *("m1", "k1", "m2", "k2", "start_offset_object1", "start_offset_object2"),
-    *("foot_transition", "impact_restitution", "release_instant"),
+    *("foot_transition", "impact_restitution", "contact_gap", "release_instant"),
 )
 
 
@@ -87,7 +92,8 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     foot = 1.0 + imperfect * foot_transition.SD * normal()
     rebound = imperfect * impact_restitution.PRIOR.forward(normal())
     zero = jnp.zeros(())
-    theta = jnp.stack([m1, k1, m2, k2, zero, zero, foot, rebound, instant])
+    overlap = imperfect * contact_gap.PRIOR.forward(normal())
+    theta = jnp.stack([m1, k1, m2, k2, zero, zero, foot, rebound, overlap, instant])
     cos, sin = jnp.cos(angle), jnp.sin(angle)
     start1 = (half_height[0] * sin - release * cos, half_height[0] * cos + release * sin)
     scene = Surroundings(

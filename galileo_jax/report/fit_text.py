@@ -36,6 +36,7 @@ MEANINGS = {
     "declared_scale": "share by which lengths are measured too long",
     "foot_transition": "factor on the speed after the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
+    "contact_gap": "by how much further apart objects touch when they meet again",
     "release_instant": "release after the first frame",
     "noise_scale": "tracking noise over what the tracker stated",
 }

@@ -48,16 +48,19 @@ class Bodies(NamedTuple):
         """How fast each slides over its surface, `[object]`."""
         return self.speed_m_s if self.rim_m_s is None else self.speed_m_s - self.rim_m_s
 
-    def gap_m(self, scene: Surroundings) -> jax.Array:
+    def gap_m(self, law: Dynamics, scene: Surroundings) -> jax.Array:
         """Between the faces of neighbours, `[object - 1]`."""
         x = self.path_m + jnp.asarray(scene.corner_m)
         half = jnp.asarray(scene.half_length_m)
-        return jnp.maximum(x[1:] - x[:-1] - half[1:] - half[:-1], 0.0)
+        apart = x[1:] - x[:-1] - half[1:] - half[:-1]
+        # What stands in the way moves once it was hit.
+        has_met = self.path_m[1:] > law.start_m[1:] + TOUCH_M
+        return jnp.maximum(apart - jnp.where(has_met, law.overlap_m, 0.0), 0.0)
 
-    def touches(self, scene: Surroundings) -> jax.Array:
+    def touches(self, law: Dynamics, scene: Surroundings) -> jax.Array:
         """Whether neighbours rest against each other or move as one, `[object - 1]`."""
         apart = jnp.abs(self.speed_m_s[1:] - self.speed_m_s[:-1])
-        return (self.gap_m(scene) < TOUCH_M) & (apart < TOUCH_M_S)
+        return (self.gap_m(law, scene) < TOUCH_M) & (apart < TOUCH_M_S)
 
 
 def roll_out(
@@ -106,12 +109,12 @@ def _to_next_event(
     When `is_last`, by `left_s` in any case: where events never end (an object in a corner from
     which both sides lead up) what is slow waits, and the others go on.
     """
-    touches = bodies.touches(scene)
+    touches = bodies.touches(law, scene)
     at_start = _accelerations(bodies, bodies, touches, time_s, law, scene)
-    half = 0.5 * _event_times(bodies, touches, at_start, left_s, scene).soonest
+    half = 0.5 * _event_times(bodies, touches, at_start, left_s, law, scene).soonest
     middle = _after(bodies, at_start, half)
     a = _accelerations(bodies, middle, touches, time_s + half, law, scene)
-    events = _event_times(bodies, touches, a, left_s, scene)
+    events = _event_times(bodies, touches, a, left_s, law, scene)
     t = jnp.where(is_last, left_s, events.soonest)
     q, v, u = _after(bodies, a, t)
     holds = events.grip <= t
@@ -208,7 +211,12 @@ class _Events(NamedTuple):
 
 
 def _event_times(
-    bodies: Bodies, touches: jax.Array, by: _Accelerations, left_s: jax.Array, scene: Surroundings
+    bodies: Bodies,
+    touches: jax.Array,
+    by: _Accelerations,
+    left_s: jax.Array,
+    law: Dynamics,
+    scene: Surroundings,
 ) -> _Events:
     """When each event comes at constant accelerations, s; inf where it does not."""
     q, v, a = bodies.path_m, bodies.speed_m_s, by.centre
@@ -222,7 +230,7 @@ def _event_times(
         foot = jnp.where(jnp.abs(q) > PAST_FOOT_M, foot, jnp.inf)
     hit = jnp.full(len(scene.names) - 1, jnp.inf)
     if len(scene.names) > 1:
-        hit = _reaches(bodies.gap_m(scene), v[:-1] - v[1:], a[:-1] - a[1:])
+        hit = _reaches(bodies.gap_m(law, scene), v[:-1] - v[1:], a[:-1] - a[1:])
         hit = jnp.where(touches, jnp.inf, hit)
     soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([grip, foot, hit])))
     return _Events(grip, foot, hit, soonest)
@@ -273,7 +281,7 @@ def _after_hits(bodies: Bodies, hits: jax.Array, law: Dynamics, scene: Surroundi
     against a body that is hit is pushed on at once. Faces are smooth: rims keep their speeds.
     """
     v = bodies.speed_m_s
-    meets = hits | (bodies.gap_m(scene) < TOUCH_M)
+    meets = hits | (bodies.gap_m(law, scene) < TOUCH_M)
     approach = v[:-1] - v[1:]
     e = jnp.where(approach > PLASTIC_M_S, law.restitution, 0.0)
     parting = jnp.cumsum(jnp.where(meets, e * approach, 0.0))

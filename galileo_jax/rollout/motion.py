@@ -36,6 +36,8 @@ class Dynamics(NamedTuple):
       turn: cos and sin, each `[...]`, of the angle by which the path turns at the foot.
       foot: `[...]`, factor on the speed kept at the foot.
       restitution: `[...]`, between objects.
+      overlap_m: `[...]`, how much further apart neighbours touch again once they have met
+        (the rigid engine; MuJoCo's contacts give way by themselves).
       coefficient: `State` to friction coefficients `[..., object]`.
       drive: `State` to forces along the path but friction, `[..., object]`, N.
       brake: `State` to friction's size `[..., object]`, N.
@@ -53,6 +55,7 @@ class Dynamics(NamedTuple):
     turn: tuple[Array, Array]
     foot: Array
     restitution: Array
+    overlap_m: Array
     coefficient: Callable[[State], Array]
     drive: Callable[[State], Array]
     brake: Callable[[State], Array]
@@ -78,6 +81,7 @@ def dynamics(
     share = _sum([e.inertia(theta, scene) for e in effects])
     speed = _sum([e.start_speed(theta, scene) for e in effects])
     restitution = _sum([e.restitution(theta, scene) for e in effects])
+    overlap = _sum([e.overlap(theta, scene) for e in effects])
     tilts = [tilt for e in effects if (tilt := e.tilt(theta, scene)) is not None]
     ramp = scene.angle_rad + xp.zeros(lead)
     table = xp.zeros(lead)
@@ -119,6 +123,7 @@ def dynamics(
         turn=(xp.cos(ramp - table), xp.sin(ramp - table)),
         foot=foot,
         restitution=xp.zeros(lead) if restitution is None else restitution,
+        overlap_m=xp.zeros(lead) if overlap is None else overlap,
         coefficient=coefficient,
         drive=drive,
         brake=brake,

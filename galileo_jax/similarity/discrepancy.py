@@ -27,6 +27,10 @@ READ_OFF = 10.0  # times an angle's sd: so wide that the direction tells nothing
 SCALE_SD = 0.001
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
 HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none
+# A soft hit takes this long to end: bodies that friction pulls apart meanwhile leave without the
+# last of its impulse.
+HIT_END_S = 0.005
+MIN_FRAMES_APART = 4  # to tell how fast friction pulls bodies apart
 HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # trackers are pulled along by what they pass
 # Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
 # millimetre; how fast they go along it shows none of that.
@@ -34,6 +38,7 @@ WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
 # Nothing holds a falling body to its line: where it is across it says nothing of the fall.
 ASIDE_SD_M = 1.0
 SMALLEST_MODE = 1e-3  # of a family's largest variance; what is smaller is left out
+STILL_M_S = 0.02  # what is slower rests
 MOVED_M = 0.002  # an object that has gone so far has been hit
 
 
@@ -192,6 +197,7 @@ def _after_hit(position: np.ndarray, observation: Observation, is_filmed: bool) 
         if moved.any():
             hit = max(int(np.argmax(moved)) - 1, 0)
             found.extend(_after(hit, (i - 1, i), position))
+            found.extend(_soft_end(hit, i, position, observation))
             if is_filmed:
                 found.extend(_drift(hit, (i - 1, i), position, observation))
     return found
@@ -207,6 +213,40 @@ def _after(hit: int, objects: tuple[int, int], position: np.ndarray) -> list[np.
         step[i, 0, hit + 1 :] = HIT_STEP_SD_M
         found.extend([way, step])
     return found
+
+
+def _soft_end(
+    hit: int, front: int, position: np.ndarray, observation: Observation
+) -> list[np.ndarray]:
+    """What the bodies' relative speed lacks because a hit in frame `hit` did not end at once.
+
+    As much as friction changes it in `HIT_END_S`, shared out so that momentum is kept; nothing
+    where friction presses the bodies together.
+    """
+    times = observation.times_s
+    rear, ahead = position[front - 1, 0], position[front, 0]
+    seen = observation.mask[front - 1] & observation.mask[front]
+    moves = np.minimum(np.diff(rear), np.diff(ahead)) > STILL_M_S * np.diff(times)
+    stops = hit + 1 + int(np.argmin(np.append(moves[hit + 1 :], False)))
+    both = np.arange(hit + 1, stops)[seen[hit + 1 : stops]]
+    if len(both) < MIN_FRAMES_APART or hit < 2 or not seen[hit - 2 : hit + 1].all():
+        return []
+    since = times[both] - times[hit]
+    bend = np.polyfit(since, (ahead - rear)[both], 2)[0]
+    loses = np.polyfit(times[hit - 2 : hit + 1], rear[hit - 2 : hit + 1], 1)[0]
+    loses -= np.polyfit(since, rear[both], 2)[1]
+    gains = np.polyfit(since, ahead[both], 2)[1]
+    if bend <= 0 or min(loses, gains) <= 0:
+        return []
+    found = np.zeros_like(position)
+    lacks = 2 * bend * HIT_END_S / (loses + gains)
+    for i, share in ((front - 1, loses), (front, -gains)):
+        speed = np.append(np.diff(position[i, 0]) / np.diff(times), 0.0)
+        last = hit + 1 + int(np.argmin(speed[hit + 1 :] > STILL_M_S))
+        found[i, 0, hit + 1 :] = (
+            lacks * share * (np.minimum(times, times[last]) - times[hit])[hit + 1 :]
+        )
+    return [found]
 
 
 def _drift(

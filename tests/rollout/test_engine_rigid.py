@@ -89,6 +89,17 @@ def test_restitution_and_momentum(wanted, mass):
     assert np.dot(mass, after) == pytest.approx(np.dot(mass, before), abs=rubbed)
 
 
+@pytest.mark.parametrize("further", [0.0, 0.002])
+def test_bodies_that_meet_again_touch_further_apart(further):
+    """The front one, rougher, is caught up with: at so much more distance than at the hit."""
+    given = {"impact_restitution": 0.08, "contact_gap": further}
+    position, _, _ = simulate(HIT, 2.0, **given)
+    gap = position[1, 0] - position[0, 0] - HIT.size_m[0][0] / 2 - HIT.size_m[1][0] / 2
+    assert gap.min() == pytest.approx(0.0, abs=5e-3), "the hit itself, between two records"
+    assert gap.max(where=position[1, 0] > HIT.object2_x_m, initial=0.0) > 0.003
+    assert gap[-1] == pytest.approx(further, abs=1e-6)
+
+
 @pytest.mark.parametrize("factor", [0.9, 0.95, 1.05])
 def test_foot_transition_is_the_factor_on_the_speed(factor):
     experiment = replace(SMOOTH, object2_x_m=0.6)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import LENS_SD, WOBBLE_SD_M, modes
+from galileo_jax.similarity.discrepancy import HIT_END_S, LENS_SD, WOBBLE_SD_M, modes
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
@@ -115,3 +115,32 @@ def test_a_lens_that_bends_a_flight_is_no_misfit():
     assert np.abs(barrel).max() > 10 * 2e-4, "it shows"
     assert cost(barrel) < 4
     assert cost(ripple) > 100
+
+
+def soft_ends(experiment, monkeypatch):
+    """What of the modes is only there because hits end late."""
+    seen = observe(experiment, 0, noise_m=0.0)
+    whole = modes(seen, SCENE, is_filmed=False)
+    monkeypatch.setattr("galileo_jax.similarity.discrepancy.HIT_END_S", 0.0)
+    less = modes(seen, SCENE, is_filmed=False)
+    return seen.times_s, [a - b for a, b in zip(whole, less, strict=True) if (a != b).any()]
+
+
+def test_a_hit_that_ends_late_parts_bodies_slower(monkeypatch):
+    """By what friction does to their relative speed meanwhile; momentum is kept."""
+    parts = replace(HIT, friction=(0.2, 0.1))
+    times, (mode,) = soft_ends(parts, monkeypatch)
+    hit_s = solve(parts, times).hit_s
+    assert hit_s is not None
+    after = (times > hit_s + 0.05) & (times < hit_s + 0.25)
+    rear, ahead = (np.polyfit(times[after], x[after], 1)[0] for x in mode[:, 0])
+    lacks = 9.81 * (0.2 - 0.1) * HIT_END_S
+    assert rear - ahead == pytest.approx(lacks, rel=0.15)
+    m1, m2 = parts.mass_kg
+    assert m1 * rear + m2 * ahead == pytest.approx(0.0, abs=0.1 * m1 * rear)
+    assert not mode[:, :, times < hit_s - 1 / 30].any()
+
+
+def test_bodies_that_friction_presses_together_do_not_part(monkeypatch):
+    _, found = soft_ends(replace(HIT, friction=(0.1, 0.2)), monkeypatch)
+    assert found == []

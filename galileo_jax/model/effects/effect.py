@@ -254,6 +254,10 @@ class Effect:
         """Returns the coefficient of restitution between objects `[...]`, or None."""
         return None
 
+    def overlap(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns by how much less neighbours are apart at their first hit `[...]`, m, or None."""
+        return None
+
     def bounce(self, theta: Theta, scene: Surroundings) -> Bounce | None:
         """Returns the floor, or None where there is none to bounce on."""
         return None

@@ -47,8 +47,9 @@ def test_absent_is_nothing(effect, scene):
         assert hook(theta, scene) is None
     foot = effect.foot(theta, scene)
     assert foot is None or (foot == 1).all()
-    restitution = effect.restitution(theta, scene)
-    assert restitution is None or (restitution == 0).all()
+    for hook in (effect.restitution, effect.overlap):
+        found = hook(theta, scene)
+        assert found is None or (found == 0).all()
 
 
 @pytest.mark.parametrize("effect", NUISANCES, ids=lambda effect: effect.name)

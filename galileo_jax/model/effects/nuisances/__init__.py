@@ -5,6 +5,7 @@ They are effects like any other; only their parameters' role differs
 """
 
 from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.effects.nuisances.contact_gap import ContactGap
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
@@ -20,6 +21,7 @@ NUISANCES: tuple[Effect, ...] = (
     DeclaredAngle(),
     DeclaredScale(),
     ImpactRestitution(),
+    ContactGap(),
     ReleaseInstant(),
     PixelScale(),
     Perspective(),
