@@ -91,7 +91,7 @@ def simulate(
     Args:
       out: DIR/NAME.mp4, or DIR/NAME.csv for a track.
       seed: of everything that is drawn, 0 or more.
-      scenario: ramp, multi or incline; fall, flight, spring or liquid.
+      scenario: "ramp", "multi" or "incline"; "fall", "flight", "spring" or "liquid".
       shapes: of the objects on a ramp, in the order of the travel (box, cylinder, torus,
         sphere); round ones roll. None: as many boxes as the scenario has.
       angle: of the ramp, degrees, 1 to 60.
@@ -117,7 +117,7 @@ def simulate(
       effects_from: Python files that register further effects.
       faults: small faults of real clips: release between frames, foot and impact not ideal.
       size: of the picture, (width, height), px, even numbers.
-      direction: of the travel in the picture.
+      direction: of the travel in the picture, "right" or "left".
       no_points: the yaml does not say where the objects are.
       hand: a hand lets object 1 go.
       camera_fault: keystone, roll (how the camera is held), origin, points (of the yaml, off by
