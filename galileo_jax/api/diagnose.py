@@ -140,12 +140,9 @@ class Diagnosis:
         return pd.concat(parts, ignore_index=True)
 
     @cached_property
+    @in_float64
     def best(self) -> Fit:
         """The fit of the last round's model, as `fit` with its effects gives it."""
-        return self._best()
-
-    @in_float64
-    def _best(self) -> Fit:
         last, seed = self.found.rounds[-1].hypothesis, int(self.document["seed"])
         part = make_joint_problem(
             [one.clip for one in self.measurements],

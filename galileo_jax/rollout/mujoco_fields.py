@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from mujoco.batch import Batch
 
 from galileo_jax.model.effects.effect import Effect, State, Surroundings
 from galileo_jax.rollout.motion import LEAST_FRICTION, Dynamics, state_at, to_plane
@@ -143,6 +144,24 @@ def sliding_object(pair: str) -> int | None:
     """Which object's friction a contact pair of scenes/ramp.xml carries; None for the hit."""
     first, second = pair.split("_")
     return None if second.startswith("object") else int(first.removeprefix("object")) - 1
+
+
+def write_contacts(batch: Batch, compiled: Any, friction: Array, faces: Array | None) -> None:
+    """Writes friction coefficients, and what objects' faces are like, into a batch's contacts.
+
+    Args:
+      batch: of the compiled model.
+      compiled: the model.
+      friction: `[batch, object]`.
+      faces: `[batch, 2]`, MuJoCo's direct solref between objects; None leaves them as they are.
+    """
+    written = batch.expand("pair_friction")
+    for i in range(compiled.npair):
+        which = sliding_object(compiled.pair(i).name)
+        if which is not None:
+            written[:, i, :2] = friction[:, which, None]
+        elif faces is not None:
+            batch.expand("pair_solref")[:, i] = faces
 
 
 def bumper_solref(restitution: Array, xp: Any) -> Array:

@@ -8,7 +8,8 @@ import pytest
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.commands import command, simulate
-from galileo_jax.simulation import SLOWEST_HIT_M_S, Truth, draw_truth, roll_out
+from galileo_jax.simulation.motion import roll_out
+from galileo_jax.simulation.truth import SLOWEST_HIT_M_S, Truth, draw_truth
 from tests.reference_ramp import Experiment, Solution, solve
 
 # The motion is exact at the records; an event is looked for on straight lines between them.
