@@ -1,6 +1,7 @@
 """`simulate`: a clip with known truth, or a series of them."""
 
 import html
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.simulation.clip_files import TRUTH_SUFFIX, YAML_SUFFIX
 from galileo_jax.simulation.clip_writer import write_clips
 from galileo_jax.simulation.motion import Solver
 from galileo_jax.simulation.settings import Settings
@@ -179,11 +181,16 @@ def simulate(
         missed_frames=missed_frames,
     )
     with progress.scope(on_progress, cancel):
-        written = write_clips(Path(out), settings)
+        clips = write_clips(Path(out), settings)
+    truths = [clip.with_suffix(TRUTH_SUFFIX) for clip in clips]
     return Simulated(
-        clips=tuple(one.clip for one in written),
-        truths=tuple(one.truth for one in written),
-        paths=tuple(path for one in written for path in (one.clip, one.yaml, one.truth_file)),
+        clips=clips,
+        truths=tuple(json.loads(truth.read_text(encoding="utf-8")) for truth in truths),
+        paths=tuple(
+            path
+            for clip, truth in zip(clips, truths, strict=True)
+            for path in (clip, clip.with_suffix(YAML_SUFFIX), truth)
+        ),
     )
 
 

@@ -110,7 +110,7 @@ def train(
 
 def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
     from galileo_jax.neural.dataset import load_or_make
-    from galileo_jax.neural.presets import make_task
+    from galileo_jax.neural.task import make_task
     from galileo_jax.neural.training import train as train_network
     from galileo_jax.report.draw import to_svg
     from galileo_jax.report.training_chart import loss_chart

@@ -133,7 +133,7 @@ def load_network(path: Path) -> tuple[Any, TrainConfig]:
     Raises:
       InputError: missing, or not a network of this version.
     """
-    from galileo_jax.neural.presets import make_task
+    from galileo_jax.neural.task import make_task
 
     try:
         with np.load(path) as kept:

@@ -10,7 +10,6 @@ from flax import nnx
 
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.model.parameters import Uniform
-from galileo_jax.neural.benchmark import BENCHMARKS
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.posterior_network import (
     PosteriorNetwork,
@@ -18,10 +17,9 @@ from galileo_jax.neural.posterior_network import (
     negative_log_density,
     to_u,
 )
-from galileo_jax.neural.presets import PRESETS
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.neural.summary import NUM_CHANNELS, NUM_FEATURES, summarise
-from galileo_jax.neural.task import Arrays
+from galileo_jax.neural.task import BENCHMARKS, PRESETS, Arrays
 from galileo_jax.neural.world import IDEAL_FRICTION, Truth, draw, targets
 from galileo_jax.runtime.errors import InputError
 
