@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pybullet  # pyright: ignore
 
-from galileo_jax.simulation import Truth
+from galileo_jax.simulation.truth import Truth
 
 STEP_S = 1 / 240
 FINE_STEP_S = 1 / 960

@@ -97,7 +97,7 @@ def _prediction_in_mjx(problem: Problem) -> Predict:
     def predict(z: jax.Array) -> jax.Array:
         theta = forward(model.parameters, z)
         position, velocity = engine.rollout(theta)
-        motion = Trajectory(times, position, velocity, position[:, 0])
+        motion = Trajectory(times, position, velocity)
         return seen(effects, model.names, theta, motion, frames, model.scene.surroundings)
 
     return predict

@@ -21,7 +21,7 @@ from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import make_fields, rigid_motion
-from galileo_jax.simulation import Truth
+from galileo_jax.simulation.truth import Truth
 from galileo_jax.thesis import sampler as thesis
 from galileo_jax.thesis.similarities.thesis_gaussian import GaussianSimilarity
 

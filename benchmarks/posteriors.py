@@ -61,7 +61,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime import compilation_cache
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
-from galileo_jax.simulation import Truth
+from galileo_jax.simulation.truth import Truth
 from galileo_jax.thesis.sampler import NARROW, NUM_STEPS, Acceptance, infer
 from galileo_jax.thesis.similarity import AbstractSimilarity, similarity_class
 

@@ -27,7 +27,7 @@ from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import Engine
 from galileo_jax.runtime import compilation_cache
-from galileo_jax.simulation import Truth, draw_truth
+from galileo_jax.simulation.truth import Truth, draw_truth
 
 DURATION_S = 1.2
 SIZES = (1, 8, 64, 256)

@@ -11,7 +11,8 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.observation.observation import Observation
-from galileo_jax.simulation import Truth, draw_truth, roll_out
+from galileo_jax.simulation.motion import roll_out
+from galileo_jax.simulation.truth import Truth, draw_truth
 
 # The oracle shares nothing with the package and lives beside the tests that it serves.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))

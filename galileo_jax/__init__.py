@@ -73,7 +73,7 @@ _PLACES = {
     "galileo_jax.runtime.progress": ("Cancelled",),
     "galileo_jax.sweeping.sweep": ("Sweep", "sweep"),
 }
-_PLACE = {name: place for place, names in _PLACES.items() for name in names}
+PLACE = {name: place for place, names in _PLACES.items() for name in names}
 _RENAMED = {"register_effect": "register"}  # where a name says too little outside its module
 
 __all__ = [
@@ -120,9 +120,9 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Imports a public name when it is first asked for."""
-    if name not in _PLACE:
+    if name not in PLACE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_PLACE[name]), _RENAMED.get(name, name))
+    value = getattr(import_module(PLACE[name]), _RENAMED.get(name, name))
     globals()[name] = value
     return value
 

@@ -144,10 +144,10 @@ def compare(
 
     Args:
       fit: a fit or the folder of a saved one; or tracks, clips or files, which are fitted first.
-      effects: names of effects in the model of that fit; a `Fit` has its own.
+      effects: in the model of that fit, names ("a,b" or a sequence); a finished fit has its own.
       effects_from: Python files that register more effects.
-      engine: that rolls out.
-      pixels_per_metre: overrides the clips' scale.
+      engine: what rolls the model out: "auto" (rigid), "rigid", "c" or "mjx".
+      pixels_per_metre: overrides the clips' scale; None: the yaml's.
       seed: of starts and replicates; None: the fit's own, or 0.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
       cancel: a flag with `is_set`, such as `threading.Event`.

@@ -141,12 +141,9 @@ class Diagnosis:
         return pd.concat(parts, ignore_index=True)
 
     @cached_property
+    @in_float64
     def best(self) -> Fit:
         """The fit of the last round's model, as `fit` with its effects gives it."""
-        return self._best()
-
-    @in_float64
-    def _best(self) -> Fit:
         last, seed = self.found.rounds[-1].hypothesis, int(self.document["seed"])
         part = make_joint_problem(
             [one.clip for one in self.measurements],
@@ -247,9 +244,9 @@ def diagnose(
       tracks: a track or several (trials of the same objects); a clip or a file is tracked first.
       add: "auto": what the verdict names; "none": nothing; or an effect's name.
       effects_from: Python files that register more candidates.
-      engine: that rolls out.
+      engine: what rolls the model out: "auto" (rigid), "rigid", "c" or "mjx".
       seed: of everything random; the same seed gives the same numbers.
-      pixels_per_metre: overrides the clips' scale.
+      pixels_per_metre: overrides the clips' scale; None: the yaml's.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
         `{"round": row}` for the base model and for what is added, as in diagnosis.json's history,
         and `{"candidate": row}` for each candidate.

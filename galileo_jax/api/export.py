@@ -41,7 +41,7 @@ def export(
 
     Args:
       source: the folder that a fit was saved to, or a clip.
-      to: the format.
+      to: "csv", "parquet" or "netcdf".
       fitted: of a run: also where the fitted model has the objects, at the posterior's mean.
       out: folder; None: RUN/export, or CLIP_export.
 

@@ -2,13 +2,13 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of
+from galileo_jax.api.fit_options import BLOCK_STEPS, OF_THESIS, FitOptions, ignored_options
 from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
@@ -30,38 +30,10 @@ from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
-BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
-MAX_STEPS = 4000
 THESIS_CHAINS = 16
 TRACKED, FITTED = 0.4, 0.6  # shares of the work, for progress
 OFF_THE_PLANE = "an object has a z_m: motion in a plane takes no notice; see --motion free"
-
-
-@dataclass(frozen=True)
-class FitOptions:
-    """What `fit` was asked for; the arguments of the same names."""
-
-    method: Literal["grad", "mh", "cnn"] = "grad"
-    effects: tuple[str, ...] = ()
-    effects_from: tuple[str, ...] = ()
-    free: tuple[str, ...] = ()
-    motion: str = "planar"
-    engine: str = "auto"
-    noise: NoiseModel | None = None
-    seed: int = 0
-    sampler: str = "mixture"
-    max_steps: int = MAX_STEPS
-    chains: int | None = None
-    init: Literal["grad", "cnn"] = "grad"
-    preset: Literal["galileo", "thesis"] = "galileo"
-    similarity: str = "thesis_gaussian"
-    acceptance: str = "coin"
-    selection: str = "best"
-
-
-OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
-OF_THESIS = ("similarity", "acceptance", "selection")
 
 
 @in_float64
@@ -78,7 +50,7 @@ def fit(
     seed: int = 0,
     pixels_per_metre: float | None = None,
     sampler: str = "mixture",
-    max_steps: int = MAX_STEPS,
+    max_steps: int = 4000,
     chains: int | None = None,
     init: Literal["grad", "cnn"] = "grad",
     preset: Literal["galileo", "thesis"] = "galileo",
@@ -100,19 +72,20 @@ def fit(
       effects_from: Python files that register more effects.
       free: declared quantities to infer instead, such as "gravity".
       motion: "planar", or "free": from the first hit on objects turn and tip (MuJoCo's C engine).
-      engine: "auto", "rigid", "c" or "mjx".
+      engine: what rolls the model out: "auto" (rigid), "rigid", "c" or "mjx".
       noise: the errors a track is taken to have: "camera", "bodies" or "tracker"; None: as the
         clip was measured.
       seed: of everything random; the same seed gives the same numbers.
-      pixels_per_metre: overrides the clips' scale.
-      sampler: of method "mh".
-      max_steps: of method "mh", per chain, after the warm-up.
+      pixels_per_metre: overrides the clips' scale; None: the yaml's.
+      sampler: of method "mh": proposals.
+      max_steps: of method "mh", per chain, after the warm-up, a multiple of 25.
       chains: of method "mh", how many; None: 8 (preset "thesis": 16).
       init: of method "mh": what chains start from, "grad" or "cnn".
       preset: of method "mh": "galileo", or "thesis": the sampler this project began with.
-      similarity: of preset "thesis".
-      acceptance: of preset "thesis".
-      selection: of preset "thesis".
+      similarity: of preset "thesis": of velocity profiles.
+      acceptance: of preset "thesis": of a worse proposal, "coin" or "metropolis".
+      selection: of preset "thesis": how the answer is taken from the chains, "best" or
+        "least_variance".
       checkpoint: a file; chains that were interrupted go on from it.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
       cancel: a flag with `is_set`, such as `threading.Event`.
@@ -194,13 +167,7 @@ def _check(options: FitOptions) -> None:
 
 def _refuse_ignored(options: FitOptions) -> None:
     """Refuses options that differ from their default and would be ignored."""
-    if options.method != "mh":
-        ignored = ("preset", "chains", *OF_GALILEO, *OF_THESIS)
-        why = f"of --method mh, not of {options.method}"
-    elif options.preset == "thesis":
-        ignored, why = OF_GALILEO, "not of --preset thesis"
-    else:
-        ignored, why = OF_THESIS, "of --preset thesis only"
+    ignored, why = ignored_options(options.method, options.preset)
     plain = FitOptions()
     for name in ignored:
         if getattr(options, name) != getattr(plain, name):

@@ -99,21 +99,19 @@ class Fit:
         return pd.DataFrame.from_dict(rows, orient="index").reindex(columns=columns)
 
     @property
+    @in_float64
     def inference_data(self) -> "InferenceData":
         """ArviZ's InferenceData, for `az.summary`, `az.plot_ppc`, `az.loo`.
 
         Groups posterior, prior, posterior_predictive, log_likelihood (of each measured coordinate
         given the others), observed_data and sample_stats, with units.
         """
-        return self._inference_data()
-
-    @in_float64
-    def _inference_data(self) -> "InferenceData":
         from galileo_jax.results.inference_data import inference_data
 
         return inference_data(self.problem, self.posterior, int(self.result["seed"]))
 
     @property
+    @in_float64
     def residuals(self) -> "pd.DataFrame":
         """One row per clip, object and frame: measured minus the best fit.
 
@@ -122,10 +120,6 @@ class Fit:
         the stated noise (independent, standard normal if model and statement are right). NaN
         where an object was not seen.
         """
-        return self._residuals()
-
-    @in_float64
-    def _residuals(self) -> "pd.DataFrame":
         import pandas as pd
 
         theta = self.problem.theta(self._z())

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
 
-NUM_DRAWS, MOST_DRAWS = 200, 10_000
+NUM_DRAWS = 200
+MOST_DRAWS = 10_000
 LONGEST_S = 60.0
 
 
@@ -133,7 +134,7 @@ def predict(
     Args:
       fit: of one clip, or the folder of a run.
       seconds: how long beyond the clip's end, s, in (0, 60].
-      draws: how many rollouts.
+      draws: how many rollouts of posterior draws, 2 to 10000.
       seed: of the choice of draws.
       on_progress: called with the stage, the share done (0 to 1) and None.
       cancel: a flag with `is_set`, such as `threading.Event`.

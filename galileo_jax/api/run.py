@@ -1,6 +1,5 @@
 """`load_run`: a fit that was saved."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import with_shared_parameters
 from galileo_jax.measurement.measure import Measurement
-from galileo_jax.results.run import BEST, CLIP, POSTERIOR, RESULT, Run
+from galileo_jax.results.run import BEST, CLIP, POSTERIOR, RESULT, Run, read_result
 from galileo_jax.results.run import load_run as read_run
 from galileo_jax.runtime.precision import in_float64
 
@@ -43,7 +42,7 @@ def load_run(folder: str | Path, *, engine: str = "auto") -> Fit:
     posterior, result = runs[0].posterior, runs[0].result
     if is_joint:
         posterior = Posterior.from_netcdf(folder / POSTERIOR)
-        result = json.loads((folder / RESULT).read_text(encoding="utf-8"))
+        result = read_result(folder)
         order = {Path(source).stem: i for i, source in enumerate(result["clips"])}
         runs.sort(key=lambda run: order.get(run.problem.name, len(order)))
     named = [replace(run.problem, name=Path(run.result["clips"][0]).stem) for run in runs]

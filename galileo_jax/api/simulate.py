@@ -1,6 +1,7 @@
 """`simulate`: a clip with known truth, or a series of them."""
 
 import html
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.simulation.clip_files import TRUTH_SUFFIX, YAML_SUFFIX
 from galileo_jax.simulation.clip_writer import write_clips
 from galileo_jax.simulation.motion import Solver
 from galileo_jax.simulation.settings import Settings
@@ -91,7 +93,7 @@ def simulate(
     Args:
       out: DIR/NAME.mp4, or DIR/NAME.csv for a track.
       seed: of everything that is drawn, 0 or more.
-      scenario: ramp, multi or incline; fall, flight, spring or liquid.
+      scenario: "ramp", "multi" or "incline"; "fall", "flight", "spring" or "liquid".
       shapes: of the objects on a ramp, in the order of the travel (box, cylinder, torus,
         sphere); round ones roll. None: as many boxes as the scenario has.
       angle: of the ramp, degrees, 1 to 60.
@@ -117,7 +119,7 @@ def simulate(
       effects_from: Python files that register further effects.
       faults: small faults of real clips: release between frames, foot and impact not ideal.
       size: of the picture, (width, height), px, even numbers.
-      direction: of the travel in the picture.
+      direction: of the travel in the picture, "right" or "left".
       no_points: the yaml does not say where the objects are.
       hand: a hand lets object 1 go.
       camera_fault: keystone, roll (how the camera is held), origin, points (of the yaml, off by
@@ -179,11 +181,16 @@ def simulate(
         missed_frames=missed_frames,
     )
     with progress.scope(on_progress, cancel):
-        written = write_clips(Path(out), settings)
+        clips = write_clips(Path(out), settings)
+    truths = [clip.with_suffix(TRUTH_SUFFIX) for clip in clips]
     return Simulated(
-        clips=tuple(one.clip for one in written),
-        truths=tuple(one.truth for one in written),
-        paths=tuple(path for one in written for path in (one.clip, one.yaml, one.truth_file)),
+        clips=clips,
+        truths=tuple(json.loads(truth.read_text(encoding="utf-8")) for truth in truths),
+        paths=tuple(
+            path
+            for clip, truth in zip(clips, truths, strict=True)
+            for path in (clip, clip.with_suffix(YAML_SUFFIX), truth)
+        ),
     )
 
 

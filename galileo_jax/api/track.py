@@ -170,7 +170,7 @@ def track(
 
     Args:
       clip: a clip, or what `load` takes.
-      pixels_per_metre: overrides the clip's scale.
+      pixels_per_metre: overrides the clip's scale; None: the yaml's.
       on_progress: called with the stage, the share done (0 to 1) and None.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
@@ -206,7 +206,7 @@ def as_measurements(
 
     Args:
       tracks: one or several, or the clips, or their files.
-      pixels_per_metre: overrides the clips' scale.
+      pixels_per_metre: overrides the clips' scale; None: the yaml's.
       before: is given the clips, once they are checked, if any is to be tracked: what can go on
         beside that begins; what it returns is called when all are tracked.
 

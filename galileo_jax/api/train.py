@@ -66,14 +66,15 @@ def train(
 
     Args:
       out: folder for the network, its samples and its checkpoints.
-      preset: which network, data and loss.
-      config: a YAML file in place of the preset's own.
-      data: folder of the samples. None: `out`/data.
-      samples: how many, 100 or more. None: the config's, as for all below.
-      max_epochs: the end at the latest.
-      frames: displacements in a profile (thesis: 60 or 110).
-      seed: of samples and weights.
-      engine: that makes the samples (thesis).
+      preset: which network, data and loss: "thesis" or "galileo".
+      config: a YAML file; None: the preset's own.
+      data: folder of the samples; None: OUT/data.
+      samples: how many, 100 or more; None: the config's.
+      max_epochs: the end at the latest; None: the config's.
+      frames: of preset "thesis": displacements in a profile, 60 or 110; None: the config's.
+      seed: of samples and weights; None: the config's.
+      engine: of preset "thesis": what makes the samples, "auto", "rigid", "c" or "mjx"; None: the
+        config's.
       on_progress: called with the stage, the share done (0 to 1), and in training with epoch,
         learning rate and losses so far.
       cancel: a flag with `is_set`, such as `threading.Event`.
@@ -109,7 +110,7 @@ def train(
 
 def _train(out: Path, config: "TrainConfig", data_folder: Path) -> Trained:
     from galileo_jax.neural.dataset import load_or_make
-    from galileo_jax.neural.presets import make_task
+    from galileo_jax.neural.task import make_task
     from galileo_jax.neural.training import train as train_network
     from galileo_jax.report.draw import to_svg
     from galileo_jax.report.training_chart import loss_chart

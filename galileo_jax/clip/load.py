@@ -89,8 +89,8 @@ def with_unused(clip: Clip) -> Clip:
         )
     if clip.track_origin is not None and clip.track_units == "px":
         unused["track_origin"] = "the track is in pixels; origin_px is the foot"
-    told = tuple(f"{clip.path}: {key}: not used; {why}" for key, why in unused.items())
-    return clip.model_copy(update={"warnings": clip.warnings + told})
+    doubts = tuple(f"{clip.path}: {key}: not used; {why}" for key, why in unused.items())
+    return clip.model_copy(update={"warnings": clip.warnings + doubts})
 
 
 def has_yaml(path: Path) -> bool:

@@ -6,38 +6,19 @@ from pathlib import Path
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.commands import command
+from galileo_jax.commands.options import adder
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime.errors import InputError
 
 
-def add_clip_options(parser: command.Parser, out: str) -> None:
+def add_clip_options(parser: command.Parser, function: str, out: str) -> None:
     """Adds what `fit`, `compare` and `diagnose` have in common; `out` is the help of --out."""
-    parser.add_argument(
-        "--effects-from",
-        action="append",
-        default=[],
-        metavar="FILE.py",
-        help="Python file that registers more effects (may be given several times)",
-    )
+    add = adder(parser, function)
+    add("effects_from", metavar="FILE.py")
     parser.add_argument("--out", metavar="DIR", help=out)
-    parser.add_argument(
-        "--seed",
-        type=command.whole_number(0),
-        default=0,
-        help="of everything random; the same seed gives the same numbers (default %(default)s)",
-    )
-    parser.add_argument(
-        "--engine",
-        choices=ENGINES,
-        default="auto",
-        help="what rolls the model out (default %(default)s: rigid)",
-    )
-    parser.add_argument(
-        "--pixels-per-metre",
-        type=float,
-        metavar="SCALE",
-        help="overrides the clip's scale (default: the yaml's)",
-    )
+    add("seed", type=command.whole_number(0))
+    add("engine", choices=ENGINES, metavar=None)
+    add("pixels_per_metre", metavar="SCALE")
 
 
 def load_clips(call_clips: Sequence[str], pixels_per_metre: float | None) -> list[Clip]:

@@ -30,7 +30,7 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{self.prog}: {message}; see --help")
 
 
-def whole_number(least: int, multiple_of: int = 1, most: int | None = None) -> Callable[[str], int]:
+def whole_number(least: int) -> Callable[[str], int]:
     """Returns a parser of whole numbers for `add_argument(type=...)`."""
 
     def parse(text: str) -> int:
@@ -38,10 +38,8 @@ def whole_number(least: int, multiple_of: int = 1, most: int | None = None) -> C
             value = int(text)
         except ValueError:
             value = least - 1
-        if value < least or value % multiple_of or (most is not None and value > most):
-            many = f"multiple of {multiple_of}" if multiple_of > 1 else "whole number"
-            limit = f"{least} or more" if most is None else f"{least} to {most}"
-            raise argparse.ArgumentTypeError(f"{text!r} is no {many}, {limit}")
+        if value < least:
+            raise argparse.ArgumentTypeError(f"{text!r} is no whole number, {least} or more")
         return value
 
     return parse

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
 
@@ -18,27 +19,20 @@ NUM_CELLS = 6
 
 def main(argv: Sequence[str]) -> int | None:
     """Compares a model with clips, or a run with its own; writes compare.json and a page."""
-    call = _parser().parse_args(argv)
-    runs = [path for path in call.clips if Path(path).is_dir()]
-    if runs and len(call.clips) > 1:
+    asked = vars(_parser().parse_args(argv))
+    sources, to = asked.pop("fit"), asked.pop("out")
+    runs = [path for path in sources if Path(path).is_dir()]
+    if runs and len(sources) > 1:
         raise InputError(f"{runs[0]}: a run is compared alone; clips are given as files")
-    clips = [] if runs else load_clips(call.clips, call.pixels_per_metre)
+    clips = [] if runs else load_clips(sources, asked["pixels_per_metre"])
     if runs:
-        out = Path(call.out) if call.out else Path(runs[0]) / "compare"
+        out = Path(to) if to else Path(runs[0]) / "compare"
     else:
-        out = out_folder(call.out, clips, "compare")
+        out = out_folder(to, clips, "compare")
     from galileo_jax.api.compare import compare
 
     with progress_display() as display:
-        compared = compare(
-            runs[0] if runs else clips,
-            effects=call.effects,
-            effects_from=call.effects_from,
-            engine=call.engine,
-            seed=call.seed,
-            pixels_per_metre=call.pixels_per_metre,
-            on_progress=display,
-        )
+        compared = compare(runs[0] if runs else clips, **asked, on_progress=display)
         display("writing the page", 1.0)
         compared.save(out)
     warn(line for one in compared.fit.measurements for line in (*one.remarks, *one.doubts))
@@ -72,10 +66,11 @@ def _lines(compared: "Comparison") -> list[str]:
 
 def _parser() -> command.Parser:
     parser = command.Parser(prog="galileo compare", description=__doc__)
-    add = parser.add_argument
-    add("clips", nargs="+", metavar="CLIP|RUN", help="video, its yaml, a csv track, or a run")
-    add("--effects", default="", metavar="A,B", help="effects in the model (default: none)")
-    add_clip_options(parser, out="folder (default runs/CLIP/compare, RUN/compare)")
+    parser.add_argument(
+        "fit", nargs="+", metavar="CLIP|RUN", help="video, its yaml, a csv track, or a run"
+    )
+    adder(parser, "compare")("effects", metavar="A,B", help="effects in the model (default: none)")
+    add_clip_options(parser, "compare", out="folder (default runs/CLIP/compare, RUN/compare)")
     parser.examples(
         "galileo compare clip.mp4                              the model without effects",
         "galileo compare runs/clip                             a finished fit",

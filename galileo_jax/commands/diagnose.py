@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
 from galileo_jax.results.truth import hidden_effect
 
@@ -17,22 +18,14 @@ FRICTIONS = ("k1", "k2")
 
 def main(argv: Sequence[str]) -> int | None:
     """Diagnoses clips; writes diagnosis.json, a page, and a run of the model it ends with."""
-    call = _parser().parse_args(argv)
-    clips = load_clips(call.clips, call.pixels_per_metre)
-    out = out_folder(call.out, clips, "diagnosis")
+    asked = vars(_parser().parse_args(argv))
+    clips = load_clips(asked.pop("tracks"), asked["pixels_per_metre"])
+    out = out_folder(asked.pop("out"), clips, "diagnosis")
     hidden = hidden_effect(clips[0])
     from galileo_jax.api.diagnose import diagnose
 
     with progress_display() as display:
-        found = diagnose(
-            clips,
-            add=call.add,
-            effects_from=call.effects_from,
-            engine=call.engine,
-            seed=call.seed,
-            pixels_per_metre=call.pixels_per_metre,
-            on_progress=_RoundPrinter(display),
-        )
+        found = diagnose(clips, **asked, on_progress=_RoundPrinter(display))
         print("\n".join(_lines(found, hidden)))
         display("writing the page", 1.0)
         found.save(out)
@@ -123,16 +116,9 @@ def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
 
 def _parser() -> command.Parser:
     parser = command.Parser(prog="galileo diagnose", description=__doc__)
-    add = parser.add_argument
-    add("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
-    add(
-        "--add",
-        default="auto",
-        metavar="auto|none|NAME",
-        help="what to add to the model: what the verdict names, nothing, or an effect "
-        "(default %(default)s)",
-    )
-    add_clip_options(parser, out="folder (default runs/CLIP/diagnosis)")
+    parser.add_argument("tracks", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
+    adder(parser, "diagnose")("add", metavar="auto|none|NAME")
+    add_clip_options(parser, "diagnose", out="folder (default runs/CLIP/diagnosis)")
     parser.examples(
         "galileo diagnose clip.mp4                             what is missing is added",
         "galileo diagnose clip1.mp4 clip2.mp4 --add none       trials together; nothing is added",

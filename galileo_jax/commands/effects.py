@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from galileo_jax.commands import command
+from galileo_jax.commands.options import adder
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -19,13 +20,7 @@ def main(argv: Sequence[str]) -> int | None:
 
 def _parser() -> command.Parser:
     parser = command.Parser(prog="galileo effects", description=__doc__)
-    parser.add_argument(
-        "--effects-from",
-        action="append",
-        default=[],
-        metavar="FILE.py",
-        help="Python file that registers more effects (may be given several times)",
-    )
+    adder(parser, "effects")("effects_from", metavar="FILE.py")
     parser.examples(
         "galileo effects",
         "galileo effects --effects-from my_effect.py",

@@ -1,18 +1,17 @@
 """`galileo export`: tracks and fits as csv, parquet or netCDF, for other programs."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 from galileo_jax.api.export import export
 from galileo_jax.commands import command
-from galileo_jax.results.export import FORMATS
+from galileo_jax.commands.clip_options import warn
+from galileo_jax.commands.options import adder
 
 
 def main(argv: Sequence[str]) -> int | None:
     """Writes what a run, or a clip's track, holds; prints the files."""
     done = export(**vars(_parser().parse_args(argv)))
-    for warning in done.warnings:
-        command.console().print(f"warning: {warning}", soft_wrap=True, markup=False)
+    warn(done.warnings)
     print("\n".join(map(str, done.paths)))
     return None
 
@@ -27,19 +26,9 @@ def _parser() -> command.Parser:
         "galileo export runs/clip --to netcdf",
         "galileo export clip.mp4 --to csv --out tables",
     )
-    add = parser.add_argument
-    add("source", type=Path, metavar="RUN|CLIP", help="the folder that fit wrote, or a clip")
-    add(
-        "--to",
-        required=True,
-        metavar="FORMAT",
-        help=f"{', '.join(FORMATS)} (no default)",
-    )
-    add(
-        "--fitted",
-        action="store_true",
-        help="of a run: also where the fitted model has the objects, at the posterior's mean "
-        "(default: off)",
-    )
-    add("--out", type=Path, metavar="DIR", help="default: RUN/export, or CLIP_export")
+    parser.add_argument("source", metavar="RUN|CLIP", help="the folder that fit wrote, or a clip")
+    add = adder(parser, "export")
+    add("to", choices=None, metavar="FORMAT")
+    add("fitted")
+    add("out", metavar="DIR")
     return parser

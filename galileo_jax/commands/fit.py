@@ -4,8 +4,10 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from galileo_jax.api.fit_options import ignored_options
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.stale_outputs import PREDICTION, stale_documents
 from galileo_jax.results.truth import true_parameters
@@ -15,52 +17,25 @@ from galileo_jax.runtime.registry import entry_names
 if TYPE_CHECKING:
     from galileo_jax.api.fit_result import Fit
 
-METHODS = ("grad", "mh", "cnn")
-PRESETS = ("galileo", "thesis")
-INITS = ("grad", "cnn")
-NOISES = ("camera", "bodies", "tracker")
-OF_GALILEO, OF_THESIS = (
-    ("--sampler", "--max-steps", "--init"),
-    ("--similarity", "--acceptance", "--selection"),
-)
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
-FREE = "galileo_jax.model.effects.free"
+FREE = ", ".join(entry_names("galileo_jax.model.effects.free"))
 SIMILARITIES = entry_names("galileo_jax.thesis.similarities")
-BLOCK_STEPS = 25  # as api.fit has it, which imports JAX
 
 
 def main(argv: Sequence[str]) -> int | None:
     """Fits a clip, or several trials together, and writes a run."""
-    call = _parser().parse_args(argv)
-    _refuse_ignored(call, argv)
-    clips = load_clips(call.clips, call.pixels_per_metre)
-    out = out_folder(call.out, clips)
+    asked = vars(_parser().parse_args(argv))
+    ignored, why = ignored_options(asked["method"], asked["preset"])
+    # Also where they are given with their default.
+    command.refuse_ignored(argv, [f"--{name.replace('_', '-')}" for name in ignored], why)
+    clips = load_clips(asked.pop("tracks"), asked.pop("pixels_per_metre"))
+    out = out_folder(asked.pop("out"), clips)
     truth = true_parameters(clips[0])
     from galileo_jax.api.fit import fit
     from galileo_jax.results.run import CHECKPOINT
 
     with progress_display() as display:
-        found = fit(
-            clips,
-            method=call.method,
-            effects=call.effects,
-            effects_from=call.effects_from,
-            free=call.free,
-            motion=call.motion,
-            engine=call.engine,
-            noise=call.noise,
-            seed=call.seed,
-            sampler=call.sampler,
-            max_steps=call.max_steps,
-            chains=call.chains,
-            init=call.init,
-            preset=call.preset,
-            similarity=call.similarity,
-            acceptance=call.acceptance,
-            selection=call.selection,
-            checkpoint=out / CHECKPOINT,
-            on_progress=display,
-        )
+        found = fit(clips, **asked, checkpoint=out / CHECKPOINT, on_progress=display)
         display("writing the report", 1.0)
         had_prediction = (out / PREDICTION).is_file()
         found.save(out)
@@ -116,94 +91,24 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
     return "\n".join(lines)
 
 
-def _refuse_ignored(call: Any, argv: Sequence[str]) -> None:
-    """Options of a sampler that does not run, also where they are given with their default."""
-    if call.method != "mh":
-        where = f"of --method mh, not of {call.method}"
-        command.refuse_ignored(argv, ("--preset", "--chains", *OF_GALILEO, *OF_THESIS), where)
-    elif call.preset == "thesis":
-        command.refuse_ignored(argv, OF_GALILEO, "not of --preset thesis")
-    else:
-        command.refuse_ignored(argv, OF_THESIS, "of --preset thesis only")
-
-
 def _parser() -> command.Parser:
     parser = command.Parser(prog="galileo fit", description=__doc__)
-    add = parser.add_argument
-    add("clips", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
-    add(
-        "--method",
-        choices=METHODS,
-        default="grad",
-        help="grad: a gradient fit, seconds; mh: it is sampled, too; cnn: a network reads it off "
-        "(default %(default)s)",
-    )
-    add("--effects", default="", metavar="A,B", help="effects in the model (default: none)")
-    add(
-        "--free",
-        default="",
-        metavar="A,B",
-        help=f"declared quantities to infer: {', '.join(entry_names(FREE))} (default: none)",
-    )
-    add_clip_options(parser, out="folder of the run (default runs/CLIP)")
-    add(
-        "--motion",
-        choices=MOTIONS,
-        default="planar",
-        help="free: from the first hit on objects turn and tip, in MuJoCo's C engine "
-        "(default %(default)s)",
-    )
-    add(
-        "--noise",
-        choices=NOISES,
-        help="which errors a track is taken to have (default: as the clip was measured)",
-    )
-    group = parser.add_argument_group("--method mh")
-    add = group.add_argument
-    add("--sampler", choices=SAMPLERS, default="mixture", help="proposals (default %(default)s)")
-    add(
-        "--max-steps",
-        type=command.whole_number(BLOCK_STEPS, BLOCK_STEPS),
-        default=4000,
-        metavar="N",
-        help="per chain, after the warm-up (default %(default)s)",
-    )
-    add(
-        "--chains",
-        type=command.whole_number(1),
-        metavar="N",
-        help="how many (default 8; --preset thesis: 16)",
-    )
-    add(
-        "--init",
-        choices=INITS,
-        default="grad",
-        help="what chains start from: a fit, or the network (default %(default)s)",
-    )
-    add(
-        "--preset",
-        choices=PRESETS,
-        default="galileo",
-        help="thesis: the sampler that this project began with (default %(default)s)",
-    )
-    add(
-        "--similarity",
-        choices=SIMILARITIES,
-        default="thesis_gaussian",
-        help="of velocity profiles, of --preset thesis (default %(default)s)",
-    )
-    add(
-        "--acceptance",
-        choices=("coin", "metropolis"),
-        default="coin",
-        help="of a worse proposal, of --preset thesis (default %(default)s)",
-    )
-    add(
-        "--selection",
-        choices=("best", "least_variance"),
-        default="best",
-        help="how the answer is taken from the chains, of --preset thesis (default %(default)s)",
-    )
+    parser.add_argument("tracks", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
+    add = adder(parser, "fit")
+    add("method")
+    add("effects", metavar="A,B", help="effects in the model (default: none)")
+    add("free", metavar="A,B", help=f"declared quantities to infer: {FREE} (default: none)")
+    add_clip_options(parser, "fit", out="folder of the run (default runs/CLIP)")
+    add("motion", choices=MOTIONS, metavar=None)
+    add("noise", choices=("camera", "bodies", "tracker"), metavar=None)
+    add = adder(parser.add_argument_group("--method mh"), "fit")
+    add("sampler", choices=SAMPLERS, metavar=None)
+    add("max_steps")
+    add("chains", type=command.whole_number(1))
+    add("init", "preset")
+    add("similarity", choices=SIMILARITIES, metavar=None)
+    add("acceptance", choices=("coin", "metropolis"), metavar=None)
+    add("selection", choices=("best", "least_variance"), metavar=None)
     parser.examples(
         "galileo fit clip.mp4                                  seconds",
         "galileo fit clip1.mp4 clip2.mp4 --method mh           trials of the same objects, sampled",

@@ -1,16 +1,12 @@
 """`galileo predict`: continue a fitted scene beyond its clip."""
 
-import argparse
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 from galileo_jax.commands import command
+from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
-
-NUM_DRAWS, MOST_DRAWS = 200, 10_000  # as api.predict has them, which imports JAX
-LONGEST_S = 60.0
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -39,29 +35,14 @@ def _parser() -> command.Parser:
         description="Continue a fitted scene beyond its clip, with 95 % intervals from the "
         "posterior: will it move, how far, where does it stop, does it hit.",
     )
-    add = parser.add_argument
-    add("run", type=Path, metavar="RUN", help="the folder that fit wrote")
-    add("--seconds", type=_seconds, required=True, metavar="S", help="how long beyond the clip")
-    add("--out", type=Path, metavar="DIR", help="where to write (default: RUN)")
-    add("--seed", type=command.whole_number(0), default=0, help="of the draws (default 0)")
-    add(
-        "--draws",
-        type=command.whole_number(2, most=MOST_DRAWS),
-        default=NUM_DRAWS,
-        help="how many rollouts of posterior draws (default %(default)s)",
-    )
+    parser.add_argument("run", type=Path, metavar="RUN", help="the folder that fit wrote")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN)")
+    add = adder(parser, "predict")
+    add("seconds", metavar="S")
+    add("seed", type=command.whole_number(0))
+    add("draws")
     parser.examples(
         "galileo predict runs/clip --seconds 2",
         "galileo predict runs/clip --seconds 5 --draws 1000 --out ahead",
     )
     return parser
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 < value <= LONGEST_S:
-        raise argparse.ArgumentTypeError(f"{text!r} is no time; seconds in (0, {LONGEST_S:g}]")
-    return value

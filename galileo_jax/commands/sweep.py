@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from galileo_jax.commands import command
+from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
 
-ENGINES = ("local", "ray")
 MAX_LINES = 10  # failures that are printed one by one
 
 
@@ -48,55 +48,14 @@ class _FailurePrinter:
 def _parser() -> command.Parser:
     parser = command.Parser(prog="galileo sweep", description=__doc__)
     parser.add_argument("config", metavar="CONFIG", help="a yaml file, or the name of a ready one")
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="another value in the config, such as common.seed=3 (may be given several times)",
-    )
-    parser.add_argument(
-        "--multirun",
-        action="append",
-        default=[],
-        metavar="KEY=A,B",
-        help="the config once with each value (several times: all combinations)",
-    )
-    parser.add_argument(
-        "--out", metavar="DIR", help="folder (default sweeps/CONFIG); what is done stays done"
-    )
-    parser.add_argument("--retry", action="store_true", help="try again what failed")
-    group = parser.add_argument_group("where it is computed")
-    group.add_argument(
-        "--engine",
-        choices=ENGINES,
-        default="local",
-        help="this machine, or a Ray cluster (default %(default)s)",
-    )
-    group.add_argument(
-        "--address", metavar="HOST:PORT", help="of a Ray cluster (default: one on this machine)"
-    )
-    group.add_argument(
-        "--workers",
-        type=command.whole_number(0),
-        metavar="N",
-        help="processes of the local engine (default: as many as there is room for; 0: none, all "
-        "is computed in the command's own process)",
-    )
-    group.add_argument(
-        "--cpus-per-worker",
-        type=command.whole_number(1),
-        default=1,
-        metavar="N",
-        help="cores of each (default %(default)s)",
-    )
-    group.add_argument(
-        "--gpus-per-worker",
-        type=command.whole_number(0),
-        default=0,
-        metavar="N",
-        help="GPUs of each (default %(default)s)",
-    )
+    add = adder(parser, "sweep")
+    add("set", "multirun", metavar="KEY=VALUE")
+    add("out", metavar="DIR")
+    add("retry")
+    add = adder(parser.add_argument_group("where it is computed"), "sweep")
+    add("engine")
+    add("address", metavar="HOST:PORT")
+    add("workers", "cpus_per_worker", "gpus_per_worker")
     parser.examples(
         "galileo sweep thesis_ablation                         a ready config",
         "galileo sweep class.yaml --set common.method=mh       your own, with another value",

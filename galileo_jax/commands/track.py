@@ -8,6 +8,7 @@ import numpy as np
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import warn
+from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.pixel_csv import write_pixel_csv
@@ -73,15 +74,11 @@ def _parser() -> command.Parser:
         description="Follow the objects of a clip. Writes csv tracks in pixels and, if the scale "
         "is known, in metres, and the paths drawn over the video.",
     )
-    add = parser.add_argument
-    add("clip", type=Path, metavar="CLIP", help="video or its yaml")
-    add("--out", type=Path, metavar="DIR", help="where to write (default: NAME_track)")
-    add(
-        "--pixels-per-metre",
-        type=float,
-        metavar="SCALE",
-        help="overrides the clip's scale (default: the yaml's)",
+    parser.add_argument("clip", type=Path, metavar="CLIP", help="video or its yaml")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="where to write (default: NAME_track)"
     )
+    adder(parser, "track")("pixels_per_metre", metavar="SCALE")
     parser.examples(
         "galileo track clip.mp4",
         "galileo track clip.mp4 --pixels-per-metre 640 --out tracked",

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.api.train import PRESETS, evaluate_network, train
+from galileo_jax.api.train import evaluate_network, train
 from galileo_jax.commands import command
+from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
-from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime.errors import InputError
 
 OF_TRAINING = ("--preset", "--config", "--data", "--samples", "--max-epochs", "--frames", "--seed")
@@ -58,24 +58,15 @@ def _parser() -> command.Parser:
         "galileo train --preset thesis --out networks/thesis",
         "galileo train --test networks/thesis",
     )
-    add = parser.add_argument
-    add(
-        "--preset",
-        default="galileo",
-        metavar="NAME",
-        help=f"which network, data and loss: {' or '.join(PRESETS)} (default %(default)s)",
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="train into it, or go on there (no default)"
     )
-    add("--out", type=Path, metavar="DIR", help="train into it, or go on there (no default)")
-    add("--test", type=Path, metavar="DIR", help="test its network, train nothing (no default)")
-    add("--config", type=Path, metavar="FILE", help="a YAML file (default: the preset's own)")
-    add("--data", type=Path, metavar="DIR", help="folder of the samples (default: OUT/data)")
-    add("--samples", type=int, metavar="N", help="how many (default: the config's)")
-    add("--max-epochs", type=int, metavar="N", help="at most so many (default: the config's)")
-    add("--frames", type=int, metavar="N", help="thesis: 60 or 110 (default: the config's)")
-    add("--seed", type=int, metavar="N", help="of samples and weights (default: the config's)")
-    add(
-        "--engine",
-        metavar="NAME",
-        help=f"thesis: that makes the samples: {', '.join(ENGINES)} (default: the config's)",
+    parser.add_argument(
+        "--test", type=Path, metavar="DIR", help="test its network, train nothing (no default)"
     )
+    add = adder(parser, "train")
+    add("preset", "engine", choices=None, metavar="NAME")
+    add("config", metavar="FILE")
+    add("data", metavar="DIR")
+    add("samples", "max_epochs", "frames", "seed")
     return parser

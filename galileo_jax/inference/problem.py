@@ -145,7 +145,7 @@ def _seen_one(kind, theta, position, velocity, times_s, scene):
     effects, names, record_dt_s = kind
     times = jnp.arange(position.shape[-1]) * record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
-    motion = Trajectory(times, position, velocity, position[:, 0])
+    motion = Trajectory(times, position, velocity)
     return seen(effects, names, theta, motion, times_s, scene)
 
 

@@ -83,23 +83,23 @@ class Checkpoints:
         latest = self._manager.latest_step()
         if latest is None:
             return None
-        kept: Any = self._manager.restore(
+        stored: Any = self._manager.restore(
             latest,
             args=self._ocp.args.Composite(
                 state=self._ocp.args.StandardRestore(flatten(like)),
                 notes=self._ocp.args.JsonRestore(),
             ),
         )
-        config = TrainConfig(**kept.notes["config"])
+        config = TrainConfig(**stored.notes["config"])
         if config != self._config:
             changed = [k for k, v in config if getattr(self._config, k) != v]
             raise InputError(
                 f"{self._manager.directory}: trained with another {', '.join(changed)}; "
                 "take another --out"
             )
-        progress = kept.notes["progress"]
+        progress = stored.notes["progress"]
         progress["losses"] = tuple(map(tuple, progress["losses"]))
-        return unflatten(like, kept.state), Progress(**progress)
+        return unflatten(like, stored.state), Progress(**progress)
 
     def close(self) -> None:
         """Ends orbax's threads."""
@@ -133,11 +133,11 @@ def load_network(path: Path) -> tuple[Any, TrainConfig]:
     Raises:
       InputError: missing, or not a network of this version.
     """
-    from galileo_jax.neural.presets import make_task
+    from galileo_jax.neural.task import make_task
 
     try:
-        with np.load(path) as kept:
-            arrays = {name: kept[name] for name in kept.files}
+        with np.load(path) as file:
+            arrays = {name: file[name] for name in file.files}
         config = TrainConfig(**json.loads(str(arrays.pop("config"))))
         network = make_task(config).network(config.seed)
         like = nnx.state(network)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from galileo_jax.neural.presets import PRESETS
+from galileo_jax.neural.task import PRESETS
 from galileo_jax.runtime.errors import InputError
 
 Share = Annotated[float, Field(gt=0, lt=1)]

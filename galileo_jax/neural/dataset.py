@@ -43,8 +43,8 @@ def load_or_make(task: Trainable, config: TrainConfig, folder: Path) -> Arrays:
             made = make_samples(task, config.seed, number, task.shard_size)
             with replacing(path) as temporary:
                 np.savez(temporary, **made)  # pyright: ignore
-        with np.load(path) as kept:
-            shards.append({name: kept[name] for name in kept.files})
+        with np.load(path) as file:
+            shards.append({name: file[name] for name in file.files})
         report("simulating", (number + 1) / count)
     joined = {name: np.concatenate([shard[name] for shard in shards]) for name in shards[0]}
     return {name: values[: config.samples] for name, values in joined.items()}

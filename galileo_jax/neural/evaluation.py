@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from galileo_jax.neural.checkpoint import NETWORK, load_network
 from galileo_jax.neural.dataset import make_samples
-from galileo_jax.neural.presets import make_task
+from galileo_jax.neural.task import make_task
 from galileo_jax.runtime.atomic_write import write_json
 
 NUM_TEST = 1000

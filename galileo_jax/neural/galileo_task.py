@@ -10,7 +10,6 @@ from flax import nnx
 
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
 from galileo_jax.model.parameters import Uniform
-from galileo_jax.neural.benchmark import BENCHMARKS
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.posterior_network import (
     PosteriorNetwork,
@@ -18,10 +17,9 @@ from galileo_jax.neural.posterior_network import (
     negative_log_density,
     to_u,
 )
-from galileo_jax.neural.presets import PRESETS
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.neural.summary import NUM_CHANNELS, NUM_FEATURES, summarise
-from galileo_jax.neural.task import Arrays
+from galileo_jax.neural.task import BENCHMARKS, PRESETS, Arrays
 from galileo_jax.neural.world import IDEAL_FRICTION, Truth, draw, targets
 from galileo_jax.runtime.errors import InputError
 
@@ -177,13 +175,13 @@ def _of_ideal_prior(generator: np.random.Generator, shape: tuple[int, int]) -> n
 def _score(network: PosteriorNetwork, data: Arrays, seed: int, label: str) -> dict[str, float]:
     draws = estimate(network, data, seed)
     k1, k2, ratio = data["truth"].T
-    told = data.get("collides", data["is_hit"]) & data["moves"]
+    is_known = data.get("collides", data["is_hit"]) & data["moves"]
     cases = {
         "k1": (draws.k1, k1, data["moves"]),
-        "phi": (_phi(draws.mass_ratio), _phi(ratio), told),
-        "k2": (draws.k2, k2, told),
+        "phi": (_phi(draws.mass_ratio), _phi(ratio), is_known),
+        "k2": (draws.k2, k2, is_known),
     }
-    found: dict[str, float] = {f"{label}collisions": float(told.mean())}
+    found: dict[str, float] = {f"{label}collisions": float(is_known.mean())}
     for name, (drawn, true, where) in cases.items():
         low, high = np.quantile(drawn, INTERVAL, axis=1)
         error = np.abs(np.mean(drawn, axis=1) - true)[where]

@@ -162,5 +162,5 @@ def negative_log_density(network: PosteriorNetwork, batch: dict[str, jax.Array])
     """The mean over what each clip can tell (k1; ratio and k2 where there is a hit)."""
     u = batch["u"]
     density = network.log_density(batch["features"], batch["profile"].astype(u.dtype), u)
-    told = jnp.stack([batch["moves"], batch["is_hit"], batch["is_hit"]], axis=-1)
-    return -jnp.sum(jnp.where(told, density, 0.0)) / jnp.maximum(told.sum(), 1)
+    is_known = jnp.stack([batch["moves"], batch["is_hit"], batch["is_hit"]], axis=-1)
+    return -jnp.sum(jnp.where(is_known, density, 0.0)) / jnp.maximum(is_known.sum(), 1)

@@ -55,28 +55,28 @@ def start_from_network(trials: JointProblem, seed: int, num_chains: int) -> Star
     fit = replace(fit, stats=stats)
     generator = np.random.default_rng([seed, 8])
     drawn = posterior.flat()[generator.choice(posterior.draws.shape[1], num_chains)]
-    told = np.array([parameter.role == "main" for parameter in trials.parameters])
+    known = np.array([parameter.role == "main" for parameter in trials.parameters])
     z = np.asarray(inverse(trials.parameters, jnp.asarray(drawn)))
-    return Start(fit, completed(z, told, fit, generator), {"init": "cnn"} | _warnings(notes))
+    return Start(fit, completed(z, known, fit, generator), {"init": "cnn"} | _warnings(notes))
 
 
 def completed(
-    z: np.ndarray, told: np.ndarray, fit: GradientFit, generator: np.random.Generator
+    z: np.ndarray, known: np.ndarray, fit: GradientFit, generator: np.random.Generator
 ) -> np.ndarray:
-    """Draws of what is not `told`, given what is: N(mode, covariance) of the fit, conditional.
+    """Draws of what is not `known`, given what is: N(mode, covariance) of the fit, conditional.
 
     Args:
-      z: `[chain, parameter]`, right where told.
-      told: `[parameter]`.
+      z: `[chain, parameter]`, right where known.
+      known: `[parameter]`.
       fit: of all parameters.
       generator: of the draws.
     """
-    covariance, rest = fit.covariance, ~told
-    slope = np.linalg.solve(covariance[np.ix_(told, told)], covariance[np.ix_(told, rest)])
-    left = covariance[np.ix_(rest, rest)] - covariance[np.ix_(rest, told)] @ slope
+    covariance, rest = fit.covariance, ~known
+    slope = np.linalg.solve(covariance[np.ix_(known, known)], covariance[np.ix_(known, rest)])
+    left = covariance[np.ix_(rest, rest)] - covariance[np.ix_(rest, known)] @ slope
     noise = generator.standard_normal((len(z), int(rest.sum()))) @ np.linalg.cholesky(left).T
     whole = z.copy()
-    whole[:, rest] = fit.z[rest] + (z - fit.z)[:, told] @ slope + noise
+    whole[:, rest] = fit.z[rest] + (z - fit.z)[:, known] @ slope + noise
     return whole
 
 

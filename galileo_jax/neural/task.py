@@ -1,9 +1,17 @@
-"""What a preset brings to the training loop."""
+"""What a preset brings to the training loop, the presets by name, and what they are tested on."""
 
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
 
-import jax
 import numpy as np
+
+from galileo_jax.runtime.registry import Registry
+
+if TYPE_CHECKING:
+    import jax
+
+    from galileo_jax.neural.config import TrainConfig
 
 Arrays = dict[str, np.ndarray]
 
@@ -21,11 +29,11 @@ class Trainable(Protocol):
         """A new network; `data`: the training samples that it is to know the spread of."""
         ...
 
-    def make(self, key: jax.Array, count: int) -> Arrays:
+    def make(self, key: "jax.Array", count: int) -> Arrays:
         """New samples: arrays `[sample, ...]` by name."""
         ...
 
-    def loss(self, network: Any, batch: dict[str, jax.Array]) -> jax.Array:
+    def loss(self, network: Any, batch: "dict[str, jax.Array]") -> "jax.Array":
         """The mean loss of a batch."""
         ...
 
@@ -40,3 +48,34 @@ class Task(Trainable, Protocol):
     def reference(self) -> dict[str, float]:
         """What others reach in the same test; may be empty."""
         ...
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A setting to test a network in.
+
+    Attributes:
+      name: in the registry, and before its figures.
+      draw: makes so many samples from a key, in the form `GalileoTask.make` gives, and with them
+        `collides`: whether object 2 is hit.
+      reference: what is expected, by the figure's name.
+    """
+
+    name: str
+    draw: "Callable[[jax.Array, int], Arrays]"
+    reference: Mapping[str, float]
+
+
+PRESETS: "Registry[Callable[[TrainConfig], Task]]" = Registry(
+    "preset", "presets", "galileo_jax.neural.galileo_task"
+)
+BENCHMARKS: Registry[Benchmark] = Registry("benchmark", "benchmarks")
+
+
+def make_task(config: "TrainConfig") -> "Task":
+    """The task of a config.
+
+    Raises:
+      InputError: the preset is unknown, or the config does not go with it.
+    """
+    return PRESETS.get(config.preset)(config)

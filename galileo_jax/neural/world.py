@@ -111,7 +111,7 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     position, velocity = roll_out(NUISANCES, NAMES, NUM_RECORDS, RECORD_DT_S, theta, scene)
     records = jnp.arange(NUM_RECORDS) * RECORD_DT_S
     times = jnp.arange(NUM_FRAMES) / fps
-    motion = Trajectory(records, position, velocity, position[:, 0])
+    motion = Trajectory(records, position, velocity)
     clean, _ = at_times(motion, times - instant)
     seen = _film(clean, times, normal, imperfect)
     noise = log_uniform(*NOISE_PX, (2,)) / log_uniform(*SCALE_PX_PER_M)

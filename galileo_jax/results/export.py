@@ -1,25 +1,28 @@
 """Tracks and fits as csv, parquet or netCDF, for other programs."""
 
-import json
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.files.tables import TABLE_WRITERS, Table
+from galileo_jax.files.tables import TABLE_FORMATS, write_table
+from galileo_jax.inference.posterior import Posterior
 from galileo_jax.observation.observation import Observation
+from galileo_jax.results.run import OBSERVATION, POSTERIOR, load_run, read_result
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
-FORMATS = (*TABLE_WRITERS, "netcdf")
+if TYPE_CHECKING:
+    import pandas as pd
+
+FORMATS = (*TABLE_FORMATS, "netcdf")
 TRACK, PARAMETERS, DRAWS = "track", "parameters", "draws"
 AXES = ("x", "y")
 MEASURED = ("x_m", "y_m", "sd_x_m", "sd_y_m", "correlation")
-OBSERVATION = "observation.csv"
 
 
 def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path]:
@@ -37,11 +40,11 @@ def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path
     Raises:
       InputError: it is no finished run, or a file cannot be written.
     """
-    result = _result(folder)
+    result = read_result(folder)
     folders = _clip_folders(folder, result)
     tracks = {name: read_observation_csv(one / OBSERVATION) for name, one in folders.items()}
     fitted = {name: _fitted_m(one) for name, one in folders.items()} if with_fitted else {}
-    posterior = folder / "posterior.nc"
+    posterior = folder / POSTERIOR
     if not posterior.is_file():
         raise InputError(f"{posterior}: no such file; a folder written by `galileo fit` expected")
     if to == "netcdf":
@@ -77,12 +80,12 @@ def export_tracks(tracks: Mapping[str, Observation], out: Path, to: str) -> list
     return written
 
 
-def _write(tables: Mapping[str, Table], out: Path, to: str) -> list[Path]:
+def _write(tables: Mapping[str, "pd.DataFrame"], out: Path, to: str) -> list[Path]:
     written = []
     for name, table in tables.items():
         path = out / f"{name}.{to}"
         with _outputs(out):
-            TABLE_WRITERS[to](path, table)
+            write_table(path, table)
         written.append(path)
     return written
 
@@ -95,16 +98,6 @@ def _outputs(out: Path) -> Iterator[None]:
         raise InputError(f"--out: {out}: {error.strerror or error}") from error
 
 
-def _result(folder: Path) -> dict[str, Any]:
-    path = folder / "result.json"
-    if not path.is_file():
-        raise InputError(f"{folder}: no result.json; a folder written by `galileo fit` expected")
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{path}: not JSON ({error})") from None
-
-
 def _clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
     """Name and folder of every clip; of several clips each has a folder of its own."""
     if (folder / OBSERVATION).is_file():
@@ -114,65 +107,61 @@ def _clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
 
 def _fitted_m(folder: Path) -> np.ndarray:
     """Where a run's model, at the posterior's mean, has the objects: `[object, 2, frame]`, m."""
-    from galileo_jax.results.run import load_run
-
     run = load_run(folder)
     mean = run.posterior.flat().mean(axis=0)
     columns = [run.posterior.names.index(name) for name in run.problem.model.names]
     return np.asarray(run.problem.simulate(mean[columns]))
 
 
-def _track_table(tracks: Mapping[str, Observation], fitted_m: Mapping[str, np.ndarray]) -> Table:
+def _track_table(
+    tracks: Mapping[str, Observation], fitted_m: Mapping[str, np.ndarray]
+) -> "pd.DataFrame":
     """One row per clip, object and time; empty where the object was not visible."""
-    table: dict[str, list[Any]] = {}
+    import pandas as pd
+
+    parts = []
     for clip, observed in tracks.items():
-        count = len(observed.times_s)
         for k, name in enumerate(observed.names):
             covariance = observed.covariance_m2[k]
             sd_x, sd_y = np.sqrt(covariance[0, 0]), np.sqrt(covariance[1, 1])
-            columns = {
-                "clip": [clip] * count,
-                "object": [name] * count,
-                "time_s": observed.times_s,
-                "x_m": observed.position_m[k, 0],
-                "y_m": observed.position_m[k, 1],
-                "sd_x_m": sd_x,
-                "sd_y_m": sd_y,
-                "correlation": covariance[0, 1] / (sd_x * sd_y),
-            }
+            part = pd.DataFrame({"clip": clip, "object": name, "time_s": observed.times_s})
+            part["x_m"], part["y_m"] = observed.position_m[k]
+            part["sd_x_m"], part["sd_y_m"] = sd_x, sd_y
+            part["correlation"] = covariance[0, 1] / (sd_x * sd_y)
+            part.loc[~observed.mask[k], list(MEASURED)] = np.nan
             if clip in fitted_m:
-                columns["fitted_x_m"], columns["fitted_y_m"] = fitted_m[clip][k]
-            for title, values in columns.items():
-                is_measured = title in MEASURED
-                table.setdefault(title, []).extend(
-                    np.where(observed.mask[k], values, np.nan) if is_measured else values
-                )
-    return table
+                part["fitted_x_m"], part["fitted_y_m"] = fitted_m[clip][k]
+            parts.append(part)
+    return pd.concat(parts, ignore_index=True)
 
 
-def _parameter_table(result: dict[str, Any]) -> Table:
+def _parameter_table(result: dict[str, Any]) -> "pd.DataFrame":
     """One row per parameter, with the part of result.json in which it stands."""
+    import pandas as pd
+
     rows = [
         {"name": name, "kind": kind, **entry}
         for kind in ("parameters", "derived", "nuisances")
         for name, entry in result[kind].items()
     ]
-    titles = ("name", "kind", "unit", "mean", "sd", "q025", "q975", "identified")
-    return {title: [row.get(title) for row in rows] for title in titles}
+    titles = ["name", "kind", "unit", "mean", "sd", "q025", "q975", "identified"]
+    return pd.DataFrame(rows, columns=titles)
 
 
-def _draw_table(posterior: Path) -> Table:
+def _draw_table(posterior: Path) -> "pd.DataFrame":
     """One row per chain and draw, one column per parameter."""
-    from galileo_jax.inference.posterior import Posterior
+    import pandas as pd
 
     found = Posterior.from_netcdf(posterior)
     chains, draws = found.draws.shape[:2]
-    return {
-        "chain": np.repeat(np.arange(chains), draws),
-        "draw": np.tile(np.arange(draws), chains),
-        **{name: found[name].reshape(-1) for name in found.names},
-        "log_density": found.log_density.reshape(-1),
-    }
+    return pd.DataFrame(
+        {
+            "chain": np.repeat(np.arange(chains), draws),
+            "draw": np.tile(np.arange(draws), chains),
+            **{name: found[name].reshape(-1) for name in found.names},
+            "log_density": found.log_density.reshape(-1),
+        }
+    )
 
 
 def _dataset(observed: Observation, fitted_m: np.ndarray | None) -> Any:

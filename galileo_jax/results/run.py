@@ -81,6 +81,20 @@ def save_run(
     write_json(folder / RESULT, result)
 
 
+def read_result(folder: Path) -> dict[str, Any]:
+    """result.json of a run, of one clip or several.
+
+    Raises:
+      InputError: not a folder that `fit` has finished, or the file is damaged.
+    """
+    if not (folder / RESULT).is_file():
+        raise InputError(f"{folder}: no {RESULT}; a folder written by `galileo fit` expected")
+    try:
+        return json.loads((folder / RESULT).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{folder / RESULT}: not JSON ({error})") from error
+
+
 def load_run(folder: Path, engine: str = "auto") -> Run:
     """Reads a run.
 
@@ -88,12 +102,7 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
       InputError: not a folder that `fit` has finished; names the file that is missing.
     """
     folder = Path(folder)
-    if not (folder / RESULT).is_file():
-        raise InputError(f"{folder}: no {RESULT}; a folder written by `galileo fit` expected")
-    try:
-        result = json.loads((folder / RESULT).read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise InputError(f"{folder / RESULT}: not JSON ({error})") from error
+    result = read_result(folder)
     clip = load_clip(folder / CLIP)
     observation = read_observation_csv(folder / OBSERVATION)
     posterior = Posterior.from_netcdf(folder / POSTERIOR)

@@ -52,16 +52,16 @@ def remove_single_clip_run(folder: Path) -> None:
 def stale_documents(folder: Path, observations: Sequence[Observation]) -> list[str]:
     """One sentence for every comparison and diagnosis below `folder` of other tracks."""
     now = [digest(observation) for observation in observations]
-    told = []
+    sentences = []
     for verb, name in DOCUMENTS.items():
         document = _document(folder / name)
         if document.get(TRACKS, now) != now:
             clips = " ".join(map(str, document.get("clips", [])))
-            told.append(
+            sentences.append(
                 f"{(folder / name).parent}: made of an earlier track; "
                 f"make it again: galileo {verb} {clips}"
             )
-    return told
+    return sentences
 
 
 def _document(path: Path) -> dict[str, Any]:

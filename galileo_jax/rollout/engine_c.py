@@ -13,7 +13,7 @@ from galileo_jax.rollout.mujoco_fields import (
     make_loads,
     read_state,
     rigid_motion,
-    sliding_object,
+    write_contacts,
 )
 
 # Slower than this and no longer changing: at rest (contacts creep at 0.2 mm/s).
@@ -80,7 +80,7 @@ class EngineC:
             if loads.force is not None:
                 applied[:] = loads.force(state)
             if loads.friction is not None:
-                self._rub(batch, loads.friction(state))
+                write_contacts(batch, model.scene.model, loads.friction(state), None)
             batch.step(nstep=SUBSTEPS)
         # Semi-implicit Euler is second order in x - dt v / 2 (leapfrog), first order in x.
         positions -= 0.5 * dt * velocities
@@ -100,23 +100,11 @@ class EngineC:
         inertia[:, 1:] = (
             compiled.body_inertia[1:] * (fields.mass / compiled.body_mass[1:])[..., None]
         )
-        solref = batch.expand("pair_solref")
-        for i in range(compiled.npair):
-            if sliding_object(compiled.pair(i).name) is None:
-                solref[:, i] = fields.bumper
-        self._rub(batch, fields.friction)
+        write_contacts(batch, compiled, fields.friction, fields.bumper)
         batch.set_const()
         batch.bind("qpos")[:] = fields.qpos
         batch.bind("qvel")[:] = fields.qvel
         batch.warning[...] = 0
-
-    def _rub(self, batch: Batch, friction: np.ndarray) -> None:
-        """Writes the objects' friction coefficients `[batch, object]` into their contacts."""
-        written = batch.expand("pair_friction")
-        for i in range(written.shape[1]):
-            which = sliding_object(self.model.scene.model.pair(i).name)
-            if which is not None:
-                written[:, i, :2] = friction[:, which, None]
 
 
 def is_at_rest(velocities: np.ndarray) -> bool:

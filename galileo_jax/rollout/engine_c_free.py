@@ -23,7 +23,7 @@ from galileo_jax.model.scene.free_scene import free_model
 from galileo_jax.rollout.engine_c import LOOK_EVERY, is_at_rest
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
-from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, Loads, make_loads, sliding_object
+from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, Loads, make_loads, write_contacts
 from galileo_jax.runtime.errors import InputError
 
 # Box contacts and the faces' damping are stable at it; halving it changes hardly anything.
@@ -171,7 +171,7 @@ class EngineCFree:
             if loads.force is not None:
                 forces[..., [ALONG, UP]] = loads.force(state).reshape(size, count, 2)
             if loads.friction is not None:
-                self._rub(batch, loads.friction(state))
+                write_contacts(batch, self.compiled, loads.friction(state), None)
             batch.step(nstep=self.substeps)
         for i in np.flatnonzero(begin < num_records - 1):
             own, mujocos = ([values[i] for values in some] for some in (poses, after))
@@ -237,22 +237,10 @@ class EngineCFree:
         batch.expand("body_mass")[:, 1:] = law.inertia
         share = inertia / compiled.body_mass[1:, None]
         batch.expand("body_inertia")[:, 1:] = compiled.body_inertia[1:] * share
-        faces = batch.expand("pair_solref")
-        for i in range(compiled.npair):
-            if sliding_object(compiled.pair(i).name) is None:
-                faces[:, i] = face_solref(law.restitution)
-        self._rub(batch, law.friction)
+        write_contacts(batch, compiled, law.friction, face_solref(law.restitution))
         batch.bind("qpos")[:] = compiled.qpos0
         batch.set_const()
         batch.warning[...] = 0
-
-    def _rub(self, batch: Batch, friction: np.ndarray) -> None:
-        """Writes the objects' friction coefficients `[batch, object]` into their contacts."""
-        written = batch.expand("pair_friction")
-        for i in range(written.shape[1]):
-            which = sliding_object(self.compiled.pair(i).name)
-            if which is not None:
-                written[:, i, :2] = friction[:, which, None]
 
 
 def _join(planar: Poses, after: Poses, begin: int, late: float, model: Model) -> None:

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
@@ -34,9 +35,9 @@ class Body(NamedTuple):
       way_m: how far it has come along its curve.
     """
 
-    position_m: jax.Array
-    velocity_m_s: jax.Array
-    way_m: jax.Array
+    position_m: Float[jax.Array, "2"]
+    velocity_m_s: Float[jax.Array, "2"]
+    way_m: Float[jax.Array, ""]
 
     def moved(self, rate: "Body", time_s: Any) -> "Body":
         """With constant rates for a time."""

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import jax
 import numpy as np
+from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.model import Model
@@ -15,7 +16,9 @@ from galileo_jax.runtime.trace_cache import trace_cached
 
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
 
-Motion = tuple[jax.Array, jax.Array]
+Motion = tuple[
+    Float[jax.Array, "*batch object 2 record"], Float[jax.Array, "*batch object 2 record"]
+]
 
 
 class EngineJax:
@@ -32,13 +35,15 @@ class EngineJax:
     def __init__(self, model: Model):
         self.model = model
 
-    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def simulate(
+        self, theta: Float[np.ndarray, "batch parameter"]
+    ) -> tuple[np.ndarray, np.ndarray]:
         """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
         motion = in_chunks(MOTIONS, self._rolled_up, np.asarray(theta))
         count = self.model.num_records + 1
         return motion[0][..., :count], motion[1][..., :count]
 
-    def traceable(self, theta: jax.Array) -> Motion:
+    def traceable(self, theta: Float[jax.Array, "batch parameter"]) -> Motion:
         """`simulate` in JAX: can be jitted, vmapped and differentiated."""
         position, velocity = self._rolled_up(theta)
         count = self.model.num_records + 1

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
@@ -39,9 +40,9 @@ class Bodies(NamedTuple):
         nothing does.
     """
 
-    path_m: jax.Array
-    speed_m_s: jax.Array
-    rim_m_s: jax.Array | None = None
+    path_m: Float[jax.Array, " object"]
+    speed_m_s: Float[jax.Array, " object"]
+    rim_m_s: Float[jax.Array, " object"] | None = None
 
     @property
     def slip_m_s(self) -> jax.Array:

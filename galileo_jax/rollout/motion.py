@@ -9,9 +9,14 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from jaxtyping import Float
+
 from galileo_jax.model.effects.effect import Effect, State, Surroundings, true_surroundings
 
-Array = Any
+# NumPy or JAX arrays alike; the leading axes are the batch's.
+Array = Float[Any, "..."]
+PerObject = Float[Any, "... object"]
+OfCentres = Float[Any, "... object 2"]
 
 # MuJoCo's own least (mjMINMU); MJX does not keep to it, and at 0 its elliptic cone sticks.
 LEAST_FRICTION = 1e-5
@@ -44,21 +49,21 @@ class Dynamics(NamedTuple):
       gravity: `[...]` or a number, m/s^2.
     """
 
-    mass: Array
-    inertia: Array
-    rim: Array
-    friction: Array
-    start_m: Array
-    start_speed_m_s: Array
+    mass: PerObject
+    inertia: PerObject
+    rim: PerObject
+    friction: PerObject
+    start_m: PerObject
+    start_speed_m_s: PerObject
     ramp_rad: Array
     table_rad: Array
     turn: tuple[Array, Array]
     foot: Array
     restitution: Array
     overlap_m: Array
-    coefficient: Callable[[State], Array]
-    drive: Callable[[State], Array]
-    brake: Callable[[State], Array]
+    coefficient: Callable[[State], PerObject]
+    drive: Callable[[State], PerObject]
+    brake: Callable[[State], PerObject]
     gravity: Array
 
 
@@ -94,7 +99,7 @@ def dynamics(
     laws = [law for e in effects if (law := e.friction(theta, scene)) is not None]
     forces = [force for e in effects if (force := e.force(theta, scene)) is not None]
 
-    def coefficient(state: State) -> Array:
+    def coefficient(state: State) -> PerObject:
         return functools.reduce(lambda k, law: law(state, k), laws, friction)
 
     # Once for each rollout: its loop has no need of sines.
@@ -104,11 +109,11 @@ def dynamics(
     pulls = [weight * (0.0 if scene.moves_in_plane else xp.sin(slope)) for slope in slopes]
     normals = [weight * xp.cos(slope) for slope in slopes]
 
-    def drive(state: State) -> Array:
+    def drive(state: State) -> PerObject:
         pull = xp.where(state.is_on_ramp, *pulls)
         return functools.reduce(operator.add, (force(state) for force in forces), pull)
 
-    def brake(state: State) -> Array:
+    def brake(state: State) -> PerObject:
         return coefficient(state) * xp.where(state.is_on_ramp, *normals)
 
     return Dynamics(
@@ -131,7 +136,7 @@ def dynamics(
     )
 
 
-def _rim(mass: Array, scene: Surroundings) -> Array:
+def _rim(mass: PerObject, scene: Surroundings) -> PerObject:
     xp = mass.__array_namespace__()
     if not any(scene.rolls):
         return xp.zeros(mass.shape)
@@ -139,15 +144,15 @@ def _rim(mass: Array, scene: Surroundings) -> Array:
     return rolls / (xp.where(rolls, xp.asarray(scene.roll_inertia), 1.0) * mass)
 
 
-def state_at(path_m: Array, speed_m_s: Array, time_s: Array, scene: Surroundings) -> State:
+def state_at(path_m: PerObject, speed_m_s: PerObject, time_s: Array, scene: Surroundings) -> State:
     """The state with what follows from the scene."""
     is_on_ramp = path_m < 0 if scene.has_table else path_m == path_m
     return State(path_m, speed_m_s, time_s, is_on_ramp)
 
 
 def to_plane(
-    path_m: Array, speed_m_s: Array, ramp_rad: Array, table_rad: Array, scene: Surroundings
-) -> tuple[Array, Array]:
+    path_m: PerObject, speed_m_s: PerObject, ramp_rad: Array, table_rad: Array, scene: Surroundings
+) -> tuple[OfCentres, OfCentres]:
     """From the path to x and y.
 
     Args:
@@ -171,7 +176,7 @@ def to_plane(
     return origin + path_m[..., None] * tangent, speed_m_s[..., None] * tangent
 
 
-def pitch(position: Array, scene: Surroundings) -> Array:
+def pitch(position: OfCentres, scene: Surroundings) -> PerObject:
     """How far each drawn object is turned, rad: -angle on the ramp, 0 on the table, in a fall.
 
     While an object's length spans the foot it turns evenly per metre; what rolls is drawn as if

@@ -12,11 +12,19 @@ from typing import Any, NamedTuple
 
 import jax
 import numpy as np
+from jaxtyping import Float
+from mujoco.batch import Batch
 
 from galileo_jax.model.effects.effect import Effect, State, Surroundings
-from galileo_jax.rollout.motion import LEAST_FRICTION, Dynamics, state_at, to_plane
-
-Array = Any
+from galileo_jax.rollout.motion import (
+    LEAST_FRICTION,
+    Array,
+    Dynamics,
+    OfCentres,
+    PerObject,
+    state_at,
+    to_plane,
+)
 
 # Coefficient of restitution against the bumpers' stiffness (1/s^2) and damping (1/s), measured
 # on this scene at 0.3 and 1 m/s (tests/rollout/test_restitution.py): above 600/s the damping
@@ -38,8 +46,8 @@ class Fields(NamedTuple):
       bumper: `[..., 2]`, (-stiffness, -damping) between objects, MuJoCo's direct solref.
     """
 
-    mass: Array
-    friction: Array
+    mass: PerObject
+    friction: PerObject
     qpos: Array
     qvel: Array
     bumper: Array
@@ -55,7 +63,7 @@ class Loads(NamedTuple):
     """
 
     force: Callable[[State], Array] | None
-    friction: Callable[[State], Array] | None
+    friction: Callable[[State], PerObject] | None
     is_steady: bool
 
 
@@ -103,13 +111,13 @@ def make_loads(
     log_foot = xp.log(xp.clip(law.foot, 0.5, 2.0))[..., None]
     comes_down = xp.asarray(scene.comes_down, dtype=law.mass.dtype)
 
-    def slope(state: State) -> Array:
+    def slope(state: State) -> PerObject:
         return xp.where(state.is_on_ramp, angle, 0.0)
 
-    def friction(state: State) -> Array:
+    def friction(state: State) -> PerObject:
         return xp.maximum(law.brake(state) / (weight * xp.cos(slope(state))), LEAST_FRICTION)
 
-    def log_kept(state: State) -> Array:
+    def log_kept(state: State) -> PerObject:
         """The logarithm of the factor past the foot, `[..., object]`."""
         if not is_other_body:
             return log_foot
@@ -118,7 +126,7 @@ def make_loads(
         native = math.cos(angle) - friction(state) * math.sin(angle)
         return log_foot + xp.log(xp.clip(kept / native, 0.5, 2.0))
 
-    def foot_drag(state: State) -> Array:
+    def foot_drag(state: State) -> PerObject:
         share = xp.clip(state.path_m / FOOT_ZONE_M, 0.0, 1.0)
         window = (1 - xp.cos(2 * math.pi * share)) / FOOT_ZONE_M
         speed = state.speed_m_s
@@ -145,6 +153,29 @@ def sliding_object(pair: str) -> int | None:
     return None if second.startswith("object") else int(first.removeprefix("object")) - 1
 
 
+def write_contacts(
+    batch: Batch,
+    compiled: Any,
+    friction: Float[np.ndarray, "batch object"],
+    faces: Float[np.ndarray, "batch 2"] | None,
+) -> None:
+    """Writes friction coefficients, and what objects' faces are like, into a batch's contacts.
+
+    Args:
+      batch: of the compiled model.
+      compiled: the model.
+      friction: of each object with what carries it.
+      faces: MuJoCo's direct solref between objects; None leaves them as they are.
+    """
+    written = batch.expand("pair_friction")
+    for i in range(compiled.npair):
+        which = sliding_object(compiled.pair(i).name)
+        if which is not None:
+            written[:, i, :2] = friction[:, which, None]
+        elif faces is not None:
+            batch.expand("pair_solref")[:, i] = faces
+
+
 def bumper_solref(restitution: Array, xp: Any) -> Array:
     """The bumpers' (-stiffness, -damping) for a coefficient of restitution, within 0.03.
 
@@ -156,12 +187,16 @@ def bumper_solref(restitution: Array, xp: Any) -> Array:
     return xp.stack([-stiffness, -damping], axis=-1)
 
 
-def read_state(position: Array, velocity: Array, time_s: Array, scene: Surroundings) -> State:
+def read_state(
+    position: OfCentres, velocity: OfCentres, time_s: Array, scene: Surroundings
+) -> State:
     """The state at MuJoCo's centres and velocities, each `[..., object, 2]`."""
     return state_at(*to_path(position, velocity, scene), time_s, scene)
 
 
-def to_path(position: Array, velocity: Array, scene: Surroundings) -> tuple[Array, Array]:
+def to_path(
+    position: OfCentres, velocity: OfCentres, scene: Surroundings
+) -> tuple[PerObject, PerObject]:
     """Projects centres onto the paths parallel to ramp and table.
 
     Args:
@@ -187,8 +222,8 @@ def to_path(position: Array, velocity: Array, scene: Surroundings) -> tuple[Arra
 
 
 def rigid_motion(
-    position: Array, velocity: Array, law: Dynamics, scene: Surroundings
-) -> tuple[Array, Array]:
+    position: OfCentres, velocity: OfCentres, law: Dynamics, scene: Surroundings
+) -> tuple[OfCentres, OfCentres]:
     """Takes the contacts' penetration out of simulated centres, and tilts them truly.
 
     Args:
@@ -206,7 +241,7 @@ def rigid_motion(
     return to_plane(path, speed, law.ramp_rad, law.table_rad, scene)
 
 
-def _without_overlap(path: Array, mass: Array, scene: Surroundings) -> Array:
+def _without_overlap(path: PerObject, mass: PerObject, scene: Surroundings) -> PerObject:
     """Undoes the overlap of each object's front with the next one's back face.
 
     Each centre is put back by its share (the other's mass over the sum) of the deepest overlap

@@ -14,11 +14,8 @@ class Trajectory(NamedTuple):
       times_s: `[step]`, s since the release, evenly spaced.
       position_m: `[object, 2, step]`, m; x along the travel, y up, origin at the foot.
       velocity_m_s: `[object, 2, step]`, m/s.
-      pitch_rad: `[object, step]`, rotation of the drawn shape, counter-clockwise
-        positive seen with x to the right and y up (on the ramp: minus the ramp's angle).
     """
 
     times_s: jax.Array
     position_m: jax.Array
     velocity_m_s: jax.Array
-    pitch_rad: jax.Array

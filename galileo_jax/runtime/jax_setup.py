@@ -15,7 +15,7 @@ def set_up() -> None:
 
     # Compiled chains call MuJoCo's engines back, and these run JAX themselves: with one thread,
     # as many as cores, it would wait for ever for the thread that waits for it. XLA reads NPROC.
-    told = os.environ.get("NPROC", "")
-    if (int(told) if told.isdigit() else num_cores()) < LEAST_THREADS:
+    given = os.environ.get("NPROC", "")
+    if (int(given) if given.isdigit() else num_cores()) < LEAST_THREADS:
         os.environ["NPROC"] = str(LEAST_THREADS)
     compilation_cache.enable()

@@ -1,14 +1,11 @@
 """From what was asked for to the files of one clip, or of a series."""
 
-import json
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.check_settings import checked
-from galileo_jax.simulation.clip_files import TRUTH_SUFFIX, YAML_SUFFIX, all_or_nothing
+from galileo_jax.simulation.clip_files import all_or_nothing
 from galileo_jax.simulation.free_clip import free_clips
 from galileo_jax.simulation.hidden import make_hidden
 from galileo_jax.simulation.ramp_clip import ramp_clips
@@ -17,25 +14,11 @@ from galileo_jax.simulation.settings import Settings
 SHARE_DRAWN = 0.2  # of the time, about, that goes into the motions
 
 
-@dataclass(frozen=True)
-class WrittenClip:
-    """One clip of those written.
-
-    Attributes:
-      clip: the video or the csv track.
-      yaml: what is declared about it.
-      truth_file: what is true.
-      truth: its content.
-    """
-
-    clip: Path
-    yaml: Path
-    truth_file: Path
-    truth: dict[str, Any]
-
-
-def write_clips(out: Path, settings: Settings) -> tuple[WrittenClip, ...]:
+def write_clips(out: Path, settings: Settings) -> tuple[Path, ...]:
     """Writes NAME.mp4 (or NAME.csv), NAME.yaml, NAME.truth.json; for a series NAME_1 and on.
+
+    Returns:
+      the videos or tracks.
 
     Raises:
       InputError: the settings mean nothing together, an effect has no place in the scene, or a
@@ -62,10 +45,4 @@ def write_clips(out: Path, settings: Settings) -> tuple[WrittenClip, ...]:
                     progress.report("writing", 1.0)
     except OSError as error:
         raise InputError(f"--out: {out}: {error.strerror or error}") from error
-    return tuple(_written(out.with_name(f"{name}{settings.suffix}")) for name in names)
-
-
-def _written(clip: Path) -> WrittenClip:
-    truth_file = clip.with_suffix(TRUTH_SUFFIX)
-    truth = json.loads(truth_file.read_text(encoding="utf-8"))
-    return WrittenClip(clip, clip.with_suffix(YAML_SUFFIX), truth_file, truth)
+    return tuple(out.with_name(f"{name}{settings.suffix}") for name in names)

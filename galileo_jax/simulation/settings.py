@@ -25,39 +25,7 @@ TRACK_SUFFIX, VIDEO_SUFFIX = ".csv", ".mp4"
 
 @dataclass(frozen=True)
 class Settings:
-    """One call of `simulate`.
-
-    Attributes:
-      seed: of everything that is drawn; the same seed makes the same files.
-      scenario: one of `SCENARIO_NAMES`.
-      shapes: of the objects on a ramp, in the order of the travel; None: boxes.
-      angle: of the ramp as declared, degrees.
-      seconds: length of the clip, s; None: until everything is at rest.
-      fps: frames per second as declared.
-      m1, m2: masses, kg; None: drawn.
-      k1, k2: coefficients of friction; None: drawn.
-      motion: "planar", or "free": objects that are hit turn and tip (tracks only).
-      z2: how far object 2 stands off the plane, towards the camera, m.
-      solver: see `roll_out`.
-      values: further parameters of the scenario by name, SI units.
-      floor: of a fall or a flight: the object bounces.
-      series: so many trials of the same objects; None: a single clip.
-      track_only: a csv track in place of the video.
-      track_noise: standard deviation of a track's coordinates, m.
-      effects: what is hidden: name to {parameter: value}, SI units; what is missing is drawn.
-      strength: of the hidden effects, 0 (weak) to 1 (strong); None: drawn.
-      effects_from: Python files that register further effects.
-      faults: the small faults of real clips (release between frames, foot and impact not ideal).
-      size: of the picture, (width, height), px.
-      direction: of the travel in the picture.
-      no_points: the yaml does not say where the objects are.
-      hand: a hand lets object 1 go.
-      camera_fault: some of `CAMERA_FAULTS`.
-      noise: of the sensor, grey levels of 255.
-      exposure: of a frame, s.
-      defocus: standard deviation of the blur, px.
-      missed_frames: so many frames show the one before once more.
-    """
+    """One call of `simulate`: its arguments of the same names, each with its default."""
 
     seed: int = 0
     scenario: str = "ramp"

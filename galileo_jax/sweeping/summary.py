@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.files.tables import TABLE_WRITERS
+from galileo_jax.files.tables import TABLE_FORMATS, write_table
 from galileo_jax.sweeping.cell import Cell
 from galileo_jax.sweeping.settings import Diagnose
 from galileo_jax.sweeping.store import Store
@@ -56,11 +56,13 @@ def read_truth(clip: Path) -> dict[str, Any]:
 
 def write_tables(folder: Path, rows: Sequence[Row]) -> list[Path]:
     """Writes summary.csv and, where pyarrow is installed, summary.parquet; returns the files."""
-    table = {column: [row[column] for row in rows] for column in COLUMNS}
-    formats = ["csv", *(["parquet"] if find_spec("pyarrow") else [])]
+    import pandas as pd
+
+    table = pd.DataFrame(list(rows), columns=list(COLUMNS))
+    formats = [name for name in TABLE_FORMATS if name == "csv" or find_spec("pyarrow")]
     paths = [folder / f"summary.{name}" for name in formats]
-    for name, path in zip(formats, paths, strict=True):
-        TABLE_WRITERS[name](path, table)
+    for path in paths:
+        write_table(path, table)
     return paths
 
 

@@ -118,16 +118,16 @@ def sweep(
 
     Args:
       config: a YAML file, the name of a ready config, or its keys as a mapping.
-      out: the folder; None: `sweeps/` and the config's name.
-      set: "key=value" each, to change the config, such as "common.seed=3".
-      multirun: "key=a,b" each: a config for every combination.
+      out: the folder, where what is done stays done; None: sweeps/CONFIG.
+      set: "key=value" each: another value in the config, such as "common.seed=3".
+      multirun: "key=a,b" each: the config once with each value, or combination of values.
       retry: whether to try again what failed.
-      engine: "local" or "ray".
+      engine: "local": this machine; "ray": a Ray cluster.
       address: of a Ray cluster; None: one on this machine.
-      workers: processes of the local engine; None: as many as there is room for; 0: none, all is
-        computed in this process.
-      cpus_per_worker: cores.
-      gpus_per_worker: GPUs.
+      workers: processes of the local engine; None: as many as there is room for (0: none,
+        all is computed in the calling process).
+      cpus_per_worker: cores of each.
+      gpus_per_worker: GPUs of each.
       on_progress: called with the stage, the share done (0 to 1) and, first, a mapping `cells`,
         `done`, `folder`; for each cell that fails a mapping `failed` (its name) and `why`; at the
         end the `Sweep`; else None.

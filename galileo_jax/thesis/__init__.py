@@ -4,8 +4,7 @@ It stands beside the core: it uses the core's rooms, and none of them imports it
 its preset known to `galileo train`, and its setting to the tests of trained networks.
 """
 
-from galileo_jax.neural.benchmark import BENCHMARKS
-from galileo_jax.neural.presets import PRESETS
+from galileo_jax.neural.task import BENCHMARKS, PRESETS
 
 PRESETS.extend("galileo_jax.thesis.task")
 BENCHMARKS.extend("galileo_jax.thesis.clips")

@@ -7,11 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
-from galileo_jax.neural.benchmark import BENCHMARKS, Benchmark
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.galileo_task import QUANTITIES, to_sample
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
-from galileo_jax.neural.task import Arrays
+from galileo_jax.neural.task import BENCHMARKS, Arrays, Benchmark
 from galileo_jax.neural.world import Truth
 from galileo_jax.thesis.task import FPS, ThesisTask
 

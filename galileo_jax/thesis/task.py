@@ -12,11 +12,10 @@ from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.neural.config import TrainConfig
-from galileo_jax.neural.presets import PRESETS
-from galileo_jax.neural.task import Arrays
+from galileo_jax.neural.task import PRESETS, Arrays
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.rollout import Engine
-from galileo_jax.simulation import Truth
+from galileo_jax.simulation.truth import Truth
 from galileo_jax.thesis.network import RANGES, ThesisNetwork, log_mean_absolute_errors
 
 # Object 2 stands so close that it is nearly always hit; the thesis does not tell its distances.

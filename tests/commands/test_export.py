@@ -3,15 +3,17 @@
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
 
+from galileo_jax.api.export import export
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.commands import command, export
+from galileo_jax.commands import command
+from galileo_jax.commands import export as export_command
 from galileo_jax.inference.posterior import Posterior, Status
 from tests.clip.broken_clips import build_good_track
 from tests.clip.test_track_csv import make_observation
@@ -41,7 +43,7 @@ def make_run(folder: Path, clips: tuple[str, ...] = ("slide",)) -> Path:
 
 
 def run(*argv: object) -> int:
-    return command.run(export.main, [str(part) for part in argv])
+    return command.run(export_command.main, [str(part) for part in argv])
 
 
 @pytest.mark.parametrize("to", ["csv", "parquet"])
@@ -91,19 +93,18 @@ def test_netcdf_of_a_run(tmp_path: Path, capsys) -> None:
 
 def test_several_clips(tmp_path: Path) -> None:
     folder = make_run(tmp_path / "run", ("first", "second"))
-    assert run(folder, "--to", "csv") == 0
+    export(folder, to="csv")
     track = pd.read_csv(folder / "export" / "track.csv")
     assert list(track["clip"].unique()) == ["first", "second"]
-    assert run(folder, "--to", "netcdf") == 0
-    path = folder / "export" / "run.nc"
+    (path,) = export(folder, to="netcdf").paths
     with xr.open_dataset(path, group="observed_data/second", engine="h5netcdf") as data:
         np.testing.assert_array_equal(data["position_m"], make_observation(1, False).position_m)
 
 
 @pytest.mark.parametrize("to, name", [("parquet", "track.parquet"), ("netcdf", "clip.nc")])
-def test_track_of_a_clip(to: str, name: str, tmp_path: Path) -> None:
+def test_track_of_a_clip(to: Literal["parquet", "netcdf"], name: str, tmp_path: Path) -> None:
     path = build_good_track(tmp_path)
-    assert run(path, "--to", to, "--out", tmp_path / "out") == 0
+    export(path, to=to, out=tmp_path / "out")
     assert [found.name for found in (tmp_path / "out").iterdir()] == [name]
 
 

@@ -5,6 +5,7 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,10 +13,11 @@ import yaml
 from rich.progress import Progress
 
 from galileo_jax import report
-from galileo_jax.api.fit import OFF_THE_PLANE
+from galileo_jax.api.fit import OFF_THE_PLANE, fit
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.commands import command, fit
+from galileo_jax.commands import command
+from galileo_jax.commands import fit as fit_command
 from galileo_jax.inference.samplers import driver
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results.run import load_run
@@ -63,9 +65,9 @@ def write_clip(folder, centres, times, scenario="ramp", **keys):
     return folder / "clip.yaml"
 
 
-def run_fit(clip, out, *more):
+def call_fit(clip, out, *more):
     """Calls the command and returns result.json."""
-    assert command.run(fit.main, [str(clip), "--out", str(out), *more]) == 0
+    assert command.run(fit_command.main, [str(clip), "--out", str(out), *more]) == 0
     return json.loads((out / "result.json").read_text())
 
 
@@ -91,7 +93,7 @@ def first(simulated, tmp_path_factory):
     """The gradient fit of `simulated`: its folder and result."""
     out = tmp_path_factory.mktemp("fit") / "run"
     with in_64_bit():
-        return out, run_fit(simulated[0], out)
+        return out, call_fit(simulated[0], out)
 
 
 @pytest.mark.slow
@@ -142,7 +144,7 @@ def test_leaves_a_run_that_can_be_read(first):
 
 @pytest.mark.slow
 def test_same_seed_same_result_and_truth_beside_it(simulated, first, tmp_path, capsys):
-    again = run_fit(simulated[0], tmp_path / "again")
+    again = call_fit(simulated[0], tmp_path / "again")
     assert without_times(again) == without_times(first[1])
     shown = capsys.readouterr().out
     assert "truth" in shown.splitlines()[0]
@@ -152,7 +154,7 @@ def test_same_seed_same_result_and_truth_beside_it(simulated, first, tmp_path, c
 def test_a_damaged_truth_is_said(simulated, tmp_path, capsys):
     clip = build_good_track(tmp_path)
     (tmp_path / "clip.truth.json").write_text('{"m1": 1}')
-    assert command.run(fit.main, [str(clip), "--out", str(tmp_path / "run")]) == 2
+    assert command.run(fit_command.main, [str(clip), "--out", str(tmp_path / "run")]) == 2
     assert "clip.truth.json: not a truth with m1, k1, m2 and k2" in capsys.readouterr().err
 
 
@@ -162,7 +164,7 @@ def test_recovers_a_world_of_points(tmp_path):
     experiment = replace(HIT, friction=(0.13, 0.22), mass_kg=(0.6, 0.25))
     times = np.arange(45) / 30
     clip = write_clip(tmp_path, solve(experiment, times).position_m, times)
-    result = run_fit(clip, tmp_path / "run")
+    result = fit(clip).result
     assert result["parameters"]["k1"]["mean"] == pytest.approx(0.13, abs=K1_ATOL)
     assert deviation(result["parameters"]["k1"], 0.13) < SIGMAS
     assert deviation(result["parameters"]["k2"], 0.22) < SIGMAS
@@ -174,7 +176,7 @@ def test_nothing_moves(tmp_path):
     times = np.arange(30) / 30
     still = replace(HIT, friction=(0.5, 0.2))
     clip = write_clip(tmp_path, solve(still, times).position_m, times)
-    result = run_fit(clip, tmp_path / "run")
+    result = fit(clip).result
     for name, entry in (result["parameters"] | result["derived"]).items():
         assert not entry["identified"], name
 
@@ -185,7 +187,7 @@ def test_one_object(tmp_path, capsys):
     times = np.arange(40) / 30
     alone = replace(HIT, object2_x_m=None)
     clip = write_clip(tmp_path, solve(alone, times).position_m, times)
-    result = run_fit(clip, tmp_path / "run")
+    result = call_fit(clip, tmp_path / "run")
     assert list(result["parameters"]) == ["m1", "k1"]
     assert result["derived"] == {}
     assert deviation(result["parameters"]["k1"], HIT.friction[0]) < SIGMAS
@@ -204,7 +206,7 @@ def test_incline(tmp_path):
     height = 0.03
     centres = np.array([[along * cos + height * sin, -along * sin + height * cos]])
     clip = write_clip(tmp_path, centres, times, "incline", ramp_angle_deg=22.0)
-    result = run_fit(clip, tmp_path / "run")
+    result = fit(clip).result
     assert result["parameters"]["k1"]["identified"]
     assert deviation(result["parameters"]["k1"], k1) < SIGMAS
 
@@ -215,7 +217,7 @@ def test_a_video(tmp_path):
     """Rendered, tracked and fitted."""
     video = tmp_path / "clip.mp4"
     (truth,) = simulate(video, seed=11, seconds=1.4, size=(480, 270)).truths
-    result = run_fit(video, tmp_path / "run")
+    result = fit(video).result
     assert result["parameters"]["k1"]["mean"] == pytest.approx(truth["k1"], abs=K1_ATOL)
     assert result["timings_s"]["track"] > 0
 
@@ -223,22 +225,22 @@ def test_a_video(tmp_path):
 @pytest.mark.slow
 @pytest.mark.video
 @pytest.mark.parametrize("name", ["plain_coulomb_none_0"])
-def test_shared_clips(name, shared_data, tmp_path):
+def test_shared_clips(name, shared_data):
     clip = shared_data / "ramp" / f"{name}.yaml"
     truth = json.loads((shared_data / "ramp" / f"{name}.truth.json").read_text())
-    result = run_fit(clip, tmp_path / "run")
+    result = fit(clip).result
     assert result["parameters"]["k1"]["mean"] == pytest.approx(truth["k1"], abs=K1_ATOL)
 
 
 @pytest.mark.slow
 @pytest.mark.video
-def test_a_slope_without_a_scale(shared_data, tmp_path):
+def test_a_slope_without_a_scale(shared_data):
     """The first clip says so; with a scale the same clip tells k1."""
     clip = shared_data / "real" / "slide_r1.yaml"
-    unknown = run_fit(clip, tmp_path / "unknown")["parameters"]
+    unknown = fit(clip).parameters
     assert not unknown["k1"]["identified"]
     assert not unknown["pixels_per_metre"]["identified"]
-    known = run_fit(clip, tmp_path / "known", "--pixels-per-metre", "490")["parameters"]
+    known = fit(clip, pixels_per_metre=490.0).parameters
     assert known["k1"]["identified"]
     assert "pixels_per_metre" not in known
 
@@ -255,7 +257,7 @@ class TestSampling:
 
     @pytest.mark.slow
     def test_resumes_to_the_same_result(self, simulated, tmp_path, monkeypatch, capsys):
-        undisturbed = run_fit(simulated[0], tmp_path / "once", *self.SHORT)
+        undisturbed = call_fit(simulated[0], tmp_path / "once", *self.SHORT)
         assert undisturbed["method"] == "mh"
         assert not undisturbed["converged"], "fifty steps are too few, and it says so"
 
@@ -270,21 +272,24 @@ class TestSampling:
         out = tmp_path / "twice"
         monkeypatch.setattr(Progress, "update", stop_at_the_second_block)
         words = [str(simulated[0]), "--out", str(out), *self.SHORT]
-        assert command.run(fit.main, words) == 130
+        assert command.run(fit_command.main, words) == 130
         assert "what was finished is kept" in capsys.readouterr().err
         assert not (out / "result.json").exists()
         assert list(out.iterdir()), "the checkpoint"
         monkeypatch.setattr(Progress, "update", update)
-        resumed = run_fit(simulated[0], out, *self.SHORT)
+        resumed = call_fit(simulated[0], out, *self.SHORT)
         assert without_times(resumed) == without_times(undisturbed)
         assert not list(out.glob("*.checkpoint.npz"))
 
 
 @pytest.mark.slow
-def test_the_thesis_preset_says_what_it_chose(simulated, tmp_path):
-    chosen = {"similarity": "root_mean", "acceptance": "metropolis", "selection": "least_variance"}
-    words = [word for name, value in chosen.items() for word in (f"--{name}", value)]
-    result = run_fit(simulated[0], tmp_path / "run", "--method", "mh", "--preset", "thesis", *words)
+def test_the_thesis_preset_says_what_it_chose(simulated):
+    chosen: dict[str, Any] = {
+        "similarity": "root_mean",
+        "acceptance": "metropolis",
+        "selection": "least_variance",
+    }
+    result = fit(simulated[0], method="mh", preset="thesis", **chosen).result
     assert {name: result[name] for name in chosen} == chosen
     assert result["preset"] == "thesis"
     assert set(result["best"]) == {"m1", "k1", "m2", "k2"}
@@ -297,7 +302,7 @@ def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
     folder, out = tmp_path / "folder", tmp_path / "run"
     folder.mkdir()
     clip = broken.build(folder)
-    assert command.run(fit.main, [str(clip), "--out", str(out)]) == 2
+    assert command.run(fit_command.main, [str(clip), "--out", str(out)]) == 2
     shown = capfd.readouterr()
     assert shown.out == ""
     (line,) = shown.err.splitlines()
@@ -314,8 +319,8 @@ def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
         (["--pixels-per-metre", "-3"], "-3 is not a scale"),
         (["--pixels-per-metre", "nan"], "nan is not finite"),
         (["--pixels-per-metre", "x"], "invalid float value: 'x'"),
-        (["--max-steps", "7"], "'7' is no multiple of 25"),
-        (["--max-steps", "0"], "'0' is no multiple of 25"),
+        (["--method", "mh", "--max-steps", "7"], "7 is no multiple of 25"),
+        (["--method", "mh", "--max-steps", "0"], "0 is no multiple of 25"),
         (["--seed", "-1"], "'-1' is no whole number, 0 or more"),
         (["--seed", "x"], "'x' is no whole number"),
         (["--preset", "foo"], "--preset: invalid choice: 'foo'"),
@@ -334,7 +339,7 @@ def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
 def test_a_wrong_call_is_one_line(words, said, tmp_path, capfd):
     clip = build_good_track(tmp_path)
     out = tmp_path / "run"
-    assert command.run(fit.main, [str(clip), "--out", str(out), *words]) == 2
+    assert command.run(fit_command.main, [str(clip), "--out", str(out), *words]) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert said in line
     assert not out.exists()
@@ -343,14 +348,16 @@ def test_a_wrong_call_is_one_line(words, said, tmp_path, capfd):
 def test_a_file_in_the_place_of_the_run(tmp_path, capfd):
     clip = build_good_track(tmp_path)
     (tmp_path / "run").write_text("mine")
-    assert command.run(fit.main, [str(clip), "--out", str(tmp_path / "run")]) == 2
+    assert command.run(fit_command.main, [str(clip), "--out", str(tmp_path / "run")]) == 2
     assert "is a file; a folder expected" in capfd.readouterr().err
     assert (tmp_path / "run").read_text() == "mine"
 
 
 def test_the_same_clip_twice(tmp_path, capfd):
     clip = build_good_track(tmp_path)
-    assert command.run(fit.main, [str(clip), str(clip), "--out", str(tmp_path / "run")]) == 2
+    assert (
+        command.run(fit_command.main, [str(clip), str(clip), "--out", str(tmp_path / "run")]) == 2
+    )
     (line,) = capfd.readouterr().err.splitlines()
     assert "two clips are named clip" in line
 
@@ -378,6 +385,6 @@ def test_what_stands_off_the_plane_is_warned_of(simulated, tmp_path, capsys):
     content["track"] = str(simulated[0].with_suffix(".csv"))
     content["objects"][1]["z_m"] = 0.01
     (tmp_path / "off.yaml").write_text(yaml.safe_dump(content))
-    result = run_fit(tmp_path / "off.yaml", tmp_path / "run")
+    result = call_fit(tmp_path / "off.yaml", tmp_path / "run")
     assert result["warnings"] == [OFF_THE_PLANE]
     assert "has a z_m" in " ".join(capsys.readouterr().err.split())

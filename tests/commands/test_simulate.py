@@ -5,10 +5,13 @@ import cv2
 import numpy as np
 import pytest
 
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.commands import command, simulate
-from galileo_jax.simulation import SLOWEST_HIT_M_S, Truth, draw_truth, roll_out
+from galileo_jax.commands import command
+from galileo_jax.commands import simulate as simulate_command
+from galileo_jax.simulation.motion import roll_out
+from galileo_jax.simulation.truth import SLOWEST_HIT_M_S, Truth, draw_truth
 from tests.reference_ramp import Experiment, Solution, solve
 
 # The motion is exact at the records; an event is looked for on straight lines between them.
@@ -72,10 +75,9 @@ def test_given_values_are_kept_even_if_nothing_moves():
 
 @pytest.mark.video
 def test_clip_loads_and_its_truth_is_complete(tmp_path):
-    call = ["--seed", "3", "--size", "320x180", "--seconds", "1", "--hand"]
-    call += ["--camera-fault", "keystone", "--camera-fault", "roll"]
     path = tmp_path / "new" / "clip.mp4"
-    assert command.run(simulate.main, [*call, "--out", str(path)]) == 0
+    askew = ("keystone", "roll")
+    simulate(path, seed=3, size=(320, 180), seconds=1.0, hand=True, camera_fault=askew)
     assert {item.name for item in path.parent.iterdir()} == {
         "clip.mp4",
         "clip.yaml",
@@ -99,10 +101,9 @@ def test_clip_loads_and_its_truth_is_complete(tmp_path):
 @pytest.mark.video
 def test_same_seed_same_clip(tmp_path):
     clips = []
-    for name, seed in (("a", "5"), ("b", "5"), ("c", "6")):
-        call = ["--seed", seed, "--size", "160x90", "--seconds", "0.3", "--no-points"]
+    for name, seed in (("a", 5), ("b", 5), ("c", 6)):
         path = tmp_path / name / "clip.mp4"
-        assert command.run(simulate.main, [*call, "--out", str(path)]) == 0
+        simulate(path, seed=seed, size=(160, 90), seconds=0.3, no_points=True)
         video = cv2.VideoCapture(str(path))
         frames = [frame for ok, frame in iter(video.read, (False, None)) if ok]
         truth = path.with_suffix(".truth.json").read_text()
@@ -116,8 +117,7 @@ def test_same_seed_same_clip(tmp_path):
 
 def test_track_has_the_declared_noise(tmp_path):
     path = tmp_path / "clip.csv"
-    call = ["--track-only", "--seconds", "3", "--fps", "60", "--track-noise", "0.001"]
-    assert command.run(simulate.main, [*call, "--out", str(path)]) == 0
+    simulate(path, track_only=True, seconds=3.0, fps=60.0, track_noise=0.001)
     assert load_clip(path).frame_count == 180
     observed = read_observation_csv(path)
     truth = json.loads(path.with_suffix(".truth.json").read_text())["trajectory"]
@@ -126,11 +126,10 @@ def test_track_has_the_declared_noise(tmp_path):
     assert observed.covariance_m2[:, 0, 0] == pytest.approx(1e-6)
 
 
-def test_free_motion(tmp_path, capsys):
+def test_free_motion(tmp_path):
     """An object hit off centre turns; the yaml says where it stands, the truth where it goes."""
     path = tmp_path / "c.csv"
-    call = [*FREE, "--z2", "0.015", "--seed", "1", "--seconds", "1.4", "--out", str(path)]
-    assert command.run(simulate.main, call) == 0
+    simulate(path, track_only=True, motion="free", z2=0.015, seed=1, seconds=1.4)
     clip = load_clip(path)
     assert [each.z_m for each in clip.objects] == [0.0, 0.015]
     truth = json.loads(path.with_suffix(".truth.json").read_text())
@@ -203,7 +202,7 @@ def test_free_motion_of_what_meets_squarely_is_planar():
 )
 def test_wrong_calls_are_one_line_and_leave_nothing(call, complaint, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert command.run(simulate.main, call) == 2
+    assert command.run(simulate_command.main, call) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert err.count("\n") == 1

@@ -14,7 +14,8 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.observation.observation import Observation
-from galileo_jax.simulation import Hidden, draw_series
+from galileo_jax.simulation.hidden import Hidden
+from galileo_jax.simulation.series import draw_series
 from tests.precision import in_64_bit
 
 # Of all the library only these: what is near air drag, and what changes the start or the hit.

@@ -13,7 +13,7 @@ def rolled(engine: Engine, z: jax.Array) -> Trajectory:
     """The motion at `z` `[parameter]`; no pitch of its own."""
     position, velocity = in_jax(engine)(forward(engine.model.parameters, z[None]))
     times = jnp.arange(position.shape[-1]) * engine.model.record_dt_s
-    return Trajectory(times, position[0], velocity[0], position[0][:, 0])
+    return Trajectory(times, position[0], velocity[0])
 
 
 def derivatives(engine: Engine, z: jax.Array, times_s: jax.Array, step: float):

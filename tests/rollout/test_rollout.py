@@ -64,7 +64,7 @@ def test_interpolation_is_exact_for_constant_acceleration():
     times = jnp.arange(11) * 0.1
     position = (0.3 + 0.5 * times - 0.7 * times**2)[None, None]
     velocity = (0.5 - 1.4 * times)[None, None]
-    motion = Trajectory(times, position, velocity, position[:, 0])
+    motion = Trajectory(times, position, velocity)
     asked = jnp.array([-1.0, 0.0, 0.123, 0.55, 0.999, 7.0])
     x, v = at_times(motion, asked)
     inside = np.clip(asked, 0, 1)

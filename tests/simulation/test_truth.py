@@ -11,7 +11,11 @@ from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.model.parameters import absent
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation import Declared, Hidden, draw_series, draw_truth, hide, roll_out
+from galileo_jax.simulation.declared import Declared
+from galileo_jax.simulation.hidden import Hidden, hide
+from galileo_jax.simulation.motion import roll_out
+from galileo_jax.simulation.series import draw_series
+from galileo_jax.simulation.truth import draw_truth
 
 # The two integrators differ by where within 0.1 ms a hit or a stop is put.
 SOLVERS_AGREE_M = 1e-4

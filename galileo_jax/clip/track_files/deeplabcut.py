@@ -101,8 +101,8 @@ def _from_hdf5(path: Path) -> tuple[np.ndarray, dict[Column, np.ndarray]]:
     except InputError:
         raise
     except Exception as error:  # h5py and pickle raise whatever the bytes make them
-        told = " ".join(str(error).split())[:100]
-        raise InputError(f"{path}: not an h5 file of DeepLabCut ({told})") from None
+        reason = " ".join(str(error).split())[:100]
+        raise InputError(f"{path}: not an h5 file of DeepLabCut ({reason})") from None
 
 
 def _appendable(table: Any) -> tuple[np.ndarray, dict[Column, np.ndarray]]:

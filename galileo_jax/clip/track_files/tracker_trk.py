@@ -197,6 +197,6 @@ def _number(path: Path, owner: ElementTree.Element, name: str, where: str) -> fl
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        told = "missing" if text is None else f"{text[:40]!r} is not a number"
-        raise InputError(f"{path}: {where}: {name}: {told}")
+        problem = "missing" if text is None else f"{text[:40]!r} is not a number"
+        raise InputError(f"{path}: {where}: {name}: {problem}")
     return value

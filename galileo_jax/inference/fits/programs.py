@@ -77,7 +77,7 @@ def white_of(kind: Kind, theta, position, velocity, noise, data: Any, scene):
     """Whitened residuals of one motion, `[value]`."""
     times = jnp.arange(position.shape[-1]) * kind.record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
-    motion = Trajectory(times, position, velocity, position[:, 0])
+    motion = Trajectory(times, position, velocity)
     predicted = seen(kind.effects, kind.names, theta, motion, data.times_s, scene)
     difference = data.whitening.observed_m - predicted
     white = GaussianLikelihood.whiten(difference, noise, data.whitening).reshape(-1)

@@ -117,7 +117,6 @@ def film(experiment: Experiment, given: Mapping[str, float], times_s: np.ndarray
         jnp.asarray(motion.times_s),
         jnp.asarray(motion.position_m),
         jnp.asarray(motion.velocity_m_s),
-        jnp.zeros(()),
     )
     position, _ = at_times(dense, times)
     for effect in effects:
