@@ -31,8 +31,9 @@ CONVINCING = 7.0
 SECOND_EFFECT_ODDS = 0.1
 # Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
-# Of the best single effects so many are joined with others, to so many pairs in all.
-NUM_JOINED, NUM_PAIRS = 3, 8
+# Of the best single effects so many are joined with others, to so many pairs in all. Then either
+# effect of the best pair is kept, and joined with so many that may explain what the other does.
+NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 3
 # The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
 # sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
 MOST_LUCK = 4.0
