@@ -132,7 +132,7 @@ def _lost_frames(table: Table, generator: np.random.Generator) -> Table:
 
 
 def _missing_rows(table: Table, generator: np.random.Generator) -> Table:
-    return table[generator.random(len(table)) < 0.6]
+    return table.loc[generator.random(len(table)) < 0.6]
 
 
 def _still(table: Table, generator: np.random.Generator) -> Table:

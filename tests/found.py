@@ -49,7 +49,7 @@ def fit_of(trials: JointProblem, effects: tuple[str, ...]) -> GradientFit:
         code=Code.CONVERGED,
         stats={},
         pull=1.0,
-        num_pulled=1.0,
+        num_pulled=0.5,
     )
 
 

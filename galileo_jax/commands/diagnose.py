@@ -84,7 +84,7 @@ def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
     """Candidates, the verdict, and how to go on."""
-    from galileo_jax.inference.fits.gradient import BEHIND, Code
+    from galileo_jax.inference.fits.gradient import BEHIND, SETTLED
     from galileo_jax.report import diagnosis_text
 
     diagnosis, record = found.found, found.document
@@ -93,7 +93,7 @@ def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
     for made, entry in shown:
         strengths = diagnosis_text.strength_texts(made.effects, entry).values()
         is_behind = diagnosis.candidates[0].log_evidence - made.log_evidence > BEHIND
-        is_settled = made.hypothesis.fit.code is Code.CONVERGED
+        is_settled = made.hypothesis.fit.code in SETTLED
         evidence = "far behind" if is_behind and not is_settled else f"{made.log_evidence:+.1f}"
         lines.append(
             f"{entry['effect']:<26}{entry['probability']:>12.3f}{evidence:>12}"

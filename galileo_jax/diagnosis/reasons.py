@@ -5,7 +5,7 @@ from math import exp, log
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason
-from galileo_jax.inference.result import NOISE_SCALE_RANGE
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
 PLAIN_ODDS = 1000.0  # larger odds are told as a power of ten

@@ -4,10 +4,11 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from galileo_jax.comparison.compare import Comparison, Pull
+from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fit_text import number
 
@@ -30,18 +31,19 @@ def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
     """Whether the model is adequate, in one sentence."""
     equals = p_equals(comparison.p_value)
     model = f"with {effects_text(effects)} " if effects else ""
-    if comparison.is_adequate:
-        return f"The model {model}is adequate: its residuals look like noise ({equals})."
-    return f"The model {model}is not adequate: the data contradict it ({equals})."
+    if not comparison.is_adequate:
+        return f"The model {model}is not adequate: the data contradict it ({equals})."
+    text = f"The model {model}is adequate: its residuals look like noise ({equals})."
+    return f"{text} {misstated}" if (misstated := noise_text(comparison)) else text
 
 
-def pull_text(pull: Pull) -> str:
-    """One nuisance parameter outside its prior, as a sentence."""
-    unit = "" if pull.unit == "1" else f" {pull.unit}"
-    return (
-        f"{pull.parameter} is at {pull.value:.4g}{unit}, "
-        f"{abs(pull.z):.1f} prior standard deviations from its prior mean"
-    )
+def noise_text(comparison: Comparison) -> str:
+    """How wrong the stated noise is, in a sentence; empty where it is about right."""
+    low, high = NOISE_SCALE_RANGE
+    if all(low <= scale <= high for scale in comparison.noise_scale):
+        return ""
+    size = " and ".join(f"{scale:.1f}" for scale in comparison.noise_scale)
+    return f"The tracking errors are {size} times what was stated."
 
 
 def verdict(diagnosis: Diagnosis) -> str:
