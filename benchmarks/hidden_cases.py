@@ -29,6 +29,7 @@ EXOTICS = (
     "exotic_ripple",
     "exotic_root_drag",
 )
+PAIRS = ("initial_push+restitution", "air_drag+friction_patch")
 ANGLES_DEG = (20.0, 10.0, 15.0)
 
 
@@ -61,12 +62,12 @@ def grid(
     fps: float,
     series: int | None,
 ) -> Iterator[Case]:
-    """Effects x strengths x seeds (library's and exotic ones), then clips without an effect.
+    """Effects x strengths x seeds (library's, pairs, exotic ones), then clips without an effect.
 
     Angles go round with the seed. Every case has a seed of its own, so that a case is the same
     in a smaller grid.
     """
-    hidden = itertools.product((*effects, *EXOTICS), strengths, range(seeds))
+    hidden = itertools.product((*effects, *PAIRS, *EXOTICS), strengths, range(seeds))
     cells = [(effect, strength, seed) for effect, strength, seed in hidden]
     for effect, strength, seed in [*cells, *(("none", None, i) for i in range(num_none))]:
         level = "" if strength is None else f"_{round(100 * strength)}"
@@ -83,7 +84,8 @@ def grid(
             "series": series,
         }
         if strength is not None:
-            recipe |= {"effects": {effect: {}}, "strength": strength}
+            told = {each: {} for each in effect.split("+")}
+            recipe |= {"effects": told, "strength": strength}
         if effect in EXOTICS:
             recipe["effects_from"] = [EXOTIC_FILE]
         names = [f"{name}_{i + 1}" for i in range(series)] if series else [name]

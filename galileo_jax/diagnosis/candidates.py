@@ -57,6 +57,12 @@ class Hypothesis:
         return self.fit.chi2 / self.fit.num_values - 1.0
 
 
+def reduced(trials: JointProblem, hypothesis: Hypothesis, effects: Sequence[str]) -> Hypothesis:
+    """A hypothesis with only some of its effects, all else as it is: to start from, not a fit."""
+    fit, free = hypothesis.fit, trials.free(effects)
+    return Hypothesis(tuple(effects), replace(fit, z=np.where(free, fit.z, 0.0), free=free))
+
+
 def fit_candidates(
     fitter: GradientFitter, base: Hypothesis, candidates: Sequence[tuple[str, ...]], seed: int
 ) -> list[Hypothesis]:

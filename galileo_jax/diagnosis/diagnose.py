@@ -22,13 +22,19 @@ import numpy as np
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
-from galileo_jax.diagnosis.candidates import Hypothesis, best_gains, fit_candidates, score_tests
+from galileo_jax.diagnosis.candidates import (
+    Hypothesis,
+    best_gains,
+    fit_candidates,
+    reduced,
+    score_tests,
+)
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
-from galileo_jax.diagnosis.pairs import pairs_to_try
+from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_to_try
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
     NUM_JOINED,
@@ -201,7 +207,11 @@ def _pairs(
     library: Sequence[str],
     seed: int,
 ) -> tuple[Candidate, ...]:
-    """Pairs of the best single effects with others, fitted from the single effects' fits."""
+    """Pairs of the best single effects with others, and what could be confused with the best pair.
+
+    The first are fitted from the single effects' fits. One that is as good as the best pair may not
+    be reached from there: it is, from the best pair without one of its effects.
+    """
     trials = fitter.trials
     singles = [c for c in candidates if not c.is_form][:NUM_JOINED]
     gains = np.stack(
@@ -214,6 +224,12 @@ def _pairs(
     for one, pairs in zip(singles, pairs_to_try(singles, library, gains), strict=True):
         if pairs:
             made += _candidates(fitter, base, one.hypothesis, pairs, seed)
+    best = ranked(made)[:1]
+    for kept in best[0].effects if best else ():
+        start = reduced(trials, best[0].hypothesis, [kept])
+        if others := not_tried(kept, library, made):
+            gains = best_gains(trials, start.fit, others, seed)
+            made += _candidates(fitter, base, start, most_alike(others, gains), seed)
     return ranked(made)
 
 

@@ -1,11 +1,11 @@
 """Which pairs of effects are tried where no single effect explains the data."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import Candidate
-from galileo_jax.diagnosis.verdict import NUM_PAIRS
+from galileo_jax.diagnosis.verdict import NUM_PAIRS, NUM_SWAPPED
 
 
 def pairs_to_try(
@@ -29,3 +29,21 @@ def pairs_to_try(
         if first != second and len(found) < NUM_PAIRS:
             found.setdefault(frozenset((first, second)), (i, (first, second)))
     return [[pair for i, pair in found.values() if i == own] for own in range(len(singles))]
+
+
+def not_tried(
+    kept: str, library: Sequence[str], tried: Collection[Candidate]
+) -> list[tuple[str, str]]:
+    """An effect joined with each of the library that it was not tried with."""
+    known = {frozenset((kept,)), *(frozenset(c.effects) for c in tried)}
+    return [(kept, name) for name in library if frozenset((kept, name)) not in known]
+
+
+def most_alike(pairs: Sequence[tuple[str, str]], gains: np.ndarray) -> list[tuple[str, str]]:
+    """The `NUM_SWAPPED` pairs whose second effect best explains what is left without it.
+
+    Args:
+      pairs: from `not_tried`.
+      gains: `[pair]`, nats, from `candidates.best_gains`.
+    """
+    return [pairs[i] for i in np.argsort(-gains)[:NUM_SWAPPED]]

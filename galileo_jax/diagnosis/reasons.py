@@ -111,8 +111,8 @@ def nothing_explains(best: Candidate) -> Reason:
     return Reason(
         "nothing_explains",
         f"No effect, pair or form leaves only noise: the most probable, {best.name}, leaves "
-        f"{p_equals(p_value)}, and {ADEQUATE_P:g} is needed.",
-        {"hypothesis": best.name, "p_value": p_value, "least_p_value": ADEQUATE_P},
+        f"{p_equals(p_value)}.",
+        {"hypothesis": best.name, "p_value": p_value},
     )
 
 

@@ -27,12 +27,15 @@ FAINT_FACTOR = 2.0
 # Log odds, in nats, at which an effect is believed although the base model passes its comparison:
 # a test that looks everywhere notices less than one that knows where to look (e^7 = 1100).
 CONVINCING = 7.0
+# A pair must pass this p-value, not ADEQUATE_P: two effects come close to almost any motion.
+PAIR_P = 0.05
 # Two effects at once are so much rarer than one: who measures knows of most of what disturbs.
 SECOND_EFFECT_ODDS = 0.1
 # Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
-# Of the best single effects so many are joined with others, to so many pairs in all.
-NUM_JOINED, NUM_PAIRS = 3, 8
+# Of the best single effects so many are joined with others, to so many pairs in all. Then either
+# effect of the best pair is kept, and joined with so many that may explain what the other does.
+NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 3
 # The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
 # sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
 MOST_LUCK = 4.0
@@ -115,7 +118,8 @@ def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]
 
 def explains(candidate: Candidate) -> bool:
     """Whether a candidate was compared with the data and leaves nothing but noise."""
-    return candidate.p_value is not None and candidate.p_value >= ADEQUATE_P
+    least = ADEQUATE_P if len(candidate.effects) == 1 else PAIR_P
+    return candidate.p_value is not None and candidate.p_value >= least
 
 
 def form_that_leads(singles: Sequence[Candidate]) -> Candidate | None:

@@ -132,6 +132,7 @@ def exam(monkeypatch):
 def test_grid_is_walked_once(exam, tmp_path, capsys, monkeypatch):
     module, calls = exam
     monkeypatch.setattr(module.hidden_cases, "EXOTICS", ())
+    monkeypatch.setattr(module.hidden_cases, "PAIRS", ())
     folder = tmp_path / "exam"
     options = ["--effects", "air_drag", "--strengths", "0.1", "0.8", "--seeds", "1", "--none", "1"]
     options += ["--series", "2", "--json", str(tmp_path / "figures.json"), "--out", str(folder)]

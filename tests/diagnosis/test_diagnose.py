@@ -31,8 +31,14 @@ def precision():
         yield
 
 
-def simulated(folder: Path, *hidden: Hidden) -> JointProblem:
-    """Trials of one simulated track of two boxes on a ramp, about 45 frames."""
+def simulated(folder: Path, *hidden: Hidden, stated_m: float = NOISE_M) -> JointProblem:
+    """Trials of one simulated track of two boxes on a ramp, about 45 frames.
+
+    Args:
+      folder: where its files are written.
+      *hidden: what is hidden in it.
+      stated_m: the noise that the track states, whatever is there.
+    """
     things, secrets, camera = np.random.default_rng(1).spawn(3)
     ((truth, motion),) = draw_series(
         ANGLE_DEG, GIVEN, hidden, 1, solver="rigid", things=things, secrets=secrets
@@ -44,7 +50,7 @@ def simulated(folder: Path, *hidden: Hidden) -> JointProblem:
         names=tuple(each.name for each in truth.objects),
         times_s=times,
         position_m=centres + NOISE_M * camera.standard_normal(centres.shape),
-        covariance_m2=np.tile(NOISE_M**2 * np.eye(2)[None, ..., None], (count, 1, 1, frames)),
+        covariance_m2=np.tile(stated_m**2 * np.eye(2)[None, ..., None], (count, 1, 1, frames)),
         mask=np.ones((count, frames), bool),
     )
     write_observation_csv(folder / "clip.csv", observation)
@@ -92,4 +98,33 @@ def test_without_an_effect_nothing_is_missing(tmp_path):
     assert list(found.rounds) == told and len(told) == 1
     assert found.base.is_adequate
     assert sum(each.probability for each in found.candidates) < 0.2
+    assert found.probability_none > 0.8
+    rules = [why.rule for why in found.verdict.reasons]
+    assert rules == ["adequate_without_effects", "nothing_convinces"]
     assert {each.name for each in found.candidates} == set(CANDIDATES)
+
+
+def test_two_effects_are_named_together(tmp_path):
+    """Neither explains the data alone, so that pairs are tried."""
+    air_drag, restitution = make_effects(["air_drag", "restitution"])
+    trials = simulated(
+        tmp_path,
+        Hidden(air_drag, {"air_drag": AIR_DRAG_KG_M}),
+        Hidden(restitution, {"restitution": 0.5}),
+    )
+    found, told = diagnosed(trials)
+    assert found.verdict.status == "named"
+    assert set(found.verdict.effects) == {"air_drag", "restitution"}
+    assert set(told[-1].hypothesis.effects) == {"air_drag", "restitution"}
+    rules = [why.rule for why in found.verdict.reasons]
+    assert rules[:4] == ["contradicted_without_effects", "pairs_tried", "explains", "decisive"]
+    total = sum(each.probability for each in found.candidates) + found.probability_none
+    assert total == pytest.approx(1.0)
+
+
+def test_noise_of_twice_the_stated_size_is_told_as_that(tmp_path):
+    found, _ = diagnosed(simulated(tmp_path, stated_m=NOISE_M / 2))
+    assert (found.verdict.status, found.verdict.effects) == ("none", ())
+    first = found.verdict.reasons[0]
+    assert first.rule == "noise_misstated"
+    assert first.numbers["noise_scale_largest"] == pytest.approx(2.0, abs=0.25)
