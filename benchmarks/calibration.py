@@ -34,8 +34,9 @@ from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.observation.observation import Observation
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.simulation import Truth, draw_truth, roll_out
+from galileo_jax.simulation.motion import roll_out
 from galileo_jax.simulation.series import draw_series
+from galileo_jax.simulation.truth import Truth, draw_truth
 
 ANGLES_DEG = (10.0, 30.0)
 NOISE_M = 2e-4

@@ -38,8 +38,8 @@ from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.model.parameters import inverse
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime import compilation_cache
-from galileo_jax.simulation import Truth, roll_out
-from galileo_jax.simulation.truth import extents
+from galileo_jax.simulation.motion import roll_out
+from galileo_jax.simulation.truth import Truth, extents
 
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 ANGLES_DEG, MASSES_KG, LEAST_FRICTION, MOST_FRICTION2 = (5.0, 35.0), (0.1, 1.6), 0.01, 0.5

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ LARGEST_FILE = 4e6  # bytes
 
 
 def trials_of(
-    experiment: Experiment, fps: float = 30.0, frames: int = 90, **declared: float
+    experiment: Experiment, fps: float = 30.0, frames: int = 90, **declared: Any
 ) -> JointProblem:
     times = np.arange(frames) / fps
     exact = solve(experiment, times).position_m
