@@ -19,16 +19,8 @@ import scoring
 import tables
 
 from galileo_jax.api.fit import fit
-from galileo_jax.api.track import Track
-from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.schema import Clip
-from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
 from galileo_jax.commands import command
-from galileo_jax.measurement.measure import Measurement
-from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking import track_clip
-from galileo_jax.tracking.to_metres import observe
 
 BARS = {
     "k1": {"median": 0.003, "worst": 0.01},
@@ -96,22 +88,8 @@ def main(argv: Sequence[str]) -> int | None:
 
 
 def _fit(path: Path, call: argparse.Namespace) -> Mapping[str, Any]:
-    """As the command does it; only the track may come from an earlier run."""
-    clip = load_clip(path)
-    seen = _observe(clip, call.tracks)
-    track = Track(clip, None, Measurement(clip, seen, seen))
-    return fit(track, method=call.method, seed=call.seed).result
-
-
-def _observe(clip: Clip, tracks: Path | None) -> Observation:
-    kept = tracks / f"{clip.path.stem}.csv" if tracks else None
-    if kept and kept.is_file():
-        return read_observation_csv(kept)
-    observation = observe(clip, track_clip(clip))
-    if kept:
-        kept.parent.mkdir(parents=True, exist_ok=True)
-        write_observation_csv(kept, observation)
-    return observation
+    """As the command does it."""
+    return fit(path, method=call.method, seed=call.seed).result
 
 
 def _cells(entry: scoring.Score) -> list[Any]:
@@ -157,7 +135,6 @@ def _parser() -> command.Parser:
     parser.add_argument("--only", default="*", help="glob over clip names")
     parser.add_argument("--set", default="none", help="an effect in the truth, or all")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--tracks", type=Path, help="keep tracks there; reuse what is there")
     return parser
 
 

@@ -3,7 +3,7 @@
     galileo simulate --effects-from benchmarks/exotic_effects.py --effect exotic_gust ...
 
 Ripple, gust and heating have the shape of one of the forms without a name (`effects/forms`); bump,
-drying, dying wind and root drag were written after these, and have not.
+drying, dying wind, growing force, magnet and root drag were written after these, and have not.
 
 A sticky spot is not among them: any short stretch that brakes is a `friction_patch`, and
 naming it so is right.
@@ -190,3 +190,51 @@ class RootDrag(Effect):
             return -theta["exotic_root_drag"][..., None] * mass * speed / root
 
         return drag
+
+
+@register
+class GrowingForce(Effect):
+    """A force on object 1 that grows as the root of the time: F = F0 sqrt(t / 1 s)."""
+
+    name: ClassVar[str] = "exotic_growing_force"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Force after a second."""
+        return (unknown("exotic_growing_force", "N", LogNormal(0.4, 0.4)),)
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
+        """The force at the time."""
+        size = scene.only(theta["exotic_growing_force"], 0)
+
+        def growing(state: State) -> Array:
+            time = state.time_s + 0.0 * size
+            return size * size.__array_namespace__().sqrt(abs(time) + 1e-9)
+
+        return growing
+
+
+@register
+class Magnet(Effect):
+    """A magnet beside the way attracts object 1: F = -F0 u / (1 + u^2)^2, u = (q - place) / 4 cm.
+
+    It pulls forward before the place and back behind it.
+    """
+
+    name: ClassVar[str] = "exotic_magnet"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Force and place."""
+        return (
+            unknown("exotic_magnet", "N", LogNormal(2.0, 0.3)),
+            unknown("exotic_magnet_place", "m", Uniform(-0.2, 0.1), -0.05),
+        )
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
+        """The force at the place."""
+        size = scene.only(theta["exotic_magnet"], 0)
+
+        def pull(state: State) -> Array:
+            away = (state.path_m - theta["exotic_magnet_place"][..., None]) / 0.04
+            return -size * away / (1.0 + away**2) ** 2
+
+        return pull

@@ -13,18 +13,19 @@ import yaml
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
+from galileo_jax.measurement.measure import measure
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking import track_clip
-from galileo_jax.tracking.to_metres import observe
 
 EXOTIC_FILE = Path(__file__).with_name("exotic_effects.py")
 EXOTICS = (
     "exotic_bump",
     "exotic_drying",
     "exotic_dying_wind",
+    "exotic_growing_force",
     "exotic_gust",
     "exotic_heating",
+    "exotic_magnet",
     "exotic_ripple",
     "exotic_root_drag",
 )
@@ -124,7 +125,7 @@ def tracked(path: Path, cache: Path) -> Path:
         clip = load_clip(path)
         if clip.video is None:
             return path
-        write_observation_csv(kept.with_suffix(".csv"), observe(clip, track_clip(clip)))
+        write_observation_csv(kept.with_suffix(".csv"), measure(clip).whole)
         content = yaml.safe_load(path.read_text())
         del content["video"]
         for item in content["objects"]:

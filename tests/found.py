@@ -7,8 +7,10 @@ import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, Place, Pull
 from galileo_jax.comparison.phases import PHASES
+from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round, Verdict
+from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.fits.gradient import Code, GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
@@ -47,6 +49,7 @@ def fit_of(trials: JointProblem, effects: tuple[str, ...]) -> GradientFit:
         code=Code.CONVERGED,
         stats={},
         pull=1.0,
+        num_pulled=0.5,
     )
 
 
@@ -67,7 +70,7 @@ def comparison_of(trials: JointProblem, p_value: float) -> Comparison:
         Pull("release_instant", -0.05, "s", -4.9),
         Pull("foot_transition", 1.01, "1", 0.2),
     )
-    return Comparison(p_value, places, pulls, ERROR, (label,), (white,))
+    return Comparison(p_value, places, pulls, ERROR, (label,), (white,), (1.0,), False)
 
 
 def candidate_of(trials: JointProblem, name: str, probability: float, rivals: tuple[str, ...] = ()):
@@ -78,6 +81,7 @@ def candidate_of(trials: JointProblem, name: str, probability: float, rivals: tu
         error=ERROR | {"chi2_per_dof": 1.0},
         score_z=5.0,
         log_evidence=np.log(probability) + 40.0,
+        log_prior=-2.8,
         probability=probability,
         p_value=0.4 if probability > 0.01 else None,
         confounded_with=rivals,
@@ -90,10 +94,12 @@ def diagnosis_of(trials: JointProblem, status: str) -> Diagnosis:
         Hypothesis((), fit_of(trials, ())), comparison_of(trials, 0.5 if status == "none" else 1e-9)
     )
     rivals = ("viscous_drag",) if status == "ambiguous" else ()
-    candidates = (
-        candidate_of(trials, "air_drag", 0.9, rivals),
-        candidate_of(trials, "viscous_drag", 0.09),
-        candidate_of(trials, "release_delay", 1e-4),
+    candidates = ranked(
+        [
+            candidate_of(trials, "air_drag", 0.9, rivals),
+            candidate_of(trials, "viscous_drag", 0.09),
+            candidate_of(trials, "release_delay", 0.01),
+        ]
     )
     rounds = (first,)
     if status in ("named", "ambiguous"):
@@ -102,7 +108,12 @@ def diagnosis_of(trials: JointProblem, status: str) -> Diagnosis:
     return Diagnosis(
         rounds=rounds,
         candidates=candidates,
-        verdict=Verdict(status, effects, ("film <it> again",) if effects else ()),  # pyright: ignore
+        verdict=Verdict(
+            status,  # pyright: ignore
+            effects,
+            advice=("film <it> again",) if effects else (),
+            reasons=reasons.without_effects(first.comparison),
+        ),
         missing=_missing() if status == "unknown" else None,
     )
 

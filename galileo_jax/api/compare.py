@@ -17,7 +17,7 @@ from galileo_jax.comparison.compare import Comparison as Compared
 from galileo_jax.comparison.compare import compare as compare_fit
 from galileo_jax.comparison.document import comparison_document
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
-from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
+from galileo_jax.inference.fits.gradient import SETTLED, Code, GradientFit, GradientFitter
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
@@ -218,7 +218,7 @@ def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
         TRACKS: [digest(problem.observation) for problem in fit.problem.problems],
         "effects": list(fit.problem.all_effects),
         **comparison_document(found),
-        "converged": gradient.code is Code.CONVERGED,
+        "converged": gradient.code in SETTLED,
         "engine": fit.problem.problems[0].engine.name,
         "seconds": round(time.perf_counter() - began, 3),
         "version": __version__,

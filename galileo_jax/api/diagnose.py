@@ -47,7 +47,8 @@ STAGES = {  # how a stage begins, and how much is done by then
     "comparing it": 0.1,
     "fitting": 0.2,
     "comparing the best": 0.6,
-    "fitting pairs": 0.75,
+    "fitting pairs": 0.65,
+    "looking at what": 0.82,
     "inferring": 0.85,
     "predicting": 0.92,
     "looking at each": 0.95,
@@ -76,7 +77,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """`status` (none, named, ambiguous, unknown), `effects`, `form`, `advice`."""
+        """`status` (none, named, ambiguous, unknown), `effects`, `form`, `advice`, `reasons`."""
         return self.found.verdict
 
     @property
@@ -90,15 +91,15 @@ class Diagnosis:
     def candidates(self) -> "pd.DataFrame":
         """One row per candidate, the best first.
 
-        `effect, probability, score` (log evidence over the model without it, nats), `p_value`,
-        `rmse` (m/s), `chi2_per_dof`, `score_test_z`, `confounded_with`.
+        `effect, probability, score` (log odds over no effect, nats: `log_evidence` of the data
+        and `log_prior`), `p_value`, `rmse` (m/s), `chi2_per_dof`, `score_test_z`,
+        `confounded_with`.
         """
         import pandas as pd
 
-        columns = ["effect", "probability", "score", "p_value", "rmse", "chi2_per_dof"]
-        return pd.DataFrame(
-            self.document["candidates"], columns=[*columns, "score_test_z", "confounded_with"]
-        )
+        columns = ["effect", "probability", "score", "log_evidence", "log_prior", "p_value"]
+        columns += ["rmse", "chi2_per_dof", "score_test_z", "confounded_with"]
+        return pd.DataFrame(self.document["candidates"], columns=columns)
 
     @property
     def rounds(self) -> "pd.DataFrame":
@@ -340,7 +341,7 @@ def _diagnosed(
     def on_candidate(one: Candidate) -> None:
         row = {
             "effect": one.name,
-            "score": one.log_evidence,
+            "score": one.log_odds,
             "probability": one.probability,
             **{key: one.error[key] for key in ("rmse", "chi2_per_dof")},
         }

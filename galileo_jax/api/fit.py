@@ -265,7 +265,7 @@ def _fitted(
         if options.method == "mh":
             posterior = _by_chains(problem, gradient, starts, measured, options, checkpoint)
             extra |= {
-                "status": posterior.status.value,
+                "status": _status_of_chains(posterior, gradient),
                 "sampler": options.sampler,
                 "sampling": dict(posterior.stats),
             }
@@ -302,11 +302,18 @@ def _gradient(
         chains = options.chains or NUM_CHAINS
         start = start_from_network(fitter.trials, options.seed, chains)
         return start.fit, start.z, start.notes
-    shares = {"searching": 0.1, "refining": 0.3}
+    shares = {"searching": 0.1, "refining": 0.3, "searching on": 0.3}
     found = fitter.fit(
         options.seed, on_stage=lambda stage: progress.report(stage, shares.get(stage, 0.2))
     )
     return found, None, {}
+
+
+def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:
+    """Theirs, and the fit's that they began from where it leaves a misfit."""
+    if gradient.code is not Code.MISFIT:
+        return posterior.status.value
+    return f"{posterior.status.value}; where the chains began, {gradient.code.value}"
 
 
 def _by_chains(

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
+from galileo_jax.api.track_doubts import taken_as_exact, with_track_doubts
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.parameters import inverse
-from galileo_jax.results.run import CHECKPOINT, POSTERIOR, RESULT, Run, save_run
+from galileo_jax.results.run import BEST, CHECKPOINT, POSTERIOR, RESULT, Run, save_run
 from galileo_jax.results.stale_outputs import remove_single_clip_run, remove_stale_prediction
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
     from arviz import InferenceData
-
-BEST = "z_best"  # in the posterior's provenance
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +76,11 @@ class Fit:
     def warnings(self) -> tuple[str, ...]:
         """What to know before the fit is trusted, one line each."""
         return tuple(self.result.get("warnings", ()))
+
+    @property
+    def taken_as_exact(self) -> tuple[str, ...]:
+        """Of each video the marks without an uncertainty, and how much of k1 hangs on them."""
+        return tuple(self.result.get("taken_as_exact", ()))
 
     def summary(self) -> "pd.DataFrame":
         """One row per parameter: `kind, mean, sd, q025, q975, unit, identified`.
@@ -163,11 +167,13 @@ class Fit:
         """One clip of a joint fit, with the joint posterior of its parameters."""
         one, alone = self.measurements[index], self.problem.alone(index)
         columns = self.problem.columns_of(index)
+        z = self._z()[columns]
         own = self.posterior.chosen(columns, alone.names)
+        own = replace(own, provenance={**own.provenance, BEST: [float(value) for value in z]})
         result = make_result(
             alone,
             own,
-            self._z()[columns],
+            z,
             clips=[one.clip.source],
             method=str(self.result["method"]),
             seed=int(self.result["seed"]),
@@ -302,6 +308,10 @@ def make_fit(
         timings_s={key: round(value, 3) for key, value in timings.items()},
         notes={**notes, **inferred(measurements)},
     )
+    result = with_track_doubts(measurements, result)
+    friction = result["parameters"].get("k1", {}).get("mean")
+    if exact := [text for one in measurements if (text := taken_as_exact(one, friction))]:
+        result["taken_as_exact"] = exact
     return Fit(measurements, problem, posterior, result, z_best, gradient)
 
 

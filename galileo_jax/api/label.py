@@ -17,14 +17,17 @@ def label(
     shape: Mapping[str, str] | None = None,
     first_frame: Mapping[str, int | None] | None = None,
     pixels_per_metre: float | None = None,
+    pixels_per_metre_sd: float | None = None,
     scale: Sequence[float] | None = None,
     ramp_angle: float | None = None,
+    ramp_angle_sd: float | None = None,
     ramp: Sequence[float] | None = None,
     track_units: str | None = None,
     track_y: str | None = None,
     track_origin: Sequence[float] | None = None,
     direction: str | None = None,
     origin: Sequence[float] | None = None,
+    origin_sd: float | None = None,
     gravity: float | None = None,
     level: str = "trial",
 ) -> LabelledClip:
@@ -45,8 +48,11 @@ def label(
       first_frame: object name to the first frame in which it moves by itself, from 0; None: to
         be found.
       pixels_per_metre: of the picture.
+      pixels_per_metre_sd: how well that is known (one standard deviation); None: of a `scale`,
+        what half a pixel at either end makes of it.
       scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
       ramp_angle: of the ramp, degrees.
+      ramp_angle_sd: how well that is known, degrees; None: of a `ramp`, by half a pixel.
       ramp: (x1, y1, x2, y2): two pixels on the ramp: its angle and direction.
       track_units: of a track file: m, cm, mm, in, ft or px.
       track_y: of a track file: whether y points up or down.
@@ -54,6 +60,7 @@ def label(
         axes.
       direction: of the travel: right or left.
       origin: the foot of the ramp, (x, y), px.
+      origin_sd: how well either coordinate is known, px; None: of an `origin`, half a pixel.
       gravity: m/s^2.
       level: of a clip in folders of Physics 101: about which of them this is declared:
         scenario, setup, object or trial (points are always of the trial, sizes of the object).
@@ -80,14 +87,17 @@ def label(
             shape=shape or {},
             first_frame=first_frame or {},
             pixels_per_metre=pixels_per_metre,
+            pixels_per_metre_sd=pixels_per_metre_sd,
             scale=scale,
             ramp_angle=ramp_angle,
+            ramp_angle_sd=ramp_angle_sd,
             ramp=ramp,
             track_units=track_units,
             track_y=track_y,
             track_origin=track_origin,
             direction=direction,
             origin=origin,
+            origin_sd=origin_sd,
             gravity=gravity,
             level=level,
         ),

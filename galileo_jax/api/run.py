@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.api.fit_result import BEST, Fit
+from galileo_jax.api.fit_result import Fit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import with_shared_parameters
 from galileo_jax.measurement.measure import Measurement
-from galileo_jax.results.run import CLIP, POSTERIOR, RESULT, Run
+from galileo_jax.results.run import BEST, CLIP, POSTERIOR, RESULT, Run
 from galileo_jax.results.run import load_run as read_run
 from galileo_jax.runtime.precision import in_float64
 

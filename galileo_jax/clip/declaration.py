@@ -10,10 +10,17 @@ from galileo_jax.runtime.errors import InputError
 LEVELS = ("scenario", "setup", "object", "trial")
 """Folders of Physics 101 about which something can be declared."""
 
+CLICK_SD_PX = 0.5
+"""How well one reads off a pixel coordinate by eye: viewers show whole pixels, and lens and codec
+blur an edge over one or two of them."""
+
 NUMBERS = {
     "fps": "fps",
     "ramp_angle": "ramp_angle_deg",
+    "ramp_angle_sd": "ramp_angle_sd_deg",
     "pixels_per_metre": "pixels_per_metre",
+    "pixels_per_metre_sd": "pixels_per_metre_sd",
+    "origin_sd": "origin_sd_px",
     "gravity": "gravity",
 }
 WORDS = ("scenario", "direction", "track_units", "track_y")
@@ -33,14 +40,17 @@ class Declaration:
       first_frame: object to the first frame in which it moves by itself, from 0; None: to be
         found.
       pixels_per_metre: of the picture.
+      pixels_per_metre_sd: how well that is known; None: of a `scale`, by its two pixels.
       scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
       ramp_angle: of the ramp, degrees.
+      ramp_angle_sd: how well that is known; None: of a `ramp`, by its two pixels.
       ramp: (x1, y1, x2, y2): two pixels on the ramp.
       track_units: of a track file.
       track_y: of a track file: whether y points up or down.
       track_origin: of a track file: the foot of the ramp, (x, y), in its unit.
       direction: of the travel: right or left.
       origin: the foot of the ramp, (x, y), px.
+      origin_sd: how well either coordinate is known; None: of an `origin`, as a pixel is.
       gravity: m/s^2.
       level: Physics 101: the folder about which all this is declared.
     """
@@ -52,14 +62,17 @@ class Declaration:
     shape: Mapping[str, str] = field(default_factory=dict)
     first_frame: Mapping[str, int | None] = field(default_factory=dict)
     pixels_per_metre: float | None = None
+    pixels_per_metre_sd: float | None = None
     scale: Sequence[float] | None = None
     ramp_angle: float | None = None
+    ramp_angle_sd: float | None = None
     ramp: Sequence[float] | None = None
     track_units: str | None = None
     track_y: str | None = None
     track_origin: Sequence[float] | None = None
     direction: str | None = None
     origin: Sequence[float] | None = None
+    origin_sd: float | None = None
     gravity: float | None = None
     level: str = LEVELS[-1]
 
@@ -77,7 +90,9 @@ class Declaration:
             values |= _ramp(*_numbers("--ramp", self.ramp, 4))
         if self.scale is not None:
             numbers = _numbers("--scale", self.scale, 5)
-            values["pixels_per_metre"] = _pixels_per_metre(*numbers)
+            values |= _scale(*numbers)
+        if self.origin is not None:
+            values["origin_sd_px"] = CLICK_SD_PX
         for name, key in POINTS.items():
             if (point := getattr(self, name)) is not None:
                 values[key] = _numbers(_option(name), point, 2)
@@ -136,14 +151,28 @@ def _ramp(x1: float, y1: float, x2: float, y2: float) -> dict[str, Any]:
         raise InputError(
             f"--ramp: the two pixels differ by {dx:g} and {dy:g}; a sloping line expected"
         )
-    angle = round(math.degrees(math.atan2(abs(dy), abs(dx))), 3)
-    return {"ramp_angle_deg": angle, "direction": "right" if low_x > high_x else "left"}
+    angle = math.degrees(math.atan2(abs(dy), abs(dx)))
+    sd = math.degrees(_end_to_end_sd_px() / math.hypot(dx, dy))
+    return {
+        "ramp_angle_deg": round(angle, 3),
+        "ramp_angle_sd_deg": float(f"{sd:.3g}"),
+        "direction": "right" if low_x > high_x else "left",
+    }
 
 
-def _pixels_per_metre(x1: float, y1: float, x2: float, y2: float, metres: float) -> float:
+def _scale(x1: float, y1: float, x2: float, y2: float, metres: float) -> dict[str, float]:
+    """Pixels per metre, and how well the two pixels tell them."""
     distance = math.hypot(x2 - x1, y2 - y1)
     if not (math.isfinite(distance) and distance > 0):
         raise InputError("--scale: the two pixels are the same or not finite")
     if not (math.isfinite(metres) and metres > 0):
         raise InputError(f"--scale: {metres:g} is not a distance; metres above 0 expected")
-    return round(distance / metres, 3)
+    return {
+        "pixels_per_metre": round(distance / metres, 3),
+        "pixels_per_metre_sd": float(f"{_end_to_end_sd_px() / metres:.3g}"),
+    }
+
+
+def _end_to_end_sd_px() -> float:
+    """How well the difference of two pixels is known, along their line or across it."""
+    return math.sqrt(2) * CLICK_SD_PX

@@ -34,9 +34,12 @@ KEY_ORDER = (
     "scenario",
     "fps",
     "ramp_angle_deg",
+    "ramp_angle_sd_deg",
     "direction",
     "pixels_per_metre",
+    "pixels_per_metre_sd",
     "origin_px",
+    "origin_sd_px",
     "gravity",
     "objects",
 )

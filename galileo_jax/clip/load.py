@@ -10,7 +10,14 @@ from pydantic_core import ErrorDetails
 
 from galileo_jax.clip import placement
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import SIZE_MEANING, Clip, ClipFile, ClipObject, short
+from galileo_jax.clip.schema import (
+    MAX_SCALE_SD_SHARE,
+    SIZE_MEANING,
+    Clip,
+    ClipFile,
+    ClipObject,
+    short,
+)
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_files.read import FileTrack, is_track, read_track
 from galileo_jax.clip.yaml_file import read_mapping
@@ -348,6 +355,7 @@ def _observed(path: Path, file: ClipFile, read: FileTrack) -> dict[str, Any]:
 
 def _check_against_source(clip: Clip, observation: Observation | None, fail: Any) -> None:
     """What takes the video or the csv track to judge."""
+    _check_uncertainties(clip, fail)
     for index, item in enumerate(clip.objects):
         key = f"objects[{index}]"
         if (item.first_frame or 0) >= clip.frame_count:
@@ -367,6 +375,24 @@ def _check_against_source(clip: Clip, observation: Observation | None, fail: Any
     for problem in (placement.find_odd_size(clip), placement.find_misplacement(clip, centres_m)):
         if problem:
             fail(*problem)
+
+
+def _check_uncertainties(clip: Clip, fail: Any) -> None:
+    """Refuses the uncertainty of what nobody declared, and of a scale that is a guess."""
+    for key, of in (
+        ("ramp_angle_sd_deg", "ramp_angle_deg"),
+        ("pixels_per_metre_sd", "pixels_per_metre"),
+        ("origin_sd_px", "origin_px"),
+    ):
+        if getattr(clip, key) and getattr(clip, of) is None:
+            fail(key, f"{getattr(clip, key):g} given without {of}; give both, or leave it out")
+    scale, sd = clip.pixels_per_metre, clip.pixels_per_metre_sd
+    if scale is not None and sd > MAX_SCALE_SD_SHARE * scale:
+        fail(
+            "pixels_per_metre_sd",
+            f"{sd:g} is more than {MAX_SCALE_SD_SHARE:.0%} of pixels_per_metre ({scale:g}); "
+            "one standard deviation in pixels per metre expected",
+        )
 
 
 def _check_in_frame(

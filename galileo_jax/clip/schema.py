@@ -35,6 +35,8 @@ MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
 MIN_DENSITY, MAX_DENSITY = 100.0, 20_000.0  # kg/m^3, of a liquid
 MIN_FPS, MAX_FPS = 1.0, 1_000_000.0
 MAX_ANGLE_SD_DEG = 10.0
+MAX_SCALE_SD_SHARE = 0.2  # a scale known worse than this is a guess: leave it null
+MAX_ORIGIN_SD_PX = 50.0  # a foot known worse than this is null: found from the path
 MIN_RAMP_ANGLE_DEG = 1.0  # below it nothing slides; it is an angle in radians
 
 
@@ -134,6 +136,18 @@ def _ramp_angle_deg(value: float) -> float:
 def _angle_sd_deg(value: float) -> float:
     if not 0 <= value <= MAX_ANGLE_SD_DEG:
         raise wrong(f"{value:g} is outside [0, {MAX_ANGLE_SD_DEG:g}] degrees")
+    return value
+
+
+def _scale_sd(value: float) -> float:
+    if value < 0:
+        raise wrong(f"{value:g} is negative; pixels per metre, 0 or more, expected")
+    return value
+
+
+def _origin_sd_px(value: float) -> float:
+    if not 0 <= value <= MAX_ORIGIN_SD_PX:
+        raise wrong(f"{value:g} is outside [0, {MAX_ORIGIN_SD_PX:g}] pixels")
     return value
 
 
@@ -290,7 +304,9 @@ class ClipFile(BaseModel):
     ramp_angle_sd_deg: Annotated[Number, AfterValidator(_angle_sd_deg)] = 0.0
     direction: Annotated[Direction, _one_of(get_args(Direction))] = "right"
     pixels_per_metre: Annotated[Number, AfterValidator(_pixels_per_metre)] | None = None
+    pixels_per_metre_sd: Annotated[Number, AfterValidator(_scale_sd)] = 0.0
     origin_px: Point | None = None
+    origin_sd_px: Annotated[Number, AfterValidator(_origin_sd_px)] = 0.0
     gravity: Annotated[Number, AfterValidator(_gravity)] = 9.81
     vertical_sd_deg: Annotated[Number, AfterValidator(_angle_sd_deg)] = 0.0
     floor: Annotated[bool | float | None, BeforeValidator(_floor)] = None
@@ -316,7 +332,10 @@ class Clip(ClipFile):
       ramp_angle_sd_deg: how well it is known (one standard deviation); 0 = taken at its word.
       direction: which way object 1 travels in the image.
       pixels_per_metre: None = unknown.
+      pixels_per_metre_sd: how well it is known (one standard deviation); 0 = taken at its word.
       origin_px: foot of the ramp at table level, pixels, x right, y down; None = unknown.
+      origin_sd_px: how well each of its coordinates is known (one standard deviation); 0 = as
+        well as any start, some millimetres.
       gravity: m/s^2.
       vertical_sd_deg: flight: how well the picture's vertical is gravity's direction (one
         standard deviation); 0 = taken at its word.

@@ -1,6 +1,7 @@
 """`galileo compare`: is the model adequate for a clip, and where does it fail?"""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -50,6 +51,7 @@ def _lines(compared: "Comparison") -> list[str]:
     """The verdict, the worst cells and the nuisances outside their priors."""
     from galileo_jax.comparison.document import pulled
     from galileo_jax.report import diagnosis_text
+    from galileo_jax.report.fit_text import pull_text
 
     names, found = compared.fit.names, compared.found
     several = len(names) > 1
@@ -65,7 +67,7 @@ def _lines(compared: "Comparison") -> list[str]:
             f"{place.clip if several else '':<{width}}{place.object:<10}{place.axis:<6}"
             f"{place.phase:<11}{place.rmse:>8.4f}{place.noise:>8.4f}{place.z:>11.1f}"
         )
-    return lines + [diagnosis_text.pull_text(pull) for pull in pulled(found)]
+    return lines + [pull_text(asdict(pull)) for pull in pulled(found)]
 
 
 def _parser() -> command.Parser:

@@ -84,7 +84,7 @@ def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
     """Candidates, the verdict, and how to go on."""
-    from galileo_jax.inference.fits.gradient import BEHIND, Code
+    from galileo_jax.inference.fits.gradient import BEHIND, SETTLED
     from galileo_jax.report import diagnosis_text
 
     diagnosis, record = found.found, found.document
@@ -92,16 +92,19 @@ def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
     shown = list(zip(diagnosis.candidates, record["candidates"], strict=True))[:NUM_CANDIDATES]
     for made, entry in shown:
         strengths = diagnosis_text.strength_texts(made.effects, entry).values()
-        is_behind = diagnosis.candidates[0].log_evidence - entry["score"] > BEHIND
-        is_settled = made.hypothesis.fit.code is Code.CONVERGED
-        evidence = "far behind" if is_behind and not is_settled else f"{entry['score']:+.1f}"
+        is_behind = diagnosis.candidates[0].log_evidence - made.log_evidence > BEHIND
+        is_settled = made.hypothesis.fit.code in SETTLED
+        evidence = "far behind" if is_behind and not is_settled else f"{made.log_evidence:+.1f}"
         lines.append(
             f"{entry['effect']:<26}{entry['probability']:>12.3f}{evidence:>12}"
             f"{diagnosis_text.p_text(entry['p_value']):>9}  " + ", ".join(strengths)
         )
+    p_none = diagnosis_text.p_text(diagnosis.base.p_value)
+    lines.append(f"{'none':<26}{record['probability_none']:>12.3f}{'+0.0':>12}{p_none:>9}")
     lines += ["", found.sentence]
     if hidden is not None:
         lines.append(f"truth: {hidden}")
+    lines += [f"why: {why.sentence}" for why in found.verdict.reasons]
     if diagnosis.missing is not None:
         lines += [
             f"missing acceleration of {name}: {entry['formula']}"

@@ -75,6 +75,8 @@ def main(argv: Sequence[str]) -> int | None:
     warn(stale_documents(out, [one.observation for one in measured]))
     doubts = {doubt for one in measured for doubt in one.doubts}
     warn(line for line in found.warnings if line not in doubts)
+    for line in found.taken_as_exact:
+        command.say(f"note: {line}")
     pages = [out] if len(measured) == 1 else [out / one.name for one in measured]
     command.say(", ".join([f"{out}/result.json", *(f"{page}/report.html" for page in pages)]))
     return None

@@ -108,6 +108,13 @@ def _add_scene_options(scene: Any) -> None:
     add = scene.add_argument
     add("--pixels-per-metre", type=float, metavar="PX", help="of the picture (default: unchanged)")
     add(
+        "--pixels-per-metre-sd",
+        type=float,
+        metavar="PX",
+        help="how well that is known, one standard deviation (default: of --scale, by half a pixel "
+        "at either end; else unchanged)",
+    )
+    add(
         "--scale",
         nargs=5,
         type=float,
@@ -116,6 +123,13 @@ def _add_scene_options(scene: Any) -> None:
         "(default: unchanged)",
     )
     add("--ramp-angle", type=float, metavar="DEG", help="of the ramp, degrees (default: unchanged)")
+    add(
+        "--ramp-angle-sd",
+        type=float,
+        metavar="DEG",
+        help="how well that is known, one standard deviation (default: of --ramp, by half a pixel "
+        "at either end; else unchanged)",
+    )
     add(
         "--ramp",
         nargs=4,
@@ -130,6 +144,13 @@ def _add_scene_options(scene: Any) -> None:
         type=float,
         metavar=("X", "Y"),
         help="foot of the ramp, pixels (default: unchanged)",
+    )
+    add(
+        "--origin-sd",
+        type=float,
+        metavar="PX",
+        help="how well either coordinate is known, one standard deviation (default: of --origin, "
+        "half a pixel; else unchanged)",
     )
 
 

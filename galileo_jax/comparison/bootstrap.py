@@ -1,17 +1,22 @@
 """The parametric bootstrap: what residuals look like when the fitted model is the truth.
 
     1. From the fit, draw data: the predicted positions, and errors from the covariance with
-       which they were fitted; and draw the prior's centre, which is data, too.
+       which they were fitted, the modes as large as they are in the data (the likelihood allows
+       for imperfections that a good clip need not have); and draw the prior's centre, which is
+       data, too.
     2. Refit each replicate: Gauss-Newton steps with the fit's Jacobian, each checked with true
        rollouts, so that no residual is taken from a linear model.
 
 Rollouts of all replicates are one batch.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 NUM_STEPS = 2
 
@@ -32,7 +37,12 @@ def whitened(trials: JointProblem, theta: np.ndarray, noise_scale: np.ndarray) -
 
 
 def replicates(
-    trials: JointProblem, fit: GradientFit, noise_scale: np.ndarray, count: int, seed: int
+    trials: JointProblem,
+    fit: GradientFit,
+    noise_scale: np.ndarray,
+    mode_size: Sequence[float],
+    count: int,
+    seed: int,
 ) -> list[np.ndarray]:
     """Whitened residuals of refitted replicates, of each clip `[replicate, value]`.
 
@@ -40,6 +50,7 @@ def replicates(
       trials: the clips.
       fit: whose hypothesis, parameters and Jacobian are taken as true.
       noise_scale: `[clip]`, at which residuals are whitened; the fit's own may differ.
+      mode_size: of each clip, the modes' amplitudes over their sd.
       count: how many.
       seed: of the draws.
     """
@@ -56,6 +67,10 @@ def replicates(
         for problem in trials.problems
     ]
     noise = generator.standard_normal((count, sum(sizes))) * np.concatenate(masks)
+    parts = zip(np.split(noise, ends, axis=1), trials.problems, noise_scale, mode_size, strict=True)
+    noise = np.concatenate(
+        [_with_modes(own, problem.data, scale, size) for own, problem, scale, size in parts], axis=1
+    )
     centre = generator.standard_normal((count, len(free)))
     gain = np.linalg.inv(jacobian.T @ jacobian + np.eye(len(free)))
     base = np.concatenate(_at(trials, fit, fit.z[None], noise_scale), axis=1)
@@ -74,6 +89,16 @@ def replicates(
         improves = now < cost
         best, cost = np.where(improves[:, None], residual, best), np.where(improves, now, cost)
     return np.split(best, ends, axis=1)
+
+
+def _with_modes(
+    white: np.ndarray, data: Whitening, noise_scale: float, mode_size: float
+) -> np.ndarray:
+    """White numbers `[replicate, value]` as whitened errors whose modes are of another size."""
+    variance, gain2 = noise_scale**2, data.gain**2
+    share = np.sqrt((variance + mode_size**2 * gain2) / (variance + gain2))
+    basis = data.basis.reshape(len(gain2), -1)
+    return white + ((white @ basis.T) * (share - 1)) @ basis
 
 
 def _at(

@@ -24,11 +24,11 @@ from galileo_jax.comparison.bootstrap import replicates, whitened
 from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
-from galileo_jax.inference.result import NOISE_SCALE_RANGE, error_of
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
+from galileo_jax.inference.result import error_of
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import Whitening
-from galileo_jax.similarity.noise_scale import errors_at, fitted_noise_scale
+from galileo_jax.similarity.noise_scale import errors_at, fitted_mode_size, fitted_noise_scale
 
 NUM_REPLICATES = 200
 ADEQUATE_P = 0.01
@@ -87,8 +87,8 @@ class Comparison:
       white: of each clip `[object, 2, frame]`, the tracking errors that the fit leaves, in units
         of the stated noise.
       noise_scale: of each clip, the errors' size over what is stated, as fitted.
-      is_noise_misstated: the residuals contradict the stated noise, and nothing else: noise of
-        `noise_scale` leaves them as they are, and no tracker is so wrong about its own.
+      is_noise_misstated: the residuals contradict the stated noise at the most: they look like
+        noise of `noise_scale`, and no tracker is so wrong about its own.
     """
 
     p_value: float
@@ -112,7 +112,11 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     fitted = np.array([trials.noise_scale(theta, c) for c in range(len(trials.problems))])
     scales = np.clip(fitted, *JUDGED_SCALE_RANGE)
     measured = whitened(trials, theta[None], scales)
-    drawn = replicates(trials, fit, scales, NUM_REPLICATES, seed)
+    sizes = [
+        fitted_mode_size(white[0], scale, problem.data)
+        for white, scale, problem in zip(measured, scales, trials.problems, strict=True)
+    ]
+    drawn = replicates(trials, fit, scales, sizes, NUM_REPLICATES, seed)
     labels, cells = [], []
     for clip, problem in enumerate(trials.problems):
         label = phases(problem, trials.of_clip(theta, clip))
@@ -134,11 +138,10 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
 
     p, z = judged(JUDGED_SCALE_RANGE)
     low, high = NOISE_SCALE_RANGE
-    is_misstated = False
-    if p < ADEQUATE_P and not (low <= fitted.min() and fitted.max() <= high):
+    is_usual = low <= fitted.min() and fitted.max() <= high
+    if p < ADEQUATE_P and not is_usual:
         p_free, z_free = judged(ANY_SCALE)
-        is_misstated = p_free >= ADEQUATE_P
-        p, z = (p_free, z_free) if is_misstated else (p, z)
+        p, z = (p_free, z_free) if p_free >= ADEQUATE_P else (p, z)
     white = [
         problem.tracking_errors(problem.simulate(trials.of_clip(theta, c)))
         for c, problem in enumerate(trials.problems)
@@ -157,7 +160,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
             for w, p in zip(white, trials.problems, strict=True)
         ),
         noise_scale=tuple(map(float, fitted)),
-        is_noise_misstated=is_misstated,
+        is_noise_misstated=p >= ADEQUATE_P and not is_usual,
     )
 
 

@@ -7,8 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from galileo_jax.comparison.compare import Comparison, Pull
-
-PULLED_Z = 3.0  # of a prior's standard deviations; one nuisance in four hundred is by chance
+from galileo_jax.inference.result import PULLED_Z
 
 
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
@@ -16,6 +15,8 @@ def comparison_document(comparison: Comparison) -> dict[str, Any]:
     return {
         "adequate": comparison.is_adequate,
         "p_value": comparison.p_value,
+        "noise_scale": list(comparison.noise_scale),
+        "noise_misstated": comparison.is_noise_misstated,
         "where": [asdict(place) for place in comparison.where],
         "pulls": [asdict(pull) for pull in pulled(comparison)],
         "error": dict(comparison.error),

@@ -217,22 +217,11 @@ def _matched_shapes(
 
     For each shape the strength is the one that its slope at no strength asks for.
     """
-    count = len(trials.model_parameters)
     where, size = _strength(trials, effects[-1])
-    free = trials.free(effects)[:count]
-    new = np.flatnonzero(free & ~base.free[:count])
-    shape = np.setdiff1d(new, where)
-    number = NUM_SHAPES if len(shape) else 1
-    generator = np.random.default_rng([seed, 43])
-    z = np.tile(base.z, (number, 1))
-    z[:, shape] = ndtri(np.clip(_latin(generator, number, len(shape)), 0.02, 0.98))
-    probes = np.array(trials.theta(z, np.append(free, base.free[count:])))
-    probes[:, where] = size
-    residual, slopes = _beside(trials, base, probes)
-    power = np.sum(slopes**2, axis=1)
-    along = slopes @ residual
-    gain = np.where(power > SHOWS, along**2 / np.maximum(power, SHOWS), 0.0)
-    best = np.argsort(-gain)[:NUM_MATCHED]
+    free = trials.free(effects)[: len(trials.model_parameters)]
+    z, probes = _shapes(trials, base, effects, seed)
+    along, power = _along(trials, base, probes)
+    best = np.argsort(-_gain(along, power))[:NUM_MATCHED]
     # As far as the slope goes: the strength at which the residuals along it would vanish.
     wanted = probes[best]
     wanted[:, where] = (-along / np.maximum(power, SHOWS))[best, None] * size
@@ -240,7 +229,53 @@ def _matched_shapes(
     for column, prior in zip(where, priors, strict=True):
         found = np.asarray(prior.inverse(jnp.asarray(wanted[:, column])))
         z[best, column] = np.clip(np.nan_to_num(found, nan=-MOST_Z), -MOST_Z, MOST_Z)
-    return np.where(free, z[best, :count], 0.0)
+    return np.where(free, z[best, : len(free)], 0.0)
+
+
+def best_gains(
+    trials: JointProblem, base: GradientFit, candidates: Sequence[tuple[str, ...]], seed: int
+) -> np.ndarray:
+    """By how many nats the last effect of each candidate lowers the misfit, as far as slopes tell.
+
+    Half the square of the score test's z, of the best of the effect's shapes.
+
+    Returns:
+      `[candidate]`.
+    """
+    probes = [_shapes(trials, base, effects, seed)[1] for effects in candidates]
+    along, power = _along(trials, base, np.concatenate(probes))
+    ends = np.cumsum([len(own) for own in probes])[:-1]
+    return np.array([0.5 * own.max() for own in np.split(_gain(along, power), ends)])
+
+
+def _shapes(
+    trials: JointProblem, base: GradientFit, effects: Sequence[str], seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shapes of the last effect beside a fit: `[shape, z]`, and in units at a probe's size."""
+    count = len(trials.model_parameters)
+    where, size = _strength(trials, effects[-1])
+    new = np.flatnonzero(trials.free(effects)[:count] & ~base.free[:count])
+    shape = np.setdiff1d(new, where)
+    number = NUM_SHAPES if len(shape) else 1
+    generator = np.random.default_rng([seed, 43])
+    z = np.tile(base.z, (number, 1))
+    z[:, shape] = ndtri(np.clip(_latin(generator, number, len(shape)), 0.02, 0.98))
+    probes = np.array(trials.theta(z, trials.free(effects)))
+    probes[:, where] = size
+    return z, probes
+
+
+def _along(
+    trials: JointProblem, base: GradientFit, probes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The slopes to each of `probes` along the base fit's residuals, and their squares."""
+    residual, slopes = _beside(trials, base, probes)
+    return slopes @ residual, np.sum(slopes**2, axis=1)
+
+
+def _gain(along: np.ndarray, power: np.ndarray) -> np.ndarray:
+    """How much of the squared residuals each slope explains; none where it does not show."""
+    return np.where(power > SHOWS, along**2 / np.maximum(power, SHOWS), 0.0)
 
 
 def _beside(

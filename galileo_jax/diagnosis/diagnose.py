@@ -1,17 +1,17 @@
 """The loop: compare, ask which effect is missing, add it, and watch the error fall.
 
-1. Fit the model without effects; compare it with the data. Adequate: the verdict is none.
-2. Fit every effect of the library as a candidate, in one batch; rank by evidence (Laplace),
-   which charges for every parameter and, through the candidates' equal shares of the
-   prior, for how many were tried. Compare the best with the data, too.
-3. Adequate candidates whose evidence is close to that of the best cannot be distinguished
-   from it. If there is only one, it is named; several are ambiguous (rules: `verdict`).
-   The forms without a physical name (`model/effects/forms`) compete as well: an effect is not
-   named if a form explains the data as well, and if only a form explains them, the verdict is
-   unknown. Forms have prior odds of 1 to 20.
-4. Where no single effect is adequate, the best is joined by those whose slopes stand out most.
-5. Where no pair is adequate either, the verdict is unknown, and the missing force is
-   inferred without a form (`missing_force`).
+1. Fit the model without effects; compare it with the data.
+2. Fit every effect of the library as a candidate, in one batch, and with them the forms without a
+   physical name (`model/effects/forms`). Rank all by log odds: the evidence (Laplace), which
+   charges for every parameter, and the prior, which charges for how many were tried. The model
+   without effects will do and nothing convinces: the verdict is none.
+3. Compare the best with the data, too. Where the best single effect leaves more than noise, or a
+   form explains the data better, the best single effects are joined by others; pairs stand in the
+   same table (rules: `verdict`).
+4. What leaves only noise and is far more probable than all else is named, unless a clip like this
+   one would not tell it from another (`expected_lead`). Several are ambiguous.
+5. Where only a form explains the data, or nothing does, the verdict is unknown, and the missing
+   force is inferred without a form (`missing_force`).
 """
 
 from collections.abc import Callable, Sequence
@@ -20,23 +20,31 @@ from dataclasses import replace
 import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, compare
+from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
-from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, score_tests
+from galileo_jax.diagnosis.candidates import Hypothesis, best_gains, fit_candidates, score_tests
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
+from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
-from galileo_jax.diagnosis.pairs import pairs_with, with_largest_scores
+from galileo_jax.diagnosis.pairs import pairs_to_try
 from galileo_jax.diagnosis.verdict import (
+    CONVINCING,
+    NUM_JOINED,
     best_named,
     decisive_margin,
+    form_that_leads,
     is_nothing_missing,
-    probabilities,
+    log_prior,
+    looked_at_again,
+    needs_pairs,
+    ranked,
     rivals,
     to_add,
     to_compare,
     verdict_of,
-    verdict_of_pairs,
+    within_luck,
 )
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
@@ -80,7 +88,7 @@ def diagnose(
         trials.free([add])  # raises for unknown names
     on_stage(f"fitting {len(library)} candidates")
     singles = [(name,) for name in trials.all_effects]
-    candidates = _candidates(fitter, base, singles, seed)
+    candidates = ranked(_candidates(fitter, base, base, singles, seed))
     for candidate in candidates:
         on_candidate(candidate)
     if add not in ("auto", "none"):
@@ -88,28 +96,32 @@ def diagnose(
         rounds.append(Round(chosen.hypothesis, compare(trials, chosen.hypothesis.fit, seed)))
         on_round(rounds[-1])
     is_adequate = first.comparison.is_adequate
+    why = reasons.without_effects(first.comparison)
     if is_nothing_missing(is_adequate, candidates):
-        return Diagnosis(tuple(rounds), candidates, Verdict("none", ()))
+        why = (*why, reasons.nothing_convinces(best_named(candidates), CONVINCING))
+        return Diagnosis(tuple(rounds), candidates, Verdict("none", (), reasons=why))
 
     on_stage("comparing the best candidates with the data")
-    candidates, compared = _compared(trials, candidates, seed)
+    compared: dict[tuple[str, ...], Comparison] = {}
     decisive = decisive_margin(is_adequate)
-    verdict = verdict_of(candidates, base.misfit, decisive)
-    if verdict is None:
+    candidates = _compared(trials, candidates, decisive, seed, compared)
+    if needs_pairs(candidates):
         on_stage("fitting pairs of effects")
-        best = best_named(candidates)
-        pairs = pairs_with(best, library)
-        joined: tuple[Candidate, ...] = ()
+        pairs = _pairs(fitter, base, candidates, library, seed)
         if pairs:
-            pairs = with_largest_scores(pairs, score_tests(trials, best.hypothesis, pairs))
-            joined = _candidates(fitter, best.hypothesis, pairs, seed, base)
-            for candidate in joined:
-                on_candidate(candidate)
-            joined, compared_pairs = _compared(trials, joined, seed)
-            compared |= compared_pairs
-        verdict = verdict_of_pairs(joined, best, base.misfit, decisive)
-        if verdict.status != "unknown":
-            candidates = (*joined, *candidates)
+            form, single = form_that_leads(candidates), best_named(candidates)
+            why = (*why, reasons.pairs_tried(single, form, len(pairs)))
+        for candidate in pairs:
+            on_candidate(candidate)
+        candidates = _compared(trials, (*candidates, *pairs), decisive, seed, compared)
+    verdict = verdict_of(candidates, decisive)
+    if verdict.status == "named":
+        on_stage("looking at what could be confused with it")
+        named = next(c for c in candidates if c.effects == verdict.effects)
+        alike = within_luck(named, candidates, decisive)
+        leads = expected_leads(trials, named, alike)
+        verdict = looked_at_again(verdict, named, list(zip(alike, leads, strict=True)), decisive)
+    verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
         comparison = compared.get(chosen.effects)
@@ -143,54 +155,90 @@ def fitter_of(trials: JointProblem) -> GradientFitter:
 
 def _candidates(
     fitter: GradientFitter,
+    base: Hypothesis,
     start: Hypothesis,
     sets: Sequence[tuple[str, ...]],
     seed: int,
-    base: Hypothesis | None = None,
-) -> tuple[Candidate, ...]:
-    """Fits and ranks candidates; evidence counts from `base` (default: `start`)."""
-    base = base or start
+) -> list[Candidate]:
+    """Fits candidates from `start`; evidence counts from `base`. Not ranked yet."""
     trials = fitter.trials
     found = fit_candidates(fitter, start, sets, seed)
     scores = score_tests(trials, start, sets)
-    evidence = np.array([h.fit.log_evidence for h in found]) - base.fit.log_evidence
-    evidence += np.log([_odds(trials, hypothesis) for hypothesis in found])
-    probability = probabilities(evidence)
+    library = [name for name in trials.all_effects if name not in FORM_NAMES]
     made = []
-    for i in np.argsort(-evidence):
-        fit = found[i].fit
+    for hypothesis, score in zip(found, scores, strict=True):
+        fit = hypothesis.fit
         made.append(
             Candidate(
-                effects=found[i].effects,
-                hypothesis=found[i],
+                effects=hypothesis.effects,
+                hypothesis=hypothesis,
                 error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
-                score_z=float(scores[i]),
-                log_evidence=float(evidence[i]),
-                probability=float(probability[i]),
+                score_z=float(score),
+                log_evidence=fit.log_evidence - base.fit.log_evidence,
+                log_prior=log_prior(_odds(trials, hypothesis), len(library)),
+                probability=0.0,
                 p_value=None,
                 confounded_with=(),
             )
         )
-    return tuple(made)
+    return made
 
 
-def _odds(trials: JointProblem, hypothesis: Hypothesis) -> float:
-    """Of a set of effects, as far as the clip leads to expect them: of the likeliest."""
+def _odds(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:
+    """Of each effect of a hypothesis, as far as the clip leads to expect it."""
     problem = trials.problems[0]
     theta = trials.of_clip(trials.theta(hypothesis.fit.z, hypothesis.fit.free), 0)
     named = dict(zip(problem.model.names, theta, strict=True))
     scene = problem.model.scene.surroundings
     effects = [e for e in problem.model.effects if e.name in hypothesis.effects]
-    return max(effect.odds(named, scene) for effect in effects)
+    return [effect.odds(named, scene) for effect in effects]
+
+
+def _pairs(
+    fitter: GradientFitter,
+    base: Hypothesis,
+    candidates: Sequence[Candidate],
+    library: Sequence[str],
+    seed: int,
+) -> tuple[Candidate, ...]:
+    """Pairs of the best single effects with others, fitted from the single effects' fits."""
+    trials = fitter.trials
+    singles = [c for c in candidates if not c.is_form][:NUM_JOINED]
+    gains = np.stack(
+        [
+            best_gains(trials, one.hypothesis.fit, [(*one.effects, name) for name in library], seed)
+            for one in singles
+        ]
+    )
+    made = []
+    for one, pairs in zip(singles, pairs_to_try(singles, library, gains), strict=True):
+        if pairs:
+            made += _candidates(fitter, base, one.hypothesis, pairs, seed)
+    return ranked(made)
 
 
 def _compared(
-    trials: JointProblem, candidates: tuple[Candidate, ...], seed: int
-) -> tuple[tuple[Candidate, ...], dict[tuple[str, ...], Comparison]]:
-    """The best candidates with their p-values and with whom they are confounded."""
-    compared = {c.effects: compare(trials, c.hypothesis.fit, seed) for c in to_compare(candidates)}
+    trials: JointProblem,
+    candidates: Sequence[Candidate],
+    decisive: float,
+    seed: int,
+    compared: dict[tuple[str, ...], Comparison],
+) -> tuple[Candidate, ...]:
+    """The table of candidates, the best with their p-values and with whom they are confounded.
+
+    Args:
+      trials: what the candidates were fitted to.
+      candidates: in any order.
+      decisive: difference in log odds, nats, at which one hypothesis rules out another.
+      seed: of the replicates.
+      compared: comparisons by effects; those made here are added.
+    """
+    table = ranked(candidates)
+    for c in to_compare(table, decisive):
+        if c.effects not in compared:
+            compared[c.effects] = compare(trials, c.hypothesis.fit, seed)
     done = [
         replace(c, p_value=compared[c.effects].p_value) if c.effects in compared else c
-        for c in candidates
+        for c in table
     ]
-    return tuple(replace(c, confounded_with=rivals(c, done)) for c in done), compared
+    return tuple(replace(c, confounded_with=rivals(c, done)) for c in done)

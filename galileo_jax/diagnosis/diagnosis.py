@@ -3,10 +3,12 @@
 The keys of the file are listed in docs/reference/result_files.md.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.special import softmax
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.candidates import Hypothesis
@@ -25,7 +27,8 @@ class Candidate:
       hypothesis: the fit.
       error: rmse, noise, chi2_per_dof, ... as in result.json.
       score_z: of the score test at zero strength, in standard deviations.
-      log_evidence: over that of the model without it.
+      log_evidence: over that of the model without effects: what the data say alone.
+      log_prior: log of its probability before the data over that of the model without effects.
       probability: among all candidates and the model without any of them.
       p_value: of its adequacy; None where it was not compared (too improbable).
       confounded_with: candidates that these data do not tell from it.
@@ -36,6 +39,7 @@ class Candidate:
     error: dict[str, float]
     score_z: float
     log_evidence: float
+    log_prior: float
     probability: float
     p_value: float | None
     confounded_with: tuple[str, ...]
@@ -46,9 +50,29 @@ class Candidate:
         return "+".join(self.effects)
 
     @property
+    def log_odds(self) -> float:
+        """How much more probable it is than no effect, in nats: with the data and the prior."""
+        return self.log_evidence + self.log_prior
+
+    @property
     def is_form(self) -> bool:
         """Whether it is a form without a name."""
         return any(name in FORM_NAMES for name in self.effects)
+
+
+@dataclass(frozen=True)
+class Reason:
+    """A rule of the verdict that fired.
+
+    Attributes:
+      rule: its name.
+      sentence: what it says here.
+      numbers: what it was decided by, and names of the hypotheses that it is about.
+    """
+
+    rule: str
+    sentence: str
+    numbers: Mapping[str, float | str | None]
 
 
 @dataclass(frozen=True)
@@ -62,12 +86,14 @@ class Verdict:
       form: where it is unknown: the form without a name that explains the data; None if not
         even that is known.
       advice: what would tell more, one sentence each.
+      reasons: the rules that fired, in their order.
     """
 
     status: Status
     effects: tuple[str, ...]
     form: str | None = None
     advice: tuple[str, ...] = ()
+    reasons: tuple[Reason, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -105,7 +131,7 @@ class Diagnosis:
 
     Attributes:
       rounds: of the loop; the first is the model without effects (or with those given).
-      candidates: of the first round, the most probable first.
+      candidates: all hypotheses but the model without effects, the most probable first.
       verdict: what is missing.
       missing: the missing force, where the verdict is unknown.
       each_clip: of a series that no model without effects fits, each clip against the model of
@@ -125,3 +151,8 @@ class Diagnosis:
     def base(self) -> Comparison:
         """The model without the missing effect against the data."""
         return self.rounds[0].comparison
+
+    @property
+    def probability_none(self) -> float:
+        """That no effect is missing; with those of the candidates it sums to 1."""
+        return float(softmax([0.0, *(c.log_odds for c in self.candidates)])[0])

@@ -33,6 +33,7 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
     """
     named = trials.problems[0].observation.names
     document = comparison_document(diagnosis.base) | {
+        "probability_none": diagnosis.probability_none,
         "candidates": [_candidate(trials, c, seed) for c in diagnosis.candidates],
         "verdict": {
             "status": diagnosis.verdict.status,
@@ -40,6 +41,10 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             "form": diagnosis.verdict.form,
             "advice": list(diagnosis.verdict.advice),
         },
+        "reasons": [
+            {"rule": why.rule, "sentence": why.sentence, **why.numbers}
+            for why in diagnosis.verdict.reasons
+        ],
         "history": [history_row(trials, each, seed) for each in diagnosis.rounds],
     }
     if diagnosis.missing is not None:
@@ -122,7 +127,9 @@ def _candidate(trials: JointProblem, candidate: Candidate, seed: int) -> dict[st
         "derived": derived,
         "rmse": candidate.error["rmse"],
         "chi2_per_dof": candidate.error["chi2_per_dof"],
-        "score": candidate.log_evidence,
+        "score": candidate.log_odds,
+        "log_evidence": candidate.log_evidence,
+        "log_prior": candidate.log_prior,
         "score_test_z": candidate.score_z,
         "probability": candidate.probability,
         "p_value": candidate.p_value,

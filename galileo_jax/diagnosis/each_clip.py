@@ -18,8 +18,7 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
-from galileo_jax.comparison.bootstrap import whitened
-from galileo_jax.comparison.compare import ADEQUATE_P, NOISE_SCALE_RANGE, Comparison
+from galileo_jax.comparison.compare import ADEQUATE_P, JUDGED_SCALE_RANGE, Comparison
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -38,10 +37,10 @@ class EachClip:
 
     Attributes:
       clip: its name.
-      chi2_together, chi2_alone: per number measured, under the model of all clips and refitted
-        by itself.
-      p_alone: of a chi2 as large as that by itself. (Replicates say little here: what several
-        clips determine, one alone may not.)
+      chi2_together, chi2_alone: per degree of freedom at the stated noise, under the model of
+        all clips and refitted by itself.
+      p_alone: of a chi2 as large as that by itself, at the noise that it asks for. (Replicates
+        say little here: what several clips determine, one alone may not.)
       way_m: `[part + 1]`, how far object 1 has gone at the edges of the parts.
       extra_m_s2, sd_m_s2: `[part]`, how much more it accelerates than the model of all clips.
     """
@@ -92,15 +91,22 @@ def _one(trials: JointProblem, fit: GradientFit, comparison: Comparison, clip: i
     start, free = fit.z[columns], fit.free[columns]
     found = GradientFitter(alone).fit_from(start[None], free[None], np.zeros(1, int))[0]
     theta = alone.theta(found.z, found.free)
-    scale = np.clip([alone.noise_scale(theta, 0)], *NOISE_SCALE_RANGE)
-    left = float(np.sum(whitened(alone, theta[None], scale)[0] ** 2))
-    values = float(trials.problems[clip].data.num_values)
+    problem = trials.problems[clip]
+    predicted = problem.simulate(alone.of_clip(theta, 0))
+    scale = float(np.clip(alone.noise_scale(theta, 0), *JUDGED_SCALE_RANGE))
+
+    def degrees(scale: float) -> float:
+        return max(float(GaussianLikelihood.degrees(scale, problem.data)) - found.num_used, 1.0)
+
+    left = float(np.sum(problem.tracking_errors(predicted, scale) ** 2))
+    stated = float(np.sum(problem.tracking_errors(predicted) ** 2))
+    together = float(np.sum(comparison.white[clip] ** 2))
     way, extra, sd = _parts(trials, fit, clip)
     return EachClip(
-        clip=trials.problems[clip].name,
-        chi2_together=float(np.sum(comparison.white[clip] ** 2)) / values,
-        chi2_alone=left / values,
-        p_alone=float(stats.chi2.sf(left, values)),
+        clip=problem.name,
+        chi2_together=together / degrees(1.0),
+        chi2_alone=stated / degrees(1.0),
+        p_alone=float(stats.chi2.sf(left, degrees(scale))),
         way_m=way,
         extra_m_s2=extra,
         sd_m_s2=sd,

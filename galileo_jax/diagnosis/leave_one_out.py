@@ -34,7 +34,7 @@ def _one(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> float:
     shared = dict(zip(others.names, others.theta(fit.z, fit.free), strict=True))
     theta = np.array([_value(p, shared, hypothesis.effects) for p in problem.parameters])
     predicted = problem.simulate(theta)
-    return velocity_error([problem], [predicted], [1.0])["rmse"]
+    return velocity_error([problem], [predicted])["rmse"]
 
 
 def _value(parameter: Parameter, shared: dict[str, float], effects: tuple[str, ...]) -> float:

@@ -5,22 +5,27 @@ from collections.abc import Sequence
 import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import Candidate
-from galileo_jax.diagnosis.verdict import NUM_JOINED
+from galileo_jax.diagnosis.verdict import NUM_PAIRS
 
 
-def pairs_with(best: Candidate, library: Sequence[str]) -> list[tuple[str, ...]]:
-    """The best effect with each other effect of the library; the added one stands last."""
-    return [(*best.effects, name) for name in library if name not in best.effects]
+def pairs_to_try(
+    singles: Sequence[Candidate], library: Sequence[str], gains: np.ndarray
+) -> list[list[tuple[str, str]]]:
+    """The `NUM_PAIRS` pairs that promise most, for each single effect those that begin with it.
 
-
-def with_largest_scores(
-    pairs: Sequence[tuple[str, ...]], scores: np.ndarray
-) -> list[tuple[str, ...]]:
-    """The `NUM_JOINED` pairs that are most worth a fit, the most promising first.
+    A pair promises the evidence of the single effect and what the other one would add to it. A
+    pair that two singles could begin stands with the one from which it promises more.
 
     Args:
-      pairs: from `pairs_with`.
-      scores: `[pair]`, of the score test of the added effect (`candidates.score_tests`), in
-        standard deviations.
+      singles: the best single effects, which others may join.
+      library: the effects that may join them.
+      gains: `[single, effect]`, nats that each would add, from `candidates.best_gains`.
     """
-    return [pairs[i] for i in np.argsort(-scores)[:NUM_JOINED]]
+    promise = np.array([c.log_evidence for c in singles])[:, None] + gains
+    found: dict[frozenset[str], tuple[int, tuple[str, str]]] = {}
+    for at in np.argsort(-promise, axis=None):
+        i, j = divmod(int(at), len(library))
+        (first,), second = singles[i].effects, library[j]
+        if first != second and len(found) < NUM_PAIRS:
+            found.setdefault(frozenset((first, second)), (i, (first, second)))
+    return [[pair for i, pair in found.values() if i == own] for own in range(len(singles))]

@@ -1,104 +1,104 @@
 """The rules by which candidates become a verdict: which explain the data, and which one is named.
 
-A candidate is judged by two numbers. Its log evidence (Laplace, in nats, over the model without
-any effect) ranks it among the others; the p-value of its comparison with the data says whether
-what it leaves unexplained is more than noise. The rules need no trials and no fit, so that each
-can be tested with candidates made by hand. Every threshold of the diagnosis stands here.
+A hypothesis is judged by two numbers. Its log odds (log evidence by Laplace plus log prior, in
+nats, over the model without any effect) rank it among all others; the p-value of its comparison
+with the data says whether what it leaves unexplained is more than noise. The rules need no trials
+and no fit, so that each can be tested with candidates made by hand. Every threshold of the
+diagnosis stands here, and every rule says in the verdict's reasons why it fired.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from math import comb, log, sqrt
 
 import numpy as np
+from scipy.special import softmax
 
 from galileo_jax.comparison.compare import ADEQUATE_P
+from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
 
-# Difference in log evidence, in nats, at which the weaker of two candidates is given up: it is
-# then twenty times less probable (e^3 = 20).
+# Difference in log odds, in nats, at which the weaker of two hypotheses is given up: it is then
+# twenty times less probable (e^3 = 20).
 DECISIVE = 3.0
 # How much wider that margin is where the base model already passes its comparison: the effect is
-# then so faint that more candidates stay possible.
+# then so faint that more hypotheses stay possible.
 FAINT_FACTOR = 2.0
-# Log evidence, in nats, at which an effect is believed although the base model passes its
-# comparison: a test that looks everywhere notices less than one that knows where to look.
-CONVINCING = 10.0
-# A candidate explains the data if its comparison has at least this p-value. It is far below
-# ADEQUATE_P because a camera that measures hundredths of a pixel finds fault with every model...
-EXPLAINS_P = 1e-5
-# ... or, whatever its p-value, if it leaves less than this share of the base model's misfit.
-LEFT_SHARE = 0.01
-# Two effects together can come close to almost any motion: a pair must pass this p-value.
-PAIR_P = 0.05
-# Gain in log evidence, in nats, for which an effect is worth adding: to the best single effect
-# for a pair, to the base model where the verdict is unknown and the best guess is shown.
+# Log odds, in nats, at which an effect is believed although the base model passes its comparison:
+# a test that looks everywhere notices less than one that knows where to look (e^7 = 1100).
+CONVINCING = 7.0
+# Two effects at once are so much rarer than one: who measures knows of most of what disturbs.
+SECOND_EFFECT_ODDS = 0.1
+# Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
-# Probability before the data that nothing is missing; all candidates share the rest equally.
-PRIOR_NONE = 0.5
-# Comparing costs two hundred replicates for each candidate: only so many of the best are compared.
-NUM_COMPARED = 6
-# The best single effect is tried together with so many others: those with the largest scores.
-NUM_JOINED = 8
-
-UNKNOWN = Verdict("unknown", ())
+# Of the best single effects so many are joined with others, to so many pairs in all.
+NUM_JOINED, NUM_PAIRS = 3, 8
+# The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
+# sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
+MOST_LUCK = 4.0
 
 
-def probabilities(log_evidence: np.ndarray) -> np.ndarray:
-    """Posterior probabilities of the candidates; what is missing to 1 is that of none of them.
+def log_prior(odds: Sequence[float], num_effects: int) -> float:
+    """Log of a hypothesis' probability before the data over that of the model without effects.
 
-    Args:
-      log_evidence: `[candidate]`, nats, over the model without an effect.
-
-    Returns:
-      `[candidate]`.
-    """
-    weight = np.append(
-        log_evidence + np.log((1 - PRIOR_NONE) / len(log_evidence)), np.log(PRIOR_NONE)
-    )
-    weight = np.exp(weight - weight.max())
-    return (weight / weight.sum())[:-1]
-
-
-def is_nothing_missing(is_base_adequate: bool, candidates: Sequence[Candidate]) -> bool:
-    """Whether the verdict is none: the base model is adequate and no named effect convinces.
+    All single effects together are as probable as none, and all pairs `SECOND_EFFECT_ODDS` times
+    as probable; all of a kind share alike.
 
     Args:
-      is_base_adequate: whether the model without effects passes its comparison with the data.
-      candidates: ranked, the best first; forms without a name do not count.
+      odds: of each of its effects, how many times as likely as others it is (`Effect.odds`).
+      num_effects: in the library, forms not counted.
     """
-    return is_base_adequate and best_named(candidates).log_evidence < CONVINCING
+    share = SECOND_EFFECT_ODDS ** (len(odds) - 1) / comb(num_effects, len(odds))
+    return log(share) + float(np.sum(np.log(odds)))
+
+
+def ranked(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
+    """One table of all hypotheses, the most probable first, with their probabilities.
+
+    These and that of none (`Diagnosis.probability_none`) sum to 1.
+    """
+    best_first = sorted(candidates, key=lambda c: -c.log_odds)
+    shares = softmax([*(c.log_odds for c in best_first), 0.0])[:-1]
+    return tuple(replace(c, probability=float(p)) for c, p in zip(best_first, shares, strict=True))
 
 
 def decisive_margin(is_base_adequate: bool) -> float:
-    """The difference in log evidence, nats, at which one candidate rules out another."""
+    """The difference in log odds, nats, at which one hypothesis rules out another."""
     return DECISIVE * (FAINT_FACTOR if is_base_adequate else 1.0)
 
 
+def is_nothing_missing(is_base_accepted: bool, candidates: Sequence[Candidate]) -> bool:
+    """Whether the verdict is none: the base model will do and no named effect convinces.
+
+    Args:
+      is_base_accepted: whether the model without effects leaves nothing but noise.
+      candidates: ranked; forms without a name do not count.
+    """
+    return is_base_accepted and best_named(candidates).log_odds < CONVINCING
+
+
 def best_named(candidates: Sequence[Candidate]) -> Candidate:
-    """The first candidate that is no form without a name; candidates are ranked."""
+    """The first of ranked candidates that is no form without a name."""
     return next(c for c in candidates if not c.is_form)
 
 
-def to_compare(candidates: Sequence[Candidate]) -> tuple[Candidate, ...]:
+def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidate, ...]:
     """The candidates whose fits are to be compared with the data, the best first.
 
-    Always the best, and the best with a name; beyond these only what could be confused with the
-    best: within the widest margin of it and among the first `NUM_COMPARED`.
+    Always the best, and the best with a name; beyond these what could be confused with the best.
 
     Args:
-      candidates: ranked by log evidence, the best first.
+      candidates: ranked.
+      margin: difference in log odds, nats, at which one hypothesis rules out another.
     """
-    best = candidates[0]
-    always = {best.effects, *[c.effects for c in candidates if not c.is_form][:1]}
-    widest = FAINT_FACTOR * DECISIVE
+    best, name = candidates[0], best_named(candidates)
     return tuple(
-        c
-        for i, c in enumerate(candidates)
-        if c.effects in always or (i < NUM_COMPARED and best.log_evidence - c.log_evidence < widest)
+        c for c in candidates if c is name or c is best or best.log_odds - c.log_odds < margin
     )
 
 
 def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]:
-    """Names of the compared candidates whose evidence is as good as this one's.
+    """Names of the compared candidates whose log odds are as good as this one's.
 
     Symmetric: a rival's rivals include the candidate. Empty where it was not compared itself.
     """
@@ -109,77 +109,111 @@ def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]
         for other in all_of
         if other.effects != candidate.effects
         and other.p_value is not None
-        and abs(other.log_evidence - candidate.log_evidence) < DECISIVE
+        and abs(other.log_odds - candidate.log_odds) < DECISIVE
     )
 
 
-def explains(candidate: Candidate, base_misfit: float) -> bool:
-    """Whether a candidate explains the data: what it leaves unexplained does not matter.
+def explains(candidate: Candidate) -> bool:
+    """Whether a candidate was compared with the data and leaves nothing but noise."""
+    return candidate.p_value is not None and candidate.p_value >= ADEQUATE_P
+
+
+def form_that_leads(singles: Sequence[Candidate]) -> Candidate | None:
+    """The form that explains the data better than any single effect with a name, if one does."""
+    best = best_named(singles)
+    ahead = [c for c in singles if c.is_form and c.log_odds > best.log_odds and explains(c)]
+    return ahead[0] if ahead else None
+
+
+def needs_pairs(singles: Sequence[Candidate]) -> bool:
+    """Whether pairs are to be tried: a single effect leaves more than noise, or a form leads.
 
     Args:
-      candidate: compared with the data; one that was not is no explanation.
-      base_misfit: `Hypothesis.misfit` of the model without effects.
+      singles: ranked, compared with the data.
     """
-    if candidate.p_value is None:
-        return False
-    if candidate.p_value >= EXPLAINS_P:
-        return True
-    return base_misfit > 0 and candidate.hypothesis.misfit < LEFT_SHARE * base_misfit
+    return not explains(best_named(singles)) or form_that_leads(singles) is not None
 
 
-def verdict_of(
-    candidates: Sequence[Candidate], base_misfit: float, decisive: float
-) -> Verdict | None:
-    """The verdict on ranked candidates, without advice.
+def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
+    """The verdict on the whole table, without advice.
 
     Args:
-      candidates: ranked by log evidence, the best first; those compared have a p-value.
-      base_misfit: `Hypothesis.misfit` of the model without effects.
-      decisive: difference in log evidence, nats, at which one candidate rules out another.
+      candidates: ranked; those compared have a p-value, and the first is among them.
+      decisive: difference in log odds, nats, at which one hypothesis rules out another.
 
     Returns:
-      Named: one effect explains the data and nothing else explains them as well. Ambiguous:
-      several do; a form without a name stands last. Unknown: only a form does. None: nothing
-      does, or what does is far behind an effect that does not.
+      Named: one hypothesis explains the data, and nothing else does about as well. Ambiguous:
+      several do; a form without a name stands last. Unknown: only a form does, or nothing, or
+      what does is far behind what does not.
     """
-    if candidates[0].log_evidence < 0:
-        return None
-    compared = [c for c in candidates if c.p_value is not None]
-    names = [c for c in compared if not c.is_form and explains(c, base_misfit)]
-    # A form can adapt to much. One that leaves a misfit, as where two simulators differ by a
-    # little, is no explanation: it must be adequate, with no allowance.
-    forms = [c for c in compared if c.is_form and (c.p_value or 0.0) >= ADEQUATE_P]
-    top = max((c.log_evidence for c in names), default=-np.inf)
-    if forms and forms[0].log_evidence - top > decisive:
-        return Verdict("unknown", (), forms[0].name)
-    best = max((c.log_evidence for c in candidates if not c.is_form), default=-np.inf)
-    if not names or best - top > decisive:
-        return None
-    equal = [c for c in names if top - c.log_evidence < decisive]
-    alike = [c.name for c in forms if abs(top - c.log_evidence) < decisive]
-    if len(equal) == 1 and not alike:
-        return Verdict("named", equal[0].effects)
-    return Verdict("ambiguous", (*[c.name for c in equal], *alike[:1]))
+    best, explaining = candidates[0], [c for c in candidates if explains(c)]
+    if not explaining:
+        return Verdict("unknown", (), reasons=(reasons.nothing_explains(best),))
+    top = explaining[0]
+    if best.log_odds - top.log_odds >= decisive:
+        return Verdict("unknown", (), reasons=(reasons.better_but_contradicted(best, top),))
+    if top.log_odds < 0:
+        return Verdict("unknown", (), reasons=(reasons.less_probable_than_none(top),))
+    equal = [c for c in explaining if top.log_odds - c.log_odds < decisive]
+    names, forms = [c for c in equal if not c.is_form], [c for c in equal if c.is_form]
+    if not names:
+        name = next((c for c in explaining if not c.is_form), None)
+        return Verdict("unknown", (), forms[0].name, reasons=(reasons.only_a_form(top, name),))
+    why = reasons.explains(names[0])
+    if len(equal) == 1:
+        others = [c for c in candidates if c.effects != top.effects]
+        return Verdict("named", top.effects, reasons=(why, reasons.decisive(top, others, decisive)))
+    alike = [*names, *forms[:1]]
+    contests = (reasons.contested(names[0], rival, decisive) for rival in alike[1:])
+    return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *contests))
 
 
-def verdict_of_pairs(
-    pairs: Sequence[Candidate], best_single: Candidate, base_misfit: float, decisive: float
-) -> Verdict:
-    """The verdict where no single effect explains the data: on pairs, or unknown.
+def within_luck(
+    named: Candidate, candidates: Sequence[Candidate], decisive: float
+) -> list[Candidate]:
+    """The confusables of a named hypothesis: those that only luck may have put behind it.
+
+    Luck is this clip's noise: with another, a rival that the data do not contradict and that is
+    not too far behind might be as good. Which these are depends on the clip, not on a list.
 
     Args:
-      pairs: ranked by log evidence, the best first; may be empty.
-      best_single: the best effect alone, which all pairs contain.
-      base_misfit: `Hypothesis.misfit` of the model without effects.
-      decisive: difference in log evidence, nats, at which one candidate rules out another.
+      named: the only one that explains the data.
+      candidates: ranked.
+      decisive: nats by which a rival must be behind.
     """
-    if not pairs:
-        return UNKNOWN
-    best = pairs[0]
-    helps = best.log_evidence - best_single.log_evidence > LEAST_GAIN
-    is_clean = (best.p_value or 0.0) >= PAIR_P
-    verdict = verdict_of(pairs, base_misfit, decisive) if helps and is_clean else None
-    return verdict or UNKNOWN
+    farthest = decisive + MOST_LUCK * sqrt(2 * decisive)
+    return [
+        c
+        for c in candidates
+        if c.effects != named.effects
+        and (c.p_value is None or explains(c))
+        and named.log_odds - c.log_odds < farthest
+    ]
+
+
+def looked_at_again(
+    verdict: Verdict,
+    named: Candidate,
+    expected: Sequence[tuple[Candidate, float]],
+    decisive: float,
+) -> Verdict:
+    """A named verdict, or ambiguous where a clip like this one does not tell a confusable from it.
+
+    Args:
+      verdict: named.
+      named: what it names.
+      expected: its confusables, and by how many nats each is behind in a clip like this one, if
+        what is named is there.
+      decisive: nats by which a rival must be behind.
+    """
+    looks = tuple(reasons.told_apart(named, rival, by, decisive) for rival, by in expected)
+    alike = [rival for rival, by in expected if by < decisive]
+    because = (*verdict.reasons, *looks)
+    if not alike:
+        return replace(verdict, reasons=because)
+    names = [c.name for c in alike if not c.is_form]
+    forms = [c.name for c in alike if c.is_form]
+    return Verdict("ambiguous", (named.name, *names, *forms[:1]), reasons=because)
 
 
 def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | None:
@@ -190,7 +224,7 @@ def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | Non
 
     Args:
       verdict: not none.
-      candidates: those that the verdict is on, ranked, before any others.
+      candidates: ranked.
     """
     if verdict.status == "unknown":
         best = best_named(candidates)

@@ -25,6 +25,9 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
 NOISE_SCALE = Parameter("noise_scale", "1", LogNormal(1.0, NOISE_SD), 1.0, "nuisance", step=None)
+# Fitted noise over what the tracker states: so far a tracker may be wrong about it. Beyond, the
+# statement is wrong or what is left is no noise.
+NOISE_SCALE_RANGE = (0.5, 1.5)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from galileo_jax.inference.fits.gradient import Code, GradientFit
+from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 
@@ -24,7 +24,7 @@ def laplace_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Post
         names=trials.names,
         draws=trials.theta(z, fit.free)[None],
         log_density=-0.5 * np.sum(normal**2, axis=1)[None],
-        status=Status.CONVERGED if fit.code is Code.CONVERGED else Status.STEP_LIMIT,
+        status=Status.CONVERGED if fit.code in SETTLED else Status.STEP_LIMIT,
         stats=fit.stats,
         provenance={"method": "grad", "seed": seed, "code": fit.code.name},
     )

@@ -39,9 +39,7 @@ FREE_SCALE_WARNING = (
     "nothing in this motion tells the scale: give --pixels-per-metre to have lengths in metres"
 )
 
-# Fitted noise over what the tracker states: so far a tracker may be wrong about it. Beyond, the
-# statement is wrong or what is left is no noise.
-NOISE_SCALE_RANGE = (0.5, 1.5)
+PULLED_Z = 3.0  # of a nuisance's prior standard deviations; one in four hundred is by chance
 
 
 def summarise(draws: np.ndarray) -> dict[str, float]:
@@ -65,8 +63,8 @@ def velocity_error(
       predicted_m: of each clip `[object, 2, frame]`, the fitted centres.
 
     Returns:
-      rmse; noise (what the stated tracking errors alone would give); l1 (mean absolute) and l2 (root of
-      the summed squares, per profile as in the thesis).
+      rmse; noise (what the stated tracking errors alone would give); l1 (mean absolute) and
+      l2 (root of the summed squares, per profile as in the thesis).
     """
     residuals, noises = [np.zeros(0)], [np.zeros(0)]
     for problem, predicted in zip(problems, predicted_m, strict=True):
@@ -250,8 +248,14 @@ def make_result(
     # Every parameter takes from the residuals what the data told of it.
     is_fitted = np.array([p.role != "nuisance" for p in trials.model_parameters])
     told = 1 - np.clip(spread[: len(is_fitted)] ** 2, 0, 1)
-    pull = float(np.sum(prior_deviations(trials.model_parameters, z_best[: len(is_fitted)]) ** 2))
-    error = error_of(trials, trials.theta(z_best), float(np.sum(told[is_fitted])), pull)
+    away = prior_deviations(trials.model_parameters, z_best[: len(is_fitted)])
+    theta = trials.theta(z_best)
+    num_fitted, pull = float(np.sum(told[is_fitted])), float(np.sum(away**2))
+    pulled = [
+        {"parameter": p.name, "value": float(theta[i]), "unit": p.unit, "z": float(away[i])}
+        for i, p in enumerate(trials.model_parameters)
+        if abs(away[i]) > PULLED_Z
+    ]
     status = {"converged": posterior.is_converged, **notes}
     return {
         "clips": clips,
@@ -260,7 +264,8 @@ def make_result(
         "effects": list(trials.all_effects),
         **table,
         "derived": derived,
-        "error": error,
+        "pulls": sorted(pulled, key=lambda pull: -abs(pull["z"])),
+        "error": error_of(trials, theta, num_fitted, pull),
         "timings_s": timings_s,
         "version": __version__,
         "seed": seed,

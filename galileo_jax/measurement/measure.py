@@ -9,10 +9,12 @@ from typing import Any
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
+from galileo_jax.measurement.astray import Astray, find_astray
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
+from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.measurement.truncate_at_stop import truncate_at_stop
 from galileo_jax.observation.observation import Observation
@@ -30,7 +32,8 @@ class Measurement:
       whole: in metres, to the clip's end.
       pixels: the track in pixels; None where the clip is a track already.
       inferred: key of the clip that was left null to value and sd.
-      doubts: of what is declared, one line each; results repeat them.
+      astray: objects whose tracks are not to be believed to their ends.
+      doubts: of what is declared and of tracks gone astray, one line each; results repeat them.
       remarks: what was inferred or left out, one line each.
     """
 
@@ -39,6 +42,7 @@ class Measurement:
     whole: Observation
     pixels: Track | None = None
     inferred: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    astray: tuple[Astray, ...] = ()
     doubts: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
@@ -80,18 +84,24 @@ def measure(clip: Clip) -> Measurement:
         whole, pixels = observed(clip)
         measured = Measurement(clip, whole, whole, pixels)
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
-    doubt = frame_rate_doubt(measured.clip, measured.observation)
+    pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
     observation, end_s = truncate_at_stop(measured.clip, measured.observation)
     if end_s is not None:
         remarks.append(
             f"{clip.path}: {observation.names[0]} is stopped by something after {end_s:.3f} s; "
             "what follows is left out"
         )
+    astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
+    told = (
+        f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
+        for one in astray
+    )
     return replace(
         measured,
         observation=observation,
         inferred={**found, **measured.inferred},
-        doubts=() if doubt is None else (doubt,),
+        astray=astray,
+        doubts=(*([] if doubt is None else [doubt]), *told),
         remarks=tuple(remarks),
     )
 
@@ -106,7 +116,7 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         assert clip.track is not None  # load_clip requires one of the two
         return read_track(clip.path, clip.track, clip, clip.fps).observation, None
     pixels = track_once(clip)
-    return observe(clip, pixels), pixels
+    return with_noise_at_rest(observe(clip, pixels)), pixels
 
 
 def _with_foot(clip: Clip, remarks: list[str]) -> Clip:

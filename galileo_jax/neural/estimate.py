@@ -13,6 +13,8 @@ import numpy as np
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.model.effects.effect import infers_gravity
+from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
+from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.model import MASS_PRIOR
 from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.checkpoint import load_network
@@ -47,7 +49,8 @@ def cnn_posterior(
     """Draws of the posterior of k1, k2 and the mass ratio; of all else, of the prior.
 
     The network is marginal over the nuisances; their draws are prior draws, independent of
-    the rest.
+    the rest. It takes angle and scale as declared; how well these are known is added to what it
+    says of the frictions.
 
     Returns:
       the posterior; `[parameter]`, its middle in z; notes for result.json (`status`, `cnn`,
@@ -151,9 +154,10 @@ def _complete(trials: JointProblem, found: Estimates, seed: int) -> np.ndarray:
     theta = trials.theta(z).copy()
     # The ratio shows, the product does not: of two log-normal masses they are independent.
     log_product = 2 * math.log(MASS_PRIOR.median) + math.sqrt(2) * MASS_PRIOR.sd * z[:, 0]
+    k1, k2 = _with_declared_errors(trials, found, theta)
     known: Mapping[str, np.ndarray] = {
-        "k1": found.k1,
-        "k2": found.k2,
+        "k1": k1,
+        "k2": k2,
         "m1": np.exp(0.5 * (log_product + np.log(found.mass_ratio))),
         "m2": np.exp(0.5 * (log_product - np.log(found.mass_ratio))),
     }
@@ -162,3 +166,22 @@ def _complete(trials: JointProblem, found: Estimates, seed: int) -> np.ndarray:
         if name in trials.names and not (is_single and name == "m1"):
             theta[:, trials.names.index(name)] = values
     return theta
+
+
+def _with_declared_errors(
+    trials: JointProblem, found: Estimates, theta: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Draws of k1 and k2 with the errors of declared angle and scale in `theta`, to first order.
+
+    k1 = tan a - acceleration / (g cos a) and k2 = deceleration / g, of a ramp steeper by da and
+    of lengths measured too long by a share s:
+
+        dk1 = (1 + k1 tan a) da + (tan a - k1) s,    dk2 = -k2 s
+    """
+    columns = {name: theta[:, i] for i, name in enumerate(trials.names)}
+    zero = np.zeros(len(theta))
+    steeper = columns.get(DeclaredAngle.name, zero)
+    longer = columns.get(DeclaredScale.name, zero)
+    slope = math.tan(trials.problems[0].model.scene.surroundings.angle_rad)
+    k1 = found.k1 + (1 + found.k1 * slope) * steeper + (slope - found.k1) * longer
+    return np.maximum(k1, 0.0), found.k2 * (1 - longer)

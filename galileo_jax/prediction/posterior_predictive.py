@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-import jax
 import numpy as np
 
 from galileo_jax.comparison.phases import Phase, phases, phases_of
@@ -17,7 +16,6 @@ from galileo_jax.prediction.extrapolate import (
     roll_out,
 )
 from galileo_jax.results.run import Run
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NUM_DRAWS = 100
 
@@ -29,16 +27,15 @@ class PosteriorPredictive:
     Attributes:
       observation: what was measured.
       position_m: `[draw, object, 2, frame]`, predicted positions of the tracked points.
-      noise_scale: the factor on the tracker's own noise.
       offset_m: `[object, 2]`, tracked point minus centre; `position_m` contains each draw's.
-      residuals: `[object, 2, frame]`, in units of the noise; NaN where nothing was measured.
+      residuals: `[object, 2, frame]`, the tracking errors that the best fit leaves, in units of the
+        stated noise; NaN where nothing was measured.
       phases: of each object.
       hits_s: when each object but the last hits the next; None = it does not.
     """
 
     observation: Observation
     position_m: np.ndarray
-    noise_scale: float
     offset_m: np.ndarray
     residuals: np.ndarray
     phases: tuple[tuple[Phase, ...], ...]
@@ -52,32 +49,27 @@ class PosteriorPredictive:
 
 
 def posterior_predictive(run: Run, seed: int) -> PosteriorPredictive:
-    """Rolls out the posterior's median, for the residuals, and draws, for the bands."""
+    """Rolls out the best fit, for the residuals, and draws, for the bands."""
     problem = run.problem
     observation, surroundings = problem.observation, problem.model.scene.surroundings
-    # Medians, unlike means, are the same in the parameters' units and in the search space.
-    medians = dict(zip(run.posterior.names, np.median(run.posterior.flat(), axis=0), strict=True))
-    noise_scale = float(medians["noise_scale"])
-    median = np.array([[medians[name] for name in problem.model.names]])
+    # Not the mean or the median: along a curved ridge these are no fit.
+    best = run.best[None, : len(problem.model.names)]
     frames = observation.times_s
     draws = roll_out(problem.model, problem.engine, draw_theta(run, NUM_DRAWS, seed), frames)
     # Objects may touch between two frames only.
     times = np.union1d(frames, np.arange(frames[0], frames[-1], GRID_S))
-    centre = roll_out(problem.model, problem.engine, median, times)
+    centre = roll_out(problem.model, problem.engine, best, times)
     shown = as_measured(problem.model, centre)[0][..., np.searchsorted(times, frames)]
-    white = jax.jit(GaussianLikelihood.whiten)(
-        problem.data.observed_m - shown, noise_scale, problem.data
-    )
+    errors = problem.tracking_errors(shown).reshape(shown.shape)
     is_measured = np.broadcast_to(observation.mask[:, None], shown.shape)
     drawn = as_measured(problem.model, draws)
     drawn = drawn + _offset(observation, drawn)[..., None]
     return PosteriorPredictive(
         observation=observation,
         position_m=drawn,
-        noise_scale=noise_scale,
         offset_m=_offset(observation, shown),
-        residuals=np.where(is_measured, np.asarray(white), np.nan),
-        phases=tuple(phases_of(labels, frames) for labels in phases(problem, median[0])),
+        residuals=np.where(is_measured, errors, np.nan),
+        phases=tuple(phases_of(labels, frames) for labels in phases(problem, best[0])),
         hits_s=_hits(centre, surroundings),
     )
 

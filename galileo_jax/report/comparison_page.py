@@ -1,7 +1,7 @@
 """The page of a comparison: is the model adequate, and where does it fail?"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from html import escape
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.animation import animation
 from galileo_jax.report.comparison_charts import failure_chart
+from galileo_jax.report.fit_text import pull_text
 from galileo_jax.report.html_page import chart_section, document, header, items, table
 from galileo_jax.report.provenance import provenance
 from galileo_jax.runtime.atomic_write import write_text
@@ -22,9 +23,9 @@ from galileo_jax.runtime.atomic_write import write_text
 NUM_CELLS = 12
 FAILURES = (
     "Position and speed along the path, 0 at the foot: measured (dots) and fitted (line). Below, "
-    "the residuals in units of the noise: filled along the path, hollow across it; 95 % of noise "
-    "is inside the grey band. Grey: transitions between phases. Yellow: the interval in which the "
-    "model fails worst."
+    "the residuals in units of the stated noise: filled along the path, hollow across it; 95 % of "
+    "noise is inside the grey band. Grey: transitions between phases. Yellow: the interval in "
+    "which the model fails worst."
 )
 
 
@@ -59,7 +60,7 @@ def write_comparison_page(path: Path, title: str, report: ComparisonReport) -> N
     more = (
         f"<p>chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
         f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}).</p>\n"
-        f"{items(diagnosis_text.pull_text(pull) for pull in pulled(comparison))}\n"
+        f"{items(pull_text(asdict(pull)) for pull in pulled(comparison))}\n"
         f'<p class="soft">The model: {escape(diagnosis_text.effects_text(report.effects))}.</p>'
     )
     lead = diagnosis_text.adequacy(comparison, report.effects)

@@ -9,7 +9,7 @@ from typing import Any
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
-from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
+from galileo_jax.diagnosis.diagnosis import Diagnosis, Reason, Round
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.chart import Chart
@@ -24,7 +24,7 @@ from galileo_jax.report.provenance import provenance
 from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CANDIDATES = 8
-ONLY_WIDE = ("", "log evidence", "chi2 per dof", "p")  # of the candidates
+ONLY_WIDE = ("", "log evidence", "log prior", "chi2 per dof", "p")  # of the candidates
 BAR = '<div class="bar"><div style="width:{:.1f}%"></div></div>'
 
 
@@ -66,6 +66,7 @@ def write_diagnosis_page(
         write_text(path.parent / PLOTS / f"{chart.name}.svg", to_svg(chart))
     sections = [
         _verdict(title, report),
+        _reasons(diagnosis.verdict.reasons),
         _rounds(diagnosis.rounds, report.record["history"]),
         _candidates(diagnosis, report.record["candidates"]),
         motion(report.clips, trials, _fitted(trials, diagnosis)),
@@ -105,6 +106,10 @@ def _verdict(title: str, report: DiagnosisReport) -> str:
     )
     is_good = diagnosis.verdict.status != "unknown"
     return header("diagnosis", title, diagnosis_text.verdict(diagnosis), more, is_good)
+
+
+def _reasons(reasons: Sequence[Reason]) -> str:
+    return f"<h2>Why</h2>\n{items([why.sentence for why in reasons])}" if reasons else ""
 
 
 def _rounds(rounds: Sequence[Round], history: Sequence[Mapping[str, Any]]) -> str:
@@ -158,17 +163,23 @@ def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -
                 BAR.format(100 * entry["probability"]),
                 f"{entry['probability']:.3f}",
                 escape(strengths),
-                f"{entry['score']:+.1f}",
+                f"{entry['log_evidence']:+.1f}",
+                f"{entry['log_prior']:+.1f}",
                 f"{entry['chi2_per_dof']:.2f}",
                 escape(diagnosis_text.p_text(entry["p_value"])),
                 escape(", ".join(entry["confounded_with"])).replace("_", "_<wbr>"),
             ]
         )
-    head = ["effect", "", "probability", "strength", "log evidence", "chi2 per dof", "p",
-            "not distinguished from"]  # fmt: skip
+    none, base = diagnosis.probability_none, diagnosis.base
+    rows.append(
+        ["none", BAR.format(100 * none), f"{none:.3f}", "", "+0.0", "+0.0",
+         f"{base.error['chi2_per_dof']:.2f}", escape(diagnosis_text.p_text(base.p_value)), ""]
+    )  # fmt: skip
+    head = ["effect", "", "probability", "strength", "log evidence", "log prior", "chi2 per dof",
+            "p", "not distinguished from"]  # fmt: skip
     if not any(row[-1] for row in rows):
         head, rows = head[:-1], [row[:-1] for row in rows]
-    rest = len(candidates) - len(rows)
+    rest = len(candidates) + 1 - len(rows)
     note = f"<p class='soft'>{rest} more are less probable; diagnosis.json has them.</p>"
     return f"<h2>Candidates</h2>\n{table(head, rows, ONLY_WIDE)}\n{note if rest > 0 else ''}"
 

@@ -4,25 +4,15 @@ import shlex
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from galileo_jax.comparison.compare import Comparison, Pull
+from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.diagnosis import Diagnosis
+from galileo_jax.diagnosis.reasons import p_equals
+from galileo_jax.diagnosis.reasons import p_text as p_text
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fit_text import number
 
-SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
 NO_EFFECTS = "no effects"
-
-
-def p_text(p: float | None) -> str:
-    """A p-value without places that mean nothing."""
-    if p is None:
-        return ""
-    return f"< {SMALLEST_P:.0e}" if p < SMALLEST_P else f"{p:.2g}"
-
-
-def p_equals(p: float) -> str:
-    """The same with its name."""
-    return f"p {p_text(p)}" if p < SMALLEST_P else f"p = {p_text(p)}"
 
 
 def effects_text(effects: Sequence[str]) -> str:
@@ -41,25 +31,28 @@ def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
     """Whether the model is adequate, in one sentence."""
     equals = p_equals(comparison.p_value)
     model = f"with {effects_text(effects)} " if effects else ""
-    if comparison.is_adequate:
-        return f"The model {model}is adequate: its residuals look like noise ({equals})."
-    return f"The model {model}is not adequate: the data contradict it ({equals})."
+    if not comparison.is_adequate:
+        return f"The model {model}is not adequate: the data contradict it ({equals})."
+    text = f"The model {model}is adequate: its residuals look like noise ({equals})."
+    return f"{text} {misstated}" if (misstated := noise_text(comparison)) else text
 
 
-def pull_text(pull: Pull) -> str:
-    """One nuisance parameter outside its prior, as a sentence."""
-    unit = "" if pull.unit == "1" else f" {pull.unit}"
-    return (
-        f"{pull.parameter} is at {pull.value:.4g}{unit}, "
-        f"{abs(pull.z):.1f} prior standard deviations from its prior mean"
-    )
+def noise_text(comparison: Comparison) -> str:
+    """How wrong the stated noise is, in a sentence; empty where it is about right."""
+    low, high = NOISE_SCALE_RANGE
+    if all(low <= scale <= high for scale in comparison.noise_scale):
+        return ""
+    size = " and ".join(f"{scale:.1f}" for scale in comparison.noise_scale)
+    return f"The tracking errors are {size} times what was stated."
 
 
 def verdict(diagnosis: Diagnosis) -> str:
     """Which effect the model lacks, in one sentence."""
     found, first = diagnosis.verdict, diagnosis.base
     if found.status == "none":
-        return f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."
+        noise = [why.sentence for why in found.reasons if why.rule == "noise_misstated"]
+        adequate = f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."
+        return " ".join([adequate, *noise])
     if found.status == "named":
         names = " and ".join(found.effects)
         verb = "explains" if len(found.effects) == 1 else "together explain"

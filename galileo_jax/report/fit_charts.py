@@ -149,7 +149,7 @@ def profile_panel(fitted: PosteriorPredictive, quantity: Quantity, index: int, a
     observation = fitted.observation
     times_s, drawn = observation.times_s, fitted.position_m[:, index, axis]
     measured = observation.position_m[index, axis]
-    variance = fitted.noise_scale**2 * observation.covariance_m2[index, axis, axis]
+    variance = observation.covariance_m2[index, axis, axis]
     if quantity == "velocity":
         step = np.diff(times_s)
         times_s, drawn = times_s[:-1] + step / 2, np.diff(drawn, axis=-1) / step

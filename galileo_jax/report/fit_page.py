@@ -119,6 +119,9 @@ def _header(title: str, run: Run) -> str:
     more = (
         f"<p{mark}>{escape(fit_text.convergence(run))}</p>\n{warning}"
         f'<p class="soft">Method {escape(result["method"])}; effects: {escape(effects)}.</p>\n'
+        + "".join(
+            f'<p class="soft">{escape(line)}.</p>\n' for line in result.get("taken_as_exact", [])
+        )
     )
     return header("fit", title, fit_text.fit_quality(result), more, fit_text.fits(result))
 
@@ -170,8 +173,8 @@ def _undetermined(run: Run, fitted: PosteriorPredictive) -> str:
 
 def _failure(fitted: PosteriorPredictive) -> str:
     text = (
-        "Residuals: measured minus fitted, in units of the noise. If the model is right they show "
-        "no pattern, and 95 % of them are inside the grey band. "
+        "Residuals: measured minus fitted, in units of the stated noise. If the model and that "
+        "are right they show no pattern, and 95 % of them are inside the grey band. "
     )
     found = failing_interval_of(fitted)
     if found is None:

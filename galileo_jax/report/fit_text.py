@@ -3,6 +3,7 @@
 import math
 import re
 import shlex
+from collections.abc import Mapping
 from typing import Any
 
 from galileo_jax.inference.confounded import confounded_with_gravity
@@ -32,6 +33,7 @@ MEANINGS = {
     "liquid_drag": "drag constant c of c v|v|",
     "terminal_speed": "speed at which drag and weight balance",
     "declared_angle": "ramp's angle, over what was declared",
+    "declared_scale": "share by which lengths are measured too long",
     "foot_transition": "factor on the speed after the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
     "contact_gap": "by how much further apart objects touch when they meet again",
@@ -43,6 +45,18 @@ OF_OBJECTS = (  # what parameters' names with numbers in them mean
     (re.compile(r"k(\d+)"), "friction of object {}"),
     (re.compile(r"mass_ratio_(\d+)_(\d+)"), "m{} / m{}"),
     (re.compile(r"start_offset_object(\d+)"), "start of object {}, from where it was marked"),
+)
+OUTSIDE = (  # what nuisances mean that are far from what is usual
+    (re.compile(r"impact_restitution"), "the objects bounce, with a restitution of {value:.2f}"),
+    (re.compile(r"foot_transition"), "the foot of the ramp multiplies the speed by {value:.3f}"),
+    (
+        re.compile(r"release_instant(?:_\d+)?"),
+        "object 1 is let go {ms:.0f} ms after the first frame",
+    ),
+    (
+        re.compile(r"start_offset_object(\d+)(?:_\d+)?"),
+        "object {} starts {mm:.1f} mm from where it was marked",
+    ),
 )
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
@@ -121,19 +135,39 @@ def _struck(name: str) -> int | None:
 
 
 def fit_quality(result: dict[str, Any]) -> str:
-    """chi2 per degree of freedom and what it means, in one sentence."""
+    """chi2 per degree of freedom and what it means, in a sentence or two."""
     chi2 = result["error"]["chi2_per_dof"]
     if chi2 is None or not math.isfinite(chi2):
         return "chi2 per degree of freedom cannot be computed."
+    size = f"{math.sqrt(chi2):.2g} times the stated noise"
     if chi2 < CHI2_GOOD:
         text = "The model fits, with less noise than the tracker states"
     elif chi2 <= CHI2_HIGH:
-        text = "The model fits: the residuals have the size of the tracking noise"
+        text = "The model fits: the residuals have the size of the stated noise"
     elif chi2 <= CHI2_BAD:
-        text = "The residuals are larger than tracking noise explains; see where the model fails"
+        text = (
+            f"The residuals are {size}: more noise than stated, or an effect that the model "
+            "lacks; galileo compare says which"
+        )
     else:
-        text = "The model does not describe this clip; do not trust its parameters"
-    return f"{text} (chi2 per degree of freedom {chi2:.2f})."
+        text = f"The model misses the data by {size}; do not trust its parameters"
+    text = f"{text} (chi2 per degree of freedom {chi2:.2f})."
+    return " ".join([text, *map(pull_text, result.get("pulls", []))])
+
+
+def pull_text(pull: Mapping[str, Any]) -> str:
+    """What a nuisance outside its prior says of the clip, in a sentence."""
+    name, value = str(pull["parameter"]), float(pull["value"])
+    text = (
+        f"{meaning(name) or name} is {value:.3g}{'' if pull['unit'] == '1' else ' ' + pull['unit']}"
+    )
+    for pattern, phrase in OUTSIDE:
+        if found := pattern.fullmatch(name):
+            text = phrase.format(*found.groups(), value=value, ms=1e3 * value, mm=1e3 * value)
+    return (
+        f"{text[0].upper()}{text[1:]}, {abs(pull['z']):.0f} standard deviations from what is "
+        "usual; galileo diagnose looks for the cause."
+    )
 
 
 def fits(result: dict[str, Any]) -> bool:

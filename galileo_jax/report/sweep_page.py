@@ -96,7 +96,7 @@ def _errors(
     category: Callable[[Row], str | None],
     label: Callable[[Row], str],
 ) -> list[str]:
-    """Box plots of the errors of each quantity; of the velocity error where none is known."""
+    """Box plots of each quantity's errors; of chi2 per degree of freedom where none is known."""
     charts = []
     for name, symbol in QUANTITIES.items():
         known = [row for row in rows if _has_error(row, name)]
@@ -105,11 +105,11 @@ def _errors(
             title = f"error of {symbol}"
             charts.append(_boxes(title, known, values, category, label))
     if not charts:
-        known = [row for row in rows if row["rmse"] is not None and row["noise"]]
+        known = [row for row in rows if row["chi2_per_dof"] is not None]
         if not known:
             return []
-        values = [row["rmse"] / row["noise"] for row in known]
-        charts.append(_boxes("velocity error / noise", known, values, category, label))
+        values = [row["chi2_per_dof"] for row in known]
+        charts.append(_boxes("chi2 per degree of freedom", known, values, category, label))
     names = sorted({label(row) for row in rows})
     key = legend(("dot", COLOURS[i % len(COLOURS)], name) for i, name in enumerate(names))
     return [chart_section(heading, caption, charts, legend=key)]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from galileo_jax.clip.load import load_clip
@@ -28,6 +29,7 @@ from galileo_jax.runtime.errors import InputError
 RESULT, OBSERVATION = "result.json", "observation.csv"
 CLIP, POSTERIOR = "clip.yaml", "posterior.nc"
 CHECKPOINT = "chains.checkpoint.npz"
+BEST = "z_best"  # in the posterior's provenance: the best fit, in the search space
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,17 @@ class Run:
     def trials(self) -> JointProblem:
         """The problem alone."""
         return JointProblem((self.problem,))
+
+    @property
+    def best(self) -> np.ndarray:
+        """`[parameter]`, the best fit in the parameters' units.
+
+        Of a run that an earlier version wrote the posterior's medians.
+        """
+        z = self.posterior.provenance.get(BEST)
+        if z is None:
+            return np.median(self.posterior.flat(), axis=0)
+        return self.trials.theta(np.asarray(z))
 
 
 def save_run(

@@ -16,6 +16,7 @@ from jaxtyping import Float
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 NUM_ITERATIONS = 100
+MODE_SIZES = np.linspace(0.0, 1.0, 41)
 
 
 def fitted_noise_scale(
@@ -46,6 +47,23 @@ def fitted_noise_scale(
         left = np.maximum(degrees - used, 1.0)
         variance = ((total + wide) / (left + wide))[:, None]
     return np.sqrt(variance[:, 0])
+
+
+def fitted_mode_size(
+    white: Float[np.ndarray, " value"], noise_scale: float, data: Whitening
+) -> float:
+    """The most probable common size of the modes' amplitudes over their sd, from 0 to 1.
+
+    Args:
+      white: residuals, whitened at `noise_scale`.
+      noise_scale: of the tracking errors.
+      data: the observation's covariance, decomposed.
+    """
+    noise2, gain2 = noise_scale**2, data.gain**2
+    amplitude2 = (data.basis.reshape(len(gain2), -1) @ white) ** 2 * (noise2 + gain2)
+    variance = noise2 + MODE_SIZES[:, None] ** 2 * gain2
+    log_likelihood = -0.5 * np.sum(np.log(variance) + amplitude2 / variance, axis=1)
+    return float(MODE_SIZES[np.argmax(log_likelihood)])
 
 
 def errors_at(

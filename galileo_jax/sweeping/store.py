@@ -21,6 +21,7 @@ import numpy as np
 
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip
+from galileo_jax.measurement.astray import Astray
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import replacing, write_json
@@ -122,7 +123,8 @@ class Store:
             picture = file["thumbnail"].tobytes()
         seen = Observation(names=names, **arrays)
         said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
-        measured = Measurement(clip, seen, seen, None, notes["inferred"], **said)
+        astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
+        measured = Measurement(clip, seen, seen, None, notes["inferred"], astray, **said)
         return MeasuredClip(measured, picture or None)
 
     def save_clip(self, key: str, measured: MeasuredClip) -> None:
@@ -130,6 +132,7 @@ class Store:
         one = measured.measurement
         seen = one.observation
         notes = {name: getattr(one, name) for name in ("inferred", "doubts", "remarks")}
+        notes["astray"] = [vars(entry) for entry in one.astray]
         with replacing(self._clip(key)) as path:
             np.savez_compressed(
                 path,

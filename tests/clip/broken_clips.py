@@ -260,6 +260,18 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "gravity_is_negative": _edit("9.81", "-9.81", "gravity", "did you mean 9.81"),
     "scale_per_millimetre": _edit("300.0", "0.9", "pixels_per_metre", "did you mean 900"),
     "scale_in_metres_per_pixel": _edit("300.0", "0.00333", "pixels_per_metre", "did you mean 300"),
+    "scale_sd_is_a_share_too_large": _edit(
+        "300.0", "300.0\npixels_per_metre_sd: 90", "pixels_per_metre_sd", "90", "20%", "300"
+    ),
+    "scale_sd_is_negative": _edit(
+        "300.0", "300.0\npixels_per_metre_sd: -1.5", "pixels_per_metre_sd", "-1.5", "0 or more"
+    ),
+    "scale_sd_without_a_scale": _edit(
+        "300.0", "null\npixels_per_metre_sd: 1.5", "pixels_per_metre_sd", "without pixels_per_metre"
+    ),
+    "origin_sd_is_no_pixels": _edit(
+        "gravity", "origin_sd_px: 640\ngravity", "origin_sd_px", "640", "[0, 50] pixels"
+    ),
     "scale_is_zero": _edit("300.0", "0", "pixels_per_metre", "0", "above 0"),
     "size_in_millimetres": _edit("[0.06, ", "[60, ", "objects[0].size_m[0]", "did you mean 0.06"),
     "size_in_centimetres": _edit("[0.06, ", "[6, ", "objects[0].size_m[0]", "did you mean 0.06"),

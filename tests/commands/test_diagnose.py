@@ -25,6 +25,7 @@ from tests.precision import in_64_bit
 ENTRY = {"mean", "sd", "q025", "q975", "unit", "identified"}
 PLACE = {"object", "axis", "phase", "rmse", "noise", "z"}
 CANDIDATE = {"effect", "parameters", "rmse", "chi2_per_dof", "score", "probability"}
+ODDS = {"log_evidence", "log_prior", "p_value"}
 STATUSES = ("none", "named", "ambiguous", "unknown")
 
 
@@ -46,11 +47,15 @@ def check_contract(document):
     assert 0 <= document["p_value"] <= 1
     assert all(set(place) >= PLACE for place in document["where"])
     for candidate in document["candidates"]:
-        assert set(candidate) >= CANDIDATE | {"confounded_with"}
+        assert set(candidate) >= CANDIDATE | ODDS | {"confounded_with"}
+        assert candidate["score"] == candidate["log_evidence"] + candidate["log_prior"]
         assert all(set(entry) >= ENTRY for entry in candidate["parameters"].values())
         assert {"k1"} <= set(candidate["parameters"])
     scores = [candidate["score"] for candidate in document["candidates"]]
     assert scores == sorted(scores, reverse=True), "best first"
+    shares = [candidate["probability"] for candidate in document["candidates"]]
+    assert sum(shares) + document["probability_none"] == pytest.approx(1.0)
+    assert all({"rule", "sentence"} <= set(why) for why in document["reasons"])
     status, effects = document["verdict"]["status"], document["verdict"]["effects"]
     assert status in STATUSES
     assert bool(effects) == (status in ("named", "ambiguous"))
@@ -110,6 +115,12 @@ def test_finds_what_was_hidden(tmp_path, capsys):
     assert after["chi2_per_dof"] < 1.5 < before["chi2_per_dof"]
     assert after["rmse"] < 1.1 * after["noise"]
     assert "truth: air_drag" in told
+    assert [why["rule"] for why in document["reasons"]][:3] == [
+        "contradicted_without_effects",
+        "explains",
+        "decisive",
+    ]
+    assert all(f"why: {why['sentence']}" in told for why in document["reasons"])
     assert "next: galileo fit" in told and "--effects air_drag" in told
     rows = [line for line in told.splitlines() if line.startswith(("no effects", "air_drag"))]
     assert len(rows) >= 2, "one row per round"

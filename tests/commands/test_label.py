@@ -1,3 +1,4 @@
+import math
 import shlex
 import subprocess
 import sys
@@ -40,9 +41,28 @@ def test_new_yaml(video: Path, capsys) -> None:
     assert clip.objects[0].size_m == (0.06, 0.05, 0.06)
     assert clip.objects[1].point_px == (205, 141)
     assert clip.objects[1].first_frame == 3
+    # Half a pixel at either end of a base of 95.79 px, of 150 px for half a metre.
+    assert clip.ramp_angle_sd_deg == pytest.approx(math.degrees(math.sqrt(0.5) / 95.79), rel=1e-2)
+    assert clip.pixels_per_metre_sd == pytest.approx(math.sqrt(0.5) / 150 * 300, rel=1e-2)
+    assert clip.origin_sd_px == 0.5
     output = capsys.readouterr()
     assert output.out.strip() == str(clip.path)
     assert "240 declared, the container says 30" in output.err
+
+
+def test_what_the_user_says_of_uncertainties_goes_first(video: Path) -> None:
+    told = ("--ramp-angle-sd", 0.3, "--pixels-per-metre-sd", 4, "--origin-sd", 2)
+    assert run(video, *NEW, *told) == 0
+    clip = load_clip(video)
+    sds = (clip.ramp_angle_sd_deg, clip.pixels_per_metre_sd, clip.origin_sd_px)
+    assert sds == (0.3, 4, 2)
+
+
+def test_a_typed_angle_and_scale_are_exact(video: Path) -> None:
+    typed = ("--scenario", "incline", "--ramp-angle", 20, "--pixels-per-metre", 300)
+    assert run(video, *typed, "--point", "object1", 73.1, 108.8) == 0
+    clip = load_clip(video)
+    assert (clip.ramp_angle_sd_deg, clip.pixels_per_metre_sd) == (0, 0)
 
 
 def test_frame_rate_of_the_container_is_noted(video: Path, capsys) -> None:

@@ -25,7 +25,7 @@ def squares(trials, fit, num_steps=bootstrap.NUM_STEPS):
     """Sums of the replicates' squared residuals after so many steps of the refit."""
     with in_64_bit(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(bootstrap, "NUM_STEPS", num_steps)
-        (white,) = bootstrap.replicates(trials, fit, np.ones(1), COUNT, seed=0)
+        (white,) = bootstrap.replicates(trials, fit, np.ones(1), [1.0], COUNT, seed=0)
     return np.sum(white**2, axis=1)
 
 

@@ -124,6 +124,18 @@ def test_a_perfect_track_is_adequate():
     assert 0.7 < found.error["chi2_per_dof"] < 1.5
 
 
+def test_noise_of_another_size_is_said_to_be_that():
+    """White errors 2.1 times what is stated contradict the statement, not the model."""
+    (problem,) = make_trials([HIT], 5).problems
+    seen = problem.observation
+    stated = replace(seen, covariance_m2=seen.covariance_m2 / 2.1**2)
+    trials = JointProblem((replace(problem, observation=stated),))
+    found = compare(trials, fit_near_truth(trials), 0)
+    assert found.is_noise_misstated and found.is_adequate
+    assert found.noise_scale[0] == pytest.approx(2.1, rel=0.2)
+    assert found.error["chi2_per_dof"] > 3
+
+
 def test_a_deviation_is_seen_where_it_is():
     """A millimetre to and fro along the ramp, which no parameter makes."""
     trials = make_trials([HIT])
@@ -134,6 +146,6 @@ def test_a_deviation_is_seen_where_it_is():
     away[0] = 1e-3 * slope[:, None] * bump
     wrong = disturbed(trials, away)
     found = compare(wrong, fit_near_truth(wrong), 0)
-    assert not found.is_adequate
+    assert not found.is_adequate and not found.is_noise_misstated
     assert found.where[0].object == "object1"
     assert found.where[0].phase in ("ramp", "whole")

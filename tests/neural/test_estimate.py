@@ -25,7 +25,9 @@ NOISE_M = 3e-5
 LARGEST_FILE = 4e6  # bytes
 
 
-def trials_of(experiment: Experiment, fps: float = 30.0, frames: int = 90) -> JointProblem:
+def trials_of(
+    experiment: Experiment, fps: float = 30.0, frames: int = 90, **declared: float
+) -> JointProblem:
     times = np.arange(frames) / fps
     exact = solve(experiment, times).position_m
     count = len(exact)
@@ -52,8 +54,10 @@ def trials_of(experiment: Experiment, fps: float = 30.0, frames: int = 90) -> Jo
         ramp_angle_deg=float(np.rad2deg(experiment.angle_rad)),
         objects=objects,
         frame_count=frames,
+        **declared,
     )
-    return make_joint_problem([clip], [observation])
+    # An ideal track, whether or not the yaml has a scale.
+    return make_joint_problem([clip], [observation], noise="bodies")
 
 
 def phi(posterior: Posterior) -> np.ndarray:
@@ -91,6 +95,19 @@ def test_same_seed_same_draws_and_masses_make_the_ratio(x64):
     assert np.array_equal(first.draws, second.draws)
     # Only the ratio shows: each mass alone stays as unknown as before.
     assert np.std(np.log(first["m1"])) > 0.4
+
+
+def test_angle_and_scale_known_within_so_much_widen_the_frictions(x64):
+    exact, _, _ = cnn_posterior(trials_of(HIT), seed=0)
+    sds = {"ramp_angle_sd_deg": 0.5, "pixels_per_metre": 500.0, "pixels_per_metre_sd": 10.0}
+    posterior, _, _ = cnn_posterior(trials_of(HIT, **sds), seed=0)
+    k1, k2 = HIT.friction
+    slope = np.tan(HIT.angle_rad)
+    added = np.hypot((1 + k1 * slope) * np.deg2rad(0.5), (slope - k1) * 0.02)
+    assert posterior["k1"].std() == pytest.approx(np.hypot(exact["k1"].std(), added), rel=0.05)
+    with_angle = np.corrcoef(posterior["k1"].ravel(), posterior["declared_angle"].ravel())[0, 1]
+    assert with_angle > 0.5
+    assert np.corrcoef(posterior["k2"].ravel(), posterior["declared_scale"].ravel())[0, 1] < -0.2
 
 
 def test_what_a_clip_cannot_tell_stays_open(x64):

@@ -107,7 +107,12 @@ def test_label_writes_the_table(tmp_path: Path, capsys) -> None:
     labels = path.parents[4] / "labels.yaml"
     assert capsys.readouterr().out.split() == [str(labels)] * 2
     content = yaml.safe_load(labels.read_text())
-    assert content["clips"]["ramp/20_01"] == {"origin_px": [160.0, 150.0], "pixels_per_metre": 300}
+    assert content["clips"]["ramp/20_01"] == {
+        "origin_px": [160.0, 150.0],
+        "origin_sd_px": 0.5,
+        "pixels_per_metre": 300,
+        "pixels_per_metre_sd": 1.41,
+    }
     trial = content["clips"]["ramp/20_01/c_block_01/03"]
     assert trial["point_px"]["c_block_01"] == [73.1, 108.8]
     clip = load_clip(path)

@@ -68,6 +68,8 @@ def write(trials, clip, status: str, page: Path) -> str:
 def test_tells_the_verdict_and_needs_nothing_from_outside(status, trials, clip, tmp_path):
     page = write(trials, clip, status, tmp_path / "report.html")
     assert SAYS[status] in page and GO_ON in page and "Truth: air_drag" in page
+    assert "<h2" in page and "Why" in page and "the model without effects: p" in page
+    assert "<td>none</td>" in page, "no effect is a hypothesis, too"
     assert ("The missing force" in page) == (status == "unknown")
     assert ("0.99 sin(6 t)" in page) == (status == "unknown")
     assert ("Added: air_drag" in page) == (status in ("named", "ambiguous"))

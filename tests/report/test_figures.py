@@ -82,7 +82,7 @@ def test_a_diagnosis_has_the_errors_of_rounds_and_the_probabilities(trials):
     figure: Any = diagnosis_figure(diagnosis)
     (bars,) = traces(figure, "probability")
     assert list(bars.y) == ["air_drag", "viscous_drag", "release_delay"]
-    assert bars.x == pytest.approx([0.9, 0.09, 1e-4])
+    assert bars.x == pytest.approx([0.9, 0.09, 0.01])
     rounds = [bar for bar in figure.data if bar.type == "bar" and bar is not bars]
     assert [list(bar.x) for bar in rounds] == [["1. no effects"], ["2. air_drag"]]
     assert all(bar.y == pytest.approx([0.02]) for bar in rounds)

@@ -194,11 +194,18 @@ def test_says_why_a_parameter_is_not_told(tmp_path):
 
 @pytest.mark.parametrize(
     ("chi2", "said"),
-    [(0.3, "less noise than the tracker states"), (1.1, "size of the tracking noise"),
-     (2, "see where the model fails"), (50, "do not trust"), (None, "cannot be computed")],
+    [(0.3, "less noise than the tracker states"), (1.1, "size of the stated noise"),
+     (2, "galileo compare says which"), (50, "do not trust"), (None, "cannot be computed")],
 )  # fmt: skip
 def test_chi2_is_put_in_words(chi2, said):
     assert said in fit_quality({"error": {"chi2_per_dof": chi2}})
+
+
+def test_a_misfit_of_a_nuisance_alone_is_put_in_words():
+    pull = {"parameter": "impact_restitution", "value": 0.452, "unit": "1", "z": 5.2}
+    said = fit_quality({"error": {"chi2_per_dof": 1.1}, "pulls": [pull]})
+    assert "The objects bounce, with a restitution of 0.45" in said
+    assert "galileo diagnose" in said
 
 
 def test_numbers_have_the_places_their_uncertainty_allows():

@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity import discrepancy, gaussian_likelihood
-from galileo_jax.similarity.discrepancy import crossing_sd_m, modes
+from galileo_jax.similarity.discrepancy import crossings, modes
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
@@ -42,12 +42,12 @@ def dense(observation, noise_scale):
     size = observation.position_m.size
     index = np.arange(size).reshape(observation.position_m.shape)
     tracker = np.zeros((size, size))
-    extra = crossing_sd_m(observation, SCENE) ** 2
     for i in range(2):
         for t in range(FRAMES):
             at = np.ix_(index[i, :, t], index[i, :, t])
-            tracker[at] = observation.covariance_m2[i, :, :, t] + extra[i, t] * np.eye(2)
-    patterns = modes(observation, SCENE).reshape(-1, size)
+            tracker[at] = observation.covariance_m2[i, :, :, t]
+    patterns = [modes(observation, SCENE), crossings(observation, SCENE)]
+    patterns = np.concatenate(patterns).reshape(-1, size)
     measured = np.broadcast_to(observation.mask[:, None], observation.position_m.shape).reshape(-1)
     pick = np.ix_(measured, measured)
     whole = noise_scale**2 * tracker + patterns.T @ patterns
@@ -130,7 +130,7 @@ def test_differences_with_their_exact_covariance(monkeypatch):
     flat = np.zeros((2, 1, 2, frames))
     flat[0, 0, 0] = flat[1, 0, 1] = 1e3  # metres: as good as free
     monkeypatch.setattr(gaussian_likelihood, "modes", lambda *_, is_filmed: flat)
-    monkeypatch.setattr(gaussian_likelihood, "crossing_sd_m", lambda *_: np.zeros((1, frames)))
+    monkeypatch.setattr(gaussian_likelihood, "crossings", lambda *_: np.zeros((0, 1, 2, frames)))
     data = GaussianLikelihood.prepare(observation, SCENE)
 
     dt = times[1] - times[0]

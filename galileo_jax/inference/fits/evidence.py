@@ -11,12 +11,14 @@ from galileo_jax.inference.fits.residuals import Residuals, Slopes, cost, quadra
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.noise_scale import errors_at
 
 
 class Code(StrEnum):
     """How a fit ended; the value is the sentence for the user."""
 
     CONVERGED = "the fit converged"
+    MISFIT = "the fit converged, but not to within the noise, nor did a second search; try diagnose"
     STEP_LIMIT = "the fit has not settled; try another --seed or --method mh"
     FAILED = "no rollout succeeded; check the clip's geometry"
 
@@ -29,7 +31,7 @@ class GradientFit:
       z: `[parameter]`, the mode, noise scales last; 0 where pinned.
       free: `[parameter]`, which parameters the hypothesis has.
       covariance: `[parameter, parameter]`, in z; 0 where pinned.
-      chi2: sum of squared whitened residuals at the tracker's own noise (scale 1).
+      chi2: sum of the squared tracking errors that are left, in units of the stated noise.
       log_evidence: of the hypothesis, by Laplace, up to the data's constant.
       num_values: how many numbers were measured.
       steps: `[model parameter]`, the difference steps of the final Jacobian, in z.
@@ -37,7 +39,8 @@ class GradientFit:
         values as in `Problem.whiten`; 0 where pinned.
       code: how it ended.
       stats: rollouts and steps it took.
-      pull: how far the nuisances are from what is expected: the sum of their squared `prior_deviations`.
+      pull: how far the nuisances are from what is expected: the sum of the squares of their
+        `prior_deviations`.
       num_pulled: how many numbers' worth of the data the nuisances were fitted with.
     """
 
@@ -110,7 +113,10 @@ def _laplace_fit(
         z=np.append(z, np.log(scale) / NOISE_SD),
         free=free,
         covariance=covariance,
-        chi2=sum(float(np.sum((w * s) ** 2)) for w, s in zip(white, scale, strict=True)),
+        chi2=sum(
+            float(np.sum(errors_at(w[None], s[None], np.ones(1), clip.data.whitening) ** 2))
+            for w, s, clip in zip(white, scale, clips, strict=True)
+        ),
         log_evidence=_log_evidence(z, scale, white, covariance[np.ix_(free, free)], residuals),
         num_values=trials.num_values,
         steps=found.widths[i],

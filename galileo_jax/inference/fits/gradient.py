@@ -4,7 +4,9 @@
     2. Levenberg-Marquardt (`descent.py`) on  [ C^-1/2 (observed - predicted(z)) ; z ],  the prior
        being the second block, for all starts (and, in a diagnosis, all hypotheses) in one batch.
     3. The same with fitted noise scales, until a new round gains nothing (`polish.py`).
-    4. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace (`evidence.py`).
+    4. Where noise does not explain what is left, or the refined starts disagree, a second search,
+       phase by phase (`stages.py`) and from more starts.
+    5. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace (`evidence.py`).
 
 Compiled code (`programs.py`) contains no rollout. JAX can therefore cache it for every engine, and
 all clips share it; clips differ only in the data they pass in. From a single distant starting point
@@ -14,9 +16,10 @@ docs/explanation/optimiser.md.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
 from galileo_jax.inference.fits.evidence import Code as Code
@@ -24,12 +27,22 @@ from galileo_jax.inference.fits.evidence import GradientFit as GradientFit
 from galileo_jax.inference.fits.evidence import laplace_fits
 from galileo_jax.inference.fits.polish import BEHIND as BEHIND
 from galileo_jax.inference.fits.polish import polish
+from galileo_jax.inference.fits.programs import Quadratic
 from galileo_jax.inference.fits.residuals import Batch, Residuals
-from galileo_jax.inference.fits.starts import scattered_starts
-from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.fits.stages import before_moving
+from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
+SAME_VALLEY_NATS = 1.0  # by which ends of a search differ that are of one valley: they stop at 0.1
+LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
+MOST_VALLEYS = 4  # that are polished
+CHANCE = 0.01  # a fit that noise leaves so seldom as bad or worse is searched for once more
+OPEN_SD_Z = 0.5  # of the prior's 1: what a phase leaves so open is scattered in the next one
+# What a fit that has come to rest says of itself, well or ill.
+SETTLED = (Code.CONVERGED, Code.MISFIT)
 
 
 @dataclass(frozen=True)
@@ -39,6 +52,8 @@ class Settings:
     Attributes:
       num_starts: scattered parameter vectors.
       num_refined: of these, how many are refined.
+      num_second_starts: of a second search, as many by phases and as many scattered.
+      num_second_refined: of all these, how many are refined.
       search_sd_m: noise assumed on the way to the fit: a camera that sees hundredths of a
         millimetre makes valleys too narrow to be met by scattered starts.
       max_steps: of Levenberg-Marquardt from one start.
@@ -51,12 +66,44 @@ class Settings:
 
     num_starts: int = 64
     num_refined: int = 4
+    num_second_starts: int = 128
+    num_second_refined: int = 16
     search_sd_m: float = 0.001
     max_polish_steps: int = 80
     max_steps: int = 80
     enough: float = 0.1
     settled: float = 0.05
     settled_if_rough: float = 0.5
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Where a search ended.
+
+    Attributes:
+      best: the best point of every valley that is not far behind, best first.
+      num_agreeing: starts that ended in the first's.
+      num_steps: how many it took.
+    """
+
+    best: Quadratic
+    num_agreeing: int
+    num_steps: int
+
+    @classmethod
+    def of(cls, ends: Quadratic, num_steps: int) -> "Ends":
+        """Sorts ends by valleys: nearness is measured by the slopes of the better one."""
+        left, valleys, num_agreeing = np.argsort(ends.cost), [], 0
+        left = left[ends.cost[left] < ends.cost[left[0]] + BEHIND_IN_SEARCH]
+        while left.size and len(valleys) < MOST_VALLEYS:
+            best = left[0]
+            step = ends.z[left] - ends.z[best]
+            far = 0.5 * np.einsum("pi,ij,pj->p", step, ends.normal[best], step)
+            is_same = np.maximum(far, ends.cost[left] - ends.cost[best]) < SAME_VALLEY_NATS
+            num_agreeing = num_agreeing or int(is_same.sum())
+            valleys.append(best)
+            left = left[~is_same]
+        return cls(Quadratic(*(leaf[valleys] for leaf in ends)), num_agreeing, num_steps)
 
 
 class GradientFitter:
@@ -96,12 +143,21 @@ class GradientFitter:
         effects = self.trials.all_effects if effects is None else effects
         free = self.trials.free(effects)[: self._count]
         on_stage("searching")
-        scattered = scattered_starts(self.trials, free, self.settings.num_starts, seed)
-        starts = self._batch(scattered, free)
-        best = np.argsort(self._residuals.costs(starts))[: self.settings.num_refined]
-        found = self._search(starts.take(best), np.arange(len(best)))
+        starts = scattered_starts(self.trials, free, self.settings.num_starts, seed)
+        ends = self._ends(starts, free, self.settings.num_refined)
         on_stage("refining")
-        return self._best_variant(found.best.z[np.argmin(found.best.cost)], free, found.num_steps)
+        fit = self._best_valley(ends, free)
+        if ends.num_agreeing >= LEAST_AGREEING and self._is_explained(fit):
+            return fit
+        on_stage("searching on")
+        num = self.settings.num_second_starts
+        scattered = scattered_starts(self.trials, free, num, seed + 1)
+        starts = np.concatenate([self._starts_by_phases(free, num, seed), scattered])
+        ends = self._ends(starts, free, self.settings.num_second_refined)
+        fit = max(fit, self._best_valley(ends, free), key=_evidence)
+        if fit.code is Code.CONVERGED and not self._is_explained(fit, NOISE_SCALE_RANGE[1]):
+            fit = replace(fit, code=Code.MISFIT)
+        return fit
 
     def refit(self, fit: GradientFit) -> GradientFit:
         """Fits again from a fit, with its positive nuisances moved: the better of both."""
@@ -136,18 +192,63 @@ class GradientFitter:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
         return self._residuals.costs(self._batch(z, free))
 
+    def _ends(self, starts: np.ndarray, free: np.ndarray, num_refined: int) -> "Ends":
+        """Refines the best of some starts."""
+        points = self._batch(starts, free)
+        best = np.argsort(self._residuals.costs(points))[:num_refined]
+        found = self._search(points.take(best), np.zeros(len(best), int))
+        return Ends.of(found.best, found.num_steps)
+
+    def _starts_by_phases(self, free: np.ndarray, num: int, seed: int) -> np.ndarray:
+        """Starts that suit what was seen before each further object moved, `[start, z]`."""
+        is_main = free & np.array([p.role != "nuisance" for p in self.trials.model_parameters])
+        centres, is_open = absent_z(self.trials)[None], is_main[None]
+        for index in range(1, len(self.trials.problems[0].observation.names)):
+            short = before_moving(self.trials, index)
+            if short is None:
+                continue
+            phase = GradientFitter(short, self.settings)
+            starts = scattered_round(short, centres, is_open, self.settings.num_starts, seed)
+            ends = phase._ends(starts, free, self.settings.num_refined)
+            self._residuals.num_rollouts += phase._residuals.num_rollouts
+            variance = np.diagonal(np.linalg.inv(ends.best.normal), axis1=1, axis2=2)
+            centres, is_open = ends.best.z, is_main & (variance > OPEN_SD_Z**2)
+        return scattered_round(self.trials, centres, is_open, num, seed)
+
+    def _best_valley(self, ends: "Ends", free: np.ndarray) -> GradientFit:
+        """Polishes the best of every valley and variants of the first; the most evident fit."""
+        first, *others = ends.best.z
+        variants = self._variants(first, free)
+        fits = self._polish(self._batch(np.stack([*variants, *others]), free), ends.num_steps)
+        best = int(np.argmax([fit.log_evidence for fit in fits]))
+        if best < len(variants):
+            return fits[best]
+        return self._best_variant(fits[best].z[: self._count], free, ends.num_steps)
+
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
-        """Polishes z and variants of it; the most evident fit.
+        """Polishes z and variants of it; the most evident fit."""
+        variants = np.stack(self._variants(z, free))
+        return max(self._polish(self._batch(variants, free), num_steps), key=_evidence)
+
+    def _variants(self, z: np.ndarray, free: np.ndarray) -> list[np.ndarray]:
+        """z, and it with other values of the positive nuisances.
 
         A small coefficient of restitution decides whether bodies part and meet again, so that
         the misfit has a valley on either side.
         """
         positive = self._is_positive_nuisance & free
-        variants = [z]
-        if positive.any():
-            variants += [np.where(positive, other, z) for other in VARIANTS_Z]
-        fits = self._polish(self._batch(np.stack(variants), free), num_steps)
-        return max(fits, key=lambda fit: fit.log_evidence)
+        if not positive.any():
+            return [z]
+        return [z, *(np.where(positive, other, z) for other in VARIANTS_Z)]
+
+    def _is_explained(self, fit: GradientFit, noise_scale: float = 1.0) -> bool:
+        """Whether noise of that scale leaves as much at least once in 1 / CHANCE times."""
+        degrees = sum(
+            float(GaussianLikelihood.degrees(1.0, clip.data.whitening))
+            for clip in self._residuals.clips
+        )
+        left = fit.chi2 / noise_scale**2
+        return bool(chi2.sf(left, max(degrees - fit.num_used, 1.0)) > CHANCE)
 
     def _batch(self, z: np.ndarray, free: np.ndarray) -> Batch:
         free = np.broadcast_to(free, z.shape)
@@ -167,3 +268,7 @@ class GradientFitter:
         found = polish(self._descent, points, self._settled, self.settings.max_polish_steps)
         stats: dict[str, float] = {"num_steps": num_steps + found.num_steps}
         return laplace_fits(self.trials, self._residuals, found, stats)
+
+
+def _evidence(fit: GradientFit) -> float:
+    return fit.log_evidence

@@ -21,17 +21,50 @@ def scattered_starts(trials: JointProblem, free: np.ndarray, num: int, seed: int
     Returns:
       `[start, model parameter]`, z.
     """
-    parameters = trials.model_parameters
-    scattered = [i for i, p in enumerate(parameters) if p.role != "nuisance" and free[i]]
-    share = qmc.LatinHypercube(len(scattered), rng=np.random.default_rng(seed)).random(num)
-    starts = np.tile(absent_z(trials), (num, 1))
-    angle = trials.problems[0].model.scene.surroundings.angle_rad
-    for i, u in zip(scattered, share.T, strict=True):
-        if parameters[i].name.startswith("k") and parameters[i].role == "main":
-            # Above tan(angle) nothing slides and every start looks alike.
-            u = u * min(np.tan(angle) if parameters[i].name == "k1" else 0.5, 0.98) + 0.01
-        starts[:, i] = ndtri(np.clip(u, 0.01, 0.99))
+    is_scattered = free & np.array([p.role != "nuisance" for p in trials.model_parameters])
+    return scattered_round(trials, absent_z(trials)[None], is_scattered[None], num, seed)
+
+
+def scattered_round(
+    trials: JointProblem, centres: np.ndarray, is_scattered: np.ndarray, num: int, seed: int
+) -> np.ndarray:
+    """Starts round centres in turn, of which some parameters are known and others scattered.
+
+    Args:
+      trials: what is to be fitted.
+      centres: `[centre, model parameter]`, z.
+      is_scattered: `[centre, model parameter]`, those that are not known.
+      num: of starts.
+      seed: the same seed gives the same starts.
+
+    Returns:
+      `[start, model parameter]`, z.
+    """
+    turn = np.arange(num) % len(centres)
+    some = np.flatnonzero(is_scattered.any(axis=0)).tolist()
+    shares = qmc.LatinHypercube(len(some), rng=np.random.default_rng(seed)).random(num)
+    starts = centres[turn].copy()
+    for i, share in zip(some, shares.T, strict=True):
+        column = ndtri(np.clip(_in_range(trials, i, share), 0.01, 0.99))
+        starts[:, i] = np.where(is_scattered[turn, i], column, starts[:, i])
     return starts
+
+
+def _in_range(trials: JointProblem, index: int, share: np.ndarray) -> np.ndarray:
+    """Shares of a parameter's prior, those of friction within what can be told from motion."""
+    parameter = trials.model_parameters[index]
+    if parameter.role != "main" or not parameter.name.startswith("k"):
+        return share
+    scene = trials.problems[0].model.scene.surroundings
+    if parameter.name != "k1":
+        return 0.5 * share**2 + 0.01  # as many between 0.01 and 0.13 as above
+    # Above tan(angle) nothing slides and every start looks alike.
+    steepest = min(float(np.tan(scene.angle_rad)), 0.98)
+    if not (any(scene.rolls) and scene.rolls[0]):
+        return steepest * share + 0.01
+    # Half of them where it slips as it rolls: with more friction it rolls alike.
+    slips = steepest * scene.roll_inertia[0] / (1 + scene.roll_inertia[0])
+    return np.interp(share, [0.0, 0.5, 1.0], [0.0, slips, steepest]) + 0.01
 
 
 def absent_z(trials: JointProblem) -> np.ndarray:

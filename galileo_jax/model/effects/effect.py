@@ -59,7 +59,8 @@ class Bounce(NamedTuple):
     grip: Array
 
 
-FALL_LENGTH = "fall_length"  # in `Surroundings.expected`, of a high fall
+# In `Surroundings.expected`: of a high fall; how well the angle and the origin are known.
+FALL_LENGTH, ANGLE, ORIGIN = "fall_length", "declared_angle", "origin_m"
 
 Force = Callable[[State], PerObject]
 Friction = Callable[[State, PerObject], PerObject]
@@ -83,7 +84,6 @@ _STATIC = (
     "comes_down",
     "is_scale_known",
     "has_surface",
-    "angle_sd_rad",
     "rolls",
     "moves_in_plane",
     "laws",
@@ -113,15 +113,14 @@ class Surroundings:
         deviation.
       is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
       has_surface: whether objects slide on something; not in a fall, in the air, in a liquid.
-      angle_sd_rad: how well the ramp's angle (in the plane: gravity's direction) is known; 0:
-        taken at its word.
       mass_kg: `[object]`, as weighed, None where not; empty: none is.
       rolls: `[object]`, whether it is round and may turn; empty: none does.
       roll_inertia: `[object]`, beta = J / (m r^2) of what rolls; empty: none does.
       moves_in_plane: whether the path is not given, but bends with the motion.
       laws: names of the laws that are always there (`effects/laws/`).
-      expected: what a look at the clip suggests of the laws' parameters, by name: the two
-        numbers of a prior that is wide against what the fit will tell.
+      expected: by name the two numbers of a prior: of the laws' parameters what a look at the
+        clip suggests, wide against what the fit will tell; of the angle, scale and origin how
+        well they are declared, where not taken at their word.
     """
 
     names: tuple[str, ...]
@@ -137,7 +136,6 @@ class Surroundings:
     release_s: tuple[float, float] = (0.0, 0.01)
     is_scale_known: bool = True
     has_surface: bool = True
-    angle_sd_rad: float = 0.0
     mass_kg: tuple[float | None, ...] = ()
     rolls: tuple[bool, ...] = ()
     roll_inertia: tuple[float, ...] = ()
@@ -149,6 +147,11 @@ class Surroundings:
     def starts_moving(self) -> bool:
         """Whether nothing is let go: the object moves when it is first seen."""
         return "start_velocity" in self.laws
+
+    @property
+    def angle_sd_rad(self) -> float:
+        """How well the ramp's angle (in the plane: gravity's direction) is known; 0: exactly."""
+        return self.expected.get(ANGLE, (0.0, 0.0))[1]
 
     def tree_flatten_with_keys(self):
         """Splits into traced numbers and static facts."""

@@ -1,8 +1,9 @@
-"""Rough estimates from the track of a scenario's parameters: centre and width of their priors.
+"""Centre and width of the priors that differ from clip to clip.
 
-The widths are many times larger than the uncertainty of the fit. They are needed because a search
-must start near the answer: with a period that is wrong by half, the misfit of an oscillation does
-not point towards the right one.
+Of a scenario's parameters they are rough estimates from the track, many times wider than the
+uncertainty of the fit. They are needed because a search must start near the answer: with a period
+that is wrong by half, the misfit of an oscillation does not point towards the right one. Of the
+declared angle, scale and origin they are how well the yaml says that these are known.
 """
 
 import math
@@ -13,9 +14,11 @@ import numpy as np
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.model.effects.air import expected_drags
-from galileo_jax.model.effects.effect import FALL_LENGTH
+from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN
+from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
+from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
-from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 
 START_FRAMES = 6  # the start's velocity is read off so many
 START_SD_M_S = 1.0
@@ -32,12 +35,10 @@ UNKNOWN_M_S, UNKNOWN_M = 10.0, 3.0  # widths where nobody knows how long a metre
 def expected(
     clip: Clip, observation: Observation, half_height_m: float
 ) -> Mapping[str, tuple[float, float]]:
-    """The two numbers of each prior, by the parameter's name; of every law that might ask.
-
-    Empty where the objects slide on a ramp.
-    """
+    """The two numbers of each prior, by the parameter's name; of every law that might ask."""
+    declared = _declared(clip)
     if SCENARIOS[clip.scenario].has_ramp:
-        return {}
+        return declared
     seen = np.flatnonzero(observation.mask[0])
     times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
     down_m = place_m[1, 0] - place_m[1]
@@ -57,8 +58,22 @@ def expected(
         "period": (_period_s(times_s, down_m), PERIOD_SD),
         "density_ratio": _density_ratio(clip),
         "floor_height": _floor_height(clip, place_m[1], half_height_m),
+        **declared,
         **(_high_fall(clip, float(down_m.max())) if clip.scenario == "fall" and known else {}),
     }
+
+
+def _declared(clip: Clip) -> dict[str, tuple[float, float]]:
+    """How well angle, scale and origin are known; nothing of what is taken at its word."""
+    in_plane = SCENARIOS[clip.scenario].moves_in_plane
+    angle_sd_deg = clip.vertical_sd_deg if in_plane else clip.ramp_angle_sd_deg
+    scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
+    sds = {
+        DeclaredAngle.name: math.radians(angle_sd_deg),
+        DeclaredScale.name: clip.pixels_per_metre_sd / scale,
+        ORIGIN: clip.origin_sd_px / scale,
+    }
+    return {name: (0.0, sd) for name, sd in sds.items() if sd}
 
 
 def _high_fall(clip: Clip, length_m: float) -> dict[str, tuple[float, float]]:

@@ -100,7 +100,6 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
     """
     scenario = SCENARIOS[clip.scenario]
     has_surface, has_table = scenario.has_ramp, scenario.has_table
-    angle_sd_deg = clip.vertical_sd_deg if scenario.moves_in_plane else clip.ramp_angle_sd_deg
     if has_surface:
         assert clip.ramp_angle_deg is not None  # the clip's own validation
         angle = math.radians(clip.ramp_angle_deg)
@@ -140,7 +139,6 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.is_scale_known,
         has_surface=has_surface,
-        angle_sd_rad=math.radians(angle_sd_deg),
         mass_kg=tuple(declared.mass_kg for declared in clip.objects),
         **(rolling(clip.objects) if has_surface else {}),
         moves_in_plane=scenario.moves_in_plane,

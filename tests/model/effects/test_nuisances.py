@@ -8,6 +8,7 @@ import pytest
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.nuisances import NUISANCES
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
+from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.pixel_scale import PixelScale
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
@@ -99,8 +100,29 @@ def test_pixel_scale_only_where_it_is_unknown():
     assert twice[0] - start == pytest.approx(2 * (position[0] - start))
 
 
+@pytest.mark.parametrize("scene", [RAMP, INCLINE], ids=["ramp", "incline"])
+def test_a_declared_scale_that_is_off_lengthens_what_is_measured(scene):
+    doubted = replace(scene, expected={"declared_scale": (0.0, 0.004)})
+    scale, theta = DeclaredScale(), {"declared_scale": np.array([0.01])}
+    assert scale.parameters(scene) == ()
+    (parameter,) = scale.parameters(doubted)
+    assert (parameter.role, parameter.prior.encode()) == ("nuisance", (0, 0.0, 0.004))
+    count = len(scene.names)
+    begun = np.full((1, count), -0.202)
+    assert scale.start(begun, theta, doubted) == pytest.approx(begun / 1.01)
+    moved = np.zeros((count, 2, 2))
+    moved[:, 0] = [0.1, 0.3]
+    seen = scale.measure(moved, {"declared_scale": 0.01}, doubted)
+    assert np.diff(seen[:, 0]) == pytest.approx(0.202)
+
+
+def test_an_origin_that_is_hardly_known_widens_the_starts():
+    parameters = StartOffset().parameters(replace(RAMP, expected={"origin_m": (0.0, 0.004)}))
+    assert [parameter.prior.encode() for parameter in parameters] == [(0, 0.0, 0.005)] * 2
+
+
 def test_an_angle_that_is_known_within_tenths_may_be_steeper():
-    known, doubted = DeclaredAngle(), replace(INCLINE, angle_sd_rad=0.005)
+    known, doubted = DeclaredAngle(), replace(INCLINE, expected={"declared_angle": (0.0, 0.005)})
     assert known.parameters(INCLINE) == ()
     (parameter,) = known.parameters(doubted)
     assert (parameter.role, parameter.prior.encode()) == ("nuisance", (0, 0.0, 0.005))

@@ -1,12 +1,9 @@
 """Scale error: pixels_per_metre is not what was declared.
 
-    measured = true (1 + s)    about the foot (on an incline without one: about the start)
+    measured = true (1 + s)    (`effects/scaled.py`)
 
 Starts were read from the measured track, so that the true ones are start / (1 + s); sizes
 were measured with a ruler and stay.
-
-Source: Hartley and Zisserman, Multiple View Geometry (2004), chapter 6 (a camera square to
-a plane scales it).
 Confused with: frame_rate (both act like another gravity, g (1 + s) against g (1 + r)^2);
 rolling; on one slope k1 and ramp_angle.
 """
@@ -15,6 +12,7 @@ from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.effects.registry import register
+from galileo_jax.model.effects.scaled import scaled, unscaled
 from galileo_jax.model.parameters import Normal, Parameter
 
 PRIOR = Normal(0.0, 0.07)
@@ -36,14 +34,10 @@ class ScaleError(Effect):
         """The true starts."""
         if not self.parameters(scene):
             return path_m
-        return path_m / (1.0 + theta["scale_error"][..., None])
+        return unscaled(path_m, theta["scale_error"])
 
     def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The centres as the declared scale shows them."""
         if not self.parameters(scene):
             return position_m
-        error = theta["scale_error"]
-        if scene.has_table:
-            return position_m + error * position_m
-        origin = position_m.__array_namespace__().asarray(scene.start_m[0])[:, None]
-        return position_m + error * (position_m - origin)
+        return scaled(position_m, theta["scale_error"], scene)

@@ -7,6 +7,7 @@ They are effects like any other; only their parameters' role differs
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.nuisances.contact_gap import ContactGap
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
+from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.model.effects.nuisances.perspective import Perspective
@@ -18,6 +19,7 @@ NUISANCES: tuple[Effect, ...] = (
     StartOffset(),
     FootTransition(),
     DeclaredAngle(),
+    DeclaredScale(),
     ImpactRestitution(),
     ContactGap(),
     ReleaseInstant(),

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.effect import ANGLE, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
 
@@ -14,18 +14,18 @@ class DeclaredAngle(Effect):
     picture's vertical (`vertical_sd_deg`).
     """
 
-    name: ClassVar[str] = "declared_angle"
+    name: ClassVar[str] = ANGLE
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much steeper, rad; none where the angle is taken at its word."""
-        if not scene.angle_sd_rad:
+        if self.name not in scene.expected:
             return ()
-        prior = Normal(0.0, scene.angle_sd_rad)
-        return (Parameter("declared_angle", "rad", prior, 0.0, "nuisance", 0.1),)
+        prior = Normal(*scene.expected[self.name])
+        return (Parameter(self.name, "rad", prior, 0.0, "nuisance", 0.1),)
 
     def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
         """Of the ramp alone."""
-        if not scene.angle_sd_rad:
+        if self.name not in scene.expected:
             return None
-        steeper = theta["declared_angle"]
+        steeper = theta[self.name]
         return steeper, 0.0 * steeper

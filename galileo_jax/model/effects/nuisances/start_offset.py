@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.effect import ORIGIN, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
 SD_M = 0.003  # a point set by hand, sizes told to a millimetre
@@ -11,7 +11,8 @@ SD_M = 0.003  # a point set by hand, sizes told to a millimetre
 class StartOffset(Effect):
     """Moves each start along the object's path, downhill positive.
 
-    For object 1 it is the distance to the foot, for the others the gap before they are hit.
+    For object 1 it is the distance to the foot, for the others the gap before they are hit. A
+    foot that is known no better than `origin_sd_px` shifts all of them.
     """
 
     name: ClassVar[str] = "start_offset"
@@ -20,8 +21,10 @@ class StartOffset(Effect):
         """One per object, m."""
         if not scene.has_table:
             return ()
+        _, origin_sd_m = scene.expected.get(ORIGIN, (0.0, 0.0))
+        sd_m = (SD_M**2 + origin_sd_m**2) ** 0.5
         return tuple(
-            Parameter(f"start_offset_{name}", "m", Normal(0.0, SD_M), 0.0, "nuisance", 0.15)
+            Parameter(f"start_offset_{name}", "m", Normal(0.0, sd_m), 0.0, "nuisance", 0.15)
             for name in scene.names
         )
 

@@ -1,0 +1,109 @@
+"""What a fit has to say about the tracks and marks it rests on: in its status and warnings."""
+
+import math
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.clip.declaration import CLICK_SD_PX
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.measurement.astray import longest_absence
+from galileo_jax.measurement.measure import Measurement
+
+FAR = 1000.0
+"""chi2 per degree of freedom: residuals of thirty standard deviations on average. Few effects
+leave as much; a track of something else does."""
+
+UNCERTAINTY_OF = {
+    "ramp_angle_deg": "ramp_angle_sd_deg",
+    "pixels_per_metre": "pixels_per_metre_sd",
+}
+
+
+def with_track_doubts(
+    measurements: Sequence[Measurement], result: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The result with its status and warnings saying so where the tracks cannot be trusted."""
+    lost = [str(one) for measured in measurements for one in measured.astray]
+    chi2 = result["error"]["chi2_per_dof"]
+    is_far = not chi2 <= FAR
+    if not lost and not is_far:
+        return dict(result)
+    found = dict(result)
+    told = lost or [f"no motion of this model comes near the track (chi2 {chi2:.0f})"]
+    found["status"] = "; but ".join([*filter(None, [result.get("status")]), ", ".join(told)])
+    if is_far and not lost:
+        found["warnings"] = [*result.get("warnings", []), _far(measurements, chi2)]
+    return found
+
+
+def _far(measurements: Sequence[Measurement], chi2: float) -> str:
+    """What to look at where chi2 is in the thousands and no track is seen to go astray."""
+    text = (
+        f"chi2 per degree of freedom is {chi2:.0f}: before you believe that a force is missing, "
+        "see whether the objects are what is tracked"
+    )
+    absences = [
+        (back - gone, name, back)
+        for name, gone, back in filter(None, (longest_absence(m.observation) for m in measurements))
+    ]
+    if absences:
+        away_s, name, back = max(absences)
+        text += f", {name} from {back:.2f} s on above all: it was not seen for {away_s:.2f} s"
+    videos = [m.clip.source or str(m.clip.path) for m in measurements if m.clip.video is not None]
+    if videos:
+        text += "; the overlay shows it: galileo track " + shlex.quote(videos[0])
+    return text
+
+
+def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
+    """Which marks in a video's pixels the fit takes as exact, and how much hangs on them.
+
+    A line that is read off with an error e at either end, half a pixel, and is as long as the
+    way L of object 1 down the ramp has its angle off by sqrt(2) e / L and its length by as much
+    of itself. On the ramp k1 = tan a - acceleration / (g cos a), so that
+
+        dk1 = (1 + k1 tan a) da,    dk1 = (tan a - k1) dscale / scale.
+
+    Args:
+      measured: the clip.
+      k1: the friction found; None where there is none.
+
+    Returns:
+      One line; None of tracks, and where all is declared with its uncertainty.
+    """
+    clip, scenario = measured.clip, SCENARIOS[measured.clip.scenario]
+    if clip.video is None:
+        return None
+    exact = []
+    if scenario.has_ramp and not clip.ramp_angle_sd_deg:
+        exact.append("ramp_angle_deg")
+    if clip.pixels_per_metre is not None and not clip.pixels_per_metre_sd:
+        exact.append("pixels_per_metre")
+    if not exact:
+        return None
+    text = f"{clip.path}: {' and '.join(exact)} taken as exact"
+    way_px = _way_px(measured)
+    if k1 is None or clip.ramp_angle_deg is None or way_px < 1:
+        return text
+    slope, off = math.tan(math.radians(clip.ramp_angle_deg)), math.sqrt(2) * CLICK_SD_PX / way_px
+    change = {"ramp_angle_deg": (1 + k1 * slope) * off, "pixels_per_metre": (slope - k1) * off}
+    by = " and ".join(f"{abs(change[key]):.2g}" for key in exact)
+    keys = " and ".join(UNCERTAINTY_OF[key] for key in exact)
+    return (
+        f"{text}; half a pixel at either end of a line as long as object 1's way down the ramp "
+        f"({way_px:.0f} px) changes k1 by {by}: declare {keys} to have that in its interval"
+    )
+
+
+def _way_px(measured: Measurement) -> float:
+    """How far object 1 is seen to go on the ramp, px."""
+    seen = measured.observation
+    place = seen.position_m[0][:, seen.mask[0]]
+    if SCENARIOS[measured.clip.scenario].has_table:
+        place = place[:, place[0] < 0]
+    if not place.size:
+        return 0.0
+    return float(np.hypot(*np.ptp(place, axis=1))) * (measured.clip.pixels_per_metre or 0.0)

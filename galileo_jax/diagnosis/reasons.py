@@ -1,0 +1,230 @@
+"""The sentences that say why a verdict is what it is: one for each rule that fired."""
+
+from collections.abc import Sequence
+from math import exp, log
+
+from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
+from galileo_jax.diagnosis.diagnosis import Candidate, Reason
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
+
+SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
+PLAIN_ODDS = 1000.0  # larger odds are told as a power of ten
+
+
+def p_text(p: float | None) -> str:
+    """A p-value without places that mean nothing."""
+    if p is None:
+        return ""
+    return f"< {SMALLEST_P:.0e}" if p < SMALLEST_P else f"{p:.2g}"
+
+
+def p_equals(p: float) -> str:
+    """The same with its name."""
+    return f"p {p_text(p)}" if p < SMALLEST_P else f"p = {p_text(p)}"
+
+
+def times_text(nats: float) -> str:
+    """How many times as probable: '20 times', '10^31 times'."""
+    if nats < log(PLAIN_ODDS):
+        return f"{exp(nats):.2g} times"
+    return f"10^{nats / log(10):.0f} times"
+
+
+def without_effects(comparison: Comparison) -> tuple[Reason, ...]:
+    """Whether the data contradict the model without effects, and if not, the size of the noise.
+
+    Args:
+      comparison: of the model without effects; its p-value is that with noise of the size that
+        is there.
+    """
+    p_value, is_adequate = comparison.p_value, comparison.is_adequate
+    said = "do not contradict" if is_adequate else "contradict"
+    found = Reason(
+        "adequate_without_effects" if is_adequate else "contradicted_without_effects",
+        f"The data {said} the model without effects: {p_equals(p_value)}, "
+        f"and {ADEQUATE_P:g} is needed.",
+        {"p_value": p_value, "least_p_value": ADEQUATE_P},
+    )
+    scales, (low, high) = comparison.noise_scale, NOISE_SCALE_RANGE
+    is_misstated = is_adequate and not low <= min(scales) <= max(scales) <= high
+    return (noise_misstated(scales), found) if is_misstated else (found,)
+
+
+def noise_misstated(noise_scale: Sequence[float]) -> Reason:
+    """The errors look like noise, but not of the size that was stated.
+
+    Args:
+      noise_scale: of each clip, the errors' size over what is stated.
+    """
+    low, high = min(noise_scale), max(noise_scale)
+    times = f"{high:.2g}" if f"{low:.2g}" == f"{high:.2g}" else f"{low:.2g} to {high:.2g}"
+    return Reason(
+        "noise_misstated",
+        f"The errors of the positions look like noise {times} times as large as was stated.",
+        {"noise_scale_least": low, "noise_scale_largest": high},
+    )
+
+
+def nothing_convinces(best: Candidate, needed: float) -> Reason:
+    """Where the model without effects will do, the best effect does not convince."""
+    return Reason(
+        "nothing_convinces",
+        f"The best effect, {best.name}, is {times_text(best.log_odds)} as probable as none; "
+        f"{times_text(needed)} are needed where the model without effects will do.",
+        {"hypothesis": best.name, "log_odds": best.log_odds, "least_log_odds": needed},
+    )
+
+
+def pairs_tried(single: Candidate, form: Candidate | None, count: int) -> Reason:
+    """Why pairs were tried.
+
+    Args:
+      single: the best effect alone.
+      form: a form that explains the data better than it; None if there is none.
+      count: how many pairs.
+    """
+    said = (
+        f"The best single effect, {single.name}, leaves {p_equals(single.p_value or 0.0)}"
+        if form is None
+        else f"{form.name} explains the data better than any single effect"
+    )
+    return Reason(
+        "pairs_tried",
+        f"{said}: {count} pairs of effects were tried.",
+        {"hypothesis": single.name, "p_value": single.p_value, "num_pairs": count},
+    )
+
+
+def explains(best: Candidate) -> Reason:
+    """The best hypothesis of those that leave only noise."""
+    return Reason(
+        "explains",
+        f"With {best.name} only noise is left: {p_equals(best.p_value or 0.0)}; "
+        f"it is {times_text(best.log_odds)} as probable as no effect.",
+        {"hypothesis": best.name, "p_value": best.p_value, "log_odds": best.log_odds},
+    )
+
+
+def nothing_explains(best: Candidate) -> Reason:
+    """No hypothesis leaves only noise."""
+    p_value = best.p_value or 0.0
+    return Reason(
+        "nothing_explains",
+        f"No effect, pair or form leaves only noise: the most probable, {best.name}, leaves "
+        f"{p_equals(p_value)}, and {ADEQUATE_P:g} is needed.",
+        {"hypothesis": best.name, "p_value": p_value, "least_p_value": ADEQUATE_P},
+    )
+
+
+def less_probable_than_none(best: Candidate) -> Reason:
+    """What explains the data is less probable than no effect at all."""
+    return Reason(
+        "less_probable_than_none",
+        f"{best.name} is less probable than no effect: luck would do as well.",
+        {"hypothesis": best.name, "log_odds": best.log_odds},
+    )
+
+
+def better_but_contradicted(better: Candidate, best: Candidate) -> Reason:
+    """A hypothesis that the data contradict is far more probable than the best that explains."""
+    ahead = better.log_odds - best.log_odds
+    return Reason(
+        "better_but_contradicted",
+        f"{better.name} is {times_text(ahead)} as probable as {best.name}, yet leaves "
+        f"{p_equals(better.p_value or 0.0)}: neither is the truth.",
+        {
+            "hypothesis": best.name,
+            "rival": better.name,
+            "log_odds_behind": ahead,
+            "p_value": better.p_value,
+        },
+    )
+
+
+def only_a_form(form: Candidate, name: Candidate | None) -> Reason:
+    """A form without a name explains the data, and no name does as well.
+
+    Args:
+      form: the best.
+      name: the best hypothesis with a name that explains the data; None if there is none.
+    """
+    if name is None:
+        return Reason(
+            "only_a_form",
+            f"Only {form.name}, a form without a name, leaves nothing but noise.",
+            {"hypothesis": form.name, "p_value": form.p_value},
+        )
+    ahead = form.log_odds - name.log_odds
+    return Reason(
+        "only_a_form",
+        f"{form.name}, a form without a name, is {times_text(ahead)} as probable as {name.name}, "
+        "the best with a name.",
+        {"hypothesis": form.name, "rival": name.name, "log_odds_behind": ahead},
+    )
+
+
+def contested(best: Candidate, rival: Candidate, needed: float) -> Reason:
+    """A rival explains the data about as well."""
+    behind = best.log_odds - rival.log_odds
+    first, second = (best, rival) if behind >= 0 else (rival, best)
+    return Reason(
+        "contested",
+        f"{rival.name} explains the data, too: {first.name} is {times_text(abs(behind))} as "
+        f"probable as {second.name}, and only {times_text(needed)} would decide.",
+        {
+            "hypothesis": best.name,
+            "rival": rival.name,
+            "log_odds_behind": behind,
+            "least_log_odds": needed,
+        },
+    )
+
+
+def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) -> Reason:
+    """Nothing else comes near the best.
+
+    Args:
+      best: the hypothesis that is named.
+      candidates: all, ranked.
+      needed: nats by which the next must be behind.
+    """
+    others = [c for c in candidates if c.effects != best.effects]
+    if not others:
+        return Reason("no_rival", f"Nothing but {best.name} could be tried.", {})
+    behind = best.log_odds - others[0].log_odds
+    return Reason(
+        "decisive",
+        f"{best.name} is {times_text(behind)} as probable as the next, {others[0].name} "
+        f"({times_text(needed)} are needed).",
+        {
+            "hypothesis": best.name,
+            "rival": others[0].name,
+            "log_odds_behind": behind,
+            "least_log_odds": needed,
+        },
+    )
+
+
+def told_apart(best: Candidate, rival: Candidate, expected: float, needed: float) -> Reason:
+    """Whether a clip like this one would tell the rival from the hypothesis that is named.
+
+    Args:
+      best: the hypothesis that would be named.
+      rival: another that could be confused with it.
+      expected: nats by which the rival is behind in a clip like this one, on average.
+      needed: nats by which it must be.
+    """
+    is_told = expected >= needed
+    return Reason(
+        "told_apart" if is_told else "not_told_apart",
+        f"If {best.name} is there, a clip like this one makes it {times_text(expected)} as "
+        f"probable as {rival.name}: "
+        + ("enough to tell them apart." if is_told else f"{times_text(needed)} are needed."),
+        {
+            "hypothesis": best.name,
+            "rival": rival.name,
+            "log_odds_behind": best.log_odds - rival.log_odds,
+            "log_odds_expected": expected,
+            "least_log_odds": needed,
+        },
+    )

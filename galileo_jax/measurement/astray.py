@@ -1,0 +1,143 @@
+"""Tracks gone astray: where what is tracked is not, or hardly, the object that was marked.
+
+The tracker drops what does not look like its object (correlation below 0.7), and may go on with
+something that does. So there are two signs, looked for in every object's track:
+
+    leapt   it changes its speed as only a blow could, where nothing is to be hit
+    lost    it is not found any more, though it did not leave the picture
+
+Something that looks the same, and where the object might well be after a time out of sight, only
+the fit tells from it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.observation.observation import Observation
+from galileo_jax.tracking.track import Track
+
+FEWEST_FRAMES = 3
+"""In which a change of speed can be seen."""
+BLOW_M_S2 = 15.0
+"""Half as much again as g: what slides is braked and drawn by less than g."""
+CLEAR = 5.0
+"""Standard deviations of a change of speed that are no noise."""
+NEAR = 1.5
+"""Objects whose centres are within this share of their mean size may hit each other; what is
+within this share of its size from the foot turns there."""
+UNKNOWN_M = 0.06
+"""The size of an object that nobody measured."""
+LOST_FRAMES = 10
+"""An object that is hidden for less is not lost."""
+
+
+@dataclass(frozen=True)
+class Astray:
+    """From when on an object's track is not to be believed, and why."""
+
+    name: str
+    time_s: float
+    why: str
+
+    def __str__(self) -> str:
+        """Object and time: 'object1 is lost from 0.63 s on'."""
+        return f"{self.name} is lost from {self.time_s:.2f} s on"
+
+
+def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Astray, ...]:
+    """The objects whose tracks are not to be believed to their ends.
+
+    Args:
+      clip: without a scale leaps are not told.
+      observation: the track in metres, as far as it is used.
+      track: in pixels, to the clip's end.
+    """
+    found = []
+    for i, name in enumerate(track.names):
+        seen = np.flatnonzero(observation.mask[i])
+        if len(seen) < FEWEST_FRAMES:
+            continue
+        last = int(seen[-1])
+        if (frame := _leapt(clip, observation, i, seen)) is not None:
+            why = "what is tracked there moves as nothing can that hits nothing: something else"
+        elif _is_lost(track, i, last):
+            frame, why = last + 1, "nothing there looks like it; what follows is left out"
+        else:
+            continue
+        found.append(Astray(name, float(observation.times_s[frame]), why))
+    return tuple(found)
+
+
+def longest_absence(observation: Observation) -> tuple[str, float, float] | None:
+    """Which object is away for longest before it comes back, and from when to when, s.
+
+    None where none is away for more than a few frames.
+    """
+    found = None
+    for name, mask in zip(observation.names, observation.mask, strict=True):
+        seen = np.flatnonzero(mask)
+        gaps = np.diff(seen)
+        if gaps.size and gaps.max() > max(LOST_FRAMES, found[0] if found else 0):
+            at = int(np.argmax(gaps))
+            found = (gaps[at], name, seen[at] + 1, seen[at + 1])
+    if found is None:
+        return None
+    _, name, gone, back = found
+    return name, float(observation.times_s[gone]), float(observation.times_s[back])
+
+
+def _leapt(clip: Clip, observation: Observation, i: int, seen: np.ndarray) -> int | None:
+    """The first frame in which object `i` is where only a blow could have taken it; or None.
+
+    Once it has gone half its size: until then a hand may be at it.
+    """
+    if not SCENARIOS[clip.scenario].has_ramp or not clip.is_scale_known:
+        return None
+    place = observation.position_m[i][:, seen]
+    step_s = np.diff(observation.times_s[seen])
+    velocity = np.diff(place) / step_s
+    jump = np.hypot(*np.diff(velocity))
+    variance = np.einsum("iit->t", observation.covariance_m2[i][..., seen]) / 2
+    step_variance = (variance[1:] + variance[:-1]) / step_s**2
+    sd = np.sqrt(step_variance[1:] + step_variance[:-1])
+    most = BLOW_M_S2 * (step_s[1:] + step_s[:-1]) / 2 + CLEAR * sd
+    gone = np.hypot(*(place[:, 1:-1] - place[:, :1])) > _size_m(clip.objects[i]) / 2
+    for at in np.flatnonzero((jump > most) & gone):
+        reach = np.hypot(*velocity[:, at]) * (step_s[at] + step_s[at + 1])
+        if not _may_be_hit(clip, observation, i, int(seen[at + 1]), float(reach)):
+            return int(seen[at + 2])
+    return None
+
+
+def _may_be_hit(clip: Clip, observation: Observation, i: int, frame: int, reach_m: float) -> bool:
+    """Whether object `i` is near another, one that is not seen there, or the ramp's foot."""
+    sizes = [_size_m(item) for item in clip.objects]
+    place = observation.position_m[i, :, frame]
+    if SCENARIOS[clip.scenario].has_table and abs(place[0]) < NEAR * sizes[i] + reach_m:
+        return True
+    for other, size in enumerate(sizes):
+        if other != i:
+            apart = np.hypot(*(observation.position_m[other, :, frame] - place))
+            if not apart > NEAR * (size + sizes[i]) / 2 + reach_m:
+                return True
+    return False
+
+
+def _size_m(declared: ClipObject) -> float:
+    """The largest of its declared lengths; a radius counts twice."""
+    if declared.size_m is None:
+        return UNKNOWN_M
+    return max(declared.size_m) * (1 if declared.shape == "box" else 2)
+
+
+def _is_lost(track: Track, i: int, last: int) -> bool:
+    """Whether object `i`, last seen in frame `last`, should be in the picture after that."""
+    after = len(track.times_s) - 1 - last
+    if after < LOST_FRAMES or track.is_visible[i, last + 1 :].any():
+        return False
+    step = np.nan_to_num(track.position_px[i, last] - track.position_px[i, last - 1])
+    goes_to = track.position_px[i, last] + LOST_FRAMES * step
+    return bool(((goes_to >= 0) & (goes_to < track.frame_size_px)).all())

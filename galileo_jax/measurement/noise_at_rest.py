@@ -1,0 +1,59 @@
+"""States the noise of objects at rest by their own scatter.
+
+Sampling and coding shift what moves from frame to frame; what stands still they shift once. The
+tracker states both alike, so that a fit of one noise scale would take the quiet frames for a reason
+to trust the moving ones too much.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool
+from scipy import stats
+
+from galileo_jax.observation.observation import Observation
+
+WINDOW = 9  # frames
+STILL_SDS = 5.0  # of the stated noise: whoever goes no further in a window is at rest in it
+MIN_WINDOWS = 20  # fewer do not tell a variance
+LEAST_SCALE = 0.3  # a coder repeats what stands still: less scatter than that is no less noise
+
+
+def with_noise_at_rest(observation: Observation) -> Observation:
+    """The observation, its covariance lowered where objects are at rest.
+
+    Args:
+      observation: of a video that was tracked, with the tracker's stated covariance.
+    """
+    is_still, squares = np.zeros_like(observation.mask), []
+    for i, mask in enumerate(observation.mask):
+        if len(mask) < WINDOW:
+            return observation
+        variance = np.diagonal(observation.covariance_m2[i]).T
+        place = _windows(observation.position_m[i])
+        white = (place - place.mean(axis=-1, keepdims=True)) / np.sqrt(_windows(variance))
+        seen, away = _windows(mask).all(axis=-1), np.abs(white).max(axis=(0, 2))
+        still = seen & (np.nan_to_num(away, nan=np.inf) < STILL_SDS)
+        is_still[i] = _covered(still, len(mask))
+        squares.append(np.sum(white[:, still] ** 2, axis=-1).reshape(-1))
+    found = np.concatenate(squares)
+    if len(found) < MIN_WINDOWS:
+        return observation
+    # The median: a window that holds the begin of a motion does not count.
+    share = float(np.median(found) / stats.chi2.median(WINDOW - 1))
+    scale2 = np.where(is_still, np.clip(share, LEAST_SCALE**2, 1.0), 1.0)
+    covariance = observation.covariance_m2 * scale2[:, None, None]
+    return replace(observation, covariance_m2=covariance)
+
+
+def _windows(values: np.ndarray) -> np.ndarray:
+    """`[..., frame]` to `[..., window, WINDOW]`."""
+    return np.lib.stride_tricks.sliding_window_view(values, WINDOW, axis=-1)
+
+
+def _covered(windows: Bool[np.ndarray, " window"], frames: int) -> Bool[np.ndarray, " frame"]:
+    """Frames that lie in one of these windows."""
+    found = np.zeros(frames, bool)
+    for shift in range(WINDOW):
+        found[shift : shift + len(windows)] |= windows
+    return found
