@@ -100,7 +100,11 @@ def test_same_seed_same_draws_and_masses_make_the_ratio(x64):
 
 def test_angle_and_scale_known_within_so_much_widen_the_frictions(x64):
     exact, _, _ = cnn_posterior(trials_of(HIT), seed=0)
-    sds: dict[str, Any] = {"ramp_angle_sd_deg": 0.5, "pixels_per_metre": 500.0, "pixels_per_metre_sd": 10.0}
+    sds: dict[str, Any] = {
+        "ramp_angle_sd_deg": 0.5,
+        "pixels_per_metre": 500.0,
+        "pixels_per_metre_sd": 10.0,
+    }
     posterior, _, _ = cnn_posterior(trials_of(HIT, **sds), seed=0)
     k1, _ = HIT.friction
     slope = np.tan(HIT.angle_rad)
