@@ -127,7 +127,9 @@ def test_nothing_moves_above_the_friction_angle(angle_deg, share):
 def test_derivatives_are_those_of_the_motion():
     """Every parameter's, effects' too, against central differences of plain rollouts."""
     model = replace(make_model(HIT, 1.2), effects=(Drag(), Stribeck()))
-    theta = make_theta(model, HIT, {"impact_restitution": 0.05, "contact_gap": 3e-4, "drag": 0.05, "stribeck": 0.3})
+    theta = make_theta(
+        model, HIT, {"impact_restitution": 0.05, "contact_gap": 3e-4, "drag": 0.05, "stribeck": 0.3}
+    )
     z = inverse(model.parameters, jnp.asarray(theta))
     engine = EngineRigid(model)
     # No frame within the steps' reach of the foot or the hit, where a difference sees both
