@@ -51,7 +51,7 @@ OUTSIDE = (  # what nuisances mean that are far from what is usual
     (re.compile(r"foot_transition"), "the foot of the ramp multiplies the speed by {value:.3f}"),
     (
         re.compile(r"release_instant(?:_\d+)?"),
-        "object 1 is let go {ms:.0f} ms after the first frame",
+        "object 1 is let go {ms:+.0f} ms from the first frame",
     ),
     (
         re.compile(r"start_offset_object(\d+)(?:_\d+)?"),

@@ -106,10 +106,7 @@ def test_a_comparison_opens_in_a_browser(trials, clip, tmp_path, browser):
         document = page.content()
     assert complaints == []
     assert "The model is not adequate" in document
-    assert (
-        "release_instant is at -0.05 s, 4.9 prior standard deviations from its prior mean"
-        in document
-    )
+    assert "Object 1 is let go -50 ms from the first frame, 5 standard deviations" in document
     assert "foot_transition" not in document, "inside its prior"
 
 
