@@ -7,6 +7,7 @@ from functools import cached_property
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.model import Model
@@ -54,7 +55,7 @@ class Problem:
         scene = self.model.scene.surroundings
         return GaussianLikelihood.prepare(self.observation, scene, self.noise)
 
-    def predict(self, theta: jax.Array) -> jax.Array:
+    def predict(self, theta: Float[jax.Array, " parameter"]) -> Float[jax.Array, "object 2 frame"]:
         """What the camera would see, in JAX: `[parameter]` to `[object, 2, frame]`, m."""
         position, velocity = in_jax(self.engine)(theta[None])
         model = self.model
@@ -63,11 +64,15 @@ class Problem:
         surroundings = model.scene.surroundings
         return _seen_one(kind, theta, position[0], velocity[0], frames, surroundings)
 
-    def simulate(self, theta: np.ndarray) -> np.ndarray:
+    def simulate(
+        self, theta: Float[np.ndarray, " parameter"]
+    ) -> Float[np.ndarray, "object 2 frame"]:
         """What the camera would see: `[parameter]` to `[object, 2, frame]`, m."""
         return self.simulate_batch(theta[None])[0]
 
-    def simulate_batch(self, theta: np.ndarray) -> np.ndarray:
+    def simulate_batch(
+        self, theta: Float[np.ndarray, "batch parameter"]
+    ) -> Float[np.ndarray, "batch object 2 frame"]:
         """`simulate` of `[batch, parameter]`: `[batch, object, 2, frame]`."""
         check_cancelled()
         motion = padded_motion(*self.engine.simulate(theta))

@@ -14,13 +14,16 @@ Computational Statistics 36, 1243.
 """
 
 import numpy as np
+from jaxtyping import Float
 
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 
 def conditional_log_density(
-    difference_m: np.ndarray, noise_scale: np.ndarray, data: Whitening
-) -> np.ndarray:
+    difference_m: Float[np.ndarray, "draw object 2 frame"],
+    noise_scale: Float[np.ndarray, " draw"],
+    data: Whitening,
+) -> Float[np.ndarray, "draw object 2 frame"]:
     """Log p(y_i | y_-i) of every coordinate.
 
     Args:
@@ -47,7 +50,9 @@ def conditional_log_density(
     return np.where((root**2).sum(axis=1) > 0, density, -np.inf)
 
 
-def noise_draws(rng: np.random.Generator, noise_scale: np.ndarray, data: Whitening) -> np.ndarray:
+def noise_draws(
+    rng: np.random.Generator, noise_scale: Float[np.ndarray, " draw"], data: Whitening
+) -> Float[np.ndarray, "draw object 2 frame"]:
     """Draws of the likelihood's noise, one for each of `noise_scale` `[draw]`.
 
     Returns:
@@ -62,7 +67,7 @@ def noise_draws(rng: np.random.Generator, noise_scale: np.ndarray, data: Whiteni
     return np.einsum("oijt,dojt->doit", root, both)
 
 
-def noise_sd_m(data: Whitening) -> np.ndarray:
+def noise_sd_m(data: Whitening) -> Float[np.ndarray, "object 2 frame"]:
     """The noise's standard deviation at noise scale 1, `[object, 2, frame]`, m; 0 where masked."""
     root = _root(data)
     modes = np.einsum("oijt,mojt->moit", root, data.basis) * data.gain[:, None, None, None]

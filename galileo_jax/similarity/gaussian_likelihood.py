@@ -13,12 +13,16 @@ from typing import Any, Literal, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import crossings, modes, offsets
 
 NoiseModel = Literal["camera", "bodies", "tracker"]
+Places = Float[jax.Array, "object 2 frame"]
+Batch = Float[np.ndarray, "*batch object 2 frame"]
+Values = Float[np.ndarray, "*batch value"]
 
 
 class Whitening(NamedTuple):
@@ -35,10 +39,10 @@ class Whitening(NamedTuple):
       num_values: how many numbers were measured.
     """
 
-    observed_m: np.ndarray
-    inverse_root: np.ndarray
-    basis: np.ndarray
-    gain: np.ndarray
+    observed_m: Float[np.ndarray, "object 2 frame"]
+    inverse_root: Float[np.ndarray, "object 2 2 frame"]
+    basis: Float[np.ndarray, "mode object 2 frame"]
+    gain: Float[np.ndarray, " mode"]
     num_values: np.float64
 
 
@@ -80,7 +84,7 @@ class GaussianLikelihood:
         )
 
     @staticmethod
-    def whiten(difference_m: jax.Array, noise_scale: jax.Array, data: Whitening) -> jax.Array:
+    def whiten(difference_m: Places, noise_scale: Float[jax.Array, ""], data: Whitening) -> Places:
         """C^-1/2 r for `difference_m` `[object, 2, frame]`; unit normal if the model is right."""
         y = jnp.einsum("oijt,ojt->oit", data.inverse_root, difference_m)
         amplitude = jnp.einsum("moit,oit->m", data.basis, y)
@@ -88,7 +92,7 @@ class GaussianLikelihood:
         return (y - jnp.einsum("moit,m->oit", data.basis, shrink * amplitude)) / noise_scale
 
     @staticmethod
-    def whiten_batch(difference_m: np.ndarray, noise_scale: float, data: Whitening) -> np.ndarray:
+    def whiten_batch(difference_m: Batch, noise_scale: float, data: Whitening) -> Values:
         """`whiten` of `[..., object, 2, frame]` in NumPy, nothing to compile: `[..., value]`."""
         y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
         y = y.reshape(*difference_m.shape[:-3], -1)
@@ -97,9 +101,7 @@ class GaussianLikelihood:
         return (y - ((y @ basis.T) * shrink) @ basis) / noise_scale
 
     @staticmethod
-    def tracking_errors(
-        difference_m: np.ndarray, noise_scale: float, data: Whitening
-    ) -> np.ndarray:
+    def tracking_errors(difference_m: Batch, noise_scale: float, data: Whitening) -> Values:
         """The tracking errors in a difference, in units of their sd: `[..., value]`.
 
         s L^T C^-1 r: what the modes take up is left out, and nothing else. The one residual that
@@ -118,7 +120,9 @@ class GaussianLikelihood:
         return (y - ((y @ basis.T) * share) @ basis) / noise_scale
 
     @staticmethod
-    def log_density(predicted_m: jax.Array, noise_scale: jax.Array, data: Whitening) -> jax.Array:
+    def log_density(
+        predicted_m: Places, noise_scale: Float[jax.Array, ""], data: Whitening
+    ) -> Float[jax.Array, ""]:
         """Log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
         difference = jnp.asarray(data.observed_m) - predicted_m
         white = GaussianLikelihood.whiten(difference, noise_scale, data)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from galileo_jax.inference.fits.polish import Polished
 from galileo_jax.inference.fits.programs import FAILED
@@ -44,14 +45,14 @@ class GradientFit:
       num_pulled: how many numbers' worth of the data the nuisances were fitted with.
     """
 
-    z: np.ndarray
-    free: np.ndarray
-    covariance: np.ndarray
+    z: Float[np.ndarray, " parameter"]
+    free: Bool[np.ndarray, " parameter"]
+    covariance: Float[np.ndarray, "parameter parameter"]
     chi2: float
     log_evidence: float
     num_values: int
-    steps: np.ndarray
-    jacobian: np.ndarray
+    steps: Float[np.ndarray, " model_parameter"]
+    jacobian: Float[np.ndarray, "value model_parameter"]
     code: Code
     stats: dict[str, float]
     pull: float

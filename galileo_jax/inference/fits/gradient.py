@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Bool, Float, Int
 from scipy.stats import chi2
 
 from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
@@ -166,7 +167,10 @@ class GradientFitter:
         return self._best_variant(fit.z[:count], fit.free[:count], 0)
 
     def fit_from(
-        self, starts: np.ndarray, free: np.ndarray, owner: np.ndarray
+        self,
+        starts: Float[np.ndarray, "start parameter"],
+        free: Bool[np.ndarray, "start parameter"],
+        owner: Int[np.ndarray, " start"],
     ) -> list[GradientFit]:
         """Fits several hypotheses at once, each from one or more starts.
 

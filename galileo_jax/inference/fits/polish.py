@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from galileo_jax.inference.fits.descent import CATCHES_UP, Descent, GiveUp
 from galileo_jax.inference.fits.residuals import Batch, Residuals
@@ -26,8 +27,8 @@ class Polished(NamedTuple):
     """
 
     points: Batch
-    widths: np.ndarray
-    is_settled: np.ndarray
+    widths: Float[np.ndarray, "point parameter"]
+    is_settled: Bool[np.ndarray, " point"]
     num_steps: int
 
 
@@ -71,7 +72,9 @@ def polish(descent: Descent, points: Batch, settled: float, max_steps: int) -> P
     return Polished(Batch(z, points.free, noise), widths, is_settled, num_steps)
 
 
-def noise_scales(residuals: Residuals, points: Batch, used: np.ndarray) -> np.ndarray:
+def noise_scales(
+    residuals: Residuals, points: Batch, used: Float[np.ndarray, " point"]
+) -> Float[np.ndarray, "point clip"]:
     """The noise scales that residuals ask for, `[point, clip]`.
 
     Args:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from galileo_jax.inference.fits.programs import (
     ClipArrays,
@@ -41,9 +42,9 @@ class Batch(NamedTuple):
       noise: `[point, clip]`, noise scales.
     """
 
-    z: np.ndarray
-    free: np.ndarray
-    noise: np.ndarray
+    z: Float[np.ndarray, "point parameter"]
+    free: Bool[np.ndarray, "point parameter"]
+    noise: Float[np.ndarray, "point clip"]
 
     def take(self, index: Any) -> "Batch":
         """The points of an index array."""
@@ -58,8 +59,8 @@ class Slopes(NamedTuple):
       white: for each clip `[point, value]`.
     """
 
-    jacobian: list[np.ndarray]
-    white: list[np.ndarray]
+    jacobian: list[Float[np.ndarray, "point value parameter"]]
+    white: list[Float[np.ndarray, "point value"]]
 
 
 @dataclass(frozen=True)
@@ -145,11 +146,11 @@ class Residuals:
         self._count = len(trials.model_parameters)
         self._is_simulated = np.array([p.step is not None for p in trials.model_parameters])
 
-    def costs(self, points: Batch) -> np.ndarray:
+    def costs(self, points: Batch) -> Float[np.ndarray, " point"]:
         """chi2 / 2 and the prior's part, `[point]`."""
         return cost(self.whites(points), points.z)
 
-    def whites(self, points: Batch) -> list[np.ndarray]:
+    def whites(self, points: Batch) -> list[Float[np.ndarray, "point value"]]:
         """Whitened residuals, `[point, value]`, clip by clip."""
         white = []
         for c, clip in enumerate(self.clips):
