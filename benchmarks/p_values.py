@@ -26,6 +26,7 @@ from galileo_jax.similarity.discrepancy import crossings, modes
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
 NOISE_M = 5e-5  # a twentieth of a pixel at 1000 px/m
+NUM_ROUNDS, MOST_MODES = 4, 1000
 LEVELS = (0.01, 0.05, 0.5)
 
 
@@ -88,14 +89,13 @@ def made(
                 theta[i] = float(parameter.prior.forward(jnp.asarray(rng.standard_normal())))
     position = problem.simulate(theta)
     if is_drawn and noise != "tracker":
-        # Offsets first: where the picture shows an object decides which frames cross the foot.
-        scene, is_filmed = model.scene.surroundings, noise == "camera"
-        for patterns in (
-            lambda now: modes(now, scene, is_filmed),
-            lambda now: crossings(now, scene),
-        ):
-            found = patterns(replace(seen, position_m=position))
-            position = position + np.tensordot(rng.standard_normal(len(found)), found, axes=1)
+        # Patterns belong to the places where objects are seen, which the patterns move.
+        scene, clean, normal = model.scene.surroundings, position, rng.standard_normal(MOST_MODES)
+        for _ in range(NUM_ROUNDS):
+            now = replace(seen, position_m=position)
+            patterns = [modes(now, scene, is_filmed=noise == "camera"), crossings(now, scene)]
+            found = np.concatenate(patterns)
+            position = clean + np.tensordot(normal[: len(found)], found, axes=1)
     position = position + NOISE_M * rng.standard_normal(position.shape)
     measured = replace(seen, position_m=position)
     return replace(problem, observation=measured, noise=noise), theta
