@@ -59,6 +59,11 @@ def main(argv: Sequence[str]) -> int | None:
     return None
 
 
+def rigid_batch(size: int) -> Callable[[], object]:
+    """A batch of rollouts with the rigid engine."""
+    return _simulation(make_engine("rigid", _model(_truth())), size)
+
+
 def _truth() -> Truth:
     return draw_truth(np.random.default_rng(0), 20.0, GIVEN)
 

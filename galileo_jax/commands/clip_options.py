@@ -2,13 +2,15 @@
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.schema import Clip
 from galileo_jax.commands import command
 from galileo_jax.commands.options import adder
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime.errors import InputError
+
+if TYPE_CHECKING:
+    from galileo_jax.clip.schema import Clip
 
 
 def add_clip_options(parser: command.Parser, function: str, out: str) -> None:
@@ -21,8 +23,10 @@ def add_clip_options(parser: command.Parser, function: str, out: str) -> None:
     add("pixels_per_metre", metavar="SCALE")
 
 
-def load_clips(call_clips: Sequence[str], pixels_per_metre: float | None) -> list[Clip]:
+def load_clips(call_clips: Sequence[str], pixels_per_metre: float | None) -> "list[Clip]":
     """The clips of a call, with their warnings printed."""
+    from galileo_jax.clip.load import load_clip
+
     clips = [load_clip(path, pixels_per_metre=pixels_per_metre) for path in call_clips]
     warn(warning for clip in clips for warning in clip.warnings)
     return clips
@@ -34,7 +38,7 @@ def warn(lines: Iterable[str]) -> None:
         command.console().print(f"warning: {line}", soft_wrap=True, markup=False)
 
 
-def out_folder(out: str | None, clips: Sequence[Clip], below: str = "") -> Path:
+def out_folder(out: str | None, clips: "Sequence[Clip]", below: str = "") -> Path:
     """Where a call's results go: `--out`, or runs/ and the clips' names, and a folder in it.
 
     Raises:

@@ -4,11 +4,12 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn
-
-from rich.console import Console
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from galileo_jax.runtime.errors import InputError
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 class Parser(argparse.ArgumentParser):
@@ -62,8 +63,10 @@ def refuse_ignored(argv: Sequence[str], options: Sequence[str], why: str) -> Non
             raise InputError(f"{option}: {why}")
 
 
-def console() -> Console:
+def console() -> "Console":
     """Progress and notes go to stderr; stdout is for results."""
+    from rich.console import Console
+
     return Console(stderr=True, highlight=False)
 
 

@@ -9,7 +9,6 @@ from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
-from galileo_jax.results.stale_outputs import PREDICTION, stale_documents
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.engine_names import MOTIONS
 from galileo_jax.runtime.registry import entry_names
@@ -33,6 +32,7 @@ def main(argv: Sequence[str]) -> int | None:
     truth = true_parameters(clips[0])
     from galileo_jax.api.fit import fit
     from galileo_jax.results.run import CHECKPOINT
+    from galileo_jax.results.stale_outputs import PREDICTION, stale_documents
 
     with progress_display() as display:
         found = fit(clips, **asked, checkpoint=out / CHECKPOINT, on_progress=display)

@@ -4,11 +4,12 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
-
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 FIRST_LINE_S, NEXT_LINE_S = 5.0, 15.0  # in a pipe, since the start and since the line before
 
@@ -16,7 +17,7 @@ FIRST_LINE_S, NEXT_LINE_S = 5.0, 15.0  # in a pipe, since the start and since th
 class ProgressDisplay:
     """What the public functions take as `on_progress`."""
 
-    def __init__(self, bar: Progress | None):
+    def __init__(self, bar: "Progress | None"):
         self._bar = bar
         self._task = bar.add_task("starting", total=1.0) if bar is not None else None
         self._begun = self._next_line = time.monotonic()
@@ -49,6 +50,14 @@ def progress_display() -> Iterator[ProgressDisplay]:
     if not console.is_terminal:
         yield ProgressDisplay(None)
         return
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
     with Progress(*columns, TimeElapsedColumn(), console=console, transient=True) as bar:
         yield ProgressDisplay(bar)

@@ -84,7 +84,7 @@ def diagnose(
     """
     fitter = fitter_of(trials)
     on_stage("fitting the model without effects")
-    base = Hypothesis((), fitter.fit(seed, effects=()))
+    base = Hypothesis((), fitter.fit(seed, on_stage, effects=()))
     on_stage("comparing it with the data")
     first = Round(base, compare(trials, base.fit, seed))
     on_round(first)

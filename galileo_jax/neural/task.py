@@ -4,16 +4,17 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-import numpy as np
-
 from galileo_jax.runtime.registry import Registry
 
 if TYPE_CHECKING:
     import jax
+    import numpy as np
 
     from galileo_jax.neural.config import TrainConfig
 
-Arrays = dict[str, np.ndarray]
+    Arrays = dict[str, np.ndarray]
+else:
+    Arrays = dict  # NumPy is left out: every command registers presets here, also for a --help
 
 
 class Trainable(Protocol):

@@ -1,14 +1,16 @@
 """The truth beside a synthetic clip, shown next to what was found and used for nothing else."""
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.runtime.errors import InputError
 
+if TYPE_CHECKING:
+    from galileo_jax.clip.schema import Clip
 
-def true_parameters(clip: Clip) -> dict[str, float]:
+
+def true_parameters(clip: "Clip") -> dict[str, float]:
     """What NAME.truth.json beside a synthetic clip says of its parameters; {} without.
 
     Raises:
@@ -29,7 +31,7 @@ def true_parameters(clip: Clip) -> dict[str, float]:
     return known | mass_ratios([known[f"m{i + 1}"] for i in range(count)])
 
 
-def hidden_effect(clip: Clip) -> str | None:
+def hidden_effect(clip: "Clip") -> str | None:
     """What NAME.truth.json beside a synthetic clip says was hidden in it; None without.
 
     Raises:
@@ -45,7 +47,7 @@ def hidden_effect(clip: Clip) -> str | None:
         raise InputError(f"{path}: not a truth with an effect ({error})") from error
 
 
-def _content(clip: Clip) -> Any:
+def _content(clip: "Clip") -> Any:
     path = clip.path.with_suffix(".truth.json")
     if not path.is_file():
         return None
