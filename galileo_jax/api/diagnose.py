@@ -258,7 +258,7 @@ def diagnose(
 
     Examples:
       >>> import galileo_jax as gx
-      >>> made = gx.simulate("drag.csv", seed=3, effects={"air_drag": {}}, strength=0.7,
+      >>> made = gx.simulate("drag.csv", seed=3, effects={"air_drag": {}}, strength=1,
       ...     track_only=True)
       >>> found = gx.diagnose("drag.csv")
       >>> found.verdict.status, found.verdict.effects

@@ -26,7 +26,7 @@ def p_equals(p: float) -> str:
 def times_text(nats: float) -> str:
     """How many times as probable: '20 times', '10^31 times'."""
     if nats < log(PLAIN_ODDS):
-        return f"{exp(nats):.2g} times"
+        return f"{float(f'{exp(nats):.2g}'):g} times"  # 130, not 1.3e+02
     return f"10^{nats / log(10):.0f} times"
 
 

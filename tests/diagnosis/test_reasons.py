@@ -48,6 +48,7 @@ def test_noise_of_another_size_is_told_of(comparison, scales, p_value, said):
 
 def test_odds_and_p_values_in_words():
     assert times_text(3.0) == "20 times"
+    assert times_text(4.87) == "130 times"
     assert times_text(-1.0) == "0.37 times"
     assert times_text(100.0) == "10^43 times"
     assert p_text(1e-30) == "< 1e-12" and p_equals(1e-30) == "p < 1e-12"
