@@ -31,7 +31,7 @@ def video(folder) -> Path:
 def drag(folder) -> Path:
     """A track with a hidden drag."""
     gx.simulate(
-        folder / "drag.csv", seed=3, effects={"air_drag": {}}, strength=0.7, track_only=True
+        folder / "drag.csv", seed=3, effects={"air_drag": {}}, strength=1.0, track_only=True
     )
     return folder / "drag.csv"
 

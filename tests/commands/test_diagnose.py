@@ -100,7 +100,7 @@ def test_a_hypothesis_by_itself_moves_as_in_the_library(trials, tmp_path):
 @pytest.mark.slow
 def test_finds_what_was_hidden(tmp_path, capsys):
     """A csv track with strong air drag: told, added, the error falls, and the run can be read."""
-    simulate(tmp_path / "a.csv", track_only=True, effects=["air_drag"], strength=0.7, seed=3)
+    simulate(tmp_path / "a.csv", track_only=True, effects=["air_drag"], strength=1.0, seed=3)
     out = tmp_path / "out"
     capsys.readouterr()
     assert command.run(diagnose.main, [str(tmp_path / "a.csv"), "--out", str(out)]) == 0
