@@ -14,6 +14,7 @@ from galileo_jax.inference.fits.stages import before_moving
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.posterior import Status
+from galileo_jax.model.effects.registry import make_effects
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -49,6 +50,19 @@ def test_a_fit_leaves_a_side_valley(tmp_path, settings, seed):
     assert value["k1"] == pytest.approx(truth["k1"], abs=FRICTION_OFF)
     assert value["k2"] == pytest.approx(truth["k2"], abs=FRICTION_OFF)
     assert value["m1"] / value["m2"] == pytest.approx(truth["m1"] / truth["m2"], rel=RATIO_OFF)
+
+
+def test_a_fit_looks_at_hits_that_hardly_rebound(tmp_path):
+    """Here a restitution of 0.015 has a valley of its own, three nats above one of 0.008."""
+    made = gx.simulate(
+        tmp_path / "drag.csv", seed=3, effects=["air_drag"], strength=0.7, track_only=True
+    )
+    clip = load_clip(made.clips[0].with_suffix(".yaml"))
+    observation = read_observation_csv(made.clips[0])
+    trials = make_joint_problem([clip], [observation], effects=make_effects(["air_drag"]))
+    found = GradientFitter(trials).fit(0)
+    value = dict(zip(trials.names, trials.theta(found.z), strict=True))
+    assert value["impact_restitution"] < 0.011
 
 
 def test_a_misfit_is_no_plain_convergence(tmp_path):

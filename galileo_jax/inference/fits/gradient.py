@@ -35,7 +35,7 @@ from galileo_jax.inference.fits.starts import absent_z, scattered_round, scatter
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
-VARIANTS_Z = (-1.0, 0.5, 2.0)  # of positive nuisances, tried from every fit
+VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
 SAME_VALLEY_NATS = 1.0  # by which ends of a search differ that are of one valley: they stop at 0.1
 LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
