@@ -40,6 +40,8 @@ def free_fit(trials: JointProblem, start: np.ndarray, free: np.ndarray) -> FreeF
     """
     fitter, count = GradientFitter(trials, SETTINGS), len(start) - 1
     (fit,) = fitter.fit_from(start[None, :count], free[None, :count], np.zeros(1, int))
+    # The start is of a wrong model, whose restitution may be in another valley.
+    fit = fitter.refit(fit)
     theta = trials.theta(fit.z, free)
     residual = whitened(trials, theta[None], theta[count:])[0][0]
     return FreeFit(fit.z, free, fit.covariance[:count, :count], fit.jacobian, residual)
