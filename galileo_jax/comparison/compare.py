@@ -143,8 +143,8 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         p_free, z_free = judged(ANY_SCALE)
         p, z = (p_free, z_free) if p_free >= ADEQUATE_P else (p, z)
     white = [
-        problem.tracking_errors(problem.simulate(trials.of_clip(theta, c)))
-        for c, problem in enumerate(trials.problems)
+        errors_at(own, scale[None], np.ones(1), problem.data)[0]
+        for own, scale, problem in zip(measured, scales, trials.problems, strict=True)
     ]
     places = [
         _place(trials, theta, white, cell, float(own)) for cell, own in zip(cells, z, strict=True)

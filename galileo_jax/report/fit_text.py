@@ -51,11 +51,11 @@ OUTSIDE = (  # what nuisances mean that are far from what is usual
     (re.compile(r"foot_transition"), "the foot of the ramp multiplies the speed by {value:.3f}"),
     (
         re.compile(r"release_instant(?:_\d+)?"),
-        "object 1 is let go {ms:+.0f} ms from the first frame",
+        "object 1 is let go {thousandths:+.0f} ms from the first frame",
     ),
     (
         re.compile(r"start_offset_object(\d+)(?:_\d+)?"),
-        "object {} starts {mm:.1f} mm from where it was marked",
+        "object {} starts {thousandths:.1f} mm from where it was marked",
     ),
 )
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
@@ -163,7 +163,7 @@ def pull_text(pull: Mapping[str, Any]) -> str:
     )
     for pattern, phrase in OUTSIDE:
         if found := pattern.fullmatch(name):
-            text = phrase.format(*found.groups(), value=value, ms=1e3 * value, mm=1e3 * value)
+            text = phrase.format(*found.groups(), value=value, thousandths=1e3 * value)
     return (
         f"{text[0].upper()}{text[1:]}, {abs(pull['z']):.0f} standard deviations from what is "
         "usual; galileo diagnose looks for the cause."

@@ -94,11 +94,8 @@ class GaussianLikelihood:
     @staticmethod
     def whiten_batch(difference_m: Batch, noise_scale: float, data: Whitening) -> Values:
         """`whiten` of `[..., object, 2, frame]` in NumPy, nothing to compile: `[..., value]`."""
-        y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
-        y = y.reshape(*difference_m.shape[:-3], -1)
-        basis = data.basis.reshape(len(data.gain), -1)
-        shrink = 1 - noise_scale / np.sqrt(noise_scale**2 + data.gain**2)
-        return (y - ((y @ basis.T) * shrink) @ basis) / noise_scale
+        left = noise_scale / np.sqrt(noise_scale**2 + data.gain**2)
+        return _with_modes_times(left, difference_m, noise_scale, data)
 
     @staticmethod
     def tracking_errors(difference_m: Batch, noise_scale: float, data: Whitening) -> Values:
@@ -113,11 +110,8 @@ class GaussianLikelihood:
           noise_scale: in units of what the tracker states; 1 where residuals are shown.
           data: the observation's covariance, decomposed.
         """
-        y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
-        y = y.reshape(*difference_m.shape[:-3], -1)
-        basis = data.basis.reshape(len(data.gain), -1)
-        share = data.gain**2 / (noise_scale**2 + data.gain**2)
-        return (y - ((y @ basis.T) * share) @ basis) / noise_scale
+        left = noise_scale**2 / (noise_scale**2 + data.gain**2)
+        return _with_modes_times(left, difference_m, noise_scale, data)
 
     @staticmethod
     def log_density(
@@ -145,3 +139,13 @@ class GaussianLikelihood:
         """Of the covariance, up to the constant of the tracker's own."""
         gain = jnp.log1p((data.gain / noise_scale) ** 2)
         return data.num_values * jnp.log(noise_scale**2) + jnp.sum(gain)
+
+
+def _with_modes_times(
+    left: np.ndarray, difference_m: Batch, noise_scale: float, data: Whitening
+) -> Values:
+    """L^-1 r / s with the modes' parts times `left` `[mode]`."""
+    y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
+    y = y.reshape(*difference_m.shape[:-3], -1)
+    basis = data.basis.reshape(len(data.gain), -1)
+    return (y - ((y @ basis.T) * (1 - left)) @ basis) / noise_scale
