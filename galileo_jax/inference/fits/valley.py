@@ -1,4 +1,4 @@
-"""Coordinates in which a bent valley of the posterior is straight.
+"""Coordinates in which a curved valley of the posterior is straight.
 
     z = mode + R (u + B u^2 + C u^3)        R R^T the covariance; B, C strictly lower triangular
 
