@@ -8,6 +8,7 @@ import numpy as np
 from galileo_jax.tracking.exposure import Exposure
 from galileo_jax.tracking.finish import finished
 from galileo_jax.tracking.follower import Follower
+from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
 from galileo_jax.tracking.template import Outline, grey, median_template, template_at
 from galileo_jax.tracking.track import Track
@@ -53,20 +54,20 @@ def track_video(
     """
     followers: list[Follower | None] = [None] * len(starts)
     exposure = Exposure()
-    before: np.ndarray | None = None
+    before: Picture | None = None
     count, size_px = 0, (0, 0)
     for index, frame in enumerate(open_frames()):
-        image = grey(frame)
+        picture = Picture(grey(frame))
         for k, start in enumerate(starts):
             if index == start.first_frame:
                 point = np.array(start.point_px, dtype=float)
-                template = template_at(image, point, start.outline)
-                followers[k] = Follower(template, np.array([*point, 0.0]), exposure, image)
+                template = template_at(picture.grey, point, start.outline)
+                followers[k] = Follower(template, np.array([*point, 0.0]), exposure, picture)
             follower = followers[k]
             if follower is not None:
-                follower.step(before if index > start.first_frame else None, image)
-        before = image
-        count, size_px = index + 1, (image.shape[1], image.shape[0])
+                follower.step(before if index > start.first_frame else None, picture)
+        before = picture
+        count, size_px = index + 1, picture.size_px
         advance()
 
     coarse = [_coarse_poses(follower, count) for follower in followers]
@@ -75,13 +76,13 @@ def track_video(
     ]
     fits: list[list[Refined | None]] = [[] for _ in starts]
     for index, frame in enumerate(open_frames()):
-        image = grey(frame)
+        picture = Picture(grey(frame))
         for poses, template, found in zip(coarse, templates, fits, strict=True):
             if template is None or not np.isfinite(poses[index, 0]):
                 found.append(None)
                 continue
             velocities = velocities_at(poses, index)
-            found.append(refine_pose(image, template, poses[index], velocities, exposure.share))
+            found.append(refine_pose(picture, template, poses[index], velocities, exposure.share))
         advance()
 
     objects = finished(
