@@ -75,5 +75,5 @@ class Exposure:
         self.frames += 1
         motion = own_motion(velocity, pose[2])
         for i, share in enumerate(SHARES):
-            fit = align(picture, template.target(share * motion, FINE_PX), pose, steps=3)
+            fit = align(picture, template.target(share * motion, FINE_PX), pose, steps=1)
             self.misfit[i] += 1 - fit.correlation**2

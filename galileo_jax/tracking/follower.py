@@ -8,7 +8,7 @@ from galileo_jax.tracking.exposure import Exposure, distinct, own_motion
 from galileo_jax.tracking.lucas_kanade import follow
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import patch_at, rotation
-from galileo_jax.tracking.refine import FINE_PX, Fit
+from galileo_jax.tracking.refine import FINE_PX, Fit, align
 from galileo_jax.tracking.rigid import rigid_motion
 from galileo_jax.tracking.search import SURE, best_fit, candidate_poses, is_alike
 from galileo_jax.tracking.template import Template, median_template
@@ -21,6 +21,9 @@ REACH_SHARE = 0.2
 moves that far within a frame."""
 WORSE = 0.1
 """A fit that correlates this much less than the one before is worth a wide search."""
+AS_EXPECTED_PX, AS_SEEN = 1.0, 0.02
+"""An object that is this close to where it should be, and correlates by no more than this less than
+in the frame before, is not looked for by its features."""
 MAX_TURN_RAD = 0.7
 """An object does not turn further between two frames in which it is seen."""
 SETTLED_FRAMES, MAX_LEAP_FRAMES = 4, 4
@@ -124,16 +127,25 @@ class Follower:
         """The best fit around where the object was, went, or is led to by its features."""
         guesses = [self._expected(), self.pose]
         if before is not None and not self.frames_missed:
+            if (fit := self._as_expected(picture)) is not None:
+                return fit
             reach = int(np.ceil(2 * self._frames_since * np.hypot(*self.velocity[:2]))) + 16
-            motion = rigid_motion(
-                *follow(before.grey, picture.grey, self.pose, self.template.region, reach)
-            )
-            if motion is not None:
+            features = follow(before.grey, picture.grey, self.pose, self.template.region, reach)
+            if (motion := rigid_motion(*features)) is not None:
                 angle, shift = motion
                 place = rotation(angle) @ self.pose[:2] + shift
                 turned = self.pose[2] + (angle if self.template.shows_turns else 0.0)
                 guesses.insert(0, np.array([*place, turned]))
         return self._best(picture, guesses, FOUND)
+
+    def _as_expected(self, picture: Picture) -> Fit | None:
+        """The object where it should be, looking as it did; its features would tell no more."""
+        expected = self._expected()
+        motion = self.exposure.share * own_motion(self.velocity, expected[2])
+        fit = align(picture, self.template.target(motion, FINE_PX), expected)
+        is_there = np.hypot(*(fit.pose - expected)[:2]) < AS_EXPECTED_PX
+        is_it = is_alike(fit) and fit.correlation > max(SURE, self.correlation - AS_SEEN)
+        return fit if is_there and is_it and not self._is_scene(picture, fit) else None
 
     def _far(self, picture: Picture) -> Fit | None:
         """The best fit in a wide neighbourhood; rarely looked for while the object is gone."""
