@@ -19,12 +19,12 @@ from dataclasses import dataclass, replace
 import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
+from galileo_jax.runtime.latin_hypercube import latin_hypercube
 
 STARTS_PER_PARAMETER, MOST_STARTS = 32, 96
 NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
@@ -265,7 +265,7 @@ def _shapes(
     number = NUM_SHAPES if len(shape) else 1
     generator = np.random.default_rng([seed, 43])
     z = np.tile(base.z, (number, 1))
-    z[:, shape] = ndtri(np.clip(_latin(generator, number, len(shape)), 0.02, 0.98))
+    z[:, shape] = ndtri(np.clip(latin_hypercube(number, len(shape), generator), 0.02, 0.98))
     probes = np.array(trials.theta(z, trials.free(effects)))
     probes[:, where] = size
     return z, probes
@@ -304,11 +304,6 @@ def _beside(
     return whole - basis @ (basis.T @ whole), padded - (padded @ basis) @ basis.T
 
 
-def _latin(generator: np.random.Generator, size: int, num: int) -> np.ndarray:
-    """A Latin hypercube in the unit cube, `[point, axis]`."""
-    return qmc.LatinHypercube(num, rng=generator).random(size)
-
-
 def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int) -> np.ndarray:
     """Starts in z: new parameters over their priors, the others in one of three ways."""
     count = len(trials.model_parameters)
@@ -316,7 +311,7 @@ def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int
     new = np.flatnonzero(free & ~base.free[:count])
     size = min(STARTS_PER_PARAMETER * len(new), MOST_STARTS)
     starts = np.tile(base.z[:count], (size, 1))
-    starts[:, new] = ndtri(np.clip(_latin(generator, size, len(new)), 0.02, 0.98))
+    starts[:, new] = ndtri(np.clip(latin_hypercube(size, len(new), generator), 0.02, 0.98))
     parameters = trials.model_parameters
     zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
     rest = np.clip(zero, -1.0, 1.0)

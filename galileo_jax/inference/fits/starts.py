@@ -3,10 +3,10 @@
 import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
+from galileo_jax.runtime.latin_hypercube import latin_hypercube
 
 
 def scattered_starts(trials: JointProblem, free: np.ndarray, num: int, seed: int) -> np.ndarray:
@@ -42,7 +42,7 @@ def scattered_round(
     """
     turn = np.arange(num) % len(centres)
     some = np.flatnonzero(is_scattered.any(axis=0)).tolist()
-    shares = qmc.LatinHypercube(len(some), rng=np.random.default_rng(seed)).random(num)
+    shares = latin_hypercube(num, len(some), np.random.default_rng(seed))
     starts = centres[turn].copy()
     for i, share in zip(some, shares.T, strict=True):
         column = ndtri(np.clip(_in_range(trials, i, share), 0.01, 0.99))
