@@ -18,7 +18,6 @@ from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
-from galileo_jax.inference.metropolis import NUM_CHAINS
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.effects.free_quantities import make_free_quantities
@@ -138,16 +137,18 @@ def _check(options: FitOptions) -> None:
     Raises:
       InputError: an option that this method does not have, or a value that it does not know.
     """
-    from galileo_jax.inference.samplers import sampler_names
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
     check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
     check_known("--engine", "engine", options.engine, ENGINES)
     check_known("--motion", "motion", options.motion, MOTIONS)
-    check_known("--sampler", "sampler", options.sampler, sampler_names())
     check_known("--init", "init", options.init, ("grad", "cnn"))
     check_known("--preset", "preset", options.preset, ("galileo", "thesis"))
     _refuse_ignored(options)
+    if options.method == "mh":
+        from galileo_jax.inference.samplers import sampler_names
+
+        check_known("--sampler", "sampler", options.sampler, sampler_names())
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
             f"--max-steps: {options.max_steps} is no multiple of {BLOCK_STEPS}, {BLOCK_STEPS} or "
@@ -264,6 +265,7 @@ def _gradient(
 ) -> tuple[GradientFit, np.ndarray | None, dict[str, Any]]:
     """The mode, where chains start in z (None: dispersed round it), and notes."""
     if options.init == "cnn":
+        from galileo_jax.inference.metropolis import NUM_CHAINS
         from galileo_jax.neural.start import start_from_network
 
         chains = options.chains or NUM_CHAINS
@@ -292,7 +294,7 @@ def _by_chains(
     checkpoint: Path | None,
 ) -> Posterior:
     """Samples; resumes what an interruption left in the checkpoint."""
-    from galileo_jax.inference.metropolis import metropolis_posterior
+    from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
     from galileo_jax.inference.samplers.driver import Progress, Settings
 
     settings = Settings(
@@ -324,6 +326,8 @@ def checkpoint_identity(
     measured: Sequence[Measurement], problem: JointProblem, options: FitOptions
 ) -> str:
     """What the chains sample: a checkpoint of anything else is refused."""
+    from galileo_jax.inference.metropolis import NUM_CHAINS
+
     chains = options.chains or NUM_CHAINS
     chosen = (
         *(options.sampler, options.seed, options.effects, options.free, options.init, chains),

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from galileo_jax.tracking import Start, track_video
 from galileo_jax.tracking.exposure import Exposure
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.template import Outline, grey, template_at
+from galileo_jax.tracking.tracker import Start, track_video
 from tests.tracking.moving_box import Box, film, slide
 
 pytestmark = pytest.mark.video
