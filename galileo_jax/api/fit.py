@@ -348,8 +348,6 @@ def _by_thesis(
     problem: JointProblem, options: FitOptions
 ) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
-    import jax.numpy as jnp
-
     from galileo_jax.model.parameters import inverse
     from galileo_jax.thesis.estimate import thesis_posterior
 
@@ -359,6 +357,6 @@ def _by_thesis(
     )
     middle = problem.theta(np.zeros(len(problem.names)))
     theta = [best.get(name, rest) for name, rest in zip(problem.names, middle, strict=True)]
-    z_best = np.asarray(inverse(problem.parameters, jnp.asarray(theta)))
+    z_best = inverse(problem.parameters, np.asarray(theta))
     notes = {"status": posterior.status.value, "preset": options.preset, **chosen, "best": best}
     return posterior, z_best, notes

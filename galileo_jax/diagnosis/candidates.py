@@ -233,7 +233,7 @@ def _matched_shapes(
     wanted[:, where] = (-along / np.maximum(power, SHOWS))[best, None] * size
     priors = [trials.model_parameters[i].prior for i in where]
     for column, prior in zip(where, priors, strict=True):
-        found = np.asarray(prior.inverse(jnp.asarray(wanted[:, column])))
+        found = prior.inverse(wanted[:, column])
         z[best, column] = np.clip(np.nan_to_num(found, nan=-MOST_Z), -MOST_Z, MOST_Z)
     return np.where(free, z[best, : len(free)], 0.0)
 
@@ -313,7 +313,7 @@ def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int
     starts = np.tile(base.z[:count], (size, 1))
     starts[:, new] = ndtri(np.clip(latin_hypercube(size, len(new), generator), 0.02, 0.98))
     parameters = trials.model_parameters
-    zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
+    zero = inverse(parameters, np.array([p.absent for p in parameters]))
     rest = np.clip(zero, -1.0, 1.0)
     nuisance = np.array([p.role == "nuisance" for p in parameters])
     main = np.array([p.role != "nuisance" for p in parameters]) & base.free[:count]

@@ -1,6 +1,5 @@
 """Starts of a search: scattered over what the objects' parameters may be."""
 
-import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
@@ -70,5 +69,5 @@ def _in_range(trials: JointProblem, index: int, share: np.ndarray) -> np.ndarray
 def absent_z(trials: JointProblem) -> np.ndarray:
     """Where nothing but the scene is there, as far as priors reach, `[model parameter]`, z."""
     parameters = trials.model_parameters
-    z = np.asarray(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
+    z = inverse(parameters, np.asarray([p.absent for p in parameters]))
     return np.clip(z, -1.0, 1.0)
