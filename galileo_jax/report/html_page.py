@@ -9,7 +9,7 @@ from html import escape
 from importlib import resources
 
 from galileo_jax.report.chart import Chart
-from galileo_jax.report.draw import to_plotly
+from galileo_jax.report.plotly_figure import figure, to_json
 
 NO_SCRIPT = (
     '<noscript><p class="warn">Charts and clip need JavaScript; text and tables do not.</p>'
@@ -63,12 +63,12 @@ def header(kind: str, title: str, lead: str, more: str = "", is_good: bool = Tru
 
 def chart_element(chart: Chart) -> str:
     """The chart as HTML; page.js draws it in the colours of the page."""
-    figure = to_plotly(chart, has_legend=False)
-    encoded = str(figure.to_json()).replace("<", "\\u003c")
+    drawn = figure(chart, has_legend=False)
+    encoded = to_json(drawn).replace("<", "\\u003c")
     clock = "" if chart.clip is None else f' data-clip="{escape(chart.clip, quote=True)}"'
     return (
         f'<div class="chart" role="img" aria-label="{escape(chart.label, quote=True)}" '
-        f'style="height:{figure.layout.height}px"{clock}>'
+        f'style="height:{drawn["layout"]["height"]}px"{clock}>'
         f'<script type="application/json">{encoded}</script></div>'
     )
 
