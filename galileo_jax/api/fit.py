@@ -86,7 +86,8 @@ def fit(
       selection: of preset "thesis": how the answer is taken from the chains, "best" or
         "least_variance".
       checkpoint: a file; chains that were interrupted go on from it.
-      on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
+      on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
+        of method "mh" first the gradient fit that the chains start from, a `Fit`.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Returns:
@@ -214,6 +215,20 @@ def _fitted(
     timings = {"track": track_s, "compile": 0.0, "fit": 0.0}
     notes: dict[str, Any] = {"engine": problem.problems[0].engine.name}
     gradient: GradientFit | None = None
+
+    def finish(posterior: Posterior, z_best: np.ndarray, notes: dict[str, Any]) -> Fit:
+        return make_fit(
+            tuple(measured),
+            problem,
+            posterior,
+            z_best,
+            gradient,
+            method=options.method,
+            seed=options.seed,
+            timings=timings,
+            notes=notes,
+        )
+
     began = time.perf_counter()
     if options.method == "cnn":
         posterior, z_best, extra = _by_network(problem, options)
@@ -231,6 +246,7 @@ def _fitted(
         posterior, z_best = laplace_posterior(problem, gradient, options.seed), gradient.z
         extra = {"status": gradient.code.value} | extra
         if options.method == "mh":
+            progress.report("fitted by gradient", FITTED, finish(posterior, z_best, notes | extra))
             posterior = _by_chains(problem, gradient, starts, measured, options, checkpoint)
             extra |= {
                 "status": _status_of_chains(posterior, gradient),
@@ -245,17 +261,7 @@ def _fitted(
         notes["free"] = sorted(options.free)
     if options.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
-    made = make_fit(
-        tuple(measured),
-        problem,
-        posterior,
-        z_best,
-        gradient,
-        method=options.method,
-        seed=options.seed,
-        timings=timings,
-        notes=notes,
-    )
+    made = finish(posterior, z_best, notes)
     progress.report("fitted", 1.0, made)
     return made
 
