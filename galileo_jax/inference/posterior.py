@@ -130,32 +130,6 @@ class Posterior:
             posterior_attrs={"galileo_jax": json.dumps(self._notes())},
         )
 
-    @classmethod
-    def from_inference_data(cls, data: "InferenceData") -> Self:
-        """The inverse of `to_inference_data`.
-
-        Raises:
-          InputError: the data were not written by `to_inference_data`.
-        """
-        groups = set(data.groups())
-        if not {"posterior", "sample_stats"} <= groups:
-            raise InputError(
-                f"no groups posterior and sample_stats, but {', '.join(sorted(groups)) or 'none'}"
-            )
-        posterior = data["posterior"]
-        if "galileo_jax" not in posterior.attrs:
-            raise InputError("the posterior group has no attribute galileo_jax: not ours")
-        notes = json.loads(posterior.attrs["galileo_jax"])
-        names = tuple(notes["names"])
-        return cls(
-            names=names,
-            draws=np.stack([posterior[name].values for name in names], axis=-1),
-            log_density=data["sample_stats"]["lp"].values,
-            status=Status[notes["status"]],
-            stats=notes["stats"],
-            provenance=notes["provenance"],
-        )
-
     def to_netcdf(self, path: Path) -> None:
         """Writes what `to_inference_data().to_netcdf` writes, in one step.
 
@@ -189,10 +163,31 @@ class Posterior:
         if not path.is_file():
             raise InputError(f"{path}: no such file")
         try:
-            data = arviz().from_netcdf(str(path), engine="h5netcdf")
-        except (OSError, ValueError, KeyError) as error:
-            raise InputError(f"{path}: not a netCDF file of draws ({error})") from error
-        try:
-            return cls.from_inference_data(data)
+            return cls._read(path)
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
+        except (OSError, ValueError, KeyError) as error:
+            raise InputError(f"{path}: not a netCDF file of draws ({error})") from error
+
+    @classmethod
+    def _read(cls, path: Path) -> Self:
+        import h5netcdf
+
+        with h5netcdf.File(path, "r") as file:
+            groups = set(file.groups)
+            if not {"posterior", "sample_stats"} <= groups:
+                found = ", ".join(sorted(groups)) or "none"
+                raise InputError(f"no groups posterior and sample_stats, but {found}")
+            posterior = file["posterior"]
+            if "galileo_jax" not in posterior.attrs:
+                raise InputError("the posterior group has no attribute galileo_jax: not ours")
+            notes = json.loads(posterior.attrs["galileo_jax"])
+            names = tuple(notes["names"])
+            return cls(
+                names=names,
+                draws=np.stack([np.asarray(posterior[name][...]) for name in names], axis=-1),
+                log_density=np.asarray(file["sample_stats"]["lp"][...]),
+                status=Status[notes["status"]],
+                stats=notes["stats"],
+                provenance=notes["provenance"],
+            )
