@@ -181,7 +181,7 @@ class Posterior:
             posterior = file["posterior"]
             if "galileo_jax" not in posterior.attrs:
                 raise InputError("the posterior group has no attribute galileo_jax: not ours")
-            notes = json.loads(posterior.attrs["galileo_jax"])
+            notes = json.loads(str(posterior.attrs["galileo_jax"]))
             names = tuple(notes["names"])
             return cls(
                 names=names,

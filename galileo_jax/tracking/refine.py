@@ -113,7 +113,7 @@ def align(
         # The median of an even number but for one place, in a fraction of np.median's time.
         noise = 1.4826 * _middle(size) + 1e-6
         if robust:
-            weight = np.minimum(1.0, HUBER * noise / np.maximum(size, 1e-9))
+            weight = (HUBER * noise / np.maximum(size, 1e-9)).clip(max=1.0)
             weight *= size < REJECT * noise
         # seen(x) = gain T(x + move) + offset: the pose has to follow by `move`, and the
         # gradient columns carry the gain.
