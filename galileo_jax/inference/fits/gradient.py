@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
 from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH, Ends
@@ -291,7 +291,7 @@ class GradientFitter:
             for clip in self._residuals.clips
         )
         left = fit.chi2 / noise_scale**2
-        return bool(chi2.sf(left, max(degrees - fit.num_used, 1.0)) > CHANCE)
+        return bool(chdtrc(max(degrees - fit.num_used, 1.0), left) > CHANCE)
 
     def _batch(self, z: np.ndarray, free: np.ndarray) -> Batch:
         free = np.broadcast_to(free, z.shape)
