@@ -43,11 +43,13 @@ class Scene:
       surroundings: names, geometry and start, as effects see them.
       shapes: `[object]`, what is drawn of each.
       objects: as declared.
+      timestep_s: of MuJoCo's engines.
     """
 
     surroundings: Surroundings
     shapes: tuple[str, ...]
     objects: tuple[ClipObject, ...]
+    timestep_s: float = TIMESTEP_S
 
     @property
     def spec(self) -> "mujoco.MjSpec":
@@ -62,6 +64,7 @@ class Scene:
     @cached_property
     def _compiled(self) -> "tuple[mujoco.MjSpec, mujoco.MjModel]":
         spec = _spec(self.surroundings, self.shapes, self.objects)
+        spec.option.timestep = self.timestep_s
         return spec, spec.compile()
 
     @property
@@ -238,7 +241,6 @@ def _spec(
     import mujoco
 
     spec = mujoco.MjSpec.from_file(str(scene_path("ramp.xml")))
-    spec.option.timestep = TIMESTEP_S
     spec.option.gravity = [0, 0, -surroundings.gravity]
     has_table = math.isfinite(surroundings.corner_m[0])
     if not surroundings.has_surface:
