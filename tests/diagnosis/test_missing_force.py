@@ -15,7 +15,7 @@ from benchmarks.hidden_cases import EXOTIC_FILE
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.candidates import Hypothesis
-from galileo_jax.diagnosis.free_acceleration import FreeAcceleration, splines
+from galileo_jax.model.effects.free_acceleration import FreeAcceleration, splines
 from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
