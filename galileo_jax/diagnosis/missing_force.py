@@ -23,25 +23,36 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.diagnosis.formula import NOT_SIMPLE, Formula, Sight, find_formula
-from galileo_jax.model.effects.free_acceleration import FreeAcceleration
 from galileo_jax.inference.free_force.along_path import along_path
 from galileo_jax.inference.free_force.free_fit import FreeFit, free_fit
 from galileo_jax.inference.free_force.spans import MOVES_M_S
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
+from galileo_jax.model.effects.free_acceleration import FreeAcceleration
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.motion import dynamics, state_at
 
 NUM_TIMES, NUM_DRAWS = 200, 400
 
 
-def infer_missing_force(trials: JointProblem, hypothesis: Hypothesis, seed: int) -> MissingForce:
+def views_of(trials: JointProblem, hypothesis: Hypothesis) -> list["View"]:
+    """Each clip fitted with a free acceleration beside a hypothesis."""
+    return [view_of(trials, hypothesis, clip) for clip in range(len(trials.problems))]
+
+
+def infer_missing_force(
+    trials: JointProblem,
+    hypothesis: Hypothesis,
+    seed: int,
+    views: Sequence["View"] | None = None,
+) -> MissingForce:
     """Infers the acceleration along the path that a hypothesis lacks, and a formula for it.
 
     Args:
       trials: whose models have the hypothesis' effects.
       hypothesis: fitted to them.
       seed: of the posterior's draws.
+      views: from `views_of`, where they are there already.
 
     Returns:
       The first clip's, NaN where an object is at rest or not seen. Its zero is the hypothesis
@@ -50,7 +61,7 @@ def infer_missing_force(trials: JointProblem, hypothesis: Hypothesis, seed: int)
       and so is the share it explains: of the misfit that an acceleration of any form takes
       away.
     """
-    views = [_view(trials, hypothesis, clip) for clip in range(len(trials.problems))]
+    views = views or views_of(trials, hypothesis)
     count = len(views[0].path_m)
     formulas = [find_formula([_sight(view, i) for view in views]) for i in range(count)]
     first = views[0]
@@ -67,7 +78,7 @@ def infer_missing_force(trials: JointProblem, hypothesis: Hypothesis, seed: int)
 
 
 @dataclass(frozen=True)
-class _View:
+class View:
     """One clip fitted with a free acceleration.
 
     Attributes:
@@ -91,6 +102,7 @@ class _View:
 
     @property
     def model(self) -> Model:
+        """With the free acceleration."""
         return self.trials.problems[0].model
 
     @property
@@ -122,7 +134,7 @@ class _View:
         return -self.fit.jacobian[:, self.knots(index)] @ weights
 
 
-def _view(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> _View:
+def view_of(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> View:
     """Fits one clip with a free acceleration."""
     # A formula is judged in a linear model, some way from the truth: what a camera may bend is
     # allowed for, whoever measured, so that a bend of the model is not taken for a force.
@@ -139,7 +151,7 @@ def _view(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> _View:
     moves = _seen(problem, time_s) & (np.abs(speed) > MOVES_M_S)
     for i, own in enumerate(effect.spans_s):
         moves[i] &= (time_s >= own[0][0]) & (time_s <= own[-1][1])
-    return _View(extended, fit.start, fit, effect, time_s, path, speed, moves)
+    return View(extended, fit.start, fit, effect, time_s, path, speed, moves)
 
 
 def _motion(
@@ -161,7 +173,7 @@ def _seen(problem: Problem, time_s: np.ndarray) -> np.ndarray:
     )
 
 
-def _sight(view: _View, index: int) -> Sight:
+def _sight(view: View, index: int) -> Sight:
     """What a clip says of one object's acceleration, all that else is unknown taken out.
 
     The prior of the rest, unit normal in z, makes the target's covariance  S = 1 + N N'.
@@ -189,7 +201,7 @@ def _sight(view: _View, index: int) -> Sight:
 
 
 def _told(
-    view: _View, formulas: Sequence[Formula], generator: np.random.Generator
+    view: View, formulas: Sequence[Formula], generator: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """The acceleration over the model that goes with the formulas and its sd, `[object, time]`."""
     fit, trials = view.fit, view.trials
@@ -205,7 +217,7 @@ def _told(
     return missing.mean(axis=0), missing.std(axis=0)
 
 
-def _bases(view: _View, formulas: Sequence[Formula], generator: np.random.Generator) -> np.ndarray:
+def _bases(view: View, formulas: Sequence[Formula], generator: np.random.Generator) -> np.ndarray:
     """Draws of all but the knots with the formulas in the model, `[draw, parameter]`, z.
 
     Coefficients of formulas are free. An object without one keeps its free acceleration.
@@ -232,7 +244,7 @@ def _bases(view: _View, formulas: Sequence[Formula], generator: np.random.Genera
     return z
 
 
-def _accelerations(view: _View, theta: np.ndarray) -> np.ndarray:
+def _accelerations(view: View, theta: np.ndarray) -> np.ndarray:
     """Of a model along the fitted motion, `[draw, parameter]` to `[draw, object, time]`, m/s^2."""
     model = view.model
     scene = model.scene.surroundings

@@ -6,9 +6,7 @@ from galileo_jax.inference.problem import Problem
 from galileo_jax.rollout.motion import dynamics
 
 
-def along_path(
-    problem: Problem, theta: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def along_path(problem: Problem, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times `[record]`, s; path (m) and speed (m/s) `[object, record]` of a rollout.
 
     Args:

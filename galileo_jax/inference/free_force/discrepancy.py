@@ -25,6 +25,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import NUM_DRAWS
 from galileo_jax.inference.posterior import Posterior, Status
 
+SMALLEST_M_S2 = 0.001  # less shows in no track
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,7 @@ def fit_discrepancy(
     found = free_fit(trials, z, free, num_spans=1)
     at = _Linear.of(found)
     sizes, share = probable_sizes(at.white_target, at.knots)
-    table = np.array([size.sizes_m_s2 for size in sizes])
-    found = resized(found, np.exp(share @ np.log(table)))
+    found = resized(found, _usual(sizes, share))
     at = _Linear.of(found)
     sizes, share = probable_sizes(at.white_target, at.knots)
     draws_z = _draws(found, at, sizes, share, np.random.default_rng([seed, 67]))
@@ -181,17 +181,21 @@ def _draws(
     return generator.permutation(np.where(found.free, z, 0.0))
 
 
+def _usual(sizes: list[Size], share: np.ndarray) -> np.ndarray:
+    """The geometric mean size of each object's acceleration, m/s^2."""
+    table = np.array([size.sizes_m_s2 for size in sizes])
+    return np.exp(share @ np.log(np.maximum(table, SMALLEST_M_S2)))
+
+
 def _summary(found: FreeFit, sizes: list[Size], share: np.ndarray) -> dict[str, Any]:
     names = found.trials.problems[0].observation.names
     of_time = float(np.sum(share[[size.of == "time" for size in sizes]]))
-    table = np.array([size.sizes_m_s2 for size in sizes])
+    usual = _usual(sizes, share)
     return {
         "kind": "gp",
         "probability_of_time": of_time,
         "length_share": float(np.exp(share @ np.log([size.length for size in sizes]))),
-        "size_m_s2": {
-            name: float(np.exp(share @ np.log(table[:, i]))) for i, name in enumerate(names)
-        },
+        "size_m_s2": dict(zip(names, usual.tolist(), strict=True)),
         "spans_s": {
             problem.name: [[list(span) for span in own] for own in effect.spans_s]
             for problem, effect in zip(found.trials.problems, found.effects, strict=True)

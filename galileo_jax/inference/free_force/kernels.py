@@ -29,7 +29,8 @@ from scipy.special import softmax
 Of = Literal["time", "place"]
 OF: tuple[Of, ...] = ("time", "place")
 LENGTHS = (0.1, 0.2, 0.4, 0.8)  # over the way or the time in which the object moves
-SIZES_M_S2 = np.geomspace(0.001, 10.0, 13)  # log-uniform; each 2.15 times the last
+# Nothing at all, as probable as all the others together; and each 2.15 times the last.
+SIZES_M_S2 = np.array([0.0, *np.geomspace(0.001, 10.0, 13)])
 JITTER = 1e-8
 
 
@@ -107,5 +108,6 @@ def probable_sizes(
             b = scale * pulled
             gain = b @ cho_solve(factor, b)
             log_evidence.append(0.5 * gain - float(np.sum(np.log(np.diag(factor[0])))))
+            log_evidence[-1] += np.log(len(sizes_m_s2) - 1) * chosen.count(0.0)
             found.append(Size(of, length, tuple(float(s) for s in chosen)))
     return found, softmax(np.array(log_evidence))
