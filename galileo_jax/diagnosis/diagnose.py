@@ -44,12 +44,14 @@ from galileo_jax.diagnosis.verdict import (
     best_named,
     decisive_margin,
     form_that_leads,
+    is_contested_by_law,
     is_nothing_missing,
     law_contested,
     law_odds,
     law_verdict,
     log_prior,
     looked_at_again,
+    needs_laws,
     needs_pairs,
     other_formulas,
     ranked,
@@ -135,7 +137,7 @@ def diagnose(
         leads = expected_leads(trials, named, alike)
         verdict = looked_at_again(verdict, named, list(zip(alike, leads, strict=True)), decisive)
     views: list[View] = []
-    if verdict.status == "unknown":
+    if needs_laws(verdict):
         on_stage("inferring the missing force without a form")
         views = views_of(trials, base)
         on_stage("looking for a law")
@@ -143,7 +145,7 @@ def diagnose(
         for candidate in ranked(laws):
             on_candidate(candidate)
         candidates = _compared(trials, (*candidates, *laws), decisive, seed, compared)
-        verdict = _law_or_unknown(trials, verdict, candidates, decisive)
+        verdict = _law_or(trials, verdict, candidates, decisive)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
@@ -155,7 +157,7 @@ def diagnose(
     scene = trials.problems[0].model.scene.surroundings
     verdict = replace(verdict, advice=advice(verdict, scene, len(trials.problems)))
     missing = None
-    if views:
+    if verdict.status in ("unknown", "law"):
         missing = infer_missing_force(trials, base, seed, views)
     left_out: tuple[tuple[str, float, float], ...] = ()
     if len(trials.problems) > 1 and len(rounds) > 1:
@@ -232,14 +234,19 @@ def _laws(
     return made
 
 
-def _law_or_unknown(
-    trials: JointProblem, unknown: Verdict, candidates: Sequence[Candidate], decisive: float
+def _law_or(
+    trials: JointProblem, before: Verdict, candidates: Sequence[Candidate], decisive: float
 ) -> Verdict:
-    """The verdict law where a formula does what a named effect must; else unknown as before."""
+    """The verdict law where a formula does what a named effect must; else as before.
+
+    A pair of effects that a formula explains as well is named no more.
+    """
+    unknown = replace(before, status="unknown", effects=())
     verdict = law_verdict(candidates, decisive)
     if verdict is None:
         said = law_contested(candidates, decisive)
-        return replace(unknown, reasons=(*unknown.reasons, *said))
+        is_open = is_contested_by_law(before, candidates, decisive)
+        return replace(unknown if is_open else before, reasons=(*before.reasons, *said))
     best = next(c for c in candidates if c.effects == verdict.effects)
     alike = within_luck(best, other_formulas(best, candidates), decisive)
     leads = expected_leads(trials, best, alike)

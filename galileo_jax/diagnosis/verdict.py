@@ -182,6 +182,28 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *contests))
 
 
+def needs_laws(verdict: Verdict) -> bool:
+    """Whether formulas are to be tried: nothing explains the data, or only two effects at once do.
+
+    Two effects come close to almost any motion, and one formula may be simpler.
+    """
+    return verdict.status == "unknown" or any("+" in name for name in joined_names(verdict)[:1])
+
+
+def joined_names(verdict: Verdict) -> tuple[str, ...]:
+    """The hypotheses that a verdict is about; several effects of one are joined by +."""
+    if verdict.status == "named":
+        return ("+".join(verdict.effects),)
+    return verdict.effects
+
+
+def is_contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive: float) -> bool:
+    """Whether a formula explains the data about as well as the pair that a verdict is about."""
+    law = next((c for c in candidates if c.law is not None and explains(c)), None)
+    own = next((c for c in candidates if c.name in joined_names(verdict)), None)
+    return law is not None and own is not None and own.log_odds - law.log_odds < decisive
+
+
 def other_formulas(law: Candidate, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
     """The candidates without those that are the law's formula in another way."""
     return tuple(c for c in candidates if c.effects == law.effects or c.family != law.family)

@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from galileo_jax.diagnosis.diagnosis import Candidate, Law
+from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
 from galileo_jax.diagnosis.verdict import (
     best_named,
+    is_contested_by_law,
     law_contested,
     law_odds,
     law_verdict,
     looked_at_again,
+    needs_laws,
     other_formulas,
     ranked,
 )
@@ -98,6 +100,22 @@ def test_rivals_are_of_another_formula():
     other = candidate(FORM_OF_PULSE_T, 45.0)
     form = candidate(FORM_OF_POWER_V, 44.0)
     assert other_formulas(best, [best, same, other, form]) == (best, other)
+
+
+@pytest.mark.parametrize(("ahead", "expected"), [(DECISIVE, False), (DECISIVE - EDGE, True)])
+def test_a_pair_that_a_formula_explains_as_well_is_contested(ahead, expected):
+    named = Verdict("named", ("air_drag", "rolling"))
+    table = ranked([candidate("air_drag+rolling", 50.0 + ahead), law(50.0)])
+    assert is_contested_by_law(named, table, DECISIVE) == expected
+    assert not is_contested_by_law(named, ranked([table[0], law(50.0, 0.001)]), DECISIVE)
+
+
+def test_formulas_are_tried_where_nothing_or_only_a_pair_explains():
+    assert needs_laws(Verdict("unknown", ()))
+    assert needs_laws(Verdict("named", ("air_drag", "rolling")))
+    assert needs_laws(Verdict("ambiguous", ("air_drag+rolling", "stribeck+rolling")))
+    assert not needs_laws(Verdict("named", ("air_drag",)))
+    assert not needs_laws(Verdict("ambiguous", ("air_drag", "stribeck+rolling")))
 
 
 def test_a_second_factor_makes_a_formula_a_tenth_as_probable():
