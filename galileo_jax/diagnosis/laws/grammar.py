@@ -260,8 +260,10 @@ TOGETHER = ("power_t", "decay_t", "linear_q", "growth_q", "pulse_q", "power_v", 
 def structures(has_surface: bool, num_objects: int) -> Iterator[Structure]:
     """All formulas with one or two factors."""
     natures: list[Nature] = ["push", "drag"]
-    natures += ["drag_force"] if num_objects > 1 else []
-    natures += ["friction"] if has_surface else []
+    if num_objects > 1:
+        natures.append("drag_force")
+    if has_surface:
+        natures.append("friction")
     several = [factor for factor in FACTORS if factor.label in TOGETHER]
     pairs = [pair for pair in combinations(several, 2) if pair[0].variable != pair[1].variable]
     for nature, is_on_all in product(natures, (False, True) if num_objects > 1 else (False,)):

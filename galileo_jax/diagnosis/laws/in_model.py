@@ -1,6 +1,6 @@
 """Suggested formulas as effects, fitted to the track in the model with all else free."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
@@ -137,7 +137,7 @@ def _with_formula(
     extended: JointProblem,
     z: np.ndarray,
     one: Suggestion,
-    constants: dict[str, float],
+    constants: Mapping[str, float],
     strength: float,
     views: Sequence[View],
 ) -> np.ndarray:
@@ -164,7 +164,7 @@ def _with_formula(
 
 
 def _accelerations(
-    view: View, structure: Structure, constants: dict[str, float], strength: float
+    view: View, structure: Structure, constants: Mapping[str, float], strength: float
 ) -> list[np.ndarray]:
     """Of each object `[time]`, m/s^2."""
     scene, found = view.model.scene.surroundings, []

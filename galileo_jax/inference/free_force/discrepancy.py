@@ -57,7 +57,7 @@ def fit_discrepancy(
     found = free_fit(trials, z, free, num_spans=1)
     at = _Linear.of(found)
     sizes, share = probable_sizes(at.white_target, at.knots)
-    found = resized(found, _usual(sizes, share))
+    found = resized(found, _usual(sizes, share).tolist())
     at = _Linear.of(found)
     sizes, share = probable_sizes(at.white_target, at.knots)
     draws_z = _draws(found, at, sizes, share, np.random.default_rng([seed, 67]))
@@ -131,7 +131,10 @@ def _normal(design: np.ndarray) -> np.ndarray:
     return design.T @ design + np.eye(design.shape[1])
 
 
-def _places(found: FreeFit, theta: np.ndarray):
+Arrays = tuple[np.ndarray, ...]
+
+
+def _places(found: FreeFit, theta: np.ndarray) -> tuple[Arrays, Arrays, Arrays, Arrays]:
     """For each object: where its knots of all clips stand, mixing, times and places."""
     trials = found.trials
     count = len(trials.problems[0].observation.names)
@@ -150,7 +153,7 @@ def _places(found: FreeFit, theta: np.ndarray):
             places[i].append(np.interp(inside, recorded, path[i]) + beyond)
     return (
         tuple(np.concatenate(own) for own in where),
-        tuple(block_diag(*own) for own in mixing),
+        tuple(np.asarray(block_diag(*own)) for own in mixing),
         tuple(np.concatenate(own) for own in times),
         tuple(np.concatenate(own) for own in places),
     )

@@ -128,7 +128,7 @@ class FreeAcceleration(Effect):
     def mixing(self, index: int) -> np.ndarray:
         """From `z` of an object's knots to their accelerations, m/s^2, `[knot, knot]`."""
         counts = [len(_knots(index, piece)) for piece in range(len(self.spans_s[index]))]
-        return self.size_m_s2(index) * block_diag(*(mixing(count) for count in counts))
+        return self.size_m_s2(index) * np.asarray(block_diag(*(mixing(count) for count in counts)))
 
     def knot_values(self, times_s: np.ndarray, wanted: np.ndarray, index: int) -> np.ndarray:
         """The parameters' `z` with which an object's acceleration is closest to given curves.
