@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,19 +20,22 @@ from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
+from galileo_jax.diagnosis.laws.source import proposed_file
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import Code
+from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.observation.observation import Observation
+from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.results.truth import hidden_effect
 from galileo_jax.runtime import progress
-from galileo_jax.runtime.atomic_write import write_json
+from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
@@ -49,7 +52,8 @@ STAGES = {  # how a stage begins, and how much is done by then
     "comparing the best": 0.6,
     "fitting pairs": 0.65,
     "looking at what": 0.82,
-    "inferring": 0.85,
+    "inferring": 0.83,
+    "looking for": 0.86,
     "predicting": 0.92,
     "looking at each": 0.95,
 }
@@ -77,7 +81,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """`status` (none, named, ambiguous, unknown), `effects`, `form`, `advice`, `reasons`."""
+        """`status` (none, named, ambiguous, law, unknown), `effects`, `law`, `reasons`, ..."""
         return self.found.verdict
 
     @property
@@ -121,7 +125,7 @@ class Diagnosis:
 
     @property
     def missing_force(self) -> "pd.DataFrame | None":
-        """Where the verdict is unknown: the missing acceleration itself, else None.
+        """Where the verdict is unknown or a law: the missing acceleration itself, else None.
 
         `object, time_s, path_m, speed_m_s, acceleration_m_s2, sd_m_s2, formula`.
         """
@@ -143,23 +147,36 @@ class Diagnosis:
     @cached_property
     @in_float64
     def best(self) -> Fit:
-        """The fit of the last round's model, as `fit` with its effects gives it."""
-        last, seed = self.found.rounds[-1].hypothesis, int(self.document["seed"])
+        """The fit of the last round's model, as `fit` with its effects gives it.
+
+        Where the verdict is unknown: that of the model without effects, with an acceleration of
+        any form allowed for, as `fit` with `discrepancy="gp"` gives it.
+        """
+        is_unknown, seed = self.verdict.status == "unknown", int(self.document["seed"])
+        chosen = self.found.rounds[0 if is_unknown else -1].hypothesis
+        whole = chosen.of(self.problem)
+        effects = whole.problems[0].model.effects
         part = make_joint_problem(
             [one.clip for one in self.measurements],
             [one.observation for one in self.measurements],
             self.problem.problems[0].engine.name,
-            make_effects(last.effects),
+            tuple(effect for effect in effects if effect.name in chosen.effects),
         )
-        gradient = restricted_fit(last.fit, self.problem, part)
+        gradient = restricted_fit(chosen.fit, whole, part)
         notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
         notes["status"] = gradient.code.value
         if self.effects_from:
             notes["effects_from"] = [str(Path(path).resolve()) for path in self.effects_from]
+        if is_unknown:
+            wide = fit_discrepancy(part, gradient.z, gradient.free, seed)
+            part, gradient, posterior = wide.free.trials, wide.free.gradient, wide.posterior
+            notes["discrepancy"] = wide.summary
+        else:
+            posterior = laplace_posterior(part, gradient, seed)
         return make_fit(
             self.measurements,
             part,
-            laplace_posterior(part, gradient, seed),
+            posterior,
             gradient.z,
             gradient,
             method="grad",
@@ -204,11 +221,21 @@ class Diagnosis:
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
-        """Writes diagnosis.json, report.html and, below model/, the run of the last model."""
-        folder = Path(folder)
+        """Writes diagnosis.json, report.html and, below model/, the run of the last model.
+
+        Where the verdict is a law, its effect, too: proposed_effect.py, for `--effects-from`.
+        """
+        folder, best = Path(folder), self.best
+        proposed = folder / PROPOSED
+        proposed.unlink(missing_ok=True)
+        if self.verdict.law is not None:
+            clips = [Path(clip).name for clip in self.document["clips"]]
+            write_text(proposed, proposed_file(self.verdict.law, clips))
+            files = [*best.result.get("effects_from", []), str(proposed.resolve())]
+            best = replace(best, result={**best.result, "effects_from": files})
         write_json(folder / "diagnosis.json", self.document)
         self.report(folder / "report.html")
-        self.best.save(folder / "model", report=False)
+        best.save(folder / "model", report=False)
         return folder
 
     def __repr__(self) -> str:

@@ -16,6 +16,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
+from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.posterior import Posterior
@@ -43,6 +44,7 @@ def fit(
     effects: EffectsLike = (),
     effects_from: Sequence[str | Path] = (),
     free: EffectsLike = (),
+    discrepancy: Literal["none", "gp"] = "none",
     motion: str = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
@@ -70,6 +72,8 @@ def fit(
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
       free: declared quantities to infer instead, such as "gravity".
+      discrepancy: what no model explains: "none", or "gp": an acceleration of any form, whose size
+        and smoothness are inferred, is allowed for (method "grad").
       motion: "planar", or "free": from the first hit on objects turn and tip (MuJoCo's C engine).
       engine: what rolls the model out: "auto" (rigid), "rigid", "c" or "mjx".
       noise: the errors a track is taken to have: "camera", "bodies" or "tracker"; None: as the
@@ -109,6 +113,7 @@ def fit(
         effects=names_of(effects),
         effects_from=tuple(str(path) for path in effects_from),
         free=names_of(free),
+        discrepancy=discrepancy,
         motion=motion,
         engine=engine,
         noise=noise,
@@ -141,6 +146,12 @@ def _check(options: FitOptions) -> None:
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
     check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
+    check_known("--discrepancy", "discrepancy", options.discrepancy, ("none", "gp"))
+    if options.discrepancy != "none" and (options.method, options.motion) != ("grad", "planar"):
+        raise InputError(
+            f"--discrepancy {options.discrepancy}: of --method grad and --motion planar, not of "
+            f"--method {options.method} and --motion {options.motion}"
+        )
     check_known("--engine", "engine", options.engine, ENGINES)
     check_known("--motion", "motion", options.motion, MOTIONS)
     check_known("--init", "init", options.init, ("grad", "cnn"))
@@ -243,7 +254,14 @@ def _fitted(
         gradient, starts, extra = _gradient(fitter, options)
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
-        posterior, z_best = laplace_posterior(problem, gradient, options.seed), gradient.z
+        if options.discrepancy == "gp":
+            progress.report("allowing for what no model explains", FITTED)
+            found = fit_discrepancy(problem, gradient.z, gradient.free, options.seed)
+            problem, gradient, posterior = found.free.trials, found.free.gradient, found.posterior
+            extra |= {"discrepancy": found.summary}
+        else:
+            posterior = laplace_posterior(problem, gradient, options.seed)
+        z_best = gradient.z
         extra = {"status": gradient.code.value} | extra
         if options.method == "mh":
             progress.report("fitted by gradient", FITTED, finish(posterior, z_best, notes | extra))

@@ -39,10 +39,16 @@ class Hypothesis:
     Attributes:
       effects: names, in the order in which they were added.
       fit: of all parameters.
+      trials: whose parameters these are, where not the diagnosis's own: of a law.
     """
 
     effects: tuple[str, ...]
     fit: GradientFit
+    trials: JointProblem | None = None
+
+    def of(self, trials: JointProblem) -> JointProblem:
+        """The trials that it was fitted to, where the diagnosis's own are `trials`."""
+        return self.trials or trials
 
     @property
     def misfit(self) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from jax.scipy.special import ndtr, ndtri
 from scipy import special
 
-Role = Literal["main", "nuisance", "effect"]
+Role = Literal["main", "nuisance", "effect", "latent", "given"]
 
 
 class Prior(Protocol):
@@ -125,7 +125,8 @@ class Parameter:
       unit: SI; "1" for a pure number.
       prior: what is known before the data.
       absent: the value at which what the parameter stands for is not there.
-      role: "main" (what the user asks for), "nuisance" or "effect".
+      role: "main" (what the user asks for), "nuisance" or "effect"; "latent": of a function that
+        is told as a whole; "given": a number that compiled code needs and nobody infers.
       step: a coarse step in `z` for the first finite differences, before the scale of the
         posterior is known; None: no rollout depends on it (clock, camera).
       per_clip: whether each clip of a series has its own (nuisances always do).
