@@ -21,6 +21,7 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
+from galileo_jax.experiment.belief import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.joint_problem import JointProblem
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
 
+DOCUMENT = "diagnosis.json"
 TRACKED = 0.2  # share of the work, for progress
 STAGES = {  # how a stage begins, and how much is done by then
     "fitting the model": 0.02,
@@ -204,9 +206,13 @@ class Diagnosis:
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
-        """Writes diagnosis.json, report.html and, below model/, the run of the last model."""
+        """Writes diagnosis.json, report.html and, below model/, the run of the last model.
+
+        And hypotheses.npz, of which `next_experiment` is made.
+        """
         folder = Path(folder)
-        write_json(folder / "diagnosis.json", self.document)
+        write_json(folder / DOCUMENT, self.document)
+        write_beliefs(folder / FILE, self.problem, beliefs_of(self.found))
         self.report(folder / "report.html")
         self.best.save(folder / "model", report=False)
         return folder
@@ -286,12 +292,12 @@ def diagnose(
 
 def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
     def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
-        fitter_of(_with_library(some, seen, engine)).compile()
+        fitter_of(with_library(some, seen, engine)).compile()
 
     return precompile(clips, compile_for).join
 
 
-def _with_library(
+def with_library(
     clips: Sequence[Clip], observations: Sequence[Observation], engine: str
 ) -> JointProblem:
     """The joint problem with all effects and nameless forms that have a place in the scene."""
@@ -319,7 +325,7 @@ def _diagnosed(
 ) -> Diagnosis:
     clips, observations = [one.clip for one in measured], [one.observation for one in measured]
     began = time.perf_counter()
-    problem = _with_library(clips, observations, engine)
+    problem = with_library(clips, observations, engine)
     if add not in ("auto", "none", *problem.all_effects):
         raise InputError(f"--add: {add} has no place in {clips[0].path}")
 
@@ -358,6 +364,7 @@ def _diagnosed(
         TRACKS: [digest(observation) for observation in observations],
         **record,
         **inferred(measured),
+        **({"effects_from": [str(Path(path).resolve()) for path in files]} if files else {}),
         "left_out": [name for name in effect_names() if name not in problem.all_effects],
         "engine": problem.problems[0].engine.name,
         "timings_s": {
