@@ -122,7 +122,7 @@ class Descent:
         Conditional, the others held: along a ridge (all masses by the same factor) the
         marginal sd is large, and differences over it would bend the ridge.
         """
-        squares = sum(np.sum(j**2, axis=1) for j in slopes.jacobian)
+        squares = sum(slopes.among_all(np.sum(j**2, axis=1)) for j in slopes.jacobian)
         smallest = SMALLEST_STEP if self.is_smooth else SMALLEST_ROUGH_STEP
         half = 0.5 / np.sqrt(1 + squares)
         return np.clip(half, smallest * self.coarse_steps, LARGEST_STEP * self.coarse_steps)
