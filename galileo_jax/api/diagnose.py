@@ -21,6 +21,7 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
+from galileo_jax.experiment.advise import with_next
 from galileo_jax.experiment.belief import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import Code
@@ -358,6 +359,7 @@ def _diagnosed(
         on_round=on_round,
         on_candidate=on_candidate,
     )
+    found = with_next(found, clips[0], problem, seed)
     record = diagnosis_document(problem, found, seed)
     document = {
         "clips": [clip.source for clip in clips],

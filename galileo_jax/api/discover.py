@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from galileo_jax.api.diagnose import Diagnosis, diagnose
 from galileo_jax.api.next_experiment import rehearsed
+from galileo_jax.experiment.choose import LITTLE
 from galileo_jax.experiment.journal import Journal, open_journal
 from galileo_jax.experiment.lab import Described, Lab, LabError, program_of
 from galileo_jax.experiment.measured import same_as, write_clip
-from galileo_jax.experiment.plan import LITTLE, candidates, farthest, middle, parted, stands
+from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
 from galileo_jax.experiment.settings import Can
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
-from galileo_jax.runtime.progress import Cancelled, CancelFlag, OnProgress
+from galileo_jax.runtime.progress import CancelFlag, Cancelled, OnProgress
 
 if TYPE_CHECKING:
     import pandas as pd

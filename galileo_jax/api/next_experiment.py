@@ -1,7 +1,6 @@
 """`next_experiment`: which setting of the lab would tell most?"""
 
 import json
-import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,9 +13,14 @@ from galileo_jax.api.run import load_run
 from galileo_jax.api.track import Track
 from galileo_jax.clip.schema import Clip
 from galileo_jax.experiment.belief import FILE, Beliefs, beliefs_of, read_beliefs
-from galileo_jax.experiment.choose import Expected, best_first, expect
-from galileo_jax.experiment.proposal import height_m
-from galileo_jax.experiment.settings import check_can, grid, parse_can, text_of
+from galileo_jax.experiment.choose import (
+    Expected,
+    best_first,
+    default_can,
+    expect,
+    sentence_of,
+)
+from galileo_jax.experiment.settings import check_can, grid, parse_can
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import load_file
 from galileo_jax.runtime import progress
@@ -31,7 +35,6 @@ if TYPE_CHECKING:
 
 Found = Diagnosis | str | Path
 COLUMNS = ("gain_nats", "named", "lead_nats", "hit")
-LITTLE = 0.05  # nats; less is not worth an experiment
 DIAGNOSED = 0.8  # share of the work where runs are to be diagnosed together first
 
 
@@ -163,16 +166,6 @@ def next_experiment(
     return NextExperiment(made.expected, about, made.hypotheses, document)
 
 
-def default_can(clip: Clip, trials: JointProblem) -> dict[str, Any]:
-    """What nearly every lab allows: lower and higher; flatter and steeper."""
-    height = height_m(clip, trials.problems[0])
-    can: dict[str, Any] = {"height": (round(0.4 * height, 3), round(2.0 * height, 3))}
-    if clip.ramp_angle_deg is not None:
-        flat, steep = max(5.0, clip.ramp_angle_deg - 8), min(45.0, clip.ramp_angle_deg + 8)
-        can["angle"] = (round(flat, 1), round(steep, 1))
-    return can
-
-
 def rehearsed(
     found: Diagnosis, settings: Sequence[Mapping[str, Any]], seed: int = 0
 ) -> NextExperiment:
@@ -192,28 +185,12 @@ def make_next(
     document = {
         "about": about,
         "hypotheses": hypotheses,
-        "sentence": _sentence(ordered, about),
+        "sentence": sentence_of(ordered[0], about),
         "settings": [
             {**one.setting, **{key: getattr(one, key) for key in COLUMNS}} for one in ordered
         ],
     }
     return NextExperiment(ordered, about, hypotheses, document)
-
-
-def _sentence(ordered: Sequence[Expected], about: str | None) -> str:
-    best = ordered[0]
-    where = text_of(best.setting)
-    if about is not None:
-        narrower = math.exp(best.gain_nats)
-        return f"{where}: the interval of {about} becomes {narrower:.1f} times narrower"
-    if best.gain_nats < LITTLE:
-        return (
-            f"no setting is expected to tell more: at best {best.gain_nats:.2f} nats, with {where}"
-        )
-    return (
-        f"{where}: named with probability {best.named:.2f} "
-        f"({best.gain_nats:.2f} nats expected about which hypothesis holds)"
-    )
 
 
 def _as_json(kind: Any) -> dict[str, Any]:

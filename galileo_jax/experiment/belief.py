@@ -87,10 +87,10 @@ def write_beliefs(path: Path, trials: JointProblem, beliefs: Beliefs) -> None:
         for key in ("z", "free", "covariance", "log_odds")
     }
     names = np.array([one.name for one in beliefs.of])
+    arrays |= {"effects": names, "parameters": np.array(trials.names)}
+    arrays |= {"margin": np.array(beliefs.margin)}
     with replacing(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(
-            file, effects=names, parameters=trials.names, margin=beliefs.margin, **arrays
-        )
+        np.savez_compressed(file, **arrays)  # pyright: ignore[reportArgumentType]
 
 
 def read_beliefs(path: Path, parameters: Sequence[str]) -> Beliefs:

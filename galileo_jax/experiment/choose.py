@@ -1,5 +1,6 @@
 """Every setting that a lab allows, and what is expected of an experiment there."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,16 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.experiment.belief import Belief, Beliefs
 from galileo_jax.experiment.gain import about_hypotheses, about_parameter
-from galileo_jax.experiment.proposal import propose
+from galileo_jax.experiment.proposal import height_m, propose
 from galileo_jax.experiment.rehearsal import Rehearsed, rehearse
+from galileo_jax.experiment.settings import text_of
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.per_mass import is_any_weighed
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 
 RATIO = "mass_ratio"
+LITTLE = 0.05  # nats; less is not worth an experiment
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,7 @@ def expect(
     settings: Sequence[Mapping[str, Any]],
     about: str | None = None,
     seed: int = 0,
+    seconds: float | None = None,
 ) -> list[Expected]:
     """What is expected of every setting, in their order.
 
@@ -55,6 +61,7 @@ def expect(
       settings: to be looked at.
       about: a parameter, or mass_ratio; None: which hypothesis holds.
       seed: of all draws.
+      seconds: length of the new clip; None: long enough for most.
 
     Raises:
       InputError: a setting has no place in the scene, or no hypothesis has the parameter.
@@ -67,7 +74,7 @@ def expect(
     found = []
     for i, setting in enumerate(settings):
         progress.report("rehearsing experiments", i / len(settings))
-        proposal = propose(clip, trials, scale, setting)
+        proposal = propose(clip, trials, scale, setting, seconds)
         rehearsed = rehearse(proposal, trials, beliefs.of, seed)
         gain = about_hypotheses(rehearsed, log_odds, beliefs.margin, seed)
         nats = gain.nats if about is None else _about(trials, beliefs, rehearsed, about)
@@ -81,6 +88,34 @@ def expect(
 def best_first(expected: Sequence[Expected]) -> tuple[Expected, ...]:
     """By gain; of those whose gain is the same, which tell all there is to know, by the lead."""
     return tuple(sorted(expected, key=lambda one: (-round(one.gain_nats, 2), -one.lead_nats)))
+
+
+def default_can(clip: Clip, trials: JointProblem) -> dict[str, Any]:
+    """What nearly every lab allows: lower and higher; flatter and steeper."""
+    if not SCENARIOS[clip.scenario].has_ramp and clip.scenario != "fall":
+        return {"fps": [clip.fps, 2 * clip.fps, 4 * clip.fps]}
+    height = height_m(clip, trials.problems[0])
+    can: dict[str, Any] = {"height": (round(0.4 * height, 3), round(2.0 * height, 3))}
+    if clip.ramp_angle_deg is not None:
+        flat, steep = max(5.0, clip.ramp_angle_deg - 8), min(45.0, clip.ramp_angle_deg + 8)
+        can["angle"] = (round(flat, 1), round(steep, 1))
+    return can
+
+
+def sentence_of(best: Expected, about: str | None = None) -> str:
+    """What to do next, in one sentence."""
+    where = text_of(best.setting)
+    if about is not None:
+        narrower = math.exp(best.gain_nats)
+        return f"{where}: the interval of {about} becomes {narrower:.1f} times narrower"
+    if best.gain_nats < LITTLE:
+        return (
+            f"no setting is expected to tell more: at best {best.gain_nats:.2f} nats, with {where}"
+        )
+    return (
+        f"{where}: named with probability {best.named:.2f} "
+        f"({best.gain_nats:.2f} nats expected about which hypothesis holds)"
+    )
 
 
 def _about(
@@ -126,7 +161,7 @@ def _check_about(trials: JointProblem, beliefs: Beliefs, about: str) -> None:
         raise InputError(
             f"--about: {about!r} is no parameter of a likely hypothesis; known: {known}"
         )
-    if re.fullmatch(r"m\d+", about) and not trials.problems[0].model.scene.surroundings.mass_kg:
+    if re.fullmatch(r"m\d+", about) and not is_any_weighed(trials):
         raise InputError(
             f"--about: {about}: motion tells the ratio of masses only; {RATIO} expected"
         )

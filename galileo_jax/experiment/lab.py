@@ -21,7 +21,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import IO, Any, Protocol
 
-from galileo_jax.experiment.settings import Can, parse_can
+from galileo_jax.experiment.settings import Can, Choices, parse_can
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import check_cancelled
 
@@ -53,8 +53,8 @@ class Described:
         """As JSON, in the lab's own form."""
         settings = {
             name: {"choices": list(kind.values)}
-            if hasattr(kind, "values")
-            else {"low": kind.low, "high": kind.high}  # pyright: ignore
+            if isinstance(kind, Choices)
+            else {"low": kind.low, "high": kind.high}
             for name, kind in self.can.items()
         }
         return {"settings": settings, "clip": dict(self.clip)}

@@ -11,7 +11,6 @@ VARIED = ("height", "release", "angle", "fps", "place2")
 # A verdict is believed when it has stood so many rounds, each with another clip; what is faint or
 # nameless longer than what is named. An ambiguous one never is.
 STANDS = {"named": 2, "law": 2, "none": 3, "unknown": 4}
-LITTLE = 0.05  # nats; less is not worth an experiment
 
 
 def parted(can: Can) -> tuple[Can, dict[str, Any]]:

@@ -39,7 +39,13 @@ class Proposal:
     fixed: Mapping[str, float]
 
 
-def propose(clip: Clip, trials: JointProblem, noise_scale: float, setting: Setting) -> Proposal:
+def propose(
+    clip: Clip,
+    trials: JointProblem,
+    noise_scale: float,
+    setting: Setting,
+    seconds: float | None = None,
+) -> Proposal:
     """The experiment with a setting.
 
     Args:
@@ -47,6 +53,7 @@ def propose(clip: Clip, trials: JointProblem, noise_scale: float, setting: Setti
       trials: the clips that there are, whose models have all effects.
       noise_scale: fitted, of the first.
       setting: by name, with or without units.
+      seconds: length of the new clip; None: long enough for most.
 
     Raises:
       InputError: a setting has no place in the scene.
@@ -63,7 +70,8 @@ def propose(clip: Clip, trials: JointProblem, noise_scale: float, setting: Setti
     if SCENARIOS[clip.scenario].has_ramp:
         update["ramp_angle_deg"] = angle_deg
     clip = clip.model_copy(update=update)
-    observation = _observation(first.observation, start, fps, noise_scale, is_swapped)
+    seconds = seconds or max(LONGEST_S, float(first.observation.times_s[-1]))
+    observation = _observation(first.observation, start, seconds, fps, noise_scale, is_swapped)
     problem = make_problem(
         clip, observation, first.engine.name, first.model.effects, first.noise, first.model.motion
     )
@@ -136,12 +144,16 @@ def _start(clip: Clip, first: Problem, given: Setting, angle_deg: float) -> np.n
 
 
 def _observation(
-    seen: Observation, start: np.ndarray, fps: float, noise_scale: float, is_swapped: bool
+    seen: Observation,
+    start: np.ndarray,
+    seconds: float,
+    fps: float,
+    noise_scale: float,
+    is_swapped: bool,
 ) -> Observation:
     """Times and errors of a clip, its objects at their start."""
-    seconds = max(LONGEST_S, float(seen.times_s[-1]))
     every = math.ceil(seconds * fps / MOST_FRAMES)
-    times = np.arange(0.0, seconds, every / fps)
+    times = np.arange(math.floor(seconds * fps / every + 1e-6) + 1) * every / fps
     scale = float(np.clip(noise_scale, *NOISE_SCALE_RANGE))
     covariance = np.nanmedian(seen.covariance_m2, axis=-1) * scale**2 / every
     order = slice(None, None, -1) if is_swapped else slice(None)

@@ -162,6 +162,5 @@ def test_the_gain_is_that_of_brute_force(trials, height, monkeypatch, tmp_path):
             density.append(logsumexp(-0.5 * square, axis=1) - np.log(len(inner) - (h == truth)))
         gains.append(np.mean(log_softmax(density, axis=0)[truth] + np.log(2)))
     brute = float(np.mean(gains))
-    print(brute, ours)
     assert 0.05 < brute < 0.65, "a case that tells something and not everything"
     assert ours.nats == pytest.approx(brute, abs=0.1)
