@@ -8,6 +8,7 @@ import pytest
 
 from galileo_jax.api.diagnose import Diagnosis
 from galileo_jax.api.next_experiment import next_experiment
+from galileo_jax.experiment.advise import with_next
 from galileo_jax.experiment.belief import beliefs_of, read_beliefs, write_beliefs
 from galileo_jax.experiment.choose import best_first, expect
 from galileo_jax.experiment.proposal import MOST_FRAMES, height_m, propose, release_m
@@ -161,6 +162,15 @@ def test_about_a_parameter(found, trials, clip):
     for about, line in (("k9", "no parameter of a likely"), ("m1", "ratio of masses only")):
         with pytest.raises(InputError, match=line):
             next_experiment(found, can="height=0.05:0.3", about=about)
+
+
+def test_an_ambiguous_verdict_advises_what_to_measure(found, trials, clip):
+    before = found.found.verdict.advice
+    told = with_next(found.found, clip, trials, 0).verdict
+    assert told.advice[0].startswith("measure next: release object 1 from")
+    assert told.advice[1:] == before
+    named = diagnosis_of(trials, "named")
+    assert with_next(named, clip, trials, 0) is named
 
 
 def test_hypotheses_that_no_experiment_can_tell_apart(found, trials, clip):
