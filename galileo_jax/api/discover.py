@@ -142,6 +142,10 @@ def discover(
         if folder.exists() and not folder.is_dir():
             raise InputError(f"--out: {folder} is a file; a folder expected")
         try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"--out: {folder}: {error.strerror or error}") from error
+        try:
             described = lab.describe()
         except LabError as error:
             raise InputError(f"LAB: {error}") from error
@@ -287,7 +291,11 @@ class _Loop:
             )
         if found is None:  # begun again after the budget was spent
             found = self._diagnosed([one["clip"] for one in journal.tracks])
-        ahead = rehearsed(found, settings, journal.seed)
+        try:
+            ahead = rehearsed(found, settings, journal.seed)
+        except InputError as error:  # of scenes that nobody can set up here
+            said = f"not rehearsed ({_line(error)}): as different as can be from those so far"
+            return farthest(self._can, settings, tried), said
         best = ahead.expected[0]
         journal.rounds[-1]["hypotheses"] = dict(ahead.hypotheses)
         if best.gain_nats < LITTLE:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.clip.load import check_clip, load_clip
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_csv import position_noise_m, read_observation_csv
 from galileo_jax.clip.yaml_file import yaml_text
@@ -40,6 +41,9 @@ def write_clip(
         for name, value in settings.items()
         if known_as(name) in DECLARED
     }
+    scenario = declared.get("scenario")  # one that is not known is for `check_clip` to refuse
+    if scenario in SCENARIOS and not SCENARIOS[str(scenario)].has_ramp:
+        update.pop("ramp_angle_deg", None)
     content = {key: value for key, value in declared.items() if key != "video"}
     content |= {"track": path.name, **update}
     if not text.strip():

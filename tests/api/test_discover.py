@@ -183,6 +183,23 @@ def test_interrupted_it_goes_on_where_it_was(where, verdicts, tmp_path):
     assert third.asked == [] and done.document["rounds"] == found.document["rounds"]
 
 
+def test_what_cannot_be_rehearsed_is_tried_all_the_same(verdicts, monkeypatch):
+    def refuse(*_):
+        raise InputError("--can: height has no place in scenario spring")
+
+    monkeypatch.setattr(module, "rehearsed", refuse)
+    lab = Lab()
+    found = gx.discover(lab, budget=3)
+    assert "not rehearsed (--can: height has no place" in found.experiments["reason"][1]
+    assert len({one["height_m"] for one in lab.asked}) == 3
+
+
+def test_a_folder_that_cannot_be_written(verdicts, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match=r"--out: .*file/run: Not a directory"):
+        gx.discover(Lab(), out=tmp_path / "file" / "run")
+
+
 def test_more_budget_goes_on(verdicts, tmp_path):
     gx.discover(Lab(), budget=2, out=tmp_path)
     lab = Lab(track(11), track(12))
