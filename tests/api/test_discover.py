@@ -254,3 +254,21 @@ def test_wrong_calls(verdicts, tmp_path):
     (tmp_path / "run" / "discover.json").write_text("[")
     with pytest.raises(InputError, match="not the journal of a discovery"):
         gx.discover(Lab(), out=tmp_path / "run")
+
+
+@pytest.mark.slow
+def test_a_saved_diagnosis_is_as_good_as_one_in_memory(tmp_path):
+    gx.simulate(
+        tmp_path / "slide.csv",
+        scenario="incline",
+        seed=6,
+        effects={"viscous_drag": {}},
+        strength=0.2,
+        track_only=True,
+    )
+    found = gx.diagnose(tmp_path / "slide.csv")
+    found.save(tmp_path / "run")
+    here = gx.next_experiment(found, can="height=0.1:0.4")
+    there = gx.next_experiment(tmp_path / "run", can="height=0.1:0.4")
+    gains = [one.document["settings"] for one in (here, there)]
+    assert gains[0] == gains[1] and here.hypotheses == there.hypotheses
