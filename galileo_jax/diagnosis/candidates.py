@@ -23,7 +23,8 @@ import numpy as np
 
 from galileo_jax.diagnosis.candidate_starts import matched, scattered
 from galileo_jax.inference.fits.descent import Descended, ends_of, in_valley
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter, valleys
+from galileo_jax.inference.fits.ends import valleys
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 
 NUM_REFITTED, OUT_OF_THE_RACE = 6, 100.0  # candidates, unless so many nats behind the best

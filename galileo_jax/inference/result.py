@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax import __version__
@@ -209,7 +208,7 @@ def make_result(
       notes: what else the method has to say ("engine", "status", warnings).
     """
     draws = posterior.flat()
-    spread = np.asarray(inverse(trials.parameters, jnp.asarray(draws))).std(axis=0)
+    spread = inverse(trials.parameters, np.asarray(draws)).std(axis=0)
     table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
     for i, parameter in enumerate(trials.parameters):
         entry: dict[str, Any] = summarise(draws[:, i])
