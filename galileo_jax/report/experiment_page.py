@@ -78,8 +78,7 @@ def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -
         [
             str(one["number"]),
             *(_value(one["settings"].get(name)) for name in names),
-            escape(one["reason"]),
-            escape(one["line"] or one["outcome"] or "not made"),
+            escape(one["outcome"] or "not made"),
         ]
         for one in record["experiments"]
     ]
@@ -89,19 +88,25 @@ def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -
             escape(one["status"]),
             escape(", ".join(one["effects"]) or one["form"] or ""),
             escape(p_text(one["p_value"])),
-            escape(one["sentence"]),
         ]
         for one in record["rounds"]
     ]
+    reasons = [
+        f"{one['number']}: {one['reason']}" + (f"; lost: {one['line']}" if one["line"] else "")
+        for one in record["experiments"]
+    ]
+    words = [f"{len(one['clips'])}: {one['sentence']}" for one in record["rounds"]]
     held = [f"{name} = {value}" for name, value in record["held"].items()]
     ended = f"<p>{escape(str(record['ended']))}.</p>" if record["ended"] else ""
     is_good = bool(record["rounds"]) and record["rounds"][-1]["status"] in ("named", "none", "law")
     sections = [
         header("discovery", path.parent.name or "lab", sentence, ended, is_good),
         "<h2>Experiments</h2>\n"
-        + table(["no.", *map(_title, names), "why", "what came of it"], experiments),
+        + table(["no.", *map(_title, names), "what came of it"], experiments)
+        + f"\n<h3>Why</h3>\n{items(reasons)}",
         "<h2>Verdicts</h2>\n"
-        + table(["clips", "verdict", "effects", "p without", "in words"], verdicts),
+        + table(["clips", "verdict", "effects", "p without"], verdicts)
+        + f"\n<h3>In words</h3>\n{items(words)}",
         f"<h2>Left alone</h2>\n{items(held)}" if held else "",
     ]
     write_text(path, document("discovery", [part for part in sections if part]))
