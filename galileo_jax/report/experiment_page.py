@@ -22,6 +22,7 @@ NUMBERS = ("gain_nats", "named", "lead_nats", "hit")
 def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
     """Writes the page of next.json."""
     names = _names(record)
+    title = ", ".join(Path(clip).stem for clip in record["clips"])
     about = record["about"] or "which hypothesis holds"
     lead = str(record["sentence"])
     odds = [f"{name}: {share:.3f}" for name, share in record["hypotheses"].items()]
@@ -31,7 +32,7 @@ def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
     ]
     head = [*map(_title, names), f"gain, nats, about {about}", "named", "lead, nats", "hit"]
     sections = [
-        header("next experiment", " ".join(record["clips"]), lead),
+        header("next experiment", title, lead),
         f"<h2>What is open</h2>\n<p>Probabilities of the hypotheses so far.</p>{items(odds)}",
         chart_section(
             "What each setting would tell",
@@ -45,14 +46,16 @@ def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
         "average; hit: how probable it is that object 1 hits another object. next.json has all "
         f"{len(record['settings'])}.</p>",
     ]
-    write_text(path, document(f"{' '.join(record['clips'])}: next experiment", sections))
+    write_text(path, document(f"{title}: next experiment", sections))
 
 
 def gains_chart(record: Mapping[str, Any]) -> Chart:
     """The gain against each setting, one panel each; the best in colour."""
     rows = record["settings"]
     panels = []
-    for name in _names(record):
+    names = _names(record)
+    varied = [name for name in names if len({row[name] for row in rows}) > 1]
+    for name in varied or names[:1]:
         values = [row[name] for row in rows]
         gains = [row["gain_nats"] for row in rows]
         is_number = all(isinstance(v, int | float) for v in values)
@@ -62,7 +65,7 @@ def gains_chart(record: Mapping[str, Any]) -> Chart:
             Points(x[:1], gains[:1], "accent", "the best", size_px=8),
         )
         panels.append(Panel("gain, nats", marks, xlabel=_title(name), level=0.0))
-    label = f"expected gain against {', '.join(map(_title, _names(record)))}; {record['sentence']}"
+    label = f"expected gain against {', '.join(map(_title, names))}; {record['sentence']}"
     return Chart("gains", label, tuple(panels))
 
 
