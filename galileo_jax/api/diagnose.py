@@ -256,7 +256,8 @@ def diagnose(
       pixels_per_metre: overrides the clips' scale; None: the yaml's.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
         `{"round": row}` for the base model and for what is added, as in diagnosis.json's history,
-        and `{"candidate": row}` for each candidate.
+        and `{"candidate": row}` for each candidate as soon as it is fitted, and once more in the
+        end: until then its fit may get better, and probabilities change.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Raises:
