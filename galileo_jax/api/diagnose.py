@@ -22,6 +22,8 @@ from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.laws.source import proposed_file
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
+from galileo_jax.experiment.advise import with_next
+from galileo_jax.experiment.belief import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
@@ -44,6 +46,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
 
+DOCUMENT = "diagnosis.json"
 TRACKED = 0.2  # share of the work, for progress
 STAGES = {  # how a stage begins, and how much is done by then
     "fitting the model": 0.02,
@@ -223,7 +226,8 @@ class Diagnosis:
     def save(self, folder: str | Path) -> Path:
         """Writes diagnosis.json, report.html and, below model/, the run of the last model.
 
-        Where the verdict is a law, its effect, too: proposed_effect.py, for `--effects-from`.
+        And hypotheses.npz, of which `next_experiment` is made; where the verdict is a law, its
+        effect, too: proposed_effect.py, for `--effects-from`.
         """
         folder, best = Path(folder), self.best
         proposed = folder / PROPOSED
@@ -233,7 +237,8 @@ class Diagnosis:
             write_text(proposed, proposed_file(self.verdict.law, clips))
             files = [*best.result.get("effects_from", []), str(proposed.resolve())]
             best = replace(best, result={**best.result, "effects_from": files})
-        write_json(folder / "diagnosis.json", self.document)
+        write_json(folder / DOCUMENT, self.document)
+        write_beliefs(folder / FILE, self.problem, beliefs_of(self.found))
         self.report(folder / "report.html")
         best.save(folder / "model", report=False)
         return folder
@@ -314,12 +319,12 @@ def diagnose(
 
 def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
     def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
-        fitter_of(_with_library(some, seen, engine)).compile()
+        fitter_of(with_library(some, seen, engine)).compile()
 
     return precompile(clips, compile_for).join
 
 
-def _with_library(
+def with_library(
     clips: Sequence[Clip], observations: Sequence[Observation], engine: str
 ) -> JointProblem:
     """The joint problem with all effects and nameless forms that have a place in the scene."""
@@ -347,7 +352,7 @@ def _diagnosed(
 ) -> Diagnosis:
     clips, observations = [one.clip for one in measured], [one.observation for one in measured]
     began = time.perf_counter()
-    problem = _with_library(clips, observations, engine)
+    problem = with_library(clips, observations, engine)
     if add not in ("auto", "none", *problem.all_effects):
         raise InputError(f"--add: {add} has no place in {clips[0].path}")
 
@@ -381,12 +386,14 @@ def _diagnosed(
         on_round=on_round,
         on_candidate=on_candidate,
     )
+    found = with_next(found, clips[0], problem, seed)
     record = diagnosis_document(problem, found, seed)
     document = {
         "clips": [clip.source for clip in clips],
         TRACKS: [digest(observation) for observation in observations],
         **record,
         **inferred(measured),
+        **({"effects_from": [str(Path(path).resolve()) for path in files]} if files else {}),
         "left_out": [name for name in effect_names() if name not in problem.all_effects],
         "engine": problem.problems[0].engine.name,
         "timings_s": {
