@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from galileo_jax.measurement.cuts import Cut
 from galileo_jax.prediction.posterior_predictive import (
     PosteriorPredictive,
     posterior_predictive,
@@ -120,10 +121,18 @@ def _header(title: str, run: Run) -> str:
         f"<p{mark}>{escape(fit_text.convergence(run))}</p>\n{warning}"
         f'<p class="soft">Method {escape(result["method"])}; effects: {escape(effects)}.</p>\n'
         + "".join(
-            f'<p class="soft">{escape(line)}.</p>\n' for line in result.get("taken_as_exact", [])
+            f'<p class="soft">{escape(line)}.</p>\n'
+            for line in (*_cuts(result), *result.get("taken_as_exact", []))
         )
     )
     return header("fit", title, fit_text.fit_quality(result), more, fit_text.fits(result))
+
+
+def _cuts(result: Mapping[str, Any]) -> list[str]:
+    """What of each clip is left out, and why: one line each."""
+    return [
+        f"{clip}: {Cut(**entry)}" for clip, cuts in result.get("cuts", {}).items() for entry in cuts
+    ]
 
 
 def _key(run: Run) -> str:

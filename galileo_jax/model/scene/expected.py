@@ -18,6 +18,7 @@ from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
+from galileo_jax.model.scene.board_path import board_shape
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 
 START_FRAMES = 6  # the start's velocity is read off so many
@@ -37,13 +38,17 @@ def expected(
 ) -> Mapping[str, tuple[float, float]]:
     """The two numbers of each prior, by the parameter's name; of every law that might ask."""
     declared = _declared(clip)
-    if SCENARIOS[clip.scenario].has_ramp:
-        return declared
     seen = np.flatnonzero(observation.mask[0])
     times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
+    known = clip.is_scale_known
+    if SCENARIOS[clip.scenario].has_ramp:
+        if clip.starts_moving:
+            speed = math.hypot(*_start_velocity(times_s, place_m))
+            declared["start_speed"] = (speed, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
+        is_board = not SCENARIOS[clip.scenario].has_table
+        return declared | (board_shape(clip, observation) if is_board else {})
     down_m = place_m[1, 0] - place_m[1]
     velocity = _start_velocity(times_s, place_m)
-    known = clip.is_scale_known
     middle = (float(down_m.min()) + float(down_m.max())) / 2
     width = float(np.ptp(down_m))
 

@@ -15,6 +15,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.files.package_data import scene_path
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.effects.laws.start_velocity import StartVelocity
 from galileo_jax.model.scene.expected import expected
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
@@ -22,9 +23,10 @@ from galileo_jax.runtime.errors import InputError
 # Where nothing else is declared; an incline's dynamics do not depend on it.
 UNKNOWN_BOX_M: tuple[float, ...] = (0.04, 0.04, 0.04)
 UNKNOWN_ROUND_M: tuple[float, ...] = (0.02, 0.01)
-EARLY_SHARE = 0.3  # of a fall, before the air makes itself felt
+EARLY_SHARE = 0.3  # of a fall, before the air makes itself felt; of a way that turns back
 # Of the objects beyond the file's two, in turn.
 SHAPE_RGBA = ([0.35, 0.60, 0.30, 1], [0.62, 0.45, 0.70, 1], [0.80, 0.36, 0.22, 1])
+TURNED = 0.99  # of its way, where what ended nearer has turned back
 BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do not climb
 
 
@@ -142,10 +144,16 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         mass_kg=tuple(declared.mass_kg for declared in clip.objects),
         **(rolling(clip.objects) if has_surface else {}),
         moves_in_plane=scenario.moves_in_plane,
-        laws=(*scenario.laws, *(("floor",) if clip.has_floor else ())),
+        laws=laws_of(clip),
         expected=expected(clip, observation, half[0][1]),
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
+
+
+def laws_of(clip: Clip) -> tuple[str, ...]:
+    """The scenario's laws, and those that the clip's keys bring."""
+    declared = (("floor", clip.has_floor), (StartVelocity.name, clip.starts_moving))
+    return SCENARIOS[clip.scenario].laws + tuple(name for name, is_there in declared if is_there)
 
 
 def start_paths(
@@ -168,7 +176,7 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
     """
     frame_s = 1.0 / clip.fps
     declared = clip.objects[0].first_frame
-    if "start_velocity" in SCENARIOS[clip.scenario].laws:
+    if StartVelocity.name in laws_of(clip):
         return float(observation.times_s[np.argmax(observation.mask[0])]), frame_s
     if clip.scenario == "ramp" and declared is not None:
         return declared * frame_s, frame_s / 3
@@ -178,7 +186,7 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
     if SCENARIOS[clip.scenario].has_table:
         gone = np.where(place[0] < 0, gone, 0.0)
     moving = gone > 0.05 * gone.max()
-    if clip.scenario == "fall":
+    if clip.scenario == "fall" or gone[-1] < TURNED * gone.max():
         moving &= gone < EARLY_SHARE * gone.max()
         moving &= np.arange(len(gone)) <= np.argmax(gone)  # it may come back up
     if gone.max() <= 0 or moving.sum() < 3:
