@@ -13,7 +13,7 @@ from typing import Any
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
-from galileo_jax.measurement.find_blow import blow_frame
+from galileo_jax.measurement.find_blow import blow_frame, goes_on
 from galileo_jax.measurement.find_hand import hand_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
 from galileo_jax.observation.observation import Observation
@@ -60,6 +60,8 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
     ]
     if ends:
         last, why = min(ends)
+        if why == STOPPED and goes_on(observation, last):
+            why = STRUCK
         # Of a video: the hit falls into an exposure, whose frame shows neither.
         last -= SMEARED_FRAMES if clip.video is not None else 0
         observation = _without(observation, slice(last + 1, None))

@@ -20,6 +20,7 @@ HIT_M_S2 = 20.0  # two g
 SHARE = 0.3
 CLEAR = 6.0
 USUAL = 4.0
+GOES_ON = 0.1  # of the speed: what keeps less has been stopped
 STEPS = 3  # on either side
 SMEARED = 2  # steps into which the blow itself may fall
 
@@ -60,6 +61,21 @@ def blow_frame(observation: Observation) -> int | None:
     at = first + int(np.argmax(size[first:last]))
     steps = np.hypot(*np.diff(velocity[:, at + STEPS - 1 : at + STEPS + SMEARED]))
     return int(seen[at + STEPS + int(np.argmax(steps > 0.25 * size[at]))])
+
+
+def goes_on(observation: Observation, last: int) -> bool:
+    """Whether object 1 still moves after the frame `last`, with more than a tenth of its speed."""
+    seen = np.flatnonzero(observation.mask[0])
+    at = int(np.searchsorted(seen, last))
+    before, after = seen[max(at - STEPS, 0) : at + 1], seen[at + SMEARED : at + SMEARED + STEPS + 1]
+    if min(len(before), len(after)) < 2:
+        return False
+    place, times = observation.position_m[0], observation.times_s
+    speeds = [
+        np.hypot(*(place[:, part[-1]] - place[:, part[0]])) / (times[part[-1]] - times[part[0]])
+        for part in (before, after)
+    ]
+    return bool(speeds[1] > GOES_ON * speeds[0])
 
 
 def _median(values: np.ndarray) -> np.ndarray:
