@@ -309,6 +309,7 @@ class ClipFile(BaseModel):
     origin_sd_px: Annotated[Number, AfterValidator(_origin_sd_px)] = 0.0
     gravity: Annotated[Number, AfterValidator(_gravity)] = 9.81
     vertical_sd_deg: Annotated[Number, AfterValidator(_angle_sd_deg)] = 0.0
+    launch_angle_deg: Annotated[Number, Field(gt=-90, lt=90)] | None = None
     starts_moving: Annotated[bool, Field(strict=True)] = False
     floor: Annotated[bool | float | None, BeforeValidator(_floor)] = None
     liquid_density: Annotated[Number, AfterValidator(_liquid_density)] | None = None
@@ -340,6 +341,8 @@ class Clip(ClipFile):
       gravity: m/s^2.
       vertical_sd_deg: flight: how well the picture's vertical is gravity's direction (one
         standard deviation); 0 = taken at its word.
+      launch_angle_deg: flight: at which a launcher is set, over the horizontal; None = not known,
+        or thrown by hand.
       starts_moving: incline: the object moves already in the first frame that is used.
       floor: fall, flight: its height over the origin, m; true = there is one, at a height to be
         inferred; None or false = none is reached.

@@ -15,6 +15,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.model.effects.air import expected_drags
 from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN
+from galileo_jax.model.effects.laws.start_velocity import LAUNCH
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
@@ -30,6 +31,7 @@ DENSITY_RATIO = (0.5, 0.8)  # steel in water 0.13, a bubble 800
 WEIGHED_RATIO_SD = 0.03  # where density, mass and size are declared
 EYE_M = 1.6  # as high as a camera is held
 DISTANCE = 1.5  # of the camera from a high fall, in its lengths: it fills half of the picture
+LAUNCH_SD_DEG = 0.5  # a launcher is set by a scale of degrees
 UNKNOWN_M_S, UNKNOWN_M = 10.0, 3.0  # widths where nobody knows how long a metre is
 
 
@@ -64,6 +66,7 @@ def expected(
         "density_ratio": _density_ratio(clip),
         "floor_height": _floor_height(clip, place_m[1], half_height_m),
         **declared,
+        **_launcher(clip),
         **(_high_fall(clip, float(down_m.max())) if clip.scenario == "fall" and known else {}),
     }
 
@@ -79,6 +82,13 @@ def _declared(clip: Clip) -> dict[str, tuple[float, float]]:
         ORIGIN: clip.origin_sd_px / scale,
     }
     return {name: (0.0, sd) for name, sd in sds.items() if sd}
+
+
+def _launcher(clip: Clip) -> dict[str, tuple[float, float]]:
+    """The declared angle of a launcher; nothing where there is none."""
+    if clip.launch_angle_deg is None:
+        return {}
+    return {LAUNCH: (math.radians(clip.launch_angle_deg), math.radians(LAUNCH_SD_DEG))}
 
 
 def _high_fall(clip: Clip, length_m: float) -> dict[str, tuple[float, float]]:
