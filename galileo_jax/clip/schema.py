@@ -17,6 +17,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 
 LengthUnit = Literal["m", "cm", "mm", "km", "in", "ft", "px"]
 YAxis = Literal["up", "down"]
+UpAxis = Literal["y", "z"]
 Shape = Literal["box", "cylinder", "torus", "sphere"]
 Direction = Literal["right", "left"]
 
@@ -255,6 +256,7 @@ class ClipObject(BaseModel):
         A number is its moment of inertia over m r^2, where it is not that of a solid.
       z_m: how far its centre is from the plane in which object 1 moves, m, positive towards the
         camera; of use to `--motion free` only.
+      spin_rad_s: flight: its spin where it was measured, along the track's axes.
       track_name: what another tool's track file calls it; None = the same, or the only one.
     """
 
@@ -268,6 +270,7 @@ class ClipObject(BaseModel):
     first_frame: Annotated[int, Field(strict=True, ge=0)] | None = 0
     rolls: Annotated[bool | float | None, BeforeValidator(_rolls)] = None
     z_m: Annotated[Number, AfterValidator(_across)] = 0.0
+    spin_rad_s: tuple[Number, Number, Number] | None = None
     track_name: OneLine | None = None
 
     @property
@@ -298,6 +301,7 @@ class ClipFile(BaseModel):
     track_units: Annotated[LengthUnit, _one_of(get_args(LengthUnit))] | None = None
     track_y: Annotated[YAxis, _one_of(get_args(YAxis))] | None = None
     track_origin: Point | None = None
+    track_up: Annotated[UpAxis, _one_of(get_args(UpAxis))] = "y"
     scenario: Annotated[str, _one_of(tuple(SCENARIOS))]
     fps: Annotated[Number, AfterValidator(_fps)]
     ramp_angle_deg: Annotated[Number, AfterValidator(_ramp_angle_deg)] | None = None
@@ -326,6 +330,7 @@ class Clip(ClipFile):
       track: the track file, ours or another tool's; None for a video.
       track_units: of a track file of another tool, or of its calibration; "px" = pixels.
       track_y: which way its y axis points.
+      track_up: which axis of our own csv of a flight in space points up.
       track_origin: where the foot of the ramp is in a track file in units of length, in these
         units and along its axes.
       scenario: a name in `SCENARIOS`.

@@ -167,8 +167,8 @@ def _spans(problem: Problem, theta: np.ndarray) -> tuple[tuple[Span, ...], ...]:
     position, velocity = problem.engine.simulate(theta[None])
     times = np.arange(velocity.shape[-1]) * problem.model.record_dt_s
     scene = problem.model.scene.surroundings
-    speeds = np.hypot(velocity[0, :, 0], velocity[0, :, 1])
-    moved = np.hypot(*(position[0] - position[0, ..., :1]).transpose(1, 0, 2))
+    speeds = np.linalg.norm(velocity[0], axis=1)
+    moved = np.linalg.norm(position[0] - position[0, ..., :1], axis=1)
     found = []
     for way, speed in zip(moved, speeds, strict=True):
         moving = np.flatnonzero((speed > MOVES_M_S) & (times <= last))
@@ -213,11 +213,12 @@ def _motion(
         origin = np.asarray(scene.start_m)
         slope = np.broadcast_to(law.ramp_rad, position[:, 0].shape)
     tangent = np.stack([np.cos(slope), -np.sin(slope)], axis=1)
-    path = np.sum((position - origin[..., None]) * tangent, axis=1)
-    speed = np.sum(velocity * tangent, axis=1)
-    if scene.moves_in_plane:
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        steps = np.hypot(*np.diff(position, axis=-1).transpose(1, 0, 2))
+    if not scene.moves_in_plane:
+        path = np.sum((position - origin[..., None]) * tangent, axis=1)
+        speed = np.sum(velocity * tangent, axis=1)
+    else:
+        speed = np.linalg.norm(velocity, axis=1)
+        steps = np.linalg.norm(np.diff(position, axis=-1), axis=1)
         path = np.pad(np.cumsum(steps, axis=-1), [(0, 0), (1, 0)])
     recorded = np.arange(path.shape[-1]) * model.record_dt_s
     chosen = np.unique(np.linspace(0, np.searchsorted(recorded, end_s), NUM_TIMES).astype(int))

@@ -42,11 +42,11 @@ def blow_frame(observation: Observation) -> int | None:
     # From the middle of one window to that of the next which shares no step with it.
     apart = STEPS + SMEARED - 1
     change = usual[:, apart:] - usual[:, :-apart]
-    size = np.hypot(*change)
+    size = np.linalg.norm(change, axis=0)
     # Steady acceleration of the run itself, over as much time.
     between_s = centre_s[apart:] - centre_s[:-apart]
     steady = np.quantile(size / between_s, 0.75) * between_s
-    speed = np.hypot(*usual)
+    speed = np.linalg.norm(usual, axis=0)
     clear = CLEAR * np.hypot(error[apart:], error[:-apart]) * np.sqrt(np.pi / 2)
     jump_s = np.median(step_s)
     beyond = size - steady
@@ -59,7 +59,7 @@ def blow_frame(observation: Observation) -> int | None:
     last = first + int(np.argmin(np.append(is_blow[first:], False)))
     # Of the windows that see it, those in whose middle it is: there the change is largest.
     at = first + int(np.argmax(size[first:last]))
-    steps = np.hypot(*np.diff(velocity[:, at + STEPS - 1 : at + STEPS + SMEARED]))
+    steps = np.linalg.norm(np.diff(velocity[:, at + STEPS - 1 : at + STEPS + SMEARED]), axis=0)
     return int(seen[at + STEPS + int(np.argmax(steps > 0.25 * size[at]))])
 
 
@@ -72,7 +72,7 @@ def goes_on(observation: Observation, last: int) -> bool:
         return False
     place, times = observation.position_m[0], observation.times_s
     speeds = [
-        np.hypot(*(place[:, part[-1]] - place[:, part[0]])) / (times[part[-1]] - times[part[0]])
+        np.linalg.norm(place[:, part[-1]] - place[:, part[0]]) / (times[part[-1]] - times[part[0]])
         for part in (before, after)
     ]
     return bool(speeds[1] > GOES_ON * speeds[0])

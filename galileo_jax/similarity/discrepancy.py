@@ -44,11 +44,11 @@ MOVED_M = 0.002  # an object that has gone so far has been hit
 
 def offsets(observation: Observation) -> list[np.ndarray]:
     """The modes of a track as a whole: with these alone, displacements are what counts."""
-    count, _, frames = observation.position_m.shape
+    count, axes, frames = observation.position_m.shape
     found = []
     for i in range(count):
-        for axis in range(2):
-            offset = np.zeros((count, 2, frames))
+        for axis in range(axes):
+            offset = np.zeros((count, axes, frames))
             # Paths begin where the object is first seen, within that frame's error.
             seen = int(np.argmax(observation.mask[i]))
             error = observation.covariance_m2[i, axis, axis, seen]

@@ -64,8 +64,9 @@ class GaussianLikelihood:
         """
         mask = observation.mask
         covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
-        covariance[~mask] = np.eye(2)
-        if noise == "tracker":
+        axes = observation.position_m.shape[1]
+        covariance[~mask] = np.eye(axes)
+        if noise == "tracker" or axes == 3:  # no camera that anybody knows of: several
             patterns = np.stack(offsets(observation))
         else:
             patterns = modes(observation, scene, is_filmed=noise == "camera")
@@ -80,7 +81,7 @@ class GaussianLikelihood:
             inverse_root,
             basis.reshape(len(gain), *patterns.shape[1:]),  # of short tracks fewer than patterns
             gain,
-            np.float64(2 * mask.sum()),
+            np.float64(axes * mask.sum()),
         )
 
     @staticmethod

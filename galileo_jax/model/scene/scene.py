@@ -108,14 +108,14 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
     else:
         angle = 0.0 if scenario.moves_in_plane else math.pi / 2
     half = [extents(declared) for declared in clip.objects]
-    starts = []
+    starts: list[tuple[float, ...]] = []
     for i, (name, (_, height)) in enumerate(zip(observation.names, half, strict=True)):
         seen = np.flatnonzero(observation.mask[i])
         if not seen.size:
             raise InputError(f"{clip.path}: {name} is not seen in any frame")
-        x, y = observation.position_m[i, :, seen[0]]
+        x, y = observation.position_m[i, :2, seen[0]]
         if not has_table:
-            starts.append((float(x), float(y)))
+            starts.append(tuple(map(float, observation.position_m[i, :, seen[0]])))
         elif i == 0:
             along = x * math.cos(angle) - y * math.sin(angle)
             starts.append(_on_ramp(along, height, angle))
@@ -137,7 +137,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         start_m=tuple(starts),
         start_path_m=start_paths(tuple(starts), corner, angle),
         has_table=has_table,
-        comes_down=tuple(has_table and x < c for (x, _), c in zip(starts, corner, strict=True)),
+        comes_down=tuple(has_table and at[0] < c for at, c in zip(starts, corner, strict=True)),
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.is_scale_known,
         has_surface=has_surface,
@@ -157,11 +157,11 @@ def laws_of(clip: Clip) -> tuple[str, ...]:
 
 
 def start_paths(
-    starts: tuple[tuple[float, float], ...], corners: tuple[float, ...], angle: float
+    starts: tuple[tuple[float, ...], ...], corners: tuple[float, ...], angle: float
 ) -> tuple[float, ...]:
     """How far each start `(x, y)` is past the foot, along the path; 0 without a table."""
     paths = []
-    for (x, _), corner in zip(starts, corners, strict=True):
+    for (x, *_), corner in zip(starts, corners, strict=True):
         past = x - corner if math.isfinite(corner) else 0.0
         paths.append(past / math.cos(angle) if past < 0 else past)
     return tuple(paths)
@@ -220,7 +220,7 @@ def compile_scene(
         spec.delete(spec.geom("ramp"))
     elif not has_table:
         # The board is where the object is seen to stand, whatever its height.
-        (x, y), height = surroundings.start_m[0], surroundings.half_height_m[0]
+        (x, y, *_), height = surroundings.start_m[0], surroundings.half_height_m[0]
         sin, cos = math.sin(surroundings.angle_rad), math.cos(surroundings.angle_rad)
         spec.geom("ramp").pos = [x - height * sin, 0, y - height * cos]
     if surroundings.has_surface:
@@ -233,7 +233,7 @@ def compile_scene(
     for i in range(count):
         name = f"object{i + 1}"
         length, height = surroundings.half_length_m[i], surroundings.half_height_m[i]
-        x, y = surroundings.start_m[i]
+        x, y = surroundings.start_m[i][:2]
         spec.body(name).pos = [x, 0, y]
         spec.geom(f"{name}_sled").size = [height, 0, 0]
         # Bumpers meet at the height of object 1's centre, so that a push has no lift.

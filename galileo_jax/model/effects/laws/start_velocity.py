@@ -1,6 +1,7 @@
 """Start velocity: the object moves when it is first seen, nobody lets it go.
 
-    v(0) = (start_velocity_x, start_velocity_y)    in the plane, x along the travel, y up
+    v(0) = (start_velocity_x, start_velocity_y)    in the plane, x along the travel, y up;
+                                                   in space with start_velocity_z
     v(0) = start_speed                             on a straight path, downward
 
     launch_speed = start_velocity_x / cos(launch_angle)
@@ -17,7 +18,8 @@ from typing import ClassVar
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
-PLANE = ("start_velocity_x", "start_velocity_y")
+SPACE = ("start_velocity_x", "start_velocity_y", "start_velocity_z")
+PLANE = SPACE[:2]
 PATH = ("start_speed",)
 LAUNCH = "launch_angle"
 
@@ -33,7 +35,7 @@ class StartVelocity(Effect):
             return ()
         found = [
             Parameter(name, "m/s", Normal(*scene.expected[name]), 0.0, "main", 0.05, per_clip=True)
-            for name in (PLANE if scene.moves_in_plane else PATH)
+            for name in (SPACE[: scene.num_axes] if scene.moves_in_plane else PATH)
         ]
         if scene.moves_in_plane and LAUNCH in scene.expected:
             prior = Normal(*scene.expected[LAUNCH])
@@ -44,7 +46,7 @@ class StartVelocity(Effect):
         """In the plane."""
         if self.name not in scene.laws or not scene.moves_in_plane:
             return None
-        components = [theta[name] for name in PLANE]
+        components = [theta[name] for name in SPACE[: scene.num_axes]]
         return components[0].__array_namespace__().stack(components, axis=-1)[..., None, :]
 
     def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
@@ -57,9 +59,13 @@ class StartVelocity(Effect):
         """The speed of a throw and its angle over the horizontal; the speed at a launcher."""
         if self.name not in scene.laws or not scene.moves_in_plane:
             return {}
-        x, y = (theta[name] for name in PLANE)
+        x, y, *z = (theta[name] for name in SPACE[: scene.num_axes])
         xp = x.__array_namespace__()
-        found = {"start_speed": (xp.hypot(x, y), "m/s"), "start_angle": (xp.atan2(y, x), "rad")}
+        level = xp.hypot(x, z[0]) if z else x
+        found = {
+            "start_speed": (xp.hypot(level, y), "m/s"),
+            "start_angle": (xp.atan2(y, level), "rad"),
+        }
         if LAUNCH in scene.expected:
             found["launch_speed"] = (x / xp.cos(theta[LAUNCH]), "m/s")
         return found
