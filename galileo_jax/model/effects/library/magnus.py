@@ -22,7 +22,6 @@ from galileo_jax.model.effects.effect import SPIN, Array, Effect, Push, Surround
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
 
-AXES = ("magnus_x", "magnus_y", "magnus_z")
 LIFT = "magnus_lift"
 SPIN_PRIOR = Normal(0.0, 200.0)  # a table-tennis ball that is cut: 500 rad/s and more
 LIFT_PRIOR = LogNormal(median=0.6, sd=0.4)
@@ -38,10 +37,9 @@ class Magnus(Effect):
         """The spin, known or not, and the lift per spin; none but in a flight."""
         if not scene.moves_in_plane:
             return ()
-        names = AXES if scene.num_axes == 3 else AXES[2:]
         found = []
-        for name in names:
-            known = scene.expected.get(f"{SPIN}{name[-2:]}")
+        for name, axis in _spins(scene):
+            known = scene.expected.get(f"{SPIN}_{axis}")
             prior = SPIN_PRIOR if known is None else Normal(*known)
             found.append(Parameter(name, "rad/s", prior, 0.0, "effect", 0.1, per_clip=True))
         lift = Parameter(LIFT, "1", LIFT_PRIOR, LIFT_PRIOR.median, "effect", 0.1)
@@ -53,13 +51,20 @@ class Magnus(Effect):
             return None
         radius = scene.half_height_m[0]
         size = theta[LIFT] * (0.5 * AIR_KG_M3 * math.pi * radius**3)
-        spin = [theta.get(name) for name in AXES]
+        spin = [theta[name] for name, _ in _spins(scene)]
 
         def lift(velocity_m_s: Array, time_s: Array) -> Array:
             xp = velocity_m_s.__array_namespace__()
             if scene.num_axes == 2:
                 x, y = velocity_m_s
-                return size * spin[2] * xp.stack([-y, x])
+                return size * spin[0] * xp.stack([-y, x])
             return size * xp.linalg.cross(xp.stack(spin), velocity_m_s)
 
         return lift
+
+
+def _spins(scene: Surroundings) -> tuple[tuple[str, str], ...]:
+    """The spin's parameters, each with its axis."""
+    if scene.num_axes == 2:
+        return (("magnus", "z"),)
+    return tuple((f"magnus_{axis}", axis) for axis in "xyz")
