@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.api.track_doubts import taken_as_exact, with_track_doubts
@@ -146,7 +145,7 @@ class Fit:
         if self.z_best is not None:
             return self.z_best
         median = np.median(self.posterior.flat(), axis=0)
-        return np.asarray(inverse(self.problem.parameters, jnp.asarray(median)))
+        return inverse(self.problem.parameters, np.asarray(median))
 
     def runs(self, folder: Path) -> tuple[Run, ...]:
         """The fit of every clip, as `save` leaves it in `folder` and below."""

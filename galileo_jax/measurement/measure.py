@@ -94,7 +94,7 @@ def measure(clip: Clip) -> Measurement:
         moving = measured.clip.model_copy(update={"starts_moving": True})
         measured = replace(measured, clip=moving)
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
-    told = (
+    other_doubts = (
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
         for one in astray
     )
@@ -104,7 +104,7 @@ def measure(clip: Clip) -> Measurement:
         inferred={**found, **measured.inferred},
         cuts=cuts,
         astray=astray,
-        doubts=(*([] if doubt is None else [doubt]), *told),
+        doubts=(*([] if doubt is None else [doubt]), *other_doubts),
         remarks=tuple(remarks),
     )
 

@@ -9,7 +9,7 @@ from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.nuisances import NUISANCES
 from galileo_jax.model.parameters import LogNormal, Parameter, Uniform
-from galileo_jax.model.scene.scene import Scene
+from galileo_jax.model.scene.scene import TIMESTEP_S, Scene
 
 SUBSTEPS = 4  # solver steps per recorded step: forces of effects are held constant for these
 
@@ -64,7 +64,7 @@ class Model:
     @property
     def record_dt_s(self) -> float:
         """Time between recorded steps, s."""
-        return SUBSTEPS * float(self.scene.model.opt.timestep)
+        return SUBSTEPS * TIMESTEP_S
 
     @property
     def num_records(self) -> int:
