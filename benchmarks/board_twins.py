@@ -56,7 +56,7 @@ def slide_of(track: gx.Track) -> tuple[Slide, float]:
     pixels = track.pixels
     assert pixels is not None
     places, seen = pixels.position_px[0], np.flatnonzero(track.observation.mask[0])
-    line = np.polyfit(*places[seen].T, 1)
+    line = np.polyfit(places[seen, 0], places[seen, 1], 1)
     way = np.array([-1.0, -line[0]]) / np.hypot(1.0, line[0])
     start = np.median(places[:40], axis=0)
     along = (places - start) @ way
@@ -135,7 +135,7 @@ def gx_frames(path: Path) -> list[np.ndarray]:
 
 def main() -> None:
     """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--codec", choices=SUFFIX, nargs="+", default=list(SUFFIX))
     asked = parser.parse_args()

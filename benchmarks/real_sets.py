@@ -42,7 +42,7 @@ objects:
 
 def main() -> None:
     """Prints the rows."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--set", choices=SETS, nargs="+", default=list(SETS))
     parser.add_argument("--flights", type=int, default=EVERY_FLIGHT)
@@ -156,7 +156,7 @@ def _flights(folder: Path, out: Path) -> list[tuple[Path, np.ndarray]]:
 def _residual_m(found: gx.Fit, clip: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times `[frame]`, and measured and fitted places `[axis, frame]` where it was seen, m."""
     problem = found.problem.problems[clip]
-    theta = found.problem.of_clip(found.problem.theta(found.z_best), clip)
+    theta = found.problem.of_clip(found.problem.theta(np.asarray(found.z_best)), clip)
     seen = problem.observation.mask[0]
     places = problem.observation.position_m[0], problem.simulate(np.asarray(theta))[0]
     return problem.observation.times_s[seen], places[0][:, seen], places[1][:, seen]
