@@ -157,7 +157,7 @@ def _is_right(name: str, law: Any) -> bool:
 def _by_pysindy(name: str, found: Diagnosis) -> tuple[str | None, bool | None]:
     """What sparse regression makes of the missing acceleration of object 1."""
     try:
-        from pysindy.optimizers import STLSQ
+        from pysindy.optimizers import STLSQ  # pyright: ignore[reportMissingImports]
     except ImportError:
         return None, None
     if found.missing is None or name not in LAWS:

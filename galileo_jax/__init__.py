@@ -24,10 +24,12 @@ if TYPE_CHECKING:
     from galileo_jax.api.clips import load
     from galileo_jax.api.compare import Comparison, compare
     from galileo_jax.api.diagnose import Diagnosis, diagnose
+    from galileo_jax.api.discover import Discovery, discover
     from galileo_jax.api.export import export
     from galileo_jax.api.fit import fit
     from galileo_jax.api.fit_result import Fit
     from galileo_jax.api.label import label
+    from galileo_jax.api.next_experiment import NextExperiment, next_experiment
     from galileo_jax.api.predict import Prediction, predict
     from galileo_jax.api.run import load_run
     from galileo_jax.api.simulate import Simulated, simulate

@@ -106,4 +106,4 @@ def _way_px(measured: Measurement) -> float:
         place = place[:, place[0] < 0]
     if not place.size:
         return 0.0
-    return float(np.hypot(*np.ptp(place, axis=1))) * (measured.clip.pixels_per_metre or 0.0)
+    return float(np.linalg.norm(np.ptp(place, axis=1))) * (measured.clip.pixels_per_metre or 0.0)

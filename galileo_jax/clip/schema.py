@@ -17,6 +17,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 
 LengthUnit = Literal["m", "cm", "mm", "km", "in", "ft", "px"]
 YAxis = Literal["up", "down"]
+UpAxis = Literal["y", "z"]
 Shape = Literal["box", "cylinder", "torus", "sphere"]
 Direction = Literal["right", "left"]
 
@@ -255,6 +256,7 @@ class ClipObject(BaseModel):
         A number is its moment of inertia over m r^2, where it is not that of a solid.
       z_m: how far its centre is from the plane in which object 1 moves, m, positive towards the
         camera; of use to `--motion free` only.
+      spin_rad_s: flight: its spin where it was measured, along the track's axes.
       track_name: what another tool's track file calls it; None = the same, or the only one.
     """
 
@@ -268,6 +270,7 @@ class ClipObject(BaseModel):
     first_frame: Annotated[int, Field(strict=True, ge=0)] | None = 0
     rolls: Annotated[bool | float | None, BeforeValidator(_rolls)] = None
     z_m: Annotated[Number, AfterValidator(_across)] = 0.0
+    spin_rad_s: tuple[Number, Number, Number] | None = None
     track_name: OneLine | None = None
 
     @property
@@ -298,6 +301,7 @@ class ClipFile(BaseModel):
     track_units: Annotated[LengthUnit, _one_of(get_args(LengthUnit))] | None = None
     track_y: Annotated[YAxis, _one_of(get_args(YAxis))] | None = None
     track_origin: Point | None = None
+    track_up: Annotated[UpAxis, _one_of(get_args(UpAxis))] = "y"
     scenario: Annotated[str, _one_of(tuple(SCENARIOS))]
     fps: Annotated[Number, AfterValidator(_fps)]
     ramp_angle_deg: Annotated[Number, AfterValidator(_ramp_angle_deg)] | None = None
@@ -309,6 +313,8 @@ class ClipFile(BaseModel):
     origin_sd_px: Annotated[Number, AfterValidator(_origin_sd_px)] = 0.0
     gravity: Annotated[Number, AfterValidator(_gravity)] = 9.81
     vertical_sd_deg: Annotated[Number, AfterValidator(_angle_sd_deg)] = 0.0
+    launch_angle_deg: Annotated[Number, Field(gt=-90, lt=90)] | None = None
+    starts_moving: Annotated[bool, Field(strict=True)] = False
     floor: Annotated[bool | float | None, BeforeValidator(_floor)] = None
     liquid_density: Annotated[Number, AfterValidator(_liquid_density)] | None = None
     objects: tuple[ClipObject, ...]
@@ -324,6 +330,7 @@ class Clip(ClipFile):
       track: the track file, ours or another tool's; None for a video.
       track_units: of a track file of another tool, or of its calibration; "px" = pixels.
       track_y: which way its y axis points.
+      track_up: which axis of our own csv of a flight in space points up.
       track_origin: where the foot of the ramp is in a track file in units of length, in these
         units and along its axes.
       scenario: a name in `SCENARIOS`.
@@ -339,6 +346,9 @@ class Clip(ClipFile):
       gravity: m/s^2.
       vertical_sd_deg: flight: how well the picture's vertical is gravity's direction (one
         standard deviation); 0 = taken at its word.
+      launch_angle_deg: flight: at which a launcher is set, over the horizontal; None = not known,
+        or thrown by hand.
+      starts_moving: incline: the object moves already in the first frame that is used.
       floor: fall, flight: its height over the origin, m; true = there is one, at a height to be
         inferred; None or false = none is reached.
       liquid_density: liquid: kg/m^3; None = not known.

@@ -5,6 +5,10 @@ cell means that the object was not visible. The error of a point is either one s
 deviation for both axes (`object1_sd_m`) or a full covariance (`object1_sd_x_m`,
 `object1_sd_y_m`, `object1_correlation`); without either it is estimated from the positions.
 
+A flight in space has `object1_z_m` as well, towards the viewer, and one standard deviation for all
+axes (`object1_sd_m`); where times are uncertain, another one along the velocity
+(`object1_sd_along_m`). Of a single object the titles may lack its name: `time_s, x_m, y_m, z_m`.
+
 A track that a spreadsheet has saved again is read as well (`track_files/cells.py`).
 """
 
@@ -17,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.clip.space_noise import space_covariance_m2, space_noise_m, space_sds_m
 from galileo_jax.clip.track_files.cells import Rows, parse_columns, read_cells
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import write_text
@@ -37,9 +42,18 @@ MAX_SD_M = 1.0
 MAX_STEP_S = 1.0
 """No motion is seen in frames a second apart; a step of just 1 is a count of frames."""
 
-_ISOTROPIC = ("sd_m",)
+ONLY = "object1"
+"""The name of an object whose columns have none."""
+
+_ISOTROPIC = ("sd_along_m", "sd_m")
 _COVARIANCE = ("sd_x_m", "sd_y_m", "correlation")
-_FIELDS = (*_COVARIANCE, *_ISOTROPIC, "x_m", "y_m")  # sd_x_m before x_m: the longest ending counts
+_FIELDS = (
+    *_COVARIANCE,
+    *_ISOTROPIC,
+    "x_m",
+    "y_m",
+    "z_m",
+)  # sd_x_m before x_m: the longest ending counts
 
 
 def read_observation_csv(path: Path) -> Observation:
@@ -59,11 +73,13 @@ def read_observation_csv(path: Path) -> Observation:
     lines = [f"line {line}" for line, _ in rows]
     check_times(path, times, lines)
 
-    position = np.empty((len(names), 2, len(times)))
-    covariance = np.empty((len(names), 2, 2, len(times)))
+    axes = 3 if "z_m" in columns[names[0]] else 2
+    position = np.empty((len(names), axes, len(times)))
+    covariance = np.empty((len(names), axes, axes, len(times)))
     for index, name in enumerate(names):
         column = {field: table[title] for field, title in columns[name].items()}
-        position[index] = _positions(path, name, column["x_m"], column["y_m"], lines)
+        places = [column[field] for field in ("x_m", "y_m", "z_m")[:axes]]
+        position[index] = _positions(path, name, places, lines)
         is_visible = np.isfinite(position[index, 0])
         covariance[index] = _covariance(path, name, column, times, position[index], lines)
         covariance[index][:, :, ~is_visible] = np.nan
@@ -76,7 +92,8 @@ def write_observation_csv(path: Path, observation: Observation) -> None:
     Positions and times come back to the last digit, covariances to rounding.
     """
     covariance = observation.covariance_m2
-    sd = np.sqrt(np.stack([covariance[:, 0, 0], covariance[:, 1, 1]], axis=1))
+    axes = observation.position_m.shape[1]
+    sd = np.sqrt(np.stack([covariance[:, axis, axis] for axis in range(axes)], axis=1))
     correlation = covariance[:, 0, 1] / (sd[:, 0] * sd[:, 1])
     header: list[str] = [TIME]
     columns: list[np.ndarray] = [observation.times_s]
@@ -85,8 +102,11 @@ def write_observation_csv(path: Path, observation: Observation) -> None:
         is_isotropic = np.array_equal(sd[index, 0][seen], sd[index, 1][seen]) and not np.any(
             correlation[index][seen]
         )
-        fields = {"x_m": observation.position_m[index, 0], "y_m": observation.position_m[index, 1]}
-        if is_isotropic:
+        places = zip(("x_m", "y_m", "z_m"), observation.position_m[index], strict=False)
+        fields: dict[str, np.ndarray] = dict(places)
+        if axes == 3:
+            fields["sd_m"], fields["sd_along_m"] = space_sds_m(covariance[index])
+        elif is_isotropic:
             fields["sd_m"] = sd[index, 0]
         else:
             fields["sd_x_m"], fields["sd_y_m"] = sd[index]
@@ -201,6 +221,9 @@ def _find_columns(
     if repeated is not None:
         raise InputError(f"{path}: column {repeated!r}: given twice; keep one")
     columns: dict[str, dict[str, str]] = {}
+    if {"x_m", "y_m"} <= set(header):
+        fields = {title: title for title in header if title in (*_ISOTROPIC, "x_m", "y_m", "z_m")}
+        return (ONLY,), {ONLY: fields}
     for title in header:
         if title == TIME:
             continue
@@ -219,7 +242,17 @@ def _find_columns(
         has_sd, has_covariance = "sd_m" in fields, any(f in fields for f in _COVARIANCE)
         if has_sd and has_covariance:
             raise InputError(f"{path}: column '{name}_sd_m': give it or the covariance, not both")
-        required = ("x_m", "y_m", *(_COVARIANCE if has_covariance else ()))
+        if "z_m" in fields and has_covariance:
+            raise InputError(
+                f"{path}: column '{name}_z_m': in space write '{name}_sd_m', for all axes"
+            )
+        in_space = any("z_m" in other for other in columns.values())
+        required = (
+            "x_m",
+            "y_m",
+            *(("z_m",) if in_space else ()),
+            *(_COVARIANCE if has_covariance else ()),
+        )
         missing = next((field for field in required if field not in fields), None)
         if missing:
             raise InputError(f"{path}: column '{name}_{missing}': missing")
@@ -252,16 +285,15 @@ def check_times(path: Path, times: np.ndarray, rows: Sequence[str] | None = None
 
 
 def _positions(
-    path: Path, name: str, x: np.ndarray, y: np.ndarray, lines: Sequence[str]
+    path: Path, name: str, places: Sequence[np.ndarray], lines: Sequence[str]
 ) -> np.ndarray:
-    if (np.isnan(x) != np.isnan(y)).any():
-        at = int((np.isnan(x) != np.isnan(y)).argmax())
-        raise InputError(f"{path}: {lines[at]}: {name}: only one of x and y is given")
-    if np.isfinite(x).sum() < MIN_ROWS:
-        raise InputError(
-            f"{path}: {name}: visible in {np.isfinite(x).sum()} rows; at least {MIN_ROWS} expected"
-        )
-    position = np.stack([x, y])
+    position = np.stack(places)
+    empty = np.isnan(position)
+    if (partly := empty.any(axis=0) & ~empty.all(axis=0)).any():
+        which = "only one of x and y is" if len(places) == 2 else "not all of x, y and z are"
+        raise InputError(f"{path}: {lines[int(partly.argmax())]}: {name}: {which} given")
+    if (count := int((~empty[0]).sum())) < MIN_ROWS:
+        raise InputError(f"{path}: {name}: visible in {count} rows; at least {MIN_ROWS} expected")
     largest = float(np.nanmax(np.abs(position)))
     if largest > MAX_POSITION_M:
         raise InputError(
@@ -281,12 +313,16 @@ def _covariance(
 ) -> np.ndarray:
     """`[2, 2, row]`, m^2, from the columns or else from the positions' roughness."""
     correlation = np.zeros(len(times))
+    if "sd_along_m" in column:
+        return space_covariance_m2(times, position, column["sd_m"], column["sd_along_m"])
     if "sd_m" in column:
-        sd = np.stack([column["sd_m"], column["sd_m"]])
+        sd = np.stack([column["sd_m"]] * len(position))
     elif "sd_x_m" in column:
         sd = np.stack([column["sd_x_m"], column["sd_y_m"]])
         correlation = column["correlation"]
     else:
+        if len(position) == 3:
+            return space_covariance_m2(times, position, *space_noise_m(path, name, times, position))
         return roughness_covariance_m2(path, name, times, position)
     is_visible = np.isfinite(position[0])
     is_right = (sd > 0).all(axis=0) & (sd <= MAX_SD_M).all(axis=0) & (np.abs(correlation) < 1)
@@ -297,4 +333,6 @@ def _covariance(
             f"most {MAX_SD_M:g} expected, correlation between -1 and 1"
         )
     shared = correlation * sd[0] * sd[1]
-    return np.array([[sd[0] ** 2, shared], [shared, sd[1] ** 2]])
+    covariance = np.einsum("at,ab->abt", sd**2, np.eye(len(sd)))
+    covariance[0, 1] = covariance[1, 0] = shared
+    return covariance

@@ -56,14 +56,16 @@ def replicates(
     """
     generator = np.random.default_rng([seed, 31])
     free = np.flatnonzero(fit.free[: len(trials.model_parameters)])
-    sizes = [problem.observation.mask.size * 2 for problem in trials.problems]
+    sizes = [problem.observation.position_m.size for problem in trials.problems]
     ends = np.cumsum(sizes)[:-1]
     fitted_scale = trials.theta(fit.z)[len(trials.model_parameters) :]
     # The Jacobian was whitened at the fit's own noise scale.
     rows = np.repeat(fitted_scale / noise_scale, sizes)
     jacobian = fit.jacobian[:, free] * rows[:, None]
     masks = [
-        np.repeat(problem.observation.mask[:, None], 2, axis=1).reshape(-1)
+        np.repeat(
+            problem.observation.mask[:, None], problem.observation.position_m.shape[1], axis=1
+        ).reshape(-1)
         for problem in trials.problems
     ]
     noise = generator.standard_normal((count, sum(sizes))) * np.concatenate(masks)

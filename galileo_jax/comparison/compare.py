@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from galileo_jax.comparison.bootstrap import replicates, whitened
-from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
+from galileo_jax.comparison.local_tests import AXES, Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
@@ -122,7 +122,15 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         label = phases(problem, trials.of_clip(theta, clip))
         observation = problem.observation
         labels.append(label)
-        cells.extend(find_cells(clip, observation.names, observation.mask, label))
+        cells.extend(
+            find_cells(
+                clip,
+                observation.names,
+                observation.mask,
+                label,
+                observation.position_m.shape[1],
+            )
+        )
     pulls = _pulls(trials, fit, theta)
 
     def judged(bounds: tuple[float, float]) -> tuple[float, np.ndarray]:
@@ -156,7 +164,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         error=error_of(trials, theta, fit.num_fitted, fit.pull),
         labels=tuple(labels),
         white=tuple(
-            w.reshape(len(p.observation.names), 2, -1)
+            w.reshape(p.observation.position_m.shape)
             for w, p in zip(white, trials.problems, strict=True)
         ),
         noise_scale=tuple(map(float, fitted)),
@@ -242,7 +250,7 @@ def _place(
 ) -> Place:
     problem = trials.problems[cell.clip]
     observation = problem.observation
-    i, a = observation.names.index(cell.object), ("x", "y").index(cell.axis)
+    i, a = observation.names.index(cell.object), AXES.index(cell.axis)
     frames = len(observation.times_s)
     index = cell.index % frames
     predicted = problem.simulate(trials.of_clip(theta, cell.clip))[i, a]

@@ -91,7 +91,7 @@ def _object(
     is_tracked, times = observation.mask[index], observation.times_s
     tangent = _tangent(problem, index, best[index])
     difference = np.where(is_tracked, observation.position_m[index] - best[index], np.nan)
-    offset = np.nanmedian(difference, axis=1) if is_tracked.any() else np.zeros(2)
+    offset = np.nanmedian(difference, axis=1) if is_tracked.any() else np.zeros(len(difference))
     path = _path(problem, index, best[index], tangent)
     moved = np.einsum("at,bat->bt", tangent, draws[:, index] - best[index])
     # Each draw, like the fit, up to the constant offset of the tracked point.
@@ -100,7 +100,7 @@ def _object(
     covariance = observation.covariance_m2[index]
     noise = np.sqrt(np.einsum("at,abt,bt->t", tangent, covariance, tangent))
     white = np.where(is_tracked, comparison.white[clip][index], np.nan)
-    normal = np.stack([-tangent[1], tangent[0]])
+    normal = np.stack([-tangent[1], tangent[0], *tangent[2:]])
     labels = comparison.labels[clip][index]
     worst = _worst(comparison, problem.name, observation.names[index])
     return PathResiduals(
@@ -141,11 +141,11 @@ def failing_interval(
 
 
 def _tangent(problem: Problem, index: int, centre_m: np.ndarray) -> np.ndarray:
-    """The path's direction at `centre_m` `[2, frame]`, as declared."""
+    """The path's direction at `centre_m` `[axis, frame]`, as declared; across it z is not shown."""
     scene = problem.model.scene.surroundings
     is_on_ramp = centre_m[0] < scene.corner_m[index]  # always, without a table
     slope = np.where(is_on_ramp, scene.angle_rad, 0.0)
-    return np.stack([np.cos(slope), -np.sin(slope)])
+    return np.stack([np.cos(slope), -np.sin(slope), *np.zeros_like(centre_m[2:])])
 
 
 def _path(problem: Problem, index: int, centre_m: np.ndarray, tangent: np.ndarray) -> np.ndarray:

@@ -68,7 +68,7 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     hit_s = _hit_s(position, recorded, scene.half_length_m)
     for i in range(len(scene.names)):
         x = np.interp(times, recorded, position[i, 0])
-        speed = np.interp(times, recorded, np.hypot(*velocity[i]))
+        speed = np.interp(times, recorded, np.linalg.norm(velocity[i], axis=0))
         label[i] = PHASES.index("table")
         if scene.comes_down[i] or not scene.has_table:
             beyond = x - scene.corner_m[i]  # -inf without a table

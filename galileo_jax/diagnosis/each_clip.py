@@ -123,13 +123,13 @@ def _parts(
     seen = np.flatnonzero(problem.observation.mask[0])
     times_s = problem.observation.times_s[seen[0] : seen[-1] + 1]
     path = predicted[0][:, seen[0] : seen[-1] + 1]
-    gone = np.append(0.0, np.cumsum(np.hypot(*np.diff(path))))
+    gone = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(path), axis=0)))
     edges = np.linspace(0.0, gone[-1], NUM_PARTS + 1)
     fine_s = np.linspace(times_s[0], times_s[-1], FINE * len(times_s))
     fine = np.interp(fine_s, times_s, gone)
     step_s = fine_s[1] - fine_s[0]
     velocity = np.stack([np.gradient(row, times_s) for row in path])
-    way = velocity / np.maximum(np.hypot(*velocity), np.finfo(float).tiny)
+    way = velocity / np.maximum(np.linalg.norm(velocity, axis=0), np.finfo(float).tiny)
     shapes = [velocity]
     for low, high in pairwise(edges):
         inside = (fine > low) & (fine <= high)

@@ -67,7 +67,7 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     if not clip.is_scale_known:
         return None
     seen = observation.mask[0]
-    times, (x, y) = observation.times_s[seen], observation.position_m[0][:, seen]
+    times, (x, y) = observation.times_s[seen], observation.position_m[0, :2][:, seen]
     if clip.scenario in ("fall", "flight"):
         found = _largest(_accelerations(times, -y))
         return None if found is None else ApparentGravity(found)

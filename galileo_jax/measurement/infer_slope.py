@@ -27,6 +27,8 @@ UPPER_SHARE = 0.75
 """Of the way down to the table; further down the object's front is on the table already."""
 
 MIN_POINTS = 5
+BEGIN_SHARE, LEAST_BEND = 0.5, 0.01
+"""Of the way: its begin; by how many rad, at least, a valley's slope changes there."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,10 @@ def infer_slope(clip: Clip, observation: Observation) -> Slope:
         )
     away = points - points.mean(axis=1, keepdims=True)
     values, axes = np.linalg.eigh(away @ away.T)
-    along = axes[:, 1] if axes[:, 1] @ (points[:, -1] - points[:, 0]) >= 0 else -axes[:, 1]
+    # Where a board is curved, what goes down may come back.
+    gone = points - points[:, :1]
+    furthest = gone[:, np.argmax((gone**2).sum(axis=0))]
+    along = axes[:, 1] if axes[:, 1] @ furthest >= 0 else -axes[:, 1]
     scatter_m = math.sqrt(max(values[0], 0.0) / (points.shape[1] - 2))
     scatter_m = max(scatter_m, _noise_m(observation))
     sd_deg = math.degrees(scatter_m / math.sqrt(max(values[1], 1e-30)))
@@ -91,6 +96,9 @@ def infer_slope(clip: Clip, observation: Observation) -> Slope:
             f"write direction: {other}"
         )
     angle_deg = math.degrees(math.atan2(-along[1], along[0]))
+    if angle_deg < MIN_RAMP_ANGLE_DEG:
+        # A valley: what rolls down into it comes to rest as high as it began.
+        angle_deg = max(angle_deg, _at_start_deg(gone, along))
     if not MIN_RAMP_ANGLE_DEG <= angle_deg < 90:
         raise InputError(
             f"{clip.path}: ramp_angle_deg: null, and {name}'s path falls by {angle_deg:.1f} "
@@ -98,6 +106,17 @@ def infer_slope(clip: Clip, observation: Observation) -> Slope:
         )
     sd_deg = min(math.hypot(sd_deg, LEVEL_SD_DEG), MAX_ANGLE_SD_DEG)
     return Slope(round(angle_deg, 3), round(sd_deg, 3))
+
+
+def _at_start_deg(gone: np.ndarray, along: np.ndarray) -> float:
+    """The slope of the first part of a way into a valley, of a parabola through it; else -90."""
+    way = along @ gone
+    first = (way < BEGIN_SHARE * way.max()) & (np.arange(len(way)) <= int(np.argmax(way)))
+    if first.sum() < MIN_POINTS or np.ptp(way[first]) <= 0:
+        return -90.0
+    bend, slope, _ = np.polyfit(gone[0, first], gone[1, first], 2)
+    is_valley = bend * np.ptp(gone[0, first]) > LEAST_BEND
+    return math.degrees(math.atan(-slope)) if is_valley else -90.0
 
 
 def _noise_m(observation: Observation) -> float:

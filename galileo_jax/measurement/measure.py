@@ -11,12 +11,12 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.measurement.astray import Astray, find_astray
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
+from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.track_cache import track_once
-from galileo_jax.measurement.truncate_at_stop import truncate_at_stop
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
@@ -28,10 +28,11 @@ class Measurement:
 
     Attributes:
       clip: with what was inferred filled in.
-      observation: in metres, up to where something that is not in the scene stops an object.
+      observation: in metres, without what `cuts` leave out.
       whole: in metres, to the clip's end.
       pixels: the track in pixels; None where the clip is a track already.
       inferred: key of the clip that was left null to value and sd.
+      cuts: where and why parts of the track are left out, in time's order.
       astray: objects whose tracks are not to be believed to their ends.
       doubts: of what is declared and of tracks gone astray, one line each; results repeat them.
       remarks: what was inferred or left out, one line each.
@@ -42,6 +43,7 @@ class Measurement:
     whole: Observation
     pixels: Track | None = None
     inferred: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    cuts: tuple[Cut, ...] = ()
     astray: tuple[Astray, ...] = ()
     doubts: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -58,13 +60,13 @@ class Measurement:
 
 
 def inferred(measured: Sequence[Measurement]) -> dict[str, Any]:
-    """For a result's document: `{"inferred": {clip: {key: {mean, sd}}}}`, or nothing."""
+    """For a result's document: `{"inferred": {clip: {key: {mean, sd}}}}` and `cuts_of`."""
     found = {
         one.name: {key: dict(value) for key, value in one.inferred.items()}
         for one in measured
         if one.inferred
     }
-    return {"inferred": found} if found else {}
+    return ({"inferred": found} if found else {}) | cuts_of(measured)
 
 
 def measure(clip: Clip) -> Measurement:
@@ -85,12 +87,12 @@ def measure(clip: Clip) -> Measurement:
         measured = Measurement(clip, whole, whole, pixels)
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
     pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
-    observation, end_s = truncate_at_stop(measured.clip, measured.observation)
-    if end_s is not None:
-        remarks.append(
-            f"{clip.path}: {observation.names[0]} is stopped by something after {end_s:.3f} s; "
-            "what follows is left out"
-        )
+    observation, cuts = cut(measured.clip, measured.observation)
+    remarks.extend(f"{clip.path}: {each}" for each in cuts)
+    if any(each.why == HELD for each in cuts):
+        # Nobody lets it go in what is left.
+        moving = measured.clip.model_copy(update={"starts_moving": True})
+        measured = replace(measured, clip=moving)
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
     other_doubts = (
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
@@ -100,6 +102,7 @@ def measure(clip: Clip) -> Measurement:
         measured,
         observation=observation,
         inferred={**found, **measured.inferred},
+        cuts=cuts,
         astray=astray,
         doubts=(*([] if doubt is None else [doubt]), *other_doubts),
         remarks=tuple(remarks),
@@ -152,9 +155,9 @@ def _with_slope(clip: Clip, remarks: list[str]) -> Measurement:
     if clip.video is not None:
         # The object's outline stands along the ramp: a first look, without it, tells how steep.
         first_look, _ = observed(_without_sizes(clip))
-        clip = _inclined(clip, infer_slope(clip, first_look))
+        clip = _inclined(clip, infer_slope(clip, cut(clip, first_look)[0]))
     observation, pixels = observed(clip)
-    slope = infer_slope(clip, observation)
+    slope = infer_slope(clip, cut(clip, observation)[0])
     clip = _inclined(clip, slope)
     remarks.append(
         f"{clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "

@@ -30,16 +30,18 @@ def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray
     Args:
       clip: where its video is still there, the frames are shown.
       problem: its observation and its scene.
-      predicted_m: centres `[object, 2, frame]` by the name of the model; the last is drawn
+      predicted_m: centres `[object, axis, frame]` by the name of the model; the last is drawn
         filled, those before it dashed.
     """
     observation = problem.observation
+    # What flies in space is drawn from the side.
+    predicted_m = {name: motion[:, :2] for name, motion in predicted_m.items()}
     models = list(predicted_m)
     offset = _offset(problem, predicted_m[models[-1]])
     video = _frames(clip, len(observation.times_s))
     # Over a frame, shapes stand around the tracked point, in a drawing around the centre.
     motions = {name: motion + offset * (video is not None) for name, motion in predicted_m.items()}
-    motions["measured"] = observation.position_m - offset * (video is None)
+    motions["measured"] = observation.position_m[:, :2] - offset * (video is None)
     view = view_of(clip, problem.model.scene, np.stack(list(motions.values())))
     steps = video.frames if video else range(0, len(observation.times_s), _stride(problem))
     chosen = {name: motion[..., list(steps)] for name, motion in motions.items()}
@@ -81,7 +83,7 @@ def _offset(problem: Problem, predicted_m: np.ndarray) -> np.ndarray:
     found = np.zeros((len(observation.names), 2, 1))
     for i, seen in enumerate(observation.mask):
         if seen.any():
-            difference = (observation.position_m[i] - predicted_m[i])[:, seen]
+            difference = (observation.position_m[i, :2] - predicted_m[i])[:, seen]
             found[i, :, 0] = np.median(difference, axis=1)
     return found
 

@@ -22,7 +22,7 @@ from galileo_jax.report.style import object_colour
 
 Quantity = Literal["velocity", "position"]
 UNITS = {"velocity": "m/s", "position": "m"}
-AXES = ("x", "y")
+AXES = ("x", "y", "z")  # the last of a track in space
 FAILS_Z = 5.0  # of white noise, the largest of four tracks of 120 frames is over 4.6 in 1 of 100
 SMALLEST_RANGE = 3.3  # of the residuals' axis, in units of the noise
 
@@ -32,11 +32,16 @@ def failing_interval_of(fitted: PosteriorPredictive) -> tuple[str, str, Interval
     found = [
         (name, axis, interval)
         for name, both in zip(fitted.observation.names, fitted.residuals, strict=True)
-        for axis, values in zip(AXES, both, strict=True)
+        for axis, values in zip(AXES, both, strict=False)
         if (interval := worst_interval(values, fitted.observation.times_s)) is not None
     ]
     worst = max(found, key=lambda one: one[2].z, default=None)
     return worst if worst is not None and worst[2].z > FAILS_Z else None
+
+
+def axes_of(fitted: PosteriorPredictive) -> range:
+    """The axes that were measured, as indices into `AXES`."""
+    return range(fitted.observation.position_m.shape[1])
 
 
 def profile_chart(
@@ -59,7 +64,7 @@ def residual_chart(fitted: PosteriorPredictive, index: int, clip: str) -> Chart:
 def object_chart(fitted: PosteriorPredictive, index: int) -> Chart:
     """Both velocities of one object, and its residuals below."""
     name = fitted.observation.names[index]
-    velocities = (profile_panel(fitted, "velocity", index, axis) for axis in range(len(AXES)))
+    velocities = (profile_panel(fitted, "velocity", index, axis) for axis in axes_of(fitted))
     label = f"velocity of {name} against time, measured and fitted, and residuals"
     return stacked(f"fit_{name}", label, (*velocities, fit_residual_panel(fitted, index)))
 
@@ -83,10 +88,10 @@ def track_chart(observation: Observation, axis: int) -> Chart:
 
 
 def fit_residual_panel(fitted: PosteriorPredictive, index: int) -> Panel:
-    """The whitened residuals of one object in x and y."""
+    """The whitened residuals of one object in x and y; the charts of z show its own."""
     name = fitted.observation.names[index]
     found = failing_interval_of(fitted)
-    x, y = fitted.residuals[index]
+    x, y, *_ = fitted.residuals[index]
     return residual_panel(
         fitted.observation.times_s,
         {"x": x, "y": y},

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from galileo_jax.measurement.cuts import Cut
 from galileo_jax.prediction.posterior_predictive import (
     PosteriorPredictive,
     posterior_predictive,
@@ -17,7 +18,7 @@ from galileo_jax.report.animation import animation
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.draw import to_svg
 from galileo_jax.report.fit_charts import (
-    AXES,
+    axes_of,
     failing_interval_of,
     profile_chart,
     residual_chart,
@@ -65,7 +66,7 @@ def _charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
     draws = [pair_chart(run.posterior, names)]
     if run.result["method"] == "mh":
         draws.append(trace_chart(run.posterior, names))
-    both = [(i, axis) for i in objects for axis in range(len(AXES))]
+    both = [(i, axis) for i in objects for axis in axes_of(fitted)]
     return {
         "velocity": [profile_chart(fitted, "velocity", *one, clip) for one in both],
         "residuals": [residual_chart(fitted, i, clip) for i in objects],
@@ -120,10 +121,18 @@ def _header(title: str, run: Run) -> str:
         f"<p{mark}>{escape(fit_text.convergence(run))}</p>\n{warning}"
         f'<p class="soft">Method {escape(result["method"])}; effects: {escape(effects)}.</p>\n'
         + "".join(
-            f'<p class="soft">{escape(line)}.</p>\n' for line in result.get("taken_as_exact", [])
+            f'<p class="soft">{escape(line)}.</p>\n'
+            for line in (*_cuts(result), *result.get("taken_as_exact", []))
         )
     )
     return header("fit", title, fit_text.fit_quality(result), more, fit_text.fits(result))
+
+
+def _cuts(result: Mapping[str, Any]) -> list[str]:
+    """What of each clip is left out, and why: one line each."""
+    return [
+        f"{clip}: {Cut(**entry)}" for clip, cuts in result.get("cuts", {}).items() for entry in cuts
+    ]
 
 
 def _key(run: Run) -> str:
@@ -192,7 +201,8 @@ def _position_caption(fitted: PosteriorPredictive) -> str:
     millimetres = np.round(1e3 * fitted.offset_m, 1) + 0.0  # no -0.0
     names = fitted.observation.names
     moved = "; ".join(
-        f"{name} ({x:.1f}, {y:.1f}) mm" for name, (x, y) in zip(names, millimetres, strict=True)
+        f"{name} ({', '.join(f'{value:.1f}' for value in moved)}) mm"
+        for name, moved in zip(names, millimetres, strict=True)
     )
     return (
         "The tracked point is not exactly the centre. The fitted curves include this constant "

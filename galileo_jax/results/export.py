@@ -125,12 +125,16 @@ def _track_table(
             covariance = observed.covariance_m2[k]
             sd_x, sd_y = np.sqrt(covariance[0, 0]), np.sqrt(covariance[1, 1])
             part = pd.DataFrame({"clip": clip, "object": name, "time_s": observed.times_s})
-            part["x_m"], part["y_m"] = observed.position_m[k]
+            part["x_m"], part["y_m"], *z = observed.position_m[k]
             part["sd_x_m"], part["sd_y_m"] = sd_x, sd_y
             part["correlation"] = covariance[0, 1] / (sd_x * sd_y)
-            part.loc[~observed.mask[k], list(MEASURED)] = np.nan
+            if z:
+                part["z_m"], part["sd_z_m"] = z[0], np.sqrt(covariance[2, 2])
+            measured = [*MEASURED, *(("z_m", "sd_z_m") if z else ())]
+            part.loc[~observed.mask[k], measured] = np.nan
             if clip in fitted_m:
-                part["fitted_x_m"], part["fitted_y_m"] = fitted_m[clip][k]
+                for axis, values in zip("xyz", fitted_m[clip][k], strict=False):
+                    part[f"fitted_{axis}_m"] = values
             parts.append(part)
     return pd.concat(parts, ignore_index=True)
 

@@ -31,12 +31,12 @@ class Body(NamedTuple):
     """The body at one instant, or its rates of change.
 
     Attributes:
-      position_m, velocity_m_s: `[2]`.
+      position_m, velocity_m_s: `[axis]`, x, y (up) and, in space, z.
       way_m: how far it has come along its curve.
     """
 
-    position_m: Float[jax.Array, "2"]
-    velocity_m_s: Float[jax.Array, "2"]
+    position_m: Float[jax.Array, " axis"]
+    velocity_m_s: Float[jax.Array, " axis"]
     way_m: Float[jax.Array, ""]
 
     def moved(self, rate: "Body", time_s: Any) -> "Body":
@@ -59,7 +59,7 @@ def roll_out(
     named = {name: theta[i] for i, name in enumerate(names)}
     law = dynamics(effects, scene, named, jnp)
     start = jnp.asarray(scene.start_m)[0]
-    tangent = jnp.stack([jnp.cos(law.ramp_rad), -jnp.sin(law.ramp_rad)])
+    tangent = _along(law, scene, jnp)
     floor = floor_of(effects, named, scene)
     velocity = start_velocity(effects, named, scene)
     body = Body(
@@ -96,7 +96,8 @@ def floor_of(
         return None
     xp = floor.height_m.__array_namespace__()
     start = xp.asarray(scene.start_m)[0]
-    seen = start[None, :, None] + xp.asarray([[0.0, 0.0], [0.0, 1.0]])[None]
+    higher = [[0.0, 1.0 if axis == 1 else 0.0] for axis in range(scene.num_axes)]
+    seen = start[None, :, None] + xp.asarray(higher)[None]
     for effect in effects:
         seen = effect.measure(seen, theta, scene)
     magnified = seen[0, 1, 1] - seen[0, 1, 0]
@@ -107,20 +108,33 @@ def floor_of(
 def rates(body: Body, time_s: Any, law: Dynamics, scene: Surroundings, rests: Any) -> Body:
     """How a body changes; one that `rests` on the floor is not pulled through it."""
     xp = body.position_m.__array_namespace__()
-    down = xp.stack([xp.sin(law.ramp_rad), -xp.cos(law.ramp_rad)])
     if scene.moves_in_plane:
         speed = xp.sqrt(xp.sum(body.velocity_m_s**2) + STILL_M2_S2)
         tangent, way = body.velocity_m_s / speed, body.way_m
-        weight = law.gravity * down
+        down = [xp.sin(law.ramp_rad), -xp.cos(law.ramp_rad)]
+        weight = law.gravity * xp.stack([*down, *[0.0 * down[0]] * (scene.num_axes - 2)])
     else:
-        tangent = xp.stack([xp.cos(law.ramp_rad), -xp.sin(law.ramp_rad)])
+        tangent = _along(law, scene, xp)
         speed = xp.sum(body.velocity_m_s * tangent)
         way = xp.sum((body.position_m - xp.asarray(scene.start_m)[0]) * tangent)
-        weight = 0.0 * down
+        weight = 0.0 * tangent
     state = state_at(way[None], speed[None], time_s, scene)
     a = weight + (law.drive(state) / law.inertia)[0] * tangent
-    upward = xp.where(rests, xp.maximum(a[1], xp.zeros_like(a[1])), a[1])
-    return Body(body.velocity_m_s, xp.stack([a[0], upward]), speed)
+    for push in law.pushes:
+        a = a + push(body.velocity_m_s, time_s) / law.inertia[0]
+    held = rests & _upward(scene, xp)
+    return Body(body.velocity_m_s, xp.where(held, xp.maximum(a, xp.zeros_like(a)), a), speed)
+
+
+def _along(law: Dynamics, scene: Surroundings, xp: Any) -> Any:
+    """The direction of a straight path, `[axis]`; in the plane forward."""
+    cos, sin = xp.cos(law.ramp_rad), xp.sin(law.ramp_rad)
+    return xp.stack([cos, -sin, *[0.0 * cos] * (scene.num_axes - 2)])
+
+
+def _upward(scene: Surroundings, xp: Any) -> Any:
+    """Which axis is upward, `[axis]`."""
+    return xp.asarray([axis == 1 for axis in range(scene.num_axes)])
 
 
 def _step(
@@ -178,12 +192,12 @@ def _to_bounce(
         way = jax.lax.stop_gradient(jnp.where(hits & (speed < 0), speed, -1.0))
         at = jnp.where(hits, jnp.clip(jax.lax.stop_gradient(at) - miss / way, 0.0, left_s), left_s)
     there = after(at)
-    vx, vy = there.velocity_m_s
+    vy, upward = there.velocity_m_s[1], _upward(scene, jnp)
     rebound = jnp.where(-vy > PLASTIC_M_S, -floor.restitution * vy, 0.0)
     rebound = jnp.where(is_last, 0.0, rebound)
     bounced = Body(
-        jnp.stack([there.position_m[0], floor.height_m]),
-        jnp.stack([vx * (1 - floor.grip), rebound]),
+        jnp.where(upward, floor.height_m, there.position_m),
+        jnp.where(upward, rebound, there.velocity_m_s * (1 - floor.grip)),
         there.way_m,
     )
     found = jax.tree.map(lambda one, other: jnp.where(hits, one, other), bounced, whole)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from jaxtyping import Float
 
-from galileo_jax.model.effects.effect import Effect, State, Surroundings, true_surroundings
+from galileo_jax.model.effects.effect import Effect, Push, State, Surroundings, true_surroundings
 
 # NumPy or JAX arrays alike; the leading axes are the batch's.
 Array = Float[Any, "..."]
@@ -47,6 +47,7 @@ class Dynamics(NamedTuple):
       drive: `State` to forces along the path but friction, `[..., object]`, N.
       brake: `State` to friction's size `[..., object]`, N.
       gravity: `[...]` or a number, m/s^2.
+      pushes: forces with directions of their own on one free body, see `Effect.push`.
     """
 
     mass: PerObject
@@ -65,6 +66,7 @@ class Dynamics(NamedTuple):
     drive: Callable[[State], PerObject]
     brake: Callable[[State], PerObject]
     gravity: Array
+    pushes: tuple[Push, ...] = ()
 
 
 def dynamics(
@@ -133,6 +135,7 @@ def dynamics(
         drive=drive,
         brake=brake,
         gravity=scene.gravity,
+        pushes=tuple(push for e in effects if (push := e.push(theta, scene)) is not None),
     )
 
 

@@ -78,5 +78,5 @@ def _root(data: Whitening) -> np.ndarray:
     """L of the tracker's covariance L L^T, `[object, 2, 2, frame]`; 0 where masked."""
     inverse = np.moveaxis(data.inverse_root, -1, 1)
     is_seen = np.abs(inverse).sum(axis=(2, 3)) > 0
-    root = np.linalg.inv(np.where(is_seen[..., None, None], inverse, np.eye(2)))
+    root = np.linalg.inv(np.where(is_seen[..., None, None], inverse, np.eye(inverse.shape[-1])))
     return np.moveaxis(root * is_seen[..., None, None], 1, -1)

@@ -35,6 +35,9 @@ HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # trackers are pulled along by what th
 # Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
 # millimetre; how fast they go along it shows none of that.
 WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
+# Several cameras place a body in space by where each sees it: how they stand to each other, their
+# lenses and clocks shift it by a few millimetres, ever another way as it goes.
+WANDER_SD_M, WANDER_S = 2e-3, 0.15
 # Nothing holds a falling body to its line: where it is across it says nothing of the fall.
 ASIDE_SD_M = 1.0
 SMALLEST_MODE = 1e-3  # of a family's largest variance; what is smaller is left out
@@ -44,16 +47,32 @@ MOVED_M = 0.002  # an object that has gone so far has been hit
 
 def offsets(observation: Observation) -> list[np.ndarray]:
     """The modes of a track as a whole: with these alone, displacements are what counts."""
-    count, _, frames = observation.position_m.shape
+    count, axes, frames = observation.position_m.shape
     found = []
     for i in range(count):
-        for axis in range(2):
-            offset = np.zeros((count, 2, frames))
+        for axis in range(axes):
+            offset = np.zeros((count, axes, frames))
             # Paths begin where the object is first seen, within that frame's error.
             seen = int(np.argmax(observation.mask[i]))
             error = observation.covariance_m2[i, axis, axis, seen]
             offset[i, axis] = math.sqrt(OFFSET_SD_M**2 + error)
             found.append(offset)
+    return found
+
+
+def wander(observation: Observation) -> list[np.ndarray]:
+    """For each object and axis of a track in space a slow wander (Ornstein-Uhlenbeck)."""
+    apart = np.abs(observation.times_s[:, None] - observation.times_s)
+    values, vectors = np.linalg.eigh(WANDER_SD_M**2 * np.exp(-apart / WANDER_S))
+    kept = values > SMALLEST_MODE * values[-1]
+    patterns = (np.sqrt(values[kept]) * vectors[:, kept]).T
+    count, axes, _ = observation.position_m.shape
+    found = []
+    for i in range(count):
+        for axis in range(axes):
+            own = np.zeros((len(patterns), *observation.position_m.shape))
+            own[:, i, axis] = patterns
+            found.extend(own)
     return found
 
 

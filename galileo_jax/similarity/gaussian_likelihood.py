@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import crossings, modes, offsets
+from galileo_jax.similarity.discrepancy import crossings, modes, offsets, wander
 
 NoiseModel = Literal["camera", "bodies", "tracker"]
 Places = Float[jax.Array, "object 2 frame"]
@@ -64,9 +64,12 @@ class GaussianLikelihood:
         """
         mask = observation.mask
         covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
-        covariance[~mask] = np.eye(2)
+        axes = observation.position_m.shape[1]
+        covariance[~mask] = np.eye(axes)
         if noise == "tracker":
             patterns = np.stack(offsets(observation))
+        elif axes == 3:
+            patterns = np.stack([*offsets(observation), *wander(observation)])
         else:
             patterns = modes(observation, scene, is_filmed=noise == "camera")
             patterns = np.concatenate([patterns, crossings(observation, scene)])
@@ -80,7 +83,7 @@ class GaussianLikelihood:
             inverse_root,
             basis.reshape(len(gain), *patterns.shape[1:]),  # of short tracks fewer than patterns
             gain,
-            np.float64(2 * mask.sum()),
+            np.float64(axes * mask.sum()),
         )
 
     @staticmethod

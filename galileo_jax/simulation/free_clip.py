@@ -51,7 +51,7 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
             "video": out.name,
             "direction": settings.direction,
             "pixels_per_metre": round(camera.pixels_per_metre / magnified, 2),
-            "origin_px": list(camera.origin_px),
+            **_origin(camera),
             **content,
         }
         record["pixels_per_metre_true"] = camera.pixels_per_metre
@@ -60,6 +60,13 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
         filming = plane_filming(settings, 1.0 + truth.values.get("frame_rate", 0.0))
         film(out, path, bodies, camera, None, filming, len(frames.times_s), settings.seed)
     write_yaml_and_truth(out, content, record)
+
+
+def _origin(camera: synthetic.Camera) -> dict[str, Any]:
+    """Where heights count from; a swing is filmed from so near that it is not in the picture."""
+    axes = zip(camera.origin_px, camera.size_px, strict=True)
+    is_near = all(-size <= at < 2 * size for at, size in axes)  # as `load` allows
+    return {"origin_px": list(camera.origin_px)} if is_near else {}
 
 
 def _record(

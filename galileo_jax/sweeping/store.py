@@ -22,6 +22,7 @@ import numpy as np
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.astray import Astray
+from galileo_jax.measurement.cuts import Cut
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import replacing, write_json
@@ -124,7 +125,8 @@ class Store:
         seen = Observation(names=names, **arrays)
         said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
         astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
-        measured = Measurement(clip, seen, seen, None, notes["inferred"], astray, **said)
+        cuts = tuple(Cut(**entry) for entry in notes.get("cuts", []))
+        measured = Measurement(clip, seen, seen, None, notes["inferred"], cuts, astray, **said)
         return MeasuredClip(measured, picture or None)
 
     def save_clip(self, key: str, measured: MeasuredClip) -> None:
@@ -132,6 +134,7 @@ class Store:
         one = measured.measurement
         seen = one.observation
         notes = {name: getattr(one, name) for name in ("inferred", "doubts", "remarks")}
+        notes["cuts"] = [vars(entry) for entry in one.cuts]
         notes["astray"] = [vars(entry) for entry in one.astray]
         with replacing(self._clip(key)) as path:
             np.savez_compressed(

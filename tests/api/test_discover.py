@@ -247,7 +247,7 @@ def test_wrong_calls(verdicts, tmp_path):
         (Lab(settings={"angle_deg": {"low": 5, "high": 95}}), {}, "outside 1 to 89 degrees"),
     ):
         with pytest.raises(InputError, match=line):
-            gx.discover(lab, **options)
+            gx.discover(lab, **options)  # pyright: ignore[reportArgumentType]
     gx.discover(Lab(), budget=1, out=tmp_path / "run")
     with pytest.raises(InputError, match="of another lab"):
         gx.discover(Lab(settings={"fps": {"choices": [30]}}), out=tmp_path / "run")

@@ -17,7 +17,7 @@ from galileo_jax.commands import command, compare, diagnose, fit, predict
 from galileo_jax.commands import simulate as simulate_command
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import effect_names, make_effects
-from galileo_jax.model.parameters import absent
+from galileo_jax.model.parameters import Normal, absent
 from galileo_jax.model.scene.expected import expected
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.rollout import in_jax
@@ -129,6 +129,19 @@ def test_a_throw_is_a_parabola_and_drag_bends_it(tmp_path):
     assert y[rising] == pytest.approx(high, abs=SMOOTH_M)
 
 
+def test_a_launcher_is_faster_than_the_first_frame(tmp_path):
+    """The ball is seen late; where its path had the launcher's angle it was as fast as this."""
+    problem = problem_of(write(tmp_path, "flight", np.zeros(FRAMES), "launch_angle_deg: 45.0\n"))
+    theta = theta_of(problem, start_velocity_x=2.0, start_velocity_y=1.0)
+    model = problem.model
+    (law,) = (each for each in model.nuisances if each.name == "start_velocity")
+    derived = law.derived(model.by_name(theta), model.scene.surroundings)
+    assert derived["launch_speed"][0] == pytest.approx(2.0 * math.sqrt(2.0))
+    prior = model.parameters[model.index("launch_angle")].prior
+    assert isinstance(prior, Normal)
+    assert prior.sd == pytest.approx(math.radians(0.5))
+
+
 def test_a_spring_swings_with_its_period(tmp_path):
     period, damping, rest, speed = 0.7, 0.3, 0.05, 0.2
     w = 2 * math.pi / period
@@ -204,6 +217,13 @@ def test_simulate_writes_a_track_that_loads(scenario, tmp_path):
     assert load_clip(out).frame_count == truth["frames"]
     assert truth["effect"] == "none"
     assert true_parameters(load_clip(out)) == truth["parameters"]
+
+
+@pytest.mark.parametrize("scenario", FREE)
+def test_simulate_films_what_loads(scenario, tmp_path):
+    out = tmp_path / "clip.mp4"
+    simulate(out, scenario=scenario, seed=4, seconds=0.2)
+    assert load_clip(out).frame_count == 7
 
 
 @pytest.mark.parametrize(

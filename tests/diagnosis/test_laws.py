@@ -1,5 +1,7 @@
 """Formulas: what they are worth as effects, as text and as a file."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -27,7 +29,7 @@ def theta(structure, strength, **constants):
     return {name: np.asarray(strength), **values, **masses}
 
 
-def effect(structure):
+def effect(structure) -> Any:
     return law_class(class_source(structure, ()))()
 
 

@@ -9,14 +9,14 @@ from galileo_jax.rollout.rollout import Engine, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
 
 
-def rolled(engine: Engine, z: jax.Array) -> Trajectory:
+def rolled(engine: Engine, z: jax.Array | np.ndarray) -> Trajectory:
     """The motion at `z` `[parameter]`; no pitch of its own."""
-    position, velocity = in_jax(engine)(forward(engine.model.parameters, z[None]))
+    position, velocity = in_jax(engine)(forward(engine.model.parameters, jnp.asarray(z)[None]))
     times = jnp.arange(position.shape[-1]) * engine.model.record_dt_s
     return Trajectory(times, position[0], velocity[0])
 
 
-def derivatives(engine: Engine, z: jax.Array, times_s: jax.Array, step: float):
+def derivatives(engine: Engine, z: jax.Array | np.ndarray, times_s: jax.Array, step: float):
     """JAX's `[object, 2, frame, parameter]` of the centres, and central differences `[parameter,
     object, 2, frame]`."""
 

@@ -315,6 +315,6 @@ def test_parameters_outside_jit_and_inside_are_one_path():
     model = make_model(HIT, 0.5)
     z = inverse(model.parameters, jnp.asarray(make_theta(model, HIT)))
     engine = EngineRigid(model)
-    by_call, _ = engine.simulate(np.asarray(forward(model.parameters, z))[None])
+    by_call, _ = engine.simulate(np.asarray(forward(model.parameters, jnp.asarray(z)))[None])
     traced = jax.jit(lambda z: rolled(engine, z).position_m)(z)
     assert np.asarray(traced) == pytest.approx(by_call[0], abs=CLOSED_FORM_ATOL)

@@ -48,7 +48,7 @@ def test_a_part_has_the_values_of_the_whole(picture):
 
 
 def test_beyond_the_border_the_last_pixels_go_on():
-    grey = np.tile(np.arange(0, 200, 5, np.uint8), (30, 1))
+    grey = np.tile(np.arange(0, 200, 5, dtype=np.uint8), (30, 1))
     own = np.array([[-20.0], [0.0]], np.float32)
     found = Picture(grey).at(np.array([3.0, 15.0, 0.0]), own, 20.0, 0.8)
     assert found[0] == pytest.approx(0.0, abs=3.0)

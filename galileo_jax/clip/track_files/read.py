@@ -90,6 +90,8 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
     if _is_ours(head):
         _check_own_keys(yaml_path, path, file)
         observation = read_observation_csv(path)
+        if file.track_up == "z":
+            observation = _turned_up(yaml_path, path, observation)
         _check_names(yaml_path, path, file, observation.names)
         return FileTrack(observation, "m", _frame_rate(observation.times_s), is_own=True)
     table = _reader(path, head).read(path)
@@ -149,6 +151,18 @@ def _head(path: Path) -> bytes:
     if not head.strip():
         raise InputError(f"{path}: empty; a track file expected")
     return head
+
+
+def _turned_up(yaml_path: Path, path: Path, observation: Observation) -> Observation:
+    """From x, y and z up to x, y up and z."""
+    if observation.position_m.shape[1] != 3:
+        raise InputError(f"{yaml_path}: track_up: z, but {path.name} has no column z_m")
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+    return replace(
+        observation,
+        position_m=np.einsum("ab,obt->oat", turn, observation.position_m),
+        covariance_m2=np.einsum("ab,obct,dc->oadt", turn, observation.covariance_m2, turn),
+    )
 
 
 def _is_ours(head: bytes) -> bool:

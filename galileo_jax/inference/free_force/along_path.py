@@ -25,10 +25,11 @@ def along_path(problem: Problem, theta: np.ndarray) -> tuple[np.ndarray, np.ndar
         origin = np.asarray(scene.start_m)
         slope = np.broadcast_to(law.ramp_rad, position[:, 0].shape)
     tangent = np.stack([np.cos(slope), -np.sin(slope)], axis=1)
-    path = np.sum((position - origin[..., None]) * tangent, axis=1)
-    speed = np.sum(velocity * tangent, axis=1)
-    if scene.moves_in_plane:
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        steps = np.hypot(*np.diff(position, axis=-1).transpose(1, 0, 2))
+    if not scene.moves_in_plane:
+        path = np.sum((position - origin[..., None]) * tangent, axis=1)
+        speed = np.sum(velocity * tangent, axis=1)
+    else:
+        speed = np.linalg.norm(velocity, axis=1)
+        steps = np.linalg.norm(np.diff(position, axis=-1), axis=1)
         path = np.pad(np.cumsum(steps, axis=-1), [(0, 0), (1, 0)])
     return np.arange(path.shape[-1]) * model.record_dt_s, path, speed

@@ -20,8 +20,8 @@ def spans_of(problem: Problem, theta: np.ndarray) -> tuple[tuple[Span, ...], ...
     position, velocity = problem.engine.simulate(theta[None])
     times = np.arange(velocity.shape[-1]) * problem.model.record_dt_s
     scene = problem.model.scene.surroundings
-    speeds = np.hypot(velocity[0, :, 0], velocity[0, :, 1])
-    moved = np.hypot(*(position[0] - position[0, ..., :1]).transpose(1, 0, 2))
+    speeds = np.linalg.norm(velocity[0], axis=1)
+    moved = np.linalg.norm(position[0] - position[0, ..., :1], axis=1)
     found = []
     for way, speed in zip(moved, speeds, strict=True):
         moving = np.flatnonzero((speed > MOVES_M_S) & (times <= last))

@@ -61,8 +61,10 @@ class Bounce(NamedTuple):
 
 # In `Surroundings.expected`: of a high fall; how well the angle and the origin are known.
 FALL_LENGTH, ANGLE, ORIGIN = "fall_length", "declared_angle", "origin_m"
+SPIN = "spin"  # its components by axis, "spin_x" and so on, where the spin is known
 
 Force = Callable[[State], PerObject]
+Push = Callable[[Float[AnyArray, " axis"], Float[AnyArray, ""]], Float[AnyArray, " axis"]]
 Friction = Callable[[State, PerObject], PerObject]
 
 _ARRAYS = (
@@ -105,7 +107,7 @@ class Surroundings:
       half_length_m, half_height_m: `[object]`, along the travel and across it.
       corner_m: `[object]`, x at which each centre's path bends from ramp to table; inf
         without a table.
-      start_m: `[object, 2]`, the centres at the release.
+      start_m: `[object, axis]`, the centres at the release; of a flight in space with z.
       start_path_m: `[object]`, the same along the path, see `State`.
       has_table: whether the ramp ends on a table.
       comes_down: `[object]`, whether the object starts on the ramp.
@@ -129,7 +131,7 @@ class Surroundings:
     half_length_m: tuple[float, ...]
     half_height_m: tuple[float, ...]
     corner_m: tuple[float, ...]
-    start_m: tuple[tuple[float, float], ...]
+    start_m: tuple[tuple[float, ...], ...]
     start_path_m: tuple[float, ...]
     has_table: bool
     comes_down: tuple[bool, ...]
@@ -147,6 +149,11 @@ class Surroundings:
     def starts_moving(self) -> bool:
         """Whether nothing is let go: the object moves when it is first seen."""
         return "start_velocity" in self.laws
+
+    @property
+    def num_axes(self) -> int:
+        """2, or 3 of what was measured in space: x, y (up), z."""
+        return len(self.start_m[0])
 
     @property
     def angle_sd_rad(self) -> float:
@@ -221,6 +228,14 @@ class Effect:
 
         What depends on the parameters alone is computed here, once per rollout; the function
         returned maps a `State` to `[..., object]`, N.
+        """
+        return None
+
+    def push(self, theta: Theta, scene: Surroundings) -> Push | None:
+        """Returns a force with a direction of its own, on what moves freely, or None.
+
+        The function maps the velocity `[axis]`, m/s, of the one body of a flight, and the time
+        since the start, s, to a force `[axis]`, N: x, y (up) and, of a track in space, z.
         """
         return None
 

@@ -14,10 +14,12 @@ import numpy as np
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.model.effects.air import expected_drags
-from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN
+from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN, SPIN
+from galileo_jax.model.effects.laws.start_velocity import LAUNCH
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
+from galileo_jax.model.scene.board_path import board_shape
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 
 START_FRAMES = 6  # the start's velocity is read off so many
@@ -29,6 +31,8 @@ DENSITY_RATIO = (0.5, 0.8)  # steel in water 0.13, a bubble 800
 WEIGHED_RATIO_SD = 0.03  # where density, mass and size are declared
 EYE_M = 1.6  # as high as a camera is held
 DISTANCE = 1.5  # of the camera from a high fall, in its lengths: it fills half of the picture
+SPIN_SD_RAD_S, SPIN_SD_SHARE = 3.0, 0.03  # as a camera that looks at the ball's marks tells it
+LAUNCH_SD_DEG = 0.5  # a launcher is set by a scale of degrees
 UNKNOWN_M_S, UNKNOWN_M = 10.0, 3.0  # widths where nobody knows how long a metre is
 
 
@@ -37,13 +41,17 @@ def expected(
 ) -> Mapping[str, tuple[float, float]]:
     """The two numbers of each prior, by the parameter's name; of every law that might ask."""
     declared = _declared(clip)
-    if SCENARIOS[clip.scenario].has_ramp:
-        return declared
     seen = np.flatnonzero(observation.mask[0])
     times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
+    known = clip.is_scale_known
+    if SCENARIOS[clip.scenario].has_ramp:
+        if clip.starts_moving:
+            speed = math.hypot(*_start_velocity(times_s, place_m))
+            declared["start_speed"] = (speed, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
+        is_board = not SCENARIOS[clip.scenario].has_table
+        return declared | (board_shape(clip, observation) if is_board else {})
     down_m = place_m[1, 0] - place_m[1]
     velocity = _start_velocity(times_s, place_m)
-    known = clip.is_scale_known
     middle = (float(down_m.min()) + float(down_m.max())) / 2
     width = float(np.ptp(down_m))
 
@@ -53,12 +61,15 @@ def expected(
     return {
         "start_velocity_x": start(velocity[0]),
         "start_velocity_y": start(velocity[1]),
+        **({"start_velocity_z": start(velocity[2])} if len(velocity) == 3 else {}),
         "start_speed": start(-velocity[1]),
         "rest": (middle, max(width, 0.01)) if known else (0.0, UNKNOWN_M),
         "period": (_period_s(times_s, down_m), PERIOD_SD),
         "density_ratio": _density_ratio(clip),
         "floor_height": _floor_height(clip, place_m[1], half_height_m),
         **declared,
+        **_launcher(clip),
+        **_spin(clip),
         **(_high_fall(clip, float(down_m.max())) if clip.scenario == "fall" and known else {}),
     }
 
@@ -74,6 +85,24 @@ def _declared(clip: Clip) -> dict[str, tuple[float, float]]:
         ORIGIN: clip.origin_sd_px / scale,
     }
     return {name: (0.0, sd) for name, sd in sds.items() if sd}
+
+
+def _spin(clip: Clip) -> dict[str, tuple[float, float]]:
+    """The measured spin along the observation's axes; nothing where it is not known."""
+    given = clip.objects[0].spin_rad_s
+    if given is None:
+        return {}
+    x, y, z = given
+    turned = (x, z, -y) if clip.track_up == "z" else (x, y, z)
+    sd = SPIN_SD_RAD_S + SPIN_SD_SHARE * math.hypot(*given)
+    return {f"{SPIN}_{axis}": (value, sd) for axis, value in zip("xyz", turned, strict=True)}
+
+
+def _launcher(clip: Clip) -> dict[str, tuple[float, float]]:
+    """The declared angle of a launcher; nothing where there is none."""
+    if clip.launch_angle_deg is None:
+        return {}
+    return {LAUNCH: (math.radians(clip.launch_angle_deg), math.radians(LAUNCH_SD_DEG))}
 
 
 def _high_fall(clip: Clip, length_m: float) -> dict[str, tuple[float, float]]:
@@ -99,14 +128,13 @@ def pitched(length_m: float) -> dict[str, tuple[float, float]]:
     return {Perspective.name: (0.0, change), FALL_LENGTH: (length_m, 0.0)}
 
 
-def _start_velocity(times_s: np.ndarray, place_m: np.ndarray) -> tuple[float, float]:
-    """The velocity `(x, y)` in the first frame, m/s, from a parabola through the first few."""
+def _start_velocity(times_s: np.ndarray, place_m: np.ndarray) -> tuple[float, ...]:
+    """The velocity `[axis]` in the first frame, m/s, from a parabola through the first few."""
     count = min(len(times_s), START_FRAMES)
     if count < 2:
-        return 0.0, 0.0
+        return (0.0,) * len(place_m)
     after = times_s[:count] - times_s[0]
-    x, y = (np.polyfit(after, row[:count], min(2, count - 1))[-2] for row in place_m)
-    return float(x), float(y)
+    return tuple(float(np.polyfit(after, row[:count], min(2, count - 1))[-2]) for row in place_m)
 
 
 def _period_s(times_s: np.ndarray, down_m: np.ndarray) -> float:

@@ -18,6 +18,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.files.package_data import scene_path
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.model.effects.laws.start_velocity import StartVelocity
 from galileo_jax.model.scene.expected import expected
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
@@ -29,9 +30,10 @@ TIMESTEP_S = 1 / 960
 # Where nothing else is declared; an incline's dynamics do not depend on it.
 UNKNOWN_BOX_M: tuple[float, ...] = (0.04, 0.04, 0.04)
 UNKNOWN_ROUND_M: tuple[float, ...] = (0.02, 0.01)
-EARLY_SHARE = 0.3  # of a fall, before the air makes itself felt
+EARLY_SHARE = 0.3  # of a fall, before the air makes itself felt; of a way that turns back
 # Of the objects beyond the file's two, in turn.
 SHAPE_RGBA = ([0.35, 0.60, 0.30, 1], [0.62, 0.45, 0.70, 1], [0.80, 0.36, 0.22, 1])
+TURNED = 0.99  # of its way, where what ended nearer has turned back
 BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do not climb
 
 
@@ -136,14 +138,14 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
     else:
         angle = 0.0 if scenario.moves_in_plane else math.pi / 2
     half = [extents(declared) for declared in clip.objects]
-    starts = []
+    starts: list[tuple[float, ...]] = []
     for i, (name, (_, height)) in enumerate(zip(observation.names, half, strict=True)):
         seen = np.flatnonzero(observation.mask[i])
         if not seen.size:
             raise InputError(f"{clip.path}: {name} is not seen in any frame")
-        x, y = observation.position_m[i, :, seen[0]]
+        x, y = observation.position_m[i, :2, seen[0]]
         if not has_table:
-            starts.append((float(x), float(y)))
+            starts.append(tuple(map(float, observation.position_m[i, :, seen[0]])))
         elif i == 0:
             along = x * math.cos(angle) - y * math.sin(angle)
             starts.append(_on_ramp(along, height, angle))
@@ -165,25 +167,31 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         start_m=tuple(starts),
         start_path_m=start_paths(tuple(starts), corner, angle),
         has_table=has_table,
-        comes_down=tuple(has_table and x < c for (x, _), c in zip(starts, corner, strict=True)),
+        comes_down=tuple(has_table and at[0] < c for at, c in zip(starts, corner, strict=True)),
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.is_scale_known,
         has_surface=has_surface,
         mass_kg=tuple(declared.mass_kg for declared in clip.objects),
         **(rolling(clip.objects) if has_surface else {}),
         moves_in_plane=scenario.moves_in_plane,
-        laws=(*scenario.laws, *(("floor",) if clip.has_floor else ())),
+        laws=laws_of(clip),
         expected=expected(clip, observation, half[0][1]),
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
 
 
+def laws_of(clip: Clip) -> tuple[str, ...]:
+    """The scenario's laws, and those that the clip's keys bring."""
+    declared = (("floor", clip.has_floor), (StartVelocity.name, clip.starts_moving))
+    return SCENARIOS[clip.scenario].laws + tuple(name for name, is_there in declared if is_there)
+
+
 def start_paths(
-    starts: tuple[tuple[float, float], ...], corners: tuple[float, ...], angle: float
+    starts: tuple[tuple[float, ...], ...], corners: tuple[float, ...], angle: float
 ) -> tuple[float, ...]:
     """How far each start `(x, y)` is past the foot, along the path; 0 without a table."""
     paths = []
-    for (x, _), corner in zip(starts, corners, strict=True):
+    for (x, *_), corner in zip(starts, corners, strict=True):
         past = x - corner if math.isfinite(corner) else 0.0
         paths.append(past / math.cos(angle) if past < 0 else past)
     return tuple(paths)
@@ -198,7 +206,7 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
     """
     frame_s = 1.0 / clip.fps
     declared = clip.objects[0].first_frame
-    if "start_velocity" in SCENARIOS[clip.scenario].laws:
+    if StartVelocity.name in laws_of(clip):
         return float(observation.times_s[np.argmax(observation.mask[0])]), frame_s
     if clip.scenario == "ramp" and declared is not None:
         return declared * frame_s, frame_s / 3
@@ -208,7 +216,7 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
     if SCENARIOS[clip.scenario].has_table:
         gone = np.where(place[0] < 0, gone, 0.0)
     moving = gone > 0.05 * gone.max()
-    if clip.scenario == "fall":
+    if clip.scenario == "fall" or gone[-1] < TURNED * gone.max():
         moving &= gone < EARLY_SHARE * gone.max()
         moving &= np.arange(len(gone)) <= np.argmax(gone)  # it may come back up
     if gone.max() <= 0 or moving.sum() < 3:
@@ -250,7 +258,7 @@ def _spec(
         spec.delete(spec.geom("ramp"))
     elif not has_table:
         # The board is where the object is seen to stand, whatever its height.
-        (x, y), height = surroundings.start_m[0], surroundings.half_height_m[0]
+        (x, y, *_), height = surroundings.start_m[0], surroundings.half_height_m[0]
         sin, cos = math.sin(surroundings.angle_rad), math.cos(surroundings.angle_rad)
         spec.geom("ramp").pos = [x - height * sin, 0, y - height * cos]
     if surroundings.has_surface:
@@ -263,7 +271,7 @@ def _spec(
     for i in range(count):
         name = f"object{i + 1}"
         length, height = surroundings.half_length_m[i], surroundings.half_height_m[i]
-        x, y = surroundings.start_m[i]
+        x, y = surroundings.start_m[i][:2]
         spec.body(name).pos = [x, 0, y]
         spec.geom(f"{name}_sled").size = [height, 0, 0]
         # Bumpers meet at the height of object 1's centre, so that a push has no lift.

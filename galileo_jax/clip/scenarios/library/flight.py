@@ -19,6 +19,6 @@ register(
             "release_delay",  # start_velocity: it flies when the clip begins
             "spring_tether",  # along the velocity
         ),
-        keys=("floor", "vertical_sd_deg"),
+        keys=("floor", "launch_angle_deg", "vertical_sd_deg"),
     )
 )

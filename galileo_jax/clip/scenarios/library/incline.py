@@ -7,5 +7,6 @@ register(
         name="incline",
         meaning="one object slides down a board, no table",
         has_ramp=True,
+        keys=("starts_moving",),
     )
 )

@@ -1,7 +1,13 @@
 """Start velocity: the object moves when it is first seen, nobody lets it go.
 
-    v(0) = (start_velocity_x, start_velocity_y)    in the plane, x along the travel, y up
+    v(0) = (start_velocity_x, start_velocity_y)    in the plane, x along the travel, y up;
+                                                   in space with start_velocity_z
     v(0) = start_speed                             on a straight path, downward
+
+    launch_speed = start_velocity_x / cos(launch_angle)
+
+where a launcher at a declared angle stands before the first frame: it is the speed where the path
+has that angle. Drag on the way from there is neglected.
 
 A throw, a swing that is under way, a body that was let go before the clip begins.
 """
@@ -12,8 +18,10 @@ from typing import ClassVar
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
-PLANE = ("start_velocity_x", "start_velocity_y")
+SPACE = ("start_velocity_x", "start_velocity_y", "start_velocity_z")
+PLANE = SPACE[:2]
 PATH = ("start_speed",)
+LAUNCH = "launch_angle"
 
 
 class StartVelocity(Effect):
@@ -22,19 +30,23 @@ class StartVelocity(Effect):
     name: ClassVar[str] = "start_velocity"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Its components in the plane, or the speed along the path."""
+        """Its components in the plane (and a launcher's angle), or the speed along the path."""
         if self.name not in scene.laws:
             return ()
-        return tuple(
+        found = [
             Parameter(name, "m/s", Normal(*scene.expected[name]), 0.0, "main", 0.05, per_clip=True)
-            for name in (PLANE if scene.moves_in_plane else PATH)
-        )
+            for name in (SPACE[: scene.num_axes] if scene.moves_in_plane else PATH)
+        ]
+        if scene.moves_in_plane and LAUNCH in scene.expected:
+            prior = Normal(*scene.expected[LAUNCH])
+            found.append(Parameter(LAUNCH, "rad", prior, prior.mean, "nuisance", step=None))
+        return tuple(found)
 
     def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
         """In the plane."""
         if self.name not in scene.laws or not scene.moves_in_plane:
             return None
-        components = [theta[name] for name in PLANE]
+        components = [theta[name] for name in SPACE[: scene.num_axes]]
         return components[0].__array_namespace__().stack(components, axis=-1)[..., None, :]
 
     def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
@@ -44,9 +56,16 @@ class StartVelocity(Effect):
         return theta[PATH[0]][..., None]
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
-        """The speed of a throw and its angle over the horizontal."""
+        """The speed of a throw and its angle over the horizontal; the speed at a launcher."""
         if self.name not in scene.laws or not scene.moves_in_plane:
             return {}
-        x, y = (theta[name] for name in PLANE)
+        x, y, *z = (theta[name] for name in SPACE[: scene.num_axes])
         xp = x.__array_namespace__()
-        return {"start_speed": (xp.hypot(x, y), "m/s"), "start_angle": (xp.atan2(y, x), "rad")}
+        level = xp.hypot(x, z[0]) if z else x
+        found = {
+            "start_speed": (xp.hypot(level, y), "m/s"),
+            "start_angle": (xp.atan2(y, level), "rad"),
+        }
+        if LAUNCH in scene.expected:
+            found["launch_speed"] = (x / xp.cos(theta[LAUNCH]), "m/s")
+        return found

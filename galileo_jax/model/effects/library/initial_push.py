@@ -25,9 +25,11 @@ class InitialPush(Effect):
     name: ClassVar[str] = "initial_push"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The speed."""
+        """The speed; none of what moves already when it is first seen."""
+        if scene.starts_moving:
+            return ()
         return (Parameter("initial_push", "m/s", PRIOR, 0.0, "effect", 0.1, per_clip=True),)
 
-    def start_speed(self, theta: Theta, scene: Surroundings) -> Array:
+    def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
         """The speed, of object 1."""
-        return scene.only(theta["initial_push"], 0)
+        return None if scene.starts_moving else scene.only(theta["initial_push"], 0)

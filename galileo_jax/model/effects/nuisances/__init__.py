@@ -5,6 +5,7 @@ They are effects like any other; only their parameters' role differs
 """
 
 from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.effects.nuisances.board_shape import BoardShape
 from galileo_jax.model.effects.nuisances.contact_gap import ContactGap
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
@@ -23,6 +24,7 @@ NUISANCES: tuple[Effect, ...] = (
     ImpactRestitution(),
     ContactGap(),
     ReleaseInstant(),
+    BoardShape(),
     PixelScale(),
     Perspective(),
 )

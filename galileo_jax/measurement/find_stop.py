@@ -1,8 +1,7 @@
-"""Cuts a track where something that is not in the scene stops the motion.
+"""A stop: something that is not in the scene ends the motion.
 
-A board may end at a stop, and below a dropped object is the ground. Neither is part of the scene,
-so the track is cut there. In a fall without a declared floor, and on a board without a table, the
-track ends at step i if, with v_i the speed in the direction of motion,
+A board may end at a stop, and below a dropped object is the ground. With v_i the speed in the
+direction of motion, the object is stopped at step i if
 
     v_i < SLOWED v,   and no v_j > SLOWED v after it,   v = median of steps i - 2, i - 3, i - 4
     v_(i-2) > STEADY v                                  (what brakes slows down step by step)
@@ -12,12 +11,8 @@ track ends at step i if, with v_i the speed in the direction of motion,
 n is 1, or 2 where the hit is smeared over two steps: v_(i-1) < STEADY v.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
-from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
 
 SLOWED, STEADY = 0.6, 0.9
@@ -27,28 +22,6 @@ CLEAR = 5.0
 BEFORE = 3
 SMEARED_FRAMES = 1
 """Of a video: the hit falls into an exposure, whose frame shows neither."""
-
-
-def can_be_arrested(clip: Clip) -> bool:
-    """Whether the clip has an end that is not in its scene."""
-    scenario = SCENARIOS[clip.scenario]
-    is_board = scenario.has_ramp and not scenario.has_table
-    return is_board or (clip.scenario == "fall" and not clip.has_floor)
-
-
-def truncate_at_stop(clip: Clip, observation: Observation) -> tuple[Observation, float | None]:
-    """The observation without what follows a stop, and when its last frame is, s.
-
-    Returns:
-      The observation itself and None where nothing stops the object.
-    """
-    last = arrest_frame(observation) if can_be_arrested(clip) else None
-    if last is None:
-        return observation, None
-    last -= SMEARED_FRAMES if clip.video is not None else 0
-    mask = observation.mask.copy()
-    mask[0, last + 1 :] = False
-    return replace(observation, mask=mask), float(observation.times_s[last])
 
 
 def arrest_frame(observation: Observation) -> int | None:

@@ -1,0 +1,207 @@
+"""All rows of docs/explanation/real_data.md, from the real measurements in one folder.
+
+    python benchmarks/real_sets.py FOLDER [--set NAME ...] [--flights 60] [--out OUT]
+
+FOLDER: falling_balls.csv, ball_toss.yaml, slide_r1.yaml, slide_r2.yaml, projectile_45.mp4,
+spin_flights/, puck_head_on.mp4, cube_tosses/. A set that is absent, or that the program has no
+scenario for, is skipped, and a line says so. What is made goes into OUT (default: thrown away).
+"""
+
+import argparse
+import csv
+import math
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import galileo_jax as gx
+from galileo_jax.runtime.errors import InputError
+
+FAST_RAD_S = 100.0  # spins that bend a flight
+EVERY_FLIGHT = 10_000
+PROJECTILE = """video: {video}
+scenario: flight
+fps: 240.0
+pixels_per_metre: null
+launch_angle_deg: 45.0
+objects:
+  - {{name: object1, shape: sphere, size_m: null, point_px: [48.5, 67.5], first_frame: 180}}
+"""
+FLIGHT = """track: {track}
+track_up: z
+scenario: flight
+objects:
+  - {{name: object1, shape: sphere, size_m: [0.02], mass_kg: 0.0027}}
+"""
+
+
+def main() -> None:
+    """Prints the rows."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--set", choices=SETS, nargs="+", default=list(SETS))
+    parser.add_argument("--flights", type=int, default=EVERY_FLIGHT)
+    parser.add_argument("--out", type=Path)
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        out = asked.out or Path(scratch)
+        for name in asked.set:
+            needed, row = SETS[name]
+            if missing := [one for one in needed if not (asked.folder / one).exists()]:
+                print(f"{name}: skipped; {', '.join(missing)} not in {asked.folder}", flush=True)
+                continue
+            (out / name).mkdir(parents=True, exist_ok=True)
+            print(f"{name}: {row(asked.folder, out / name, asked.flights)}", flush=True)
+
+
+def falling_balls(folder: Path, out: Path, _: int) -> str:
+    """The example's own table."""
+    script = Path(__file__).parents[1] / "examples" / "falling_balls.py"
+    call = [sys.executable, str(script), str(folder / "falling_balls.csv"), str(out)]
+    subprocess.run(call, check=True)
+    return "see the table above"
+
+
+def ball_toss(folder: Path, out: Path, _: int) -> str:
+    """What is wrong with the scale of the tossed ball?"""
+    return _verdict(gx.diagnose(folder / "ball_toss.yaml"))
+
+
+def slides(folder: Path, out: Path, _: int) -> str:
+    """Friction and scale of the board, from both runs."""
+    found = gx.fit([folder / "slide_r1.yaml", folder / "slide_r2.yaml"])
+    told = [_estimate(found, name) for name in ("k1", "pixels_per_metre")]
+    speeds = [f"{name} {share:.1%}" for name, share in _speed_errors(found).items()]
+    cuts = [str(cut) for one in found.measurements for cut in one.cuts]
+    return f"{'; '.join(told)}; {_error(found)}; speeds off by {', '.join(speeds)} (rms); " + (
+        "; ".join(cuts)
+    )
+
+
+def projectile(folder: Path, out: Path, _: int) -> str:
+    """The launch speed, from the clip alone."""
+    path = out / "projectile_45.yaml"
+    video = out / "projectile_45.mp4"
+    video.write_bytes((folder / "projectile_45.mp4").read_bytes())
+    path.write_text(PROJECTILE.format(video=video.name))
+    found = gx.fit(path)
+    told = [_estimate(found, name) for name in ("launch_speed", "pixels_per_metre")]
+    return f"{'; '.join(told)}; {_error(found)}"
+
+
+def spin_flights(folder: Path, out: Path, most: int) -> str:
+    """Rms before the bounce; spins as inferred by the curve alone against the measured."""
+    before, after, drags, lifts, skipped, held, asked = [], [], [], [], [], 0, 0
+    for path, spin in _flights(folder / "spin_flights", out)[:most]:
+        try:
+            plain = gx.fit(path, seed=0)
+            found = gx.fit(path, effects=["air_drag", "magnus"], seed=0)
+        except InputError as error:
+            skipped.append(str(error))
+            continue
+        before.append(_rms_mm(plain))
+        after.append(_rms_mm(found))
+        told = found.result["parameters"]
+        drags.append(told["air_drag"]["mean"] / (0.6 * math.pi * 0.02**2))
+        lifts.append(told["magnus_lift"]["mean"])
+        true = dict(zip("xyz", (spin[0], spin[2], -spin[1]), strict=True))
+        for axis, value in true.items() if np.linalg.norm(spin) > FAST_RAD_S else ():
+            one = told[f"magnus_{axis}"]
+            held += one["q025"] <= value <= one["q975"]
+            asked += 1
+    for line in skipped:
+        print(f"spin_flights: {line}")
+    return (
+        f"{len(before)} flights, rms {np.median(before):.1f} -> {np.median(after):.1f} mm, "
+        f"C_d {np.median(drags):.2f}, lift {np.median(lifts):.2f}; {held} of {asked} components of "
+        f"spins over {FAST_RAD_S:g} rad/s in their 95 % intervals; {len(skipped)} not read"
+    )
+
+
+def no_scenario(folder: Path, out: Path, _: int) -> str:
+    """Nothing yet."""
+    return "skipped; the program has no scenario for it yet"
+
+
+Row = Callable[[Path, Path, int], str]
+SETS: dict[str, tuple[tuple[str, ...], Row]] = {
+    "falling_balls": (("falling_balls.csv", "falling_balls.objects.csv"), falling_balls),
+    "ball_toss": (("ball_toss.yaml", "ball_toss.mp4"), ball_toss),
+    "slides": (("slide_r1.yaml", "slide_r2.yaml"), slides),
+    "projectile": (("projectile_45.mp4",), projectile),
+    "spin_flights": (("spin_flights/index.csv",), spin_flights),
+    "puck_head_on": (("puck_head_on.mp4",), no_scenario),
+    "cube_tosses": (("cube_tosses",), no_scenario),
+}
+
+
+def _flights(folder: Path, out: Path) -> list[tuple[Path, np.ndarray]]:
+    """A yaml for each flight, and its measured spin in the file's axes."""
+    found = []
+    for row in csv.DictReader((folder / "index.csv").open()):
+        track = folder / f"{int(row['traj_file']):03d}.csv"
+        if track.is_file():
+            (out / track.name).write_bytes(track.read_bytes())
+            path = (out / track.name).with_suffix(".yaml")
+            path.write_text(FLIGHT.format(track=track.name))
+            found.append((path, np.array([float(row[f"{axis}_spin"]) for axis in "xyz"])))
+    return found
+
+
+def _residual_m(found: gx.Fit, clip: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times `[frame]`, and measured and fitted places `[axis, frame]` where it was seen, m."""
+    problem = found.problem.problems[clip]
+    theta = found.problem.of_clip(found.problem.theta(np.asarray(found.z_best)), clip)
+    seen = problem.observation.mask[0]
+    places = problem.observation.position_m[0], problem.simulate(np.asarray(theta))[0]
+    return problem.observation.times_s[seen], places[0][:, seen], places[1][:, seen]
+
+
+def _rms_mm(found: gx.Fit) -> float:
+    """Of the distance, up to a constant offset."""
+    _, measured, fitted = _residual_m(found)
+    left = measured - fitted
+    left = left - left.mean(axis=1, keepdims=True)
+    return 1e3 * float(np.sqrt(np.mean(np.sum(left**2, axis=0))))
+
+
+def _speed_errors(found: gx.Fit, frames: int = 24) -> dict[str, float]:
+    """Of each clip the rms error of the speed over a tenth of a second, as a share of its mean."""
+    errors = {}
+    for clip, one in enumerate(found.measurements):
+        times, *places = _residual_m(found, clip)
+        lasted = times[frames:] - times[:-frames]
+        seen, told = (
+            np.linalg.norm(place[:, frames:] - place[:, :-frames], axis=0) / lasted
+            for place in places
+        )
+        moves = seen > 0.2 * seen.max()
+        errors[one.name] = float(np.sqrt(np.mean((told / seen - 1)[moves] ** 2)))
+    return errors
+
+
+def _estimate(found: gx.Fit, name: str) -> str:
+    told = {**found.result["parameters"], **found.result["derived"]}[name]
+    return f"{name} {told['mean']:.4g} [{told['q025']:.4g}, {told['q975']:.4g}] {told['unit']}"
+
+
+def _error(found: gx.Fit) -> str:
+    error: dict[str, Any] = found.result["error"]
+    return f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}"
+
+
+def _verdict(found: gx.Diagnosis) -> str:
+    verdict, history = found.document["verdict"], found.document["history"]
+    return (
+        f"{verdict['status']} {', '.join(verdict['effects'])}; chi2 per degree of freedom "
+        f"{history[0]['chi2_per_dof']:.2f} -> {history[-1]['chi2_per_dof']:.2f}"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""The part of a track that is motion of the scene, and what ends it.
+
+Real clips show more than their scene: the hand that lets go, the stop at the end of a board, a
+blow by something that is no partner. What lies beyond is left out, and a `Cut` says where and why.
+
+    board without a table    from where the hand is off; to a stop or a blow
+    fall, flight             to a stop (fall) or a blow, unless a floor is declared
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.measurement.find_blow import blow_frame, goes_on
+from galileo_jax.measurement.find_hand import hand_frame
+from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
+from galileo_jax.observation.observation import Observation
+
+STOPPED = "is stopped by something that is not in the scene"
+STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
+HELD = "is moved by a hand until then: it accelerates otherwise than on its way"
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Where the part of a track that is used begins or ends.
+
+    Attributes:
+      name: the object's.
+      time_s: of the first frame that is used, or of the last.
+      side: which part is left out.
+      why: a phrase with the object as its subject.
+    """
+
+    name: str
+    time_s: float
+    side: str  # "before" or "after"
+    why: str
+
+    def __str__(self) -> str:
+        """One line, without the clip's name."""
+        return f"{self.name} {self.why}; what is {self.side} {self.time_s:.3f} s is left out"
+
+
+def is_board(clip: Clip) -> bool:
+    """Whether it shows a board without a table."""
+    scenario = SCENARIOS[clip.scenario]
+    return scenario.has_ramp and not scenario.has_table
+
+
+def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:
+    """The observation with what is not of the scene masked, and where and why, in time's order."""
+    cuts = []
+    ends = [
+        (frame, why)
+        for frame, why in ((find(observation), why) for find, why in _ends(clip))
+        if frame is not None
+    ]
+    if ends:
+        last, why = min(ends)
+        if why == STOPPED and goes_on(observation, last):
+            why = STRUCK
+        # Of a video: the hit falls into an exposure, whose frame shows neither.
+        last -= SMEARED_FRAMES if clip.video is not None else 0
+        observation = _without(observation, slice(last + 1, None))
+        cuts.append(Cut(observation.names[0], float(observation.times_s[last]), "after", why))
+    is_let_go = is_board(clip) and not clip.starts_moving
+    first = hand_frame(observation) if is_let_go else None
+    if first is not None:
+        observation = _without(observation, slice(None, first))
+        time_s = float(observation.times_s[first])
+        cuts.insert(0, Cut(observation.names[0], time_s, "before", HELD))
+    return observation, tuple(cuts)
+
+
+def cuts_of(measured: Sequence[Any]) -> dict[str, Any]:
+    """For a result's document: `{"cuts": {clip: [{name, time_s, side, why}]}}`, or nothing."""
+    found = {one.name: [asdict(each) for each in one.cuts] for one in measured if one.cuts}
+    return {"cuts": found} if found else {}
+
+
+def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
+    """What may end the motion of the scene."""
+    if is_board(clip) or (clip.scenario == "fall" and not clip.has_floor):
+        return [(arrest_frame, STOPPED), (blow_frame, STRUCK)]
+    if clip.scenario == "flight" and not clip.has_floor:
+        return [(blow_frame, STRUCK)]
+    return []
+
+
+def _without(observation: Observation, frames: slice) -> Observation:
+    mask = observation.mask.copy()
+    mask[0, frames] = False
+    return replace(observation, mask=mask)

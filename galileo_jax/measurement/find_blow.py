@@ -1,0 +1,83 @@
+"""A blow: the velocity jumps, and nothing in the scene is there to hit.
+
+Between the steps a and b around a frame, with d the time between their middles, it is a blow if
+of the change of velocity c = v_b - v_a
+
+    |c| > HIT_M_S2 times a step            (no friction, drag or weight accelerates so)
+    |c| > SHARE of the speed before        (a bump on the way is none)
+    |c| > CLEAR standard deviations of c
+    |c| / d > USUAL times what the run's own accelerations are (three in four are smaller):
+                                           lengths may be in units that nobody knows
+
+where v_a and v_b are medians of the steps on either side, so that no single point makes a blow.
+"""
+
+import numpy as np
+
+from galileo_jax.observation.observation import Observation
+
+HIT_M_S2 = 20.0  # two g
+SHARE = 0.3
+CLEAR = 6.0
+USUAL = 4.0
+GOES_ON = 0.1  # of the speed: what keeps less has been stopped
+STEPS = 3  # on either side
+SMEARED = 2  # steps into which the blow itself may fall
+
+
+def blow_frame(observation: Observation) -> int | None:
+    """The last frame before object 1 is struck; None where nothing strikes it."""
+    seen = np.flatnonzero(observation.mask[0])
+    if len(seen) < 2 * STEPS + SMEARED + 2:
+        return None
+    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
+    step_s = np.diff(times_s)
+    velocity = np.diff(place_m) / step_s
+    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
+    sd = np.sqrt(variance[1:] + variance[:-1]) / step_s
+    middle_s = times_s[:-1] + step_s / 2
+    windows = np.lib.stride_tricks.sliding_window_view(velocity, STEPS, axis=1)
+    usual, error = np.median(windows, axis=-1), _median(sd) / np.sqrt(STEPS)
+    centre_s = _median(middle_s)
+    # From the middle of one window to that of the next which shares no step with it.
+    apart = STEPS + SMEARED - 1
+    change = usual[:, apart:] - usual[:, :-apart]
+    size = np.linalg.norm(change, axis=0)
+    # Steady acceleration of the run itself, over as much time.
+    between_s = centre_s[apart:] - centre_s[:-apart]
+    steady = np.quantile(size / between_s, 0.75) * between_s
+    speed = np.linalg.norm(usual, axis=0)
+    clear = CLEAR * np.hypot(error[apart:], error[:-apart]) * np.sqrt(np.pi / 2)
+    jump_s = np.median(step_s)
+    beyond = size - steady
+    is_blow = (beyond > HIT_M_S2 * jump_s) & (size > USUAL * steady) & (beyond > clear)
+    is_blow &= size > SHARE * np.maximum(speed[:-apart], speed[apart:])
+    is_blow &= speed[:-apart] > clear  # what is at rest is let go, not struck
+    if not is_blow.any():
+        return None
+    first = int(np.argmax(is_blow))
+    last = first + int(np.argmin(np.append(is_blow[first:], False)))
+    # Of the windows that see it, those in whose middle it is: there the change is largest.
+    at = first + int(np.argmax(size[first:last]))
+    steps = np.linalg.norm(np.diff(velocity[:, at + STEPS - 1 : at + STEPS + SMEARED]), axis=0)
+    return int(seen[at + STEPS + int(np.argmax(steps > 0.25 * size[at]))])
+
+
+def goes_on(observation: Observation, last: int) -> bool:
+    """Whether object 1 still moves after the frame `last`, with more than a tenth of its speed."""
+    seen = np.flatnonzero(observation.mask[0])
+    at = int(np.searchsorted(seen, last))
+    before, after = seen[max(at - STEPS, 0) : at + 1], seen[at + SMEARED : at + SMEARED + STEPS + 1]
+    if min(len(before), len(after)) < 2:
+        return False
+    place, times = observation.position_m[0], observation.times_s
+    speeds = [
+        np.linalg.norm(place[:, part[-1]] - place[:, part[0]]) / (times[part[-1]] - times[part[0]])
+        for part in (before, after)
+    ]
+    return bool(speeds[1] > GOES_ON * speeds[0])
+
+
+def _median(values: np.ndarray) -> np.ndarray:
+    """Of each window of `STEPS` steps."""
+    return np.median(np.lib.stride_tricks.sliding_window_view(values, STEPS), axis=-1)

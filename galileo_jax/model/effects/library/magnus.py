@@ -1,0 +1,70 @@
+"""Magnus force: the air carried round by a spinning ball bends its path.
+
+    F = C rho A r / 2 (w x v),    A = pi r^2
+
+w: the spin, rad/s, constant in so short a flight; C: the lift per spin, about 1 for smooth balls
+(lift coefficient C S, S = r w / v, of 0.05 to 0.4; measured from 0.4 to 1.3). In the plane of a
+picture only the spin about the line of sight shows: backspin of what flies to the right is
+positive. In space all of the spin shows but what is along the velocity. Curves show C w alone: a
+spin inferred is as uncertain as C, unless flights of known spin (`spin_rad_s`) tell C.
+
+Source: Robinson and Robinson (2013), The motion of an arbitrarily rotating spherical projectile
+and its application to ball games, Phys. Scr. 88, 018101.
+Confused with: another gravity (scale_error, frame_rate) or a tilted camera in a short flight, for
+steady backspin lifts almost evenly.
+"""
+
+import math
+from typing import ClassVar
+
+from galileo_jax.model.effects.air import AIR_KG_M3
+from galileo_jax.model.effects.effect import SPIN, Array, Effect, Push, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+
+LIFT = "magnus_lift"
+SPIN_PRIOR = Normal(0.0, 200.0)  # a table-tennis ball that is cut: 500 rad/s and more
+LIFT_PRIOR = LogNormal(median=0.6, sd=0.4)
+
+
+@register
+class Magnus(Effect):
+    """The force of the air on a spinning ball in flight."""
+
+    name: ClassVar[str] = "magnus"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The spin, known or not, and the lift per spin; none but in a flight."""
+        if not scene.moves_in_plane:
+            return ()
+        found = []
+        for name, axis in _spins(scene):
+            known = scene.expected.get(f"{SPIN}_{axis}")
+            prior = SPIN_PRIOR if known is None else Normal(*known)
+            found.append(Parameter(name, "rad/s", prior, 0.0, "effect", 0.1, per_clip=True))
+        lift = Parameter(LIFT, "1", LIFT_PRIOR, LIFT_PRIOR.median, "effect", 0.1)
+        return (*found, lift)
+
+    def push(self, theta: Theta, scene: Surroundings) -> Push | None:
+        """The force across the velocity."""
+        if not scene.moves_in_plane:
+            return None
+        radius = scene.half_height_m[0]
+        size = theta[LIFT] * (0.5 * AIR_KG_M3 * math.pi * radius**3)
+        spin = [theta[name] for name, _ in _spins(scene)]
+
+        def lift(velocity_m_s: Array, time_s: Array) -> Array:
+            xp = velocity_m_s.__array_namespace__()
+            if scene.num_axes == 2:
+                x, y = velocity_m_s
+                return size * spin[0] * xp.stack([-y, x])
+            return size * xp.linalg.cross(xp.stack(spin), velocity_m_s)
+
+        return lift
+
+
+def _spins(scene: Surroundings) -> tuple[tuple[str, str], ...]:
+    """The spin's parameters, each with its axis."""
+    if scene.num_axes == 2:
+        return (("magnus", "z"),)
+    return tuple((f"magnus_{axis}", axis) for axis in "xyz")

@@ -1,0 +1,151 @@
+"""Where a run ends: at what stops an object within a step, and not at what brakes it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.clip.load import load_clip
+from galileo_jax.inference.build_problem import make_problem
+from galileo_jax.measurement.cuts import HELD, STOPPED, STRUCK, cut
+from galileo_jax.measurement.find_blow import blow_frame
+from galileo_jax.measurement.find_hand import hand_frame
+from galileo_jax.measurement.find_stop import arrest_frame
+from galileo_jax.measurement.measure import inferred, measure
+from galileo_jax.observation.observation import Observation
+
+NOISE_M = 1e-4
+DOWN = np.array([np.cos(0.4), -np.sin(0.4)])
+
+
+def slid(speed_m_s: np.ndarray, fps: float, seed: int = 0) -> Observation:
+    """An object that goes `speed_m_s` `[step]` down a board."""
+    way = np.concatenate([[0.0], np.cumsum(speed_m_s) / fps])
+    place = way * DOWN[:, None]
+    place = place + NOISE_M * np.random.default_rng(seed).standard_normal(place.shape)
+    count = len(way)
+    error = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, :, :, None], (1, 2, 2, count))
+    seen = np.ones((1, count), bool)
+    return Observation(("object1",), np.arange(count) / fps, place[None], error, seen)
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0, 240.0])
+@pytest.mark.parametrize("rebound", [0.0, -0.3, 0.1])
+def test_a_stop_ends_the_run(fps, rebound):
+    before = 1.2 * np.arange(1, int(fps)) / fps
+    after = np.full(4, rebound * before[-1])
+    assert arrest_frame(slid(np.append(before, after), fps)) == len(before)
+
+
+def test_a_smeared_step_goes_too():
+    before = 1.2 * np.arange(1, 240) / 240
+    hit = np.array([0.8, 0.4, 0.1, 0.1]) * before[-1]
+    assert arrest_frame(slid(np.append(before, hit), 240.0)) == len(before)
+
+
+@pytest.mark.parametrize("fps", [30.0, 60.0])
+@pytest.mark.parametrize(
+    "brake_per_s", [2.0, 5.0, 10.0], ids=["weak brake", "brake", "strong brake"]
+)
+def test_what_brakes_is_no_stop(brake_per_s, fps):
+    """A zone in which a drag begins at once, whatever comes after; and friction to a rest."""
+    fast = np.minimum(1.2 * np.arange(1, int(fps)) / fps, 1.0)
+    slow = fast[-1] * np.exp(-brake_per_s * np.arange(1, int(fps)) / fps)
+    assert arrest_frame(slid(np.append(fast, slow), fps)) is None
+    rest = np.clip(1.0 - 9.81 * np.arange(1, int(fps)) / fps, 0.0, None)
+    assert arrest_frame(slid(np.append(fast, rest), fps)) is None
+
+
+STOPS = np.append(1.2 * np.arange(1, 60) / 60, np.zeros(5))
+
+
+def write_clip(folder: Path, scenario: str, more: str = "", speed_m_s=STOPS) -> Path:
+    """A run, with a stop at its end if nothing else is said: its csv and yaml; returns the yaml."""
+    seen = slid(speed_m_s, 60.0)
+    rows = [
+        f"{t},{x},{y},{NOISE_M}" for t, x, y in zip(seen.times_s, *seen.position_m[0], strict=True)
+    ]
+    head = "time_s,object1_x_m,object1_y_m,object1_sd_m"
+    (folder / "run.csv").write_text("\n".join([head, *rows]) + "\n")
+    path = folder / "run.yaml"
+    path.write_text(
+        f"track: run.csv\nscenario: {scenario}\n{more}objects:\n"
+        "  - {name: object1, shape: sphere, size_m: [0.03]}\n"
+    )
+    return path
+
+
+def test_what_follows_is_left_out_and_it_is_said(tmp_path):
+    measured = measure(load_clip(write_clip(tmp_path, "fall")))
+    seen = measured.observation.mask[0]
+    assert seen[:60].all() and not seen[60:].any()
+    (remark,) = measured.remarks
+    assert (
+        "object1 is stopped by something that is not in the scene; what is after 0.983 s" in remark
+    )
+    (entry,) = inferred([measured])["cuts"]["run"]
+    assert entry == {"name": "object1", "time_s": 59 / 60, "side": "after", "why": STOPPED}
+    assert measured.whole.mask[0, 60:].any(), "the whole track is still there"
+
+
+def test_a_declared_floor_is_in_the_scene(tmp_path):
+    """What bounces on it is not cut off."""
+    clip = load_clip(write_clip(tmp_path, "fall", "floor: true\n"))
+    seen = slid(np.append(1.2 * np.arange(1, 60) / 60, np.zeros(5)), 60.0)
+    assert cut(clip, seen) == (seen, ())
+    bare = clip.model_copy(update={"floor": False})
+    (stop,) = cut(bare, seen)[1]
+    assert stop.time_s == pytest.approx(59 / 60)
+
+
+@pytest.mark.parametrize(
+    ("fps", "kept"), [(30.0, -0.5), (60.0, -0.2), (60.0, 0.5), (240.0, -0.4), (240.0, 0.65)]
+)
+def test_a_blow_ends_the_run(fps, kept):
+    """The block bounces off the end stop, or passes it with less speed, and slides on."""
+    rest, way = np.zeros(int(0.4 * fps)), 1.2 * np.arange(1, int(1.06 * fps)) / fps
+    on = kept * way[-1] + 1.2 * np.arange(1, int(0.5 * fps)) / fps
+    seen = slid(np.concatenate([rest, way, on]), fps)
+    assert blow_frame(seen) == len(rest) + len(way)
+    assert hand_frame(seen) is None
+
+
+def test_one_bad_point_is_no_blow():
+    way = 1.2 * np.arange(1, 240) / 240
+    seen = slid(way, 240.0)
+    seen.position_m[0, :, 150] += 0.02
+    assert blow_frame(seen) is None
+
+
+@pytest.mark.parametrize("finger", [0.2, 3.0], ids=["holds it back", "pushes it"])
+def test_the_hand_is_found(finger):
+    """From rest, very late; for 0.2 s with a finger at it, which leaves when it is off."""
+    fps, accelerates = 240.0, 1.2
+    rest = np.zeros(int(2.0 * fps))
+    held = finger * accelerates * np.arange(1, int(0.2 * fps)) / fps
+    free = held[-1] + accelerates * np.arange(1, int(1.2 * fps)) / fps
+    found = hand_frame(slid(np.concatenate([rest, held, free]), fps))
+    assert found == pytest.approx(len(rest) + len(held), abs=0.06 * fps)
+
+
+def test_a_late_release_is_no_hand():
+    seen = slid(np.concatenate([np.zeros(700), 1.2 * np.arange(1, 200) / 240]), 240.0)
+    assert hand_frame(seen) is None
+
+
+def test_a_held_and_struck_run_is_what_lies_between(tmp_path):
+    """A finger holds the block back at first, and it bounces off the end stop and slides on."""
+    held, free = 0.3 * np.arange(1, 12) / 60, 0.05 + 1.2 * np.arange(1, 60) / 60
+    on = 1.2 * np.arange(1, 30) / 60 - 0.5
+    speed = np.concatenate([np.zeros(40), held, free, on])
+    path = write_clip(tmp_path, "incline", "ramp_angle_deg: 22.9\n", speed)
+    path.write_text(path.read_text().replace("[0.03]", "null"))
+    measured = measure(load_clip(path))
+    hand, blow = measured.cuts
+    assert (hand.why, hand.side, blow.why, blow.side) == (HELD, "before", STRUCK, "after")
+    assert hand.time_s == pytest.approx(51 / 60, abs=0.1)
+    assert blow.time_s == pytest.approx(110 / 60)
+    assert measured.clip.starts_moving
+    problem = make_problem(measured.clip, measured.observation)
+    assert "start_speed" in problem.model.names
+    assert "release_instant" not in problem.model.names
