@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     from galileo_jax.api.fit import fit
     from galileo_jax.api.fit_result import Fit
     from galileo_jax.api.label import label
+    from galileo_jax.api.motion import Motion
     from galileo_jax.api.predict import Prediction, predict
+    from galileo_jax.api.propose import Proposal, propose
     from galileo_jax.api.run import load_run
     from galileo_jax.api.simulate import Simulated, simulate
     from galileo_jax.api.track import Track, track
@@ -57,6 +59,8 @@ _PLACES = {
     "galileo_jax.api.fit": ("fit",),
     "galileo_jax.api.fit_result": ("Fit",),
     "galileo_jax.api.predict": ("Prediction", "predict"),
+    "galileo_jax.api.propose": ("Proposal", "propose"),
+    "galileo_jax.api.motion": ("Motion",),
     "galileo_jax.api.export": ("export",),
     "galileo_jax.api.label": ("label",),
     "galileo_jax.api.run": ("load_run",),
@@ -89,9 +93,11 @@ __all__ = [
     "HalfNormal",
     "InputError",
     "LogNormal",
+    "Motion",
     "Normal",
     "Parameter",
     "Prediction",
+    "Proposal",
     "Simulated",
     "State",
     "Surroundings",
@@ -109,6 +115,7 @@ __all__ = [
     "load",
     "load_run",
     "predict",
+    "propose",
     "register_effect",
     "scenarios",
     "simulate",
