@@ -11,6 +11,7 @@ COLOURS = {
 }  # fmt: skip
 Figure = dict[str, Any]
 MOST_MISSING = 160
+FONT = "system-ui, Segoe UI, Roboto, Arial, sans-serif"
 
 
 def track_figure(track: Mapping[str, Any], dark: bool) -> Figure:
@@ -154,7 +155,7 @@ def _figure(traces: list[dict[str, Any]], xtitle: str, ytitle: str, dark: bool) 
         "xaxis": {**axis, "title": {"text": xtitle, "standoff": 4}},
         "yaxis": {**axis, "title": {"text": ytitle, "standoff": 6}},
         "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
-        "font": {"color": colour["ink"], "size": 13}, "uirevision": ytitle,
+        "font": {"color": colour["ink"], "size": 13, "family": FONT}, "uirevision": ytitle,
         "margin": {"l": 56, "r": 12, "t": 8, "b": 36}, "hovermode": "closest",
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0, "font": {"size": 12}},
         "showlegend": True,

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from galileo_jax.api.propose import Proposal
 from galileo_jax.clip.scenarios import SCENARIOS
 
 Point = tuple[float, float]
@@ -101,15 +100,20 @@ def without_object(marks: Marks, name: str) -> Marks:
     return replace(marks, objects=tuple(one for one in marks.objects if one.name != name))
 
 
-def proposed(found: Proposal, size_px: tuple[int, int]) -> Marks:
-    """What the program found in a video, as marks; a stick to be laid on a known length."""
-    upper = foot = None
-    if found.ramp is not None:
-        upper, foot = (found.ramp[0], found.ramp[1]), (found.ramp[2], found.ramp[3])
+def proposed(found: Mapping[str, Any], size_px: tuple[int, int]) -> Marks:
+    """What the program found in a video, as marks; a stick to be laid on a known length.
+
+    Args:
+      found: the fields of a `Proposal`.
+      size_px: of the video.
+    """
+    ramp = found["ramp"]
+    upper, foot = ((ramp[0], ramp[1]), (ramp[2], ramp[3])) if ramp is not None else (None, None)
     objects = tuple(
-        ObjectMark(name, (round(x, 1), round(y, 1))) for name, (x, y) in found.objects.items()
+        ObjectMark(name, (round(x, 1), round(y, 1))) for name, (x, y) in found["objects"].items()
     )
-    return Marks(found.scenario, found.fps, objects, upper, foot, _stick(size_px, None)[0])
+    stick = _stick(size_px, None)[0]
+    return Marks(found["scenario"], found["fps"], objects, upper, foot, stick)
 
 
 def blank(fps: float, size_px: tuple[int, int]) -> Marks:

@@ -66,6 +66,7 @@ def build_page(session: Session) -> None:
     ui.add_head_html(f"<style>{(HERE / 'studio.css').read_text(encoding='utf-8')}</style>")
     ui.add_body_html(f"<script>{(HERE / 'studio.js').read_text(encoding='utf-8')}</script>")
     tab = Tab(session, _first_stage(session))
+    ui.colors(primary="#b34d25")
     dark = ui.dark_mode(None)
     seen: dict[str, int] = {}
 
@@ -78,7 +79,7 @@ def build_page(session: Session) -> None:
             _icon("contrast", "Light or dark", lambda: _turn(tab, dark, show))
     with ui.element("main").classes("work"):
         with ui.element("section").classes("left"):
-            viewer = Viewer().style("display: contents")
+            viewer = Viewer()
             strip = ui.element("div").classes("strip timed")
             with strip:
                 chart = ui.plotly(charts._figure([], "", "", False))
@@ -111,7 +112,7 @@ def build_page(session: Session) -> None:
     def curves() -> None:
         viewer.show(session, tab.stage, tab.placing)
         figure = _figure(tab)
-        strip.set_visibility(figure is not None)
+        strip.classes(add="" if figure else "none", remove="none" if figure else "")
         if figure is not None:
             chart.update_figure(figure)
 

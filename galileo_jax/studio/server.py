@@ -118,8 +118,9 @@ def make_app(
             session.show(path.stem)
         return PlainTextResponse(f"{path.name} is there\n")
 
+    ui.page("/")(lambda: build_page(session))
     ui.run_with(
-        app, root=lambda: build_page(session), title="galileo studio", dark=None,
+        app, title="galileo studio", dark=None,
         storage_secret=None, show_welcome_message=False, reconnect_timeout=10.0, tailwind=False,
     )  # fmt: skip
     guard = Guard(

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from galileo_jax.api.propose import Proposal
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
 from galileo_jax.studio.frames import Frames
@@ -345,7 +344,7 @@ class Session:
         sheet = self.sheets.get(self._context["clip"])
         if sheet is None or sheet.is_drawn:
             return
-        marks = proposed(Proposal(**found), sheet.info.size_px)
+        marks = proposed(found, sheet.info.size_px)
         self.sheets[sheet.name] = changed(sheet, marks, self.store)
         self.note = " ".join(found.get("doubts", ()))
         self._changed("marks")

@@ -5,7 +5,7 @@ const LOUPE = 4, LOUPE_PX = 150, KEEP = 400;
 export default {
   template: `
   <div class="viewer" tabindex="0" ref="root" @keydown="key" :aria-label="'video ' + name">
-    <div class="stage" ref="stage" :style="{ aspectRatio: width + '/' + height }">
+    <div class="screen"><div class="stage" ref="stage" :style="{ '--ratio': width / height }">
       <img ref="img" class="frame" :src="url(shown)" draggable="false" alt="" @load="loaded">
       <svg ref="svg" :viewBox="'0 0 ' + width + ' ' + height" @pointerdown="background"
            @pointermove="drag" @pointerup="drop" @pointercancel="drop" :class="{ placing: placing }">
@@ -39,7 +39,8 @@ export default {
              :aria-valuetext="Math.round(place[0]) + ', ' + Math.round(place[1])"
              @pointerdown.stop="grab($event, handle)" @keydown.stop="nudge($event, handle)">
             <rect v-if="boxes[handle]" class="box" :x="-boxes[handle][0] / 2"
-              :y="-boxes[handle][1] / 2" :width="boxes[handle][0]" :height="boxes[handle][1]"/>
+              :y="-boxes[handle][1] / 2" :width="boxes[handle][0]" :height="boxes[handle][1]"
+              :transform="'rotate(' + tilt(place) + ')'"/>
             <circle class="target" :r="22 * k"/>
             <circle class="ring" :r="7 * k"/><circle class="dot" :r="1.6 * k"/>
             <text class="label" :font-size="13 * k" :x="11 * k" :y="-9 * k">
@@ -49,7 +50,7 @@ export default {
       </svg>
       <canvas v-show="loupe" ref="loupe" class="loupe" width="300" height="300"
         :class="{ left: loupe && loupe[0] > width / 2 }"></canvas>
-    </div>
+    </div></div>
     <div class="scrub">
       <button type="button" class="round" @click="play" :aria-label="timer ? 'Pause' : 'Play'">
         {{ timer ? '❚❚' : '▶' }}</button>
@@ -218,6 +219,11 @@ export default {
     ends(one, other) {
       const [[x1, y1], [x2, y2]] = [this.at[one], this.at[other]];
       return { x1, y1, x2, y2 };
+    },
+    tilt([x]) {  // a box on the ramp stands along it
+      const { upper, foot } = this.at;
+      if (!upper || !foot || (this.table && (x - foot[0]) * (foot[0] - upper[0]) > 0)) return 0;
+      return Math.atan((foot[1] - upper[1]) / (foot[0] - upper[0])) * 180 / Math.PI;
     },
     kind(handle) {
       if (handle.startsWith("stick")) return "stickend";
