@@ -152,8 +152,9 @@ class Fit:
         Raises:
           InputError: a name is no parameter of the model.
         """
-        theta = replaced(self.problem, self.problem.theta(self._z()), values)
-        return motions_at(self.problem, [one.clip for one in self.measurements], theta)
+        best = self.problem.theta(self._z())
+        theta = replaced(self.problem, best, values)
+        return motions_at(self.problem, [one.clip for one in self.measurements], theta, best)
 
     def _z(self) -> np.ndarray:
         """The best fit; of a run that an earlier version wrote the posterior's median."""

@@ -56,7 +56,10 @@ class Motion:
 
 
 def motions_at(
-    trials: JointProblem, clips: Sequence[Clip], theta: np.ndarray
+    trials: JointProblem,
+    clips: Sequence[Clip],
+    theta: np.ndarray,
+    best: np.ndarray | None = None,
 ) -> tuple[Motion, ...]:
     """The motion of every clip with given parameters.
 
@@ -64,9 +67,12 @@ def motions_at(
       trials: the clips' problems.
       clips: as fitted.
       theta: `[parameter]`, in the parameters' units, noise scales last.
+      best: those of the fit, which say how far the followed points are from the centres; None:
+        `theta`.
     """
+    best = theta if best is None else best
     return tuple(
-        _motion(problem, clip, trials.of_clip(theta, i))
+        _motion(problem, clip, trials.of_clip(theta, i), trials.of_clip(best, i))
         for i, (problem, clip) in enumerate(zip(trials.problems, clips, strict=True))
     )
 
@@ -87,16 +93,16 @@ def replaced(
     return theta
 
 
-def _motion(problem: Problem, clip: Clip, theta: np.ndarray) -> Motion:
+def _motion(problem: Problem, clip: Clip, theta: np.ndarray, best: np.ndarray) -> Motion:
     seen, scene = problem.observation, problem.model.scene
-    predicted = problem.simulate(theta)
+    predicted, fitted = problem.simulate_batch(np.stack([theta, best]))
     white = problem.tracking_errors(predicted).reshape(predicted.shape)
     shown = seen.mask[:, None]
     measured = np.where(shown, seen.position_m, np.nan)
     offset = np.zeros((len(seen.names), 2, 1))
     for i, is_seen in enumerate(seen.mask):
         if is_seen.any():
-            offset[i, :, 0] = np.nanmedian(measured[i] - predicted[i], axis=1)
+            offset[i, :, 0] = np.nanmedian(measured[i] - fitted[i], axis=1)
     variance = np.stack([seen.covariance_m2[:, axis, axis] for axis in (0, 1)], axis=1)
     turned = pitch(np.nan_to_num(predicted.transpose(2, 0, 1)), scene.surroundings).T
     scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M

@@ -74,7 +74,8 @@ def residual_figure(
             points["marker"] |= {"symbol": symbol, "size": 4}
             traces.append(points)
         if extra is not None:
-            curve = _curve(extra[1]["times"], extra[1]["white"][i], colour["accent"], extra[0], 1.5)
+            curve = _curve(extra[1]["times"], extra[1]["white"][i], own, f"{name}, {extra[0]}", 2)
+            curve["line"]["dash"] = "solid" if i == 0 else "dot"
             traces.append(curve)
     figure = _figure(traces, "time, s", "residual / noise", dark)
     band = {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "y0": -2, "y1": 2}

@@ -8,6 +8,7 @@ import contextlib
 import itertools
 import multiprocessing
 import os
+import queue
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -56,7 +57,7 @@ class Worker:
         self._lock = threading.Lock()
         self._process: Any = None
         self._pipe: Connection | None = None
-        self._cancel: Any = None
+        self._is_cancelled = False
         self._current: Message | None = None  # the job that runs
 
     @property
@@ -75,7 +76,7 @@ class Worker:
                 raise RuntimeError(f"{self._current.task} is running")
             number = next(self._numbers)
             pipe = self._started()
-            self._cancel.clear()
+            self._is_cancelled = False
             self._current = Message(number, task, "progress")
             pipe.send(("job", number, task, given))
             return number
@@ -92,7 +93,10 @@ class Worker:
         with self._lock:
             if self._current is None:
                 return
-            self._cancel.set()
+            self._is_cancelled = True
+            if self._pipe is not None:
+                with contextlib.suppress(OSError):
+                    self._pipe.send(("cancel", self._current.job))
             timer = threading.Timer(PATIENCE_S, self._end_if_busy, [self._current.job])
         timer.daemon = True
         timer.start()
@@ -109,9 +113,8 @@ class Worker:
         if self._process is not None and self._process.is_alive() and self._pipe is not None:
             return self._pipe
         ours, theirs = self._context.Pipe()
-        self._cancel = self._context.Event()
         self._process = self._context.Process(
-            target=serve, args=(theirs, self._cancel, self._folder), daemon=True
+            target=serve, args=(theirs, self._folder), daemon=True
         )
         self._process.start()
         theirs.close()
@@ -128,7 +131,7 @@ class Worker:
             self._hand_on(message)
         with self._lock:
             lost = self._current if pipe is self._pipe else None
-            is_cancelled = self._cancel.is_set()
+            is_cancelled = self._is_cancelled
         if lost is not None:
             kind: Kind = "cancelled" if is_cancelled else "error"
             text = "the process that computed it has ended; try again"
@@ -149,18 +152,27 @@ class Worker:
             process.kill()
 
 
-def serve(pipe: Connection, cancel: Any, folder: str) -> None:
+class _Cancel:
+    """The flag of the job that runs; asked for in the thread that listens."""
+
+    def __init__(self) -> None:
+        self.wanted: set[int] = set()
+        self.job = 0
+
+    def is_set(self) -> bool:
+        return self.job in self.wanted
+
+
+def serve(pipe: Connection, folder: str) -> None:
     """What the process does: jobs in its main thread, questions in another."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(OSError, AttributeError):
         os.nice(NICENESS)
     os.chdir(folder)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    import queue
-
     jobs: queue.SimpleQueue[Any] = queue.SimpleQueue()
     questions: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    lock = threading.Lock()
+    lock, cancel = threading.Lock(), _Cancel()
 
     def send(message: Message) -> None:
         with lock, contextlib.suppress(OSError):
@@ -172,11 +184,16 @@ def serve(pipe: Connection, cancel: Any, folder: str) -> None:
                 kind, *rest = pipe.recv()
             except (EOFError, OSError):
                 os._exit(0)
-            (jobs if kind == "job" else questions).put(rest)
+            if kind == "cancel":
+                cancel.wanted.add(rest[0])
+            else:
+                (jobs if kind == "job" else questions).put(rest)
 
-    def answer(line: "queue.SimpleQueue[Any]", flag: Any) -> None:
+    def answer(line: queue.SimpleQueue[Any], flag: _Cancel | None) -> None:
         while True:
             number, task, given = line.get()
+            if flag is not None:
+                flag.job = number
             _run(number, task, given, send, flag)
 
     threading.Thread(target=receive, daemon=True).start()

@@ -49,6 +49,8 @@ class Tab:
 
     def go(self, stage: str) -> None:
         """Turns to a stage."""
+        if self.stage == "fit" != stage and self.session.results.live is not None:
+            self.session.put_back()
         self.stage, self.candidate, self.placing = stage, "", False
         if stage in ("fit", "compare", "diagnose", "predict"):
             self.session.open_run()
@@ -233,7 +235,8 @@ def _candidate(tab: Tab) -> tuple[str, Any] | None:
     found = tab.session.results.diagnosis
     curves = found["curves"].get(tab.candidate, ()) if found is not None else ()
     own = [one for one in curves if one["clip"] == tab.session.active]
-    return (tab.candidate, own[0]) if own else None
+    is_in = set(tab.candidate.split("+")) <= set(tab.session.effects)
+    return (tab.candidate, own[0]) if own and not is_in else None
 
 
 def _job_bar(session: Session) -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import secrets
+import signal
 import socket
 import webbrowser
 from collections.abc import AsyncIterator, Callable
@@ -60,6 +61,10 @@ def serve(
             if browser:
                 await asyncio.get_running_loop().run_in_executor(None, webbrowser.open, address)
 
+    def stop(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)  # so that the worker is ended in any case
     try:
         with contextlib.suppress(KeyboardInterrupt):
             Server(config).run(sockets=[listening])

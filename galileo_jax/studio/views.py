@@ -1,5 +1,6 @@
 """Results as plain data for the page: lists of numbers, words, and nothing else."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ import galileo_jax as gx
 MOST_POINTS = 400  # of a curve on the page
 CANDIDATE_POINTS = 90
 SIGMAS, SHARE = 8.0, 0.6  # how far a slider reaches to either side
+STEPS = 100  # at least, on either side
 
 
 def motion_view(motion: gx.Motion) -> dict[str, Any]:
@@ -123,13 +125,14 @@ def _thin(motion: gx.Motion) -> dict[str, Any]:
 
 
 def _reach(entry: Mapping[str, Any]) -> dict[str, float]:
-    """The ends of a parameter's slider."""
+    """The ends of a parameter's slider, and its steps, which are round numbers."""
     mean, sd = entry["mean"], entry["sd"]
     reach = max(SIGMAS * sd, SHARE * abs(mean), 1e-6)
-    low = mean - reach
+    step = 10.0 ** math.floor(math.log10(reach / STEPS))
+    low = math.floor((mean - reach) / step) * step
     if entry["q025"] >= 0:
         low = max(low, 0.0)
-    return {"low": low, "high": mean + reach}
+    return {"low": low, "high": math.ceil((mean + reach) / step) * step, "step": step}
 
 
 def numbers(values: Any, digits: int) -> Any:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from galileo_jax.model.effects.forms import FORM_NAMES as NAMES_OF_FORMS
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.studio import charts
 from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
@@ -15,6 +16,7 @@ from galileo_jax.studio.paths import below
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
 
+FORM_NAMES = frozenset(NAMES_OF_FORMS)  # they can be tried, not added
 MOST_SHOWN = 6
 OWN_FILE = "my_effect.py"
 TEMPLATE = '''from galileo_jax import Effect, LogNormal, Parameter, register_effect
@@ -44,8 +46,9 @@ def build(tab: "Tab") -> None:
         ui.label(found["sentence"]).classes("say").props("data-verdict")
     if rounds:
         ui.html(stairs(rounds), sanitize=False).props("data-stairs")
-        for line in friction_moves(rounds):
-            ui.label(line).style("font-variant-numeric: tabular-nums")
+        with ui.element("div"):
+            for line in friction_moves(rounds):
+                ui.label(line).style("font-variant-numeric: tabular-nums")
     if session.effects:
         with ui.element("div").classes("rowline"):
             for effect in session.effects:
@@ -57,15 +60,15 @@ def build(tab: "Tab") -> None:
     if session.states["diagnose"] != "done":
         text = "Ask again" if found is not None else "What is missing?"
         main_button(text, session.diagnose, tab, "diagnose")
-    for row in session.results.candidates[:MOST_SHOWN]:
-        _candidate(tab, row)
+    for i, row in enumerate(session.results.candidates[:MOST_SHOWN]):
+        _candidate(tab, row, is_best=i == 0)
     if found is not None:
         _beyond(tab, found)
     if session.effects:
         main_button("Predict", lambda: tab.go("predict"), tab, "to-predict")
 
 
-def _candidate(tab: "Tab", row: Mapping[str, Any]) -> None:
+def _candidate(tab: "Tab", row: Mapping[str, Any], is_best: bool) -> None:
     session, name = tab.session, str(row["effect"])
     pick = ui.element("div").classes("pick" + (" seen" if tab.candidate == name else ""))
     pick.props(f'data-candidate="{name}" tabindex=0')
@@ -80,10 +83,13 @@ def _candidate(tab: "Tab", row: Mapping[str, Any]) -> None:
         ui.label(_strength(row)).classes("strength")
         effects = tuple(name.split("+"))
         is_in = set(effects) <= set(session.effects)
+        if FORM_NAMES & set(effects):
+            ui.label("form").classes("small soft").props('title="a form without a name"')
+            return
         add = ui.button("Added" if is_in else "Add", color=None).props(
             f'unelevated no-caps data-add="{name}"'
         )
-        add.classes("plain" if is_in else "main")
+        add.classes("main" if is_best and not is_in else "plain")
         add.set_enabled(not is_in and session.job is None)
         add.on("click.stop", lambda: session.fit(_joined(session.effects, effects)))
 

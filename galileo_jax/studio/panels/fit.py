@@ -70,9 +70,8 @@ def _parameter(tab: "Tab", one: Mapping[str, Any], values: dict[str, float]) -> 
             ui.label("follows from the others").classes("small soft")
             return
         start = values.get(one["name"], one["mean"])
-        slider = ui.slider(
-            min=one["low"], max=one["high"], value=start, step=(one["high"] - one["low"]) / 500
-        ).props(f'data-slider="{one["name"]}" aria-label="{one["name"]}"')
+        slider = ui.slider(min=one["low"], max=one["high"], value=start, step=one["step"])
+        slider.props(f'label data-slider="{one["name"]}" aria-label="{one["name"]}"')
         slider.on(
             "update:model-value",
             lambda event: _move(tab, values, one["name"], event.args),

@@ -53,7 +53,7 @@ def _object(tab: "Tab", one: ObjectMark) -> None:
         shape.on_value_change(lambda event: _change(tab, one, shape=event.value, size_m=None))
         shown = " ".join(f"{side:g}" for side in one.size_m or ())
         size = ui.input(label="size, m", value=shown, placeholder="if known")
-        size.props(f'outlined dense title="{SIZE_MEANING[one.shape]}, m"').style("width: 140px")
+        size.props(f'outlined dense title="{SIZE_MEANING[one.shape]}, m" data-size={one.name}').style("width: 140px")
         size.on("change", lambda: _size(tab, one, size.value))
         ui.button(
             icon="close", color=None, on_click=lambda: _drop(tab, one.name)

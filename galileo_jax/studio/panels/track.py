@@ -36,7 +36,8 @@ def build(tab: "Tab") -> None:
         for warning in track["warnings"]:
             remark("odd", warning.split(": ", 1)[-1])
         ui.label(
-            "An object that was lost: go to the frame, turn to Marks, put it right there."
+            "If an object is lost: turn to Marks, move its mark, or let the clip count from a "
+            "later frame."
         ).classes("soft small")
     if state != "done":
         main_button("Track again" if state == "stale" else "Track", session.track, tab, "track")
