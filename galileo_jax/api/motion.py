@@ -1,4 +1,4 @@
-"""`Motion`: where a model has a clip's objects, beside where they were seen, in metres and pixels."""
+"""`Motion`: where a model has a clip's objects, beside where they were seen."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -88,7 +88,9 @@ def replaced(
     theta = np.array(theta, float)
     for name, value in (values or {}).items():
         if name not in trials.names:
-            raise InputError(f"{name}: no parameter of this model; known: {', '.join(trials.names)}")
+            raise InputError(
+                f"{name}: no parameter of this model; known: {', '.join(trials.names)}"
+            )
         theta[trials.names.index(name)] = value
     return theta
 

@@ -173,5 +173,3 @@ def _line(clip: Clip, size: Point) -> tuple[tuple[float, float, float, float], P
 def _rounded(upper: np.ndarray, lower: np.ndarray) -> tuple[float, float, float, float]:
     x1, y1, x2, y2 = (round(float(value), 1) for value in (*upper, *lower))
     return x1, y1, x2, y2
-
-

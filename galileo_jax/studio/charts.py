@@ -1,6 +1,7 @@
 """Curves for the page, as Plotly figures of plain data; colours are those of the reports."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 COLOURS = {
@@ -21,9 +22,7 @@ def track_figure(track: Mapping[str, Any], dark: bool) -> Figure:
     times = track["times"]
     for i, places in enumerate(track["seen_px"]):
         speeds: list[float | None] = []
-        for (a, b), (s, t) in zip(
-            zip(places, places[1:], strict=False), zip(times, times[1:], strict=False), strict=True
-        ):
+        for (a, b), (s, t) in zip(pairwise(places), pairwise(times), strict=True):
             gap = None in a or None in b
             speeds.append(
                 None if gap else ((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2) ** 0.5 / (t - s)

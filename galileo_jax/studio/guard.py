@@ -62,7 +62,9 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        headers = {key.decode("latin-1").lower(): v.decode("latin-1") for key, v in scope["headers"]}
+        headers = {
+            key.decode("latin-1").lower(): v.decode("latin-1") for key, v in scope["headers"]
+        }
         if why := self._refusal(scope, headers):
             await _refuse(scope, receive, send, 403, why)
         elif scope["type"] == "websocket":

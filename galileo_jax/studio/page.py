@@ -8,7 +8,7 @@ from typing import Any
 from nicegui import ui
 
 from galileo_jax.studio import charts
-from galileo_jax.studio.marks import moved, with_object
+from galileo_jax.studio.marks import Marks, moved, with_object
 from galileo_jax.studio.panels import compare, diagnose, fit, marks, predict, track, video
 from galileo_jax.studio.session import Session
 from galileo_jax.studio.stages import STAGES
@@ -25,6 +25,7 @@ PANELS = {
     "predict": predict.build,
 }
 POLL_S = 0.1
+PARTS = {"video": {"clips", "marks"}, "marks": {"clips", "marks"}}  # that their panels show
 RUNNING = {"propose": "marks", "open_run": "fit", "export": "predict"}  # else its own stage
 
 
@@ -38,6 +39,8 @@ class Tab:
       candidate: whose curve is looked at.
       placing: a click into the video adds an object.
       dark: the colours.
+      said: the job, the error and the note that are shown.
+      redraw: builds it anew.
     """
 
     session: Session
@@ -45,6 +48,7 @@ class Tab:
     candidate: str = ""
     placing: bool = False
     dark: bool = False
+    said: tuple[str, str, str] = ("", "", "")
     redraw: Callable[[], None] = lambda: None
 
     def go(self, stage: str) -> None:
@@ -54,6 +58,11 @@ class Tab:
         self.stage, self.candidate, self.placing = stage, "", False
         if stage in ("fit", "compare", "diagnose", "predict"):
             self.session.open_run()
+        self.redraw()
+
+    def mark(self, marks: Marks) -> None:
+        """Draws, and shows it in this tab at once: what is typed next must not be swept away."""
+        self.session.mark(marks)
         self.redraw()
 
     def preview(self, candidate: str) -> None:
@@ -91,25 +100,29 @@ def build_page(session: Session) -> None:
     def on_moved(event: Any) -> None:
         sheet, given = session.sheet, event.args
         if sheet is not None:
-            session.mark(moved(sheet.marks, given["handle"], (given["x"], given["y"])))
+            tab.mark(moved(sheet.marks, given["handle"], (given["x"], given["y"])))
 
     def on_place(event: Any) -> None:
         if session.sheet is not None and tab.placing:
             tab.placing = False
-            session.mark(with_object(session.sheet.marks, tuple(event.args)))
+            tab.mark(with_object(session.sheet.marks, tuple(event.args)))
 
     viewer.on("moved", on_moved)
     viewer.on("place", on_place)
 
     def show() -> None:
-        stages.clear()
-        with stages:
-            _stage_buttons(tab)
+        seen.update(session.versions)
+        lamps()
         panel.clear()
         with panel:
             _panel(tab)
         curves()
         bar()
+
+    def lamps() -> None:
+        stages.clear()
+        with stages:
+            _stage_buttons(tab)
 
     def curves() -> None:
         viewer.show(session, tab.stage, tab.placing)
@@ -128,15 +141,18 @@ def build_page(session: Session) -> None:
         now = session.versions
         new = {part for part in now if seen.get(part) != now[part]}
         seen.update(now)
-        if new & {"clips", "marks", "results"}:
+        if new & PARTS.get(tab.stage, {"clips", "marks", "results"}):
             show()
+        elif new & {"clips", "marks", "results"}:
+            lamps()
+            curves()
         elif "live" in new:
             curves()
         if "job" in new:
             bar()
-            lamps = (session.job.task if session.job else "", session.error, session.note)
-            if lamps != getattr(tab, "_lamps", None):
-                tab._lamps = lamps  # pyright: ignore[reportAttributeAccessIssue]
+            now_said = (session.job.task if session.job else "", session.error, session.note)
+            if now_said != tab.said:
+                tab.said = now_said
                 show()
 
     tab.redraw = show
@@ -173,7 +189,9 @@ def _stage_buttons(tab: Tab) -> None:
         running = RUNNING.get(tab.session.job.task, tab.session.job.task)
     for stage, title in STAGES.items():
         state = "running" if stage == running else states[stage]
-        button = ui.element("button").classes("stagebutton").props(f'type=button data-stage={stage}')
+        button = (
+            ui.element("button").classes("stagebutton").props(f"type=button data-stage={stage}")
+        )
         if stage == tab.stage:
             button.props('aria-current="step"')
         if states[stage] == "locked":
@@ -260,5 +278,3 @@ def _turn(tab: Tab, dark: Any, show: Callable[[], None]) -> None:
     tab.dark = not tab.dark
     dark.value = tab.dark
     show()
-
-

@@ -128,9 +128,7 @@ def make_app(
         app, title="galileo studio", dark=None,
         storage_secret=None, show_welcome_message=False, reconnect_timeout=10.0, tailwind=False,
     )  # fmt: skip
-    guard = Guard(
-        app, port=port, token=token, upload_path=UPLOAD, largest_upload=largest_upload
-    )
+    guard = Guard(app, port=port, token=token, upload_path=UPLOAD, largest_upload=largest_upload)
     return guard, session
 
 

@@ -82,7 +82,7 @@ def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, 
     if not complete:
         found["track"] = "locked"
     else:
-        found["track"] = next((s for s in ("open", "stale") if s in tracked), "done")
+        found["track"] = "open" if "open" in tracked else "stale" if "stale" in tracked else "done"
     is_tracked = found["track"] == "done" or fit == "done"
     found["fit"] = fit if is_tracked or fit == "stale" else "locked"
     model = trials.made_of(effects) if complete else ""
@@ -92,7 +92,8 @@ def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, 
     found["predict"] = _state(trials, "predict", entry, model) if has_fit else "locked"
     if found["fit"] == "stale":
         for stage in ("compare", "predict"):
-            found[stage] = "stale" if found[stage] == "done" else found[stage]
+            if found[stage] == "done":
+                found[stage] = "stale"
     return found
 
 

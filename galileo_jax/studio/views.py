@@ -1,7 +1,7 @@
 """Results as plain data for the page: lists of numbers, words, and nothing else."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sized
 from typing import Any
 
 import numpy as np
@@ -149,6 +149,6 @@ def _listed(array: np.ndarray) -> Any:
     return [float(value) if np.isfinite(value) else None for value in array]
 
 
-def thinned(values: Sequence[Any]) -> slice:
+def thinned(values: Sized) -> slice:
     """So that a curve has no more points than a page can show."""
     return slice(None, None, max(1, -(-len(values) // MOST_POINTS)))

@@ -10,14 +10,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from tests.missing import needed_module
-from tests.studio.clips import clip_in
-from tests.studio.server import Server, started
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
 from galileo_jax.studio.paths import below, safe_name, videos
 from galileo_jax.studio.session import Session
+from tests.missing import needed_module
+from tests.studio.clips import clip_in
+from tests.studio.server import Server, started
 
 pytestmark = pytest.mark.video
 
@@ -139,7 +139,15 @@ def test_a_frame_that_there_is_not(studio, cookie, index):
 
 @pytest.mark.parametrize(
     "name",
-    ["..%2Fup.mp4", "%2Ftmp%2Fup.mp4", ".hidden.mp4", "up.py", "up.mp4%00.yaml", "up.sh", "a%0a.mp4"],
+    [
+        "..%2Fup.mp4",
+        "%2Ftmp%2Fup.mp4",
+        ".hidden.mp4",
+        "up.py",
+        "up.mp4%00.yaml",
+        "up.sh",
+        "a%0a.mp4",
+    ],
 )
 def test_names_cannot_climb_out_and_nothing_else_is_taken(studio, cookie, folder, name):
     before = sorted(folder.iterdir())

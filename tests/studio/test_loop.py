@@ -9,14 +9,14 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.missing import needed_module
-from tests.studio.server import started
-from tests.studio.test_page import drag, opened, wait_until
 
 import galileo_jax as gx
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.results.run import read_result
 from galileo_jax.studio.session import Session
+from tests.missing import needed_module
+from tests.studio.server import started
+from tests.studio.test_page import drag, opened, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.video]
 LONG_MS = 1_500_000  # a diagnosis on a busy machine

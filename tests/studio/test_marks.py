@@ -2,16 +2,27 @@ import math
 from dataclasses import asdict, replace
 
 import pytest
-from tests.studio.clips import clip_in
 
 import galileo_jax as gx
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.check import remarks_on
-from galileo_jax.studio.marks import Marks, ObjectMark, blank, from_json, handles, labels, moved
-from galileo_jax.studio.marks import proposed, to_json, with_object, without_object
+from galileo_jax.studio.marks import (
+    Marks,
+    ObjectMark,
+    blank,
+    from_json,
+    handles,
+    labels,
+    moved,
+    proposed,
+    to_json,
+    with_object,
+    without_object,
+)
 from galileo_jax.studio.sheet import changed, opened, redone, undone
 from galileo_jax.studio.stages import Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import FILE, Store
+from tests.studio.clips import clip_in
 
 MARKS = Marks(
     objects=(ObjectMark("object1", (50.0, 40.0)), ObjectMark("object2", (200.0, 90.0))),
@@ -163,7 +174,7 @@ def test_nothing_is_proposed_where_nothing_moves(tmp_path):
         gx.propose(path)
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{\"clips\": 3}", "{\"clips\": {\"slide\": [1]}}"])
+@pytest.mark.parametrize("content", ["", "[]", '{"clips": 3}', '{"clips": {"slide": [1]}}'])
 def test_a_damaged_file_costs_undo_and_nothing_else(tmp_path, content):
     (tmp_path / FILE).write_text(content)
     store = Store(tmp_path)

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+import galileo_jax as gx
 from tests.missing import needed_module
 from tests.studio.clips import clip_in
 from tests.studio.server import Server, started
-
-import galileo_jax as gx
 
 pytestmark = pytest.mark.video
 PATIENCE_MS = 60_000  # nothing here takes long; a busy machine may

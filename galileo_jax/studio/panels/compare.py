@@ -18,8 +18,10 @@ def build(tab: "Tab") -> None:
     if found is not None:
         ui.label(found["sentence"]).classes("say").props("data-verdict")
         for one in found["stretches"]:
-            go = ui.element("button").classes("pick").props(
-                f'type=button data-stretch title="go to these frames"'
+            go = (
+                ui.element("button")
+                .classes("pick")
+                .props('type=button data-stretch title="go to these frames"')
             )
             go.style("grid-template-columns: 1fr")
             go.on("click", lambda one=one: _jump(tab, one["clip"], one["start"]))

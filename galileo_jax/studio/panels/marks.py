@@ -8,7 +8,14 @@ from nicegui import ui
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import SIZE_MEANING
 from galileo_jax.studio.marks import ObjectMark, without_object
-from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
+from galileo_jax.studio.panels.parts import (
+    main_button,
+    on_entered,
+    on_number,
+    plain_button,
+    remark,
+    title,
+)
 
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
@@ -27,13 +34,15 @@ def build(tab: "Tab") -> None:
         scene.props("outlined dense options-dense").style("min-width: 130px")
         scene.on_value_change(lambda event: _mark(tab, scenario=event.value))
         stick = ui.number("stick, m", value=marks.stick_m, min=0, step="any")
-        stick.props('outlined dense data-stick').style("width: 120px")
-        stick.on("change", lambda: _mark(tab, stick_m=stick.value or None))
+        stick.props("outlined dense data-stick").style("width: 120px")
+        on_number(stick, lambda value: _mark(tab, stick_m=value or None))
     for one in marks.objects:
         _object(tab, one)
     with ui.element("div").classes("rowline"):
         plain_button(
-            "Click on the object" if tab.placing else "Add object", lambda: _place(tab), "add-object"
+            "Click on the object" if tab.placing else "Add object",
+            lambda: _place(tab),
+            "add-object",
         )
         plain_button("Propose", lambda: _propose(tab), "propose", session.job is None)
     title("Check")
@@ -53,11 +62,13 @@ def _object(tab: "Tab", one: ObjectMark) -> None:
         shape.on_value_change(lambda event: _change(tab, one, shape=event.value, size_m=None))
         shown = " ".join(f"{side:g}" for side in one.size_m or ())
         size = ui.input(label="size, m", value=shown, placeholder="if known")
-        size.props(f'outlined dense title="{SIZE_MEANING[one.shape]}, m" data-size={one.name}').style("width: 140px")
-        size.on("change", lambda: _size(tab, one, size.value))
-        ui.button(
-            icon="close", color=None, on_click=lambda: _drop(tab, one.name)
-        ).props(f'flat round aria-label="Remove {one.name}"').classes("icon")
+        size.props(
+            f'outlined dense title="{SIZE_MEANING[one.shape]}, m" data-size={one.name}'
+        ).style("width: 140px")
+        on_entered(size, lambda text: _size(tab, one, text))
+        ui.button(icon="close", color=None, on_click=lambda: _drop(tab, one.name)).props(
+            f'flat round aria-label="Remove {one.name}"'
+        ).classes("icon")
 
 
 def _size(tab: "Tab", one: ObjectMark, text: str) -> None:
@@ -76,17 +87,17 @@ def _change(tab: "Tab", one: ObjectMark, **given: Any) -> None:
         objects = tuple(
             replace(o, **given) if o.name == one.name else o for o in sheet.marks.objects
         )
-        tab.session.mark(replace(sheet.marks, objects=objects))
+        tab.mark(replace(sheet.marks, objects=objects))
 
 
 def _drop(tab: "Tab", name: str) -> None:
     if tab.session.sheet is not None:
-        tab.session.mark(without_object(tab.session.sheet.marks, name))
+        tab.mark(without_object(tab.session.sheet.marks, name))
 
 
 def _mark(tab: "Tab", **given: Any) -> None:
     if tab.session.sheet is not None:
-        tab.session.mark(replace(tab.session.sheet.marks, **given))
+        tab.mark(replace(tab.session.sheet.marks, **given))
 
 
 def _place(tab: "Tab") -> None:

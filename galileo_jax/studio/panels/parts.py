@@ -1,5 +1,6 @@
 """Pieces that several panels have."""
 
+import contextlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -7,6 +8,8 @@ from nicegui import ui
 
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
+
+ENTERED = "(event) => emit(event.target.value)"
 
 
 def title(text: str) -> None:
@@ -17,7 +20,9 @@ def title(text: str) -> None:
 
 def main_button(text: str, action: Callable[[], Any], tab: "Tab", name: str) -> None:
     """The button that does the stage's work; off while something is computed."""
-    button = ui.button(text, on_click=action, color=None).props(f"unelevated no-caps data-do={name}")
+    button = ui.button(text, on_click=action, color=None).props(
+        f"unelevated no-caps data-do={name}"
+    )
     button.classes("main").set_enabled(tab.session.job is None)
 
 
@@ -44,3 +49,21 @@ def remark(kind: str, sentence: str) -> None:
     """One sentence with its colour."""
     with ui.element("div").classes(f"remark {kind}").props(f'data-remark="{kind}"'):
         ui.label(sentence)
+
+
+def on_entered(field: Any, action: Callable[[str], Any]) -> None:
+    """Calls `action` with what was typed, when the person goes on.
+
+    Not with the field's value in Python: that follows a little later.
+    """
+    field.on("change", lambda event: action(str(event.args)), js_handler=ENTERED)
+
+
+def on_number(field: Any, action: Callable[[float | None], Any]) -> None:
+    """The same of a number; None where it was emptied, nothing where it is none."""
+
+    def entered(text: str) -> None:
+        with contextlib.suppress(ValueError):
+            action(float(text) if text else None)
+
+    on_entered(field, entered)

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from galileo_jax.studio.panels.parts import main_button, remark, title
+from galileo_jax.studio.panels.parts import main_button, on_number, remark, title
 
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
@@ -36,14 +36,15 @@ def build(tab: "Tab") -> None:
         return
     info = sheet.info
     ui.label(
-        f"{sheet.video.name}: {info.frame_count} frames, {info.size_px[0]} × {info.size_px[1]}"
+        f"{sheet.video.name}: {info.frame_count} frames, {info.size_px[0]} x {info.size_px[1]}"
     ).classes("soft")
     with ui.element("div").classes("rowline"):
         rate = ui.number("true frames per second", value=sheet.marks.fps, min=1, step="any")
-        rate.props("outlined dense").on("change", lambda: _mark(tab, fps=rate.value))
+        rate.props("outlined dense data-fps")
+        on_number(rate, lambda value: _mark(tab, fps=value))
         first = ui.number("counts from frame", value=sheet.marks.first_frame, min=0, precision=0)
         first.props("outlined dense")
-        first.on("change", lambda: _mark(tab, first_frame=int(first.value or 0)))
+        on_number(first, lambda value: _mark(tab, first_frame=int(value or 0)))
     for one in sheet.remarks:
         if "frames per second" in one.sentence:
             remark(one.kind, one.sentence)
@@ -78,4 +79,4 @@ def _tick(tab: "Tab", name: str, is_on: bool) -> None:
 def _mark(tab: "Tab", **given: Any) -> None:
     sheet = tab.session.sheet
     if sheet is not None and None not in given.values():
-        tab.session.mark(replace(sheet.marks, **given))
+        tab.mark(replace(sheet.marks, **given))
