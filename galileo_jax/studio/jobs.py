@@ -131,6 +131,8 @@ class Worker:
             self._hand_on(message)
         with self._lock:
             lost = self._current if pipe is self._pipe else None
+            if pipe is self._pipe:
+                self._pipe = None
             is_cancelled = self._is_cancelled
         if lost is not None:
             kind: Kind = "cancelled" if is_cancelled else "error"

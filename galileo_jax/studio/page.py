@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,9 @@ class Tab:
       placing: a click into the video adds an object.
       dark: the colours.
       said: the job, the error and the note that are shown.
-      redraw: builds it anew.
+      drawn: what the panel was built of, where it can be refreshed in part.
+      refresh: does that.
+      redraw: shows everything anew.
     """
 
     session: Session
@@ -49,6 +52,8 @@ class Tab:
     placing: bool = False
     dark: bool = False
     said: tuple[str, str, str] = ("", "", "")
+    drawn: Any = None
+    refresh: Callable[[], None] = lambda: None
     redraw: Callable[[], None] = lambda: None
 
     def go(self, stage: str) -> None:
@@ -113,9 +118,14 @@ def build_page(session: Session) -> None:
     def show() -> None:
         seen.update(session.versions)
         lamps()
-        panel.clear()
-        with panel:
-            _panel(tab)
+        now = marks.drawn(tab)
+        if now is not None and now == tab.drawn:
+            tab.refresh()
+        else:
+            panel.clear()
+            with panel:
+                _panel(tab)
+            tab.drawn = marks.drawn(tab)
         curves()
         bar()
 
@@ -197,7 +207,7 @@ def _stage_buttons(tab: Tab) -> None:
         if states[stage] == "locked":
             button.props("disabled")
         button.props(f'title="{title}: {_WORDS[state]}" data-state="{state}"')
-        button.on("click", lambda stage=stage: tab.go(stage))
+        button.on("click", partial(tab.go, stage))
         with button:
             ui.element("span").classes(f"lamp {state}")
             ui.label(title)
@@ -222,7 +232,7 @@ def _panel(tab: Tab) -> None:
         with ui.element("div").classes("rowline"):
             for name in session.chosen:
                 look = "main" if name == session.active else "plain"
-                ui.button(name, on_click=lambda name=name: session.look_at(name), color=None).props(
+                ui.button(name, on_click=partial(session.look_at, name), color=None).props(
                     "flat no-caps"
                 ).classes(look)
     PANELS[tab.stage](tab)

@@ -54,6 +54,14 @@ class Hand:
         return f"{self.clicks} clicks, {time.monotonic() - self.began:.0f} s"
 
 
+def stick(folder: Path) -> float:
+    """Length of the stick as it is drawn, px."""
+    sheet = Session(folder).sheet
+    assert sheet is not None and sheet.marks.stick is not None
+    (x1, _), (x2, _) = sheet.marks.stick
+    return x2 - x1
+
+
 @pytest.fixture
 def folder(tmp_path) -> Path:
     needed_module("nicegui")
@@ -71,11 +79,9 @@ def test_from_a_bare_video_to_a_named_effect(browser, folder, capsys):
         # What moves is found without a click; the stick is laid on a length, and it is typed.
         hand.wait_for("[data-handle=object1]")
         hand.drag("stick2", 60, 0)
-        wait_until(lambda: read_mapping(folder / "clip.yaml") != {})
-        sheet = Session(folder).sheet
-        assert sheet is not None and sheet.marks.stick is not None
-        (x1, _), (x2, _) = sheet.marks.stick
-        page.locator("[data-stick]").fill(f"{(x2 - x1) / scale:.5f}")
+        wait_until(lambda: stick(folder) > 0.3 * 640 + 30)
+        length = stick(folder)
+        page.locator("[data-stick]").fill(f"{length / scale:.5f}")
         page.keyboard.press("Tab")
         hand.clicks += 1
         wait_until(lambda: "pixels_per_metre" in read_mapping(folder / "clip.yaml"))

@@ -30,6 +30,10 @@ MARKS = Marks(
 )  # fmt: skip
 
 
+def apart(one, other) -> float:
+    return math.dist(one, other)
+
+
 def test_the_foot_takes_the_ramp_with_it_and_the_upper_end_turns_it():
     after = moved(MARKS, "foot", (140.0, 110.0))
     assert after.upper == (40.0, 60.0)
@@ -75,7 +79,7 @@ def test_each_step_is_on_disk_and_can_be_undone_to_the_letter(tmp_path):
     store = Store(tmp_path)
     sheet = opened(tmp_path, video, store)
     assert sheet.is_complete
-    x, y = sheet.marks.objects[0].point
+    x, y = sheet.marks.objects[0].point or (0.0, 0.0)
     sheet = changed(sheet, moved(sheet.marks, "object1", (x + 1, y)), store)
     assert gx.load(video).objects[0].point_px == (x + 1, y)
     assert opened(tmp_path, video, Store(tmp_path)) == sheet, "a new server sees the same"
@@ -92,9 +96,10 @@ def test_marks_that_cannot_be_are_kept_and_explained_but_not_written(tmp_path):
     store = Store(tmp_path)
     sheet = opened(tmp_path, video, store)
     good = sheet.marks
-    sheet = changed(sheet, moved(good, "foot", (good.foot[0], good.foot[1] - 70)), store)
+    sheet = changed(sheet, moved(good, "foot", (150.0, 20.0)), store)
     assert video.with_suffix(".yaml").read_text() == text
-    assert not sheet.is_complete and "inside" in sheet.present.problem
+    assert not sheet.is_complete
+    assert "inside" in (sheet.present.problem or "")
     again = opened(tmp_path, video, Store(tmp_path))
     assert again.marks == sheet.marks, "what was drawn is not lost"
     mended = changed(again, good, store)
@@ -138,7 +143,7 @@ def test_what_depends_on_a_change_is_stale_and_nothing_else(tmp_path):
     store.put("runs", "slide", {"fit": made(run / "result.json", trials.made_of())})
     found = states(trials, store, ())
     assert (found["track"], found["fit"], found["compare"]) == ("done", "done", "open")
-    x, y = sheet.marks.objects[0].point
+    x, y = sheet.marks.objects[0].point or (0.0, 0.0)
     after = changed(sheet, moved(sheet.marks, "object1", (x + 1, y)), store)
     found = states(Trials(tmp_path, (after,)), store, ())
     assert (found["marks"], found["track"], found["fit"]) == ("done", "stale", "stale")
@@ -155,8 +160,8 @@ def test_a_bare_video_gets_a_proposal_that_lacks_only_the_scale(tmp_path):
     truth = gx.load(clip_in(tmp_path, "known"))
     sheet = changed(sheet, proposed(asdict(gx.propose(video)), sheet.info.size_px), store)
     for one, known in zip(sheet.marks.objects, truth.objects, strict=True):
-        assert math.dist(one.point, known.point_px) < 4.0
-    assert math.dist(sheet.marks.foot, truth.origin_px) < 8.0
+        assert apart(one.point, known.point_px) < 4.0
+    assert apart(sheet.marks.foot, truth.origin_px) < 8.0
     assert [one.kind for one in sheet.remarks].count("missing") == 1
     assert gx.load(video).ramp_angle_deg == pytest.approx(truth.ramp_angle_deg, abs=1.0)
 

@@ -1,5 +1,6 @@
 """Where it fails: the verdict in a sentence, and the stretches to jump to."""
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nicegui import ui
@@ -24,7 +25,7 @@ def build(tab: "Tab") -> None:
                 .props('type=button data-stretch title="go to these frames"')
             )
             go.style("grid-template-columns: 1fr")
-            go.on("click", lambda one=one: _jump(tab, one["clip"], one["start"]))
+            go.on("click", partial(_jump, tab, one["clip"], one["start"]))
             with go:
                 ui.label(one["sentence"])
         if found["is_adequate"]:

@@ -132,7 +132,7 @@ def _editor(tab: "Tab") -> None:
     area.style("font: 13px ui-monospace, monospace; width: 100%")
 
     def run() -> None:
-        write_text(Path(path), area.value)
+        write_text(Path(path), area.value or "")
         tab.session.diagnose((OWN_FILE,))
 
     plain_button(f"Save {OWN_FILE} and run it", run, "run-effect", tab.session.job is None)

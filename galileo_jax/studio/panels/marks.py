@@ -29,64 +29,94 @@ def build(tab: "Tab") -> None:
         return
     title("Marks")
     marks = sheet.marks
+    fields: dict[str, Any] = {}
     with ui.element("div").classes("rowline"):
         scene = ui.select(sorted(SCENARIOS), value=marks.scenario, label="scenario")
         scene.props("outlined dense options-dense").style("min-width: 130px")
         scene.on_value_change(lambda event: _mark(tab, scenario=event.value))
-        stick = ui.number("stick, m", value=marks.stick_m, min=0, step="any")
-        stick.props("outlined dense data-stick").style("width: 120px")
+        stick = ui.number("stick, m", value=marks.stick_m, min=0)
+        stick.props("outlined dense data-stick step=any").style("width: 120px")
         on_number(stick, lambda value: _mark(tab, stick_m=value or None))
     for one in marks.objects:
-        _object(tab, one)
+        fields[one.name] = _object(tab, one)
     with ui.element("div").classes("rowline"):
-        plain_button(
-            "Click on the object" if tab.placing else "Add object",
-            lambda: _place(tab),
-            "add-object",
-        )
-        plain_button("Propose", lambda: _propose(tab), "propose", session.job is None)
+        text = "Click on the object" if tab.placing else "Add object"
+        plain_button(text, lambda: _place(tab), "add-object")
+        plain_button("Propose", session.propose, "propose", session.job is None)
     title("Check")
+    place = ui.element("div").style("display: contents")
+
+    def refresh() -> None:
+        """The rest of the panel stays, so that nothing is swept away while somebody types."""
+        sheet = session.sheet
+        if sheet is None:
+            return
+        stick.set_value(sheet.marks.stick_m)
+        for one in sheet.marks.objects:
+            fields[one.name].set_value(_text(one.size_m))
+        place.clear()
+        with place:
+            _check(tab)
+
+    tab.refresh = refresh
+    refresh()
+
+
+def drawn(tab: "Tab") -> Any:
+    """While this is the same, `Tab.refresh` is enough to show what has changed."""
+    session, sheet = tab.session, tab.session.sheet
+    if tab.stage != "marks" or sheet is None:
+        return None
+    objects = tuple((one.name, one.shape) for one in sheet.marks.objects)
+    said = (session.error, session.note, session.job is None, session.chosen, session.active)
+    return (sheet.marks.scenario, objects, tab.placing, said)
+
+
+def _check(tab: "Tab") -> None:
+    sheet = tab.session.sheet
+    assert sheet is not None
     for one in sheet.remarks:
         remark(one.kind, one.sentence)
     if sheet.is_complete:
-        if all(one.kind != "missing" for one in sheet.remarks):
-            remark("fine", "Nothing is missing: the clip can be tracked.")
+        remark("fine", "Nothing is missing: the clip can be tracked.")
         main_button("Track", lambda: _track(tab), tab, "track")
 
 
-def _object(tab: "Tab", one: ObjectMark) -> None:
+def _text(size: tuple[float, ...] | None) -> str:
+    return " ".join(f"{side:g}" for side in size or ())
+
+
+def _object(tab: "Tab", one: ObjectMark) -> Any:
+    """A row of the list; returns the field of its size."""
+    name = one.name
     with ui.element("div").classes("rowline").style("flex-wrap: nowrap"):
-        ui.label(one.name).style("font-weight: 600; min-width: 68px")
+        ui.label(name).style("font-weight: 600; min-width: 68px")
         shape = ui.select(list(SIZE_MEANING), value=one.shape).props("outlined dense options-dense")
         shape.style("min-width: 104px")
-        shape.on_value_change(lambda event: _change(tab, one, shape=event.value, size_m=None))
-        shown = " ".join(f"{side:g}" for side in one.size_m or ())
-        size = ui.input(label="size, m", value=shown, placeholder="if known")
-        size.props(
-            f'outlined dense title="{SIZE_MEANING[one.shape]}, m" data-size={one.name}'
-        ).style("width: 140px")
-        on_entered(size, lambda text: _size(tab, one, text))
-        ui.button(icon="close", color=None, on_click=lambda: _drop(tab, one.name)).props(
-            f'flat round aria-label="Remove {one.name}"'
-        ).classes("icon")
+        shape.on_value_change(lambda event: _change(tab, name, shape=event.value, size_m=None))
+        size = ui.input(label="size, m", value=_text(one.size_m), placeholder="if known")
+        meaning = f"{SIZE_MEANING[one.shape]}, m"
+        size.props(f'outlined dense title="{meaning}" data-size={name}').style("width: 150px")
+        on_entered(size, lambda text: _size(tab, name, text))
+        drop = ui.button(icon="close", color=None, on_click=lambda: _drop(tab, name))
+        drop.props(f'flat round aria-label="Remove {name}"').classes("icon")
+    return size
 
 
-def _size(tab: "Tab", one: ObjectMark, text: str) -> None:
+def _size(tab: "Tab", name: str, text: str) -> None:
     try:
         size = tuple(float(part) for part in text.replace(",", " ").split())
     except ValueError:
-        tab.session.error = f"{one.name}: {text[:30]!r} is no size; metres expected"
+        tab.session.error = f"{name}: {text[:30]!r} is no size; metres expected"
         tab.redraw()
         return
-    _change(tab, one, size_m=size or None)
+    _change(tab, name, size_m=size or None)
 
 
-def _change(tab: "Tab", one: ObjectMark, **given: Any) -> None:
+def _change(tab: "Tab", name: str, **given: Any) -> None:
     sheet = tab.session.sheet
     if sheet is not None:
-        objects = tuple(
-            replace(o, **given) if o.name == one.name else o for o in sheet.marks.objects
-        )
+        objects = tuple(replace(o, **given) if o.name == name else o for o in sheet.marks.objects)
         tab.mark(replace(sheet.marks, objects=objects))
 
 
@@ -103,10 +133,6 @@ def _mark(tab: "Tab", **given: Any) -> None:
 def _place(tab: "Tab") -> None:
     tab.placing = not tab.placing
     tab.redraw()
-
-
-def _propose(tab: "Tab") -> None:
-    tab.session.propose()
 
 
 def _track(tab: "Tab") -> None:

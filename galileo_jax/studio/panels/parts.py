@@ -9,8 +9,6 @@ from nicegui import ui
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
 
-ENTERED = "(event) => emit(event.target.value)"
-
 
 def title(text: str) -> None:
     """What the panel is about."""
@@ -56,7 +54,7 @@ def on_entered(field: Any, action: Callable[[str], Any]) -> None:
 
     Not with the field's value in Python: that follows a little later.
     """
-    field.on("change", lambda event: action(str(event.args)), js_handler=ENTERED)
+    field.on("change", lambda event: action("" if event.args is None else str(event.args)))
 
 
 def on_number(field: Any, action: Callable[[float | None], Any]) -> None:

@@ -19,8 +19,8 @@ def build(tab: "Tab") -> None:
     found = session.results.prediction
     title("Predict")
     with ui.element("div").classes("rowline"):
-        seconds = ui.number("seconds beyond the clip", value=SECONDS, min=0.1, max=60, step="any")
-        seconds.props("outlined dense")
+        seconds = ui.number("seconds beyond the clip", value=SECONDS, min=0.1, max=60)
+        seconds.props("outlined dense step=any")
         main_button(
             "Predict", lambda: session.predict(float(seconds.value or SECONDS)), tab, "predict"
         )

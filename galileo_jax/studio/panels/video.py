@@ -1,6 +1,7 @@
 """Video: which clip, or which trials; its frame rate, and from which frame on it counts."""
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -39,8 +40,8 @@ def build(tab: "Tab") -> None:
         f"{sheet.video.name}: {info.frame_count} frames, {info.size_px[0]} x {info.size_px[1]}"
     ).classes("soft")
     with ui.element("div").classes("rowline"):
-        rate = ui.number("true frames per second", value=sheet.marks.fps, min=1, step="any")
-        rate.props("outlined dense data-fps")
+        rate = ui.number("true frames per second", value=sheet.marks.fps, min=1)
+        rate.props("outlined dense data-fps step=any")
         on_number(rate, lambda value: _mark(tab, fps=value))
         first = ui.number("counts from frame", value=sheet.marks.first_frame, min=0, precision=0)
         first.props("outlined dense")
@@ -64,8 +65,8 @@ def _clips(tab: "Tab") -> None:
             box = ui.checkbox(value=name in session.chosen).props(
                 f'data-trial="{name}" aria-label="{name} is a trial"'
             )
-            box.on_value_change(lambda event, name=name: _tick(tab, name, event.value))
-            ui.button(name, on_click=lambda name=name: session.show(name), color=None).props(
+            box.on_value_change(lambda event, name=name: _tick(tab, name, bool(event.value)))
+            ui.button(name, on_click=partial(session.show, name), color=None).props(
                 f'flat no-caps data-clip="{name}"'
             ).classes("main" if name == session.active else "plain")
 
