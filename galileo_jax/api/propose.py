@@ -17,6 +17,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.tracking.detect import Mover, find_movers
+from galileo_jax.tracking.pose import rotation
 from galileo_jax.video import decode
 
 SPAN_PX = 40.0  # features of one object are this close together, as where its size is unknown
@@ -37,7 +38,7 @@ class Proposal:
         incline where it goes straight down.
       fps: what the container says, right or wrong.
       objects: name to centre in the first frame, in the order in which they set out.
-      sizes_px: name to about its (width, height) in the picture.
+      sizes_px: name to about its (width, height) in the picture, object 1's along the ramp.
       direction: of the first object.
       ramp: (x1, y1, x2, y2), a line along the surface, the upper end first; None: not seen.
       foot: where the ramp meets the table; None: not seen.
@@ -110,10 +111,13 @@ def _proposed(path: Path, fps: float, movers: list[Mover]) -> Proposal:
         except InputError as error:
             doubts.append(str(error))
             continue
-        ramp, foot = _line(found, sizes[names[0]])
+        turned = _turn(found)
+        standing = {**sizes, names[0]: _size(movers[0], turned)}
+        found = _with_height(found, sizes[names[0]][1], standing[names[0]][1])
+        ramp, foot = _line(found, standing[names[0]])
         if len(seen) == 1 and foot is not None and _is_at_edge(found, foot):
             continue  # it is stopped at the picture's edge rather than going on along a table
-        return Proposal(scenario, fps, seen, sizes, direction, ramp, foot)
+        return Proposal(scenario, fps, seen, standing, direction, ramp, foot)
     return Proposal("ramp", fps, objects, sizes, direction, doubts=(doubts[0],))
 
 
@@ -147,10 +151,25 @@ def _content(
     }
 
 
-def _size(mover: Mover) -> Point:
-    """Width and height of the box that holds its features, px."""
-    width, height = np.ptp(mover.places_px, axis=0) + 2.0
+def _size(mover: Mover, turned_rad: float = 0.0) -> Point:
+    """Width and height, px, of the box that holds its features and is turned in the picture."""
+    width, height = np.ptp(mover.places_px @ rotation(turned_rad), axis=0) + 2.0
     return max(float(width), SMALLEST_PX), max(float(height), SMALLEST_PX)
+
+
+def _turn(clip: Clip) -> float:
+    """How an object on the ramp stands in the picture, clockwise, rad."""
+    assert clip.ramp_angle_deg is not None  # measured
+    return math.radians(clip.ramp_angle_deg) * (1.0 if clip.direction == "right" else -1.0)
+
+
+def _with_height(clip: Clip, before_px: float, now_px: float) -> Clip:
+    """The foot where it is if the first object is this high: see `infer_foot`."""
+    if clip.origin_px is None:
+        return clip
+    lower, turned = (before_px - now_px) / 2, _turn(clip)
+    x, y = clip.origin_px
+    return clip.model_copy(update={"origin_px": (x + lower * math.tan(turned / 2), y - lower)})
 
 
 def _line(clip: Clip, size: Point) -> tuple[tuple[float, float, float, float], Point | None]:

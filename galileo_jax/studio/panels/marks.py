@@ -92,11 +92,11 @@ def _object(tab: "Tab", one: ObjectMark) -> Any:
     with ui.element("div").classes("rowline").style("flex-wrap: nowrap"):
         ui.label(name).style("font-weight: 600; min-width: 68px")
         shape = ui.select(list(SIZE_MEANING), value=one.shape).props("outlined dense options-dense")
-        shape.style("min-width: 104px")
+        shape.style("min-width: 96px")
         shape.on_value_change(lambda event: _change(tab, name, shape=event.value, size_m=None))
         size = ui.input(label="size, m", value=_text(one.size_m), placeholder="if known")
         meaning = f"{SIZE_MEANING[one.shape]}, m"
-        size.props(f'outlined dense title="{meaning}" data-size={name}').style("width: 150px")
+        size.props(f'outlined dense title="{meaning}" data-size={name}').style("flex: 1")
         on_entered(size, lambda text: _size(tab, name, text))
         drop = ui.button(icon="close", color=None, on_click=lambda: _drop(tab, name))
         drop.props(f'flat round aria-label="Remove {name}"').classes("icon")
