@@ -20,19 +20,31 @@ def document(path: Path) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def check_run(root: Path, run: Path) -> None:
+def program_of(run: Path) -> str | None:
+    """The file of effects that loading a run would run; None: there is none."""
+    files = document(run / "result.json").get("effects_from")
+    return str(files[0]) if isinstance(files, list) and files else None
+
+
+def check_run(root: Path, run: Path, may_run: bool = False) -> None:
     """Refuses to open a run that leads out of the folder, or would run a file of effects.
+
+    Args:
+      root: the folder that was opened.
+      run: of the run.
+      may_run: somebody has pressed the button for its effects, which lie in the folder.
 
     Raises:
       InputError: says why.
     """
     below(root, run)
-    result = document(run / "result.json")
-    if files := result.get("effects_from"):
-        raise InputError(
-            f"{run.name}: its model has effects of {files[0]}, which is a program; press Fit "
-            "to run it"
-        )
+    if (program := program_of(run)) is not None:
+        below(root, program)
+        if not may_run:
+            raise InputError(
+                f"{run.name}: its model has effects of {program}, which is a program; it is "
+                "opened when you press for it"
+            )
     for path in (run / "clip.yaml", *run.glob("*/clip.yaml")):
         if path.is_file():
             below(root, path)

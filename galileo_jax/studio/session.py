@@ -128,6 +128,12 @@ class Session:
         return tuple(self.results.fit["effects"]) if self.results.fit else ()
 
     @property
+    def files(self) -> tuple[str, ...]:
+        """Of effects of one's own that the last diagnosis was asked to try."""
+        found = self.store.get("runs", self.trials.name).get("files", ())
+        return tuple(str(name) for name in found if (self.root / str(name)).is_file())
+
+    @property
     def states(self) -> dict[str, State]:
         """Of the seven stages."""
         return states(self.trials, self.store, self.effects)
@@ -177,9 +183,9 @@ class Session:
         """Tracks the chosen clips."""
         self._start("track", clips=self.trials.files)
 
-    def fit(self, effects: tuple[str, ...] = (), files: tuple[str, ...] = ()) -> None:
+    def fit(self, effects: tuple[str, ...] = ()) -> None:
         """Fits a model with these effects, then compares it with the data."""
-        trials = self.trials
+        trials, files = self.trials, self.files if effects else ()
         self._start(
             "fit",
             clips=trials.files,
@@ -196,6 +202,8 @@ class Session:
 
     def diagnose(self, files: tuple[str, ...] = ()) -> None:
         """Which effect is missing?"""
+        entry = self.store.get("runs", self.trials.name)
+        self.store.put("runs", self.trials.name, entry | {"files": list(files)})
         self._set_results(candidates=(), diagnosis=None)
         self._start("diagnose", clips=self.trials.files, run=self._run, effects_from=list(files))
 
@@ -395,14 +403,17 @@ class Session:
             rounds=tuple(entry.get("rounds") or found.get("history", ())),
         )
 
-    def open_run(self) -> None:
-        """Loads the chosen clips' fit, if there is one and nothing of it is a program."""
+    def open_run(self, is_pressed: bool = False) -> None:
+        """Loads the chosen clips' fit, if there is one.
+
+        One whose effects come from a program is loaded only where somebody has pressed for it.
+        """
         run = self.trials.run
         if self.results.fit is not None or not (run / "result.json").is_file():
             return
         self._loop = self._loop or asyncio.get_running_loop()
         try:
-            results.check_run(self.root, run)
+            results.check_run(self.root, run, may_run=is_pressed)
         except InputError as error:
             self.error = " ".join(str(error).split())
             self._changed("job")

@@ -285,6 +285,10 @@ def test_a_runs_program_is_not_run_without_a_press(tmp_path):
     (run / "result.json").write_text(json.dumps({"effects_from": ["evil.py"], "effects": []}))
     with pytest.raises(InputError, match=r"evil\.py, which is a program"):
         results.check_run(tmp_path, run)
+    results.check_run(tmp_path, run, may_run=True)
+    (run / "result.json").write_text(json.dumps({"effects_from": ["/tmp/evil.py"]}))
+    with pytest.raises(InputError, match="leads out"):
+        results.check_run(tmp_path, run, may_run=True)
 
 
 def test_a_run_cannot_lead_out_of_the_folder(tmp_path):

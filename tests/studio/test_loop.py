@@ -43,9 +43,10 @@ class Hand:
     def wait_for(self, selector: str) -> None:
         self.page.wait_for_selector(selector, timeout=LONG_MS)
 
-    def picture(self, name: str) -> None:
+    def picture(self, name: str, at_s: float = 0.6) -> None:
         if folder := os.environ.get("STUDIO_PICTURES"):
             self.page.mouse.move(640, 5)
+            self.page.evaluate(f"dispatchEvent(new CustomEvent('galileo-go', {{detail: {at_s}}}))")
             self.page.wait_for_timeout(900)
             path = Path(folder) / f"studio_{name}.jpg"
             self.page.screenshot(path=path, type="jpeg", quality=78)
@@ -92,7 +93,7 @@ def test_from_a_bare_video_to_a_named_effect(browser, folder, capsys):
             hand.clicks += 1
             wait_until(lambda name=name: str(size[name]) in (folder / "clip.yaml").read_text())
         hand.wait_for("[data-remark=fine]")
-        hand.picture("marks")
+        hand.picture("marks", 0.0)
         hand.click("[data-do=track]")
         hand.wait("track")
         hand.picture("track")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from galileo_jax.studio.panels.parts import main_button, number, plain_button, remark, title
+from galileo_jax.studio.results import program_of
 
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
@@ -19,7 +20,11 @@ def build(tab: "Tab") -> None:
     effects = ", ".join(session.effects)
     title(f"Fit, with {effects}" if effects else "Fit")
     if found is None:
-        if (session.trials.run / "result.json").is_file():
+        program = program_of(session.trials.run)
+        if program is not None:
+            text = f"Run {program.rpartition('/')[2]} and open it"
+            plain_button(text, lambda: session.open_run(is_pressed=True), "open-program")
+        elif (session.trials.run / "result.json").is_file():
             ui.label("Opening the run …").classes("soft")
         main_button("Fit", session.fit, tab, "fit")
         return
