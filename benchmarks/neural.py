@@ -54,7 +54,7 @@ def main(argv: Sequence[str]) -> int | None:
     found: dict[str, Any] = {}
     for noise in NOISES_M:
         key = jax.random.key(call.seed)
-        clips = thesis_clips(key, NUM_THESIS, noise, told_noise_m=max(noise, LEAST_NOISE_M))
+        clips = thesis_clips(key, NUM_THESIS, noise, stated_noise_m=max(noise, LEAST_NOISE_M))
         found[f"thesis {noise:g} m"] = _score(f"thesis {noise:g} m", network, clips)
     task = GalileoTask(load_config(Path("configs/train_galileo.yaml")))
     clips = make_samples(task, call.seed, SHARD, NUM_CLIPS)

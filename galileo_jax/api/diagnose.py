@@ -340,10 +340,11 @@ def _diagnosed(
     if add not in ("auto", "none", *problem.all_effects):
         raise InputError(f"--add: {add} has no place in {clips[0].path}")
 
-    share = 0.0
+    share, stage = 0.0, ""
 
-    def on_stage(stage: str) -> None:
-        nonlocal share
+    def on_stage(begun: str) -> None:
+        nonlocal share, stage
+        stage = begun
         share = max([share, *(done for begin, done in STAGES.items() if stage.startswith(begin))])
         progress.report(stage, share)
 
@@ -359,7 +360,7 @@ def _diagnosed(
             "probability": one.probability,
             **{key: one.error[key] for key in ("rmse", "chi2_per_dof")},
         }
-        progress.report("fitted", share, {"candidate": row})
+        progress.report(stage, share, {"candidate": row})
 
     found = run_loop(
         problem,

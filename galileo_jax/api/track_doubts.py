@@ -32,8 +32,8 @@ def with_track_doubts(
     if not lost and not is_far:
         return dict(result)
     found = dict(result)
-    told = lost or [f"no motion of this model comes near the track (chi2 {chi2:.0f})"]
-    found["status"] = "; but ".join([*filter(None, [result.get("status")]), ", ".join(told)])
+    found_wrong = lost or [f"no motion of this model comes near the track (chi2 {chi2:.0f})"]
+    found["status"] = "; but ".join([*filter(None, [result.get("status")]), ", ".join(found_wrong)])
     if is_far and not lost:
         found["warnings"] = [*result.get("warnings", []), _far(measurements, chi2)]
     return found

@@ -11,7 +11,7 @@ def check_scale(clip: Clip) -> None:
     """Raises `InputError` where a model needs lengths in metres and the clip has none."""
     if SCENARIOS[clip.scenario].has_table and not clip.is_scale_known:
         raise InputError(
-            f"{clip.path}: pixels_per_metre: null; the scale of a ramp clip cannot be told "
+            f"{clip.path}: pixels_per_metre: null; the scale of a ramp clip cannot be determined "
             "from its motion; set it with `galileo label --scale X1 Y1 X2 Y2 METRES` or "
             "--pixels-per-metre"
         )

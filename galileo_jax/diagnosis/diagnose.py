@@ -22,19 +22,14 @@ import numpy as np
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
-from galileo_jax.diagnosis.candidates import (
-    Hypothesis,
-    best_gains,
-    fit_candidates,
-    reduced,
-    score_tests,
-)
+from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, reduced
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.missing_force import infer_missing_force
 from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_to_try
+from galileo_jax.diagnosis.score_tests import best_gains, score_tests
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
     NUM_JOINED,
@@ -44,6 +39,7 @@ from galileo_jax.diagnosis.verdict import (
     is_nothing_missing,
     log_prior,
     looked_at_again,
+    may_decide,
     needs_pairs,
     ranked,
     rivals,
@@ -77,7 +73,8 @@ def diagnose(
         "none": only say what is missing; a name: add that effect, whatever the verdict.
       on_stage: told what is being done.
       on_round: called with each round of the loop.
-      on_candidate: called with each candidate when it is fitted, the best first.
+      on_candidate: called with each candidate as soon as it is fitted, and once more with each in
+        the end, the best first: until then fits may get better, and probabilities change.
 
     Raises:
       ValueError: `add` names no effect of the trials' models.
@@ -93,15 +90,16 @@ def diagnose(
     if add not in ("auto", "none"):
         trials.free([add])  # raises for unknown names
     on_stage(f"fitting {len(library)} candidates")
+    is_adequate = first.comparison.is_adequate
+    race = _Race(fitter, base, is_adequate, seed, on_candidate)
     singles = [(name,) for name in trials.all_effects]
-    candidates = ranked(_candidates(fitter, base, base, singles, seed))
+    candidates = ranked(race([base] * len(singles), singles))
     for candidate in candidates:
         on_candidate(candidate)
     if add not in ("auto", "none"):
         chosen = next(c for c in candidates if c.effects == (add,))
         rounds.append(Round(chosen.hypothesis, compare(trials, chosen.hypothesis.fit, seed)))
         on_round(rounds[-1])
-    is_adequate = first.comparison.is_adequate
     why = reasons.without_effects(first.comparison)
     if is_nothing_missing(is_adequate, candidates):
         why = (*why, reasons.nothing_convinces(best_named(candidates), CONVINCING))
@@ -113,12 +111,13 @@ def diagnose(
     candidates = _compared(trials, candidates, decisive, seed, compared)
     if needs_pairs(candidates):
         on_stage("fitting pairs of effects")
-        pairs = _pairs(fitter, base, candidates, library, seed)
+        pairs = _pairs(race, candidates, library)
         if pairs:
             form, single = form_that_leads(candidates), best_named(candidates)
             why = (*why, reasons.pairs_tried(single, form, len(pairs)))
         for candidate in pairs:
             on_candidate(candidate)
+        on_stage("comparing the best pairs with the data")
         candidates = _compared(trials, (*candidates, *pairs), decisive, seed, compared)
     verdict = verdict_of(candidates, decisive)
     if verdict.status == "named":
@@ -159,35 +158,89 @@ def fitter_of(trials: JointProblem) -> GradientFitter:
     return GradientFitter(trials)
 
 
-def _candidates(
-    fitter: GradientFitter,
-    base: Hypothesis,
-    start: Hypothesis,
-    sets: Sequence[tuple[str, ...]],
-    seed: int,
-) -> list[Candidate]:
-    """Fits candidates from `start`; evidence counts from `base`. Not ranked yet."""
-    trials = fitter.trials
-    found = fit_candidates(fitter, start, sets, seed)
-    scores = score_tests(trials, start, sets)
-    library = [name for name in trials.all_effects if name not in FORM_NAMES]
-    made = []
-    for hypothesis, score in zip(found, scores, strict=True):
-        fit = hypothesis.fit
-        made.append(
-            Candidate(
-                effects=hypothesis.effects,
-                hypothesis=hypothesis,
-                error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
-                score_z=float(score),
-                log_evidence=fit.log_evidence - base.fit.log_evidence,
-                log_prior=log_prior(_odds(trials, hypothesis), len(library)),
-                probability=0.0,
-                p_value=None,
-                confounded_with=(),
+class _Race:
+    """Fits candidates, and makes a table of what was fitted so far.
+
+    Attributes:
+      fitter: of trials whose models have the whole library.
+      base: the fit without effects, from which evidence counts.
+      is_adequate: whether that will do.
+      seed: of the starts.
+      on_candidate: called with each candidate as soon as it is fitted.
+    """
+
+    def __init__(
+        self,
+        fitter: GradientFitter,
+        base: Hypothesis,
+        is_adequate: bool,
+        seed: int,
+        on_candidate: Callable[[Candidate], None],
+    ):
+        self.fitter, self.base, self.is_adequate, self.seed = fitter, base, is_adequate, seed
+        self._on_candidate = on_candidate
+        self._made: dict[tuple[str, ...], Candidate] = {}
+
+    def __call__(
+        self, starts: Sequence[Hypothesis], sets: Sequence[tuple[str, ...]]
+    ) -> list[Candidate]:
+        """Fits sets of effects, each from the fit of all but its last; not ranked yet."""
+        best = max((c.log_odds for c in self._made.values()), default=-np.inf)
+        decisive = decisive_margin(self.is_adequate)
+
+        def matters(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+            log_odds = np.array([self._log_odds(one) for one in hypotheses])
+            is_form = np.array(
+                [any(name in FORM_NAMES for name in one.effects) for one in hypotheses]
             )
+            return may_decide(log_odds, is_form, best, decisive, self.is_adequate)
+
+        trials = self.fitter.trials
+        scores = dict.fromkeys(sets, 0.0)
+        for start in {id(start): start for start in starts}.values():
+            own = [e for e, other in zip(sets, starts, strict=True) if other is start]
+            scores |= dict(zip(own, score_tests(trials, start.fit, own).tolist(), strict=True))
+
+        def make(hypothesis: Hypothesis) -> Candidate:
+            made = self._candidate(hypothesis, scores[hypothesis.effects])
+            self._made[made.effects] = made
+            return made
+
+        def on_fit(hypothesis: Hypothesis) -> None:
+            made = make(hypothesis)
+            table = ranked(self._made.values())
+            self._on_candidate(next(c for c in table if c.effects == made.effects))
+
+        found = fit_candidates(self.fitter, starts, sets, self.seed, matters, on_fit)
+        return [
+            made if (made := self._made[one.effects]).hypothesis.fit is one.fit else make(one)
+            for one in found
+        ]
+
+    def _log_odds(self, hypothesis: Hypothesis) -> float:
+        return self._log_evidence(hypothesis) + self._log_prior(hypothesis)
+
+    def _log_evidence(self, hypothesis: Hypothesis) -> float:
+        return hypothesis.fit.log_evidence - self.base.fit.log_evidence
+
+    def _log_prior(self, hypothesis: Hypothesis) -> float:
+        trials = self.fitter.trials
+        library = [name for name in trials.all_effects if name not in FORM_NAMES]
+        return log_prior(_odds(trials, hypothesis), len(library))
+
+    def _candidate(self, hypothesis: Hypothesis, score_z: float) -> Candidate:
+        trials, fit = self.fitter.trials, hypothesis.fit
+        return Candidate(
+            effects=hypothesis.effects,
+            hypothesis=hypothesis,
+            error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
+            score_z=score_z,
+            log_evidence=self._log_evidence(hypothesis),
+            log_prior=self._log_prior(hypothesis),
+            probability=0.0,
+            p_value=None,
+            confounded_with=(),
         )
-    return made
 
 
 def _odds(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:
@@ -201,18 +254,14 @@ def _odds(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:
 
 
 def _pairs(
-    fitter: GradientFitter,
-    base: Hypothesis,
-    candidates: Sequence[Candidate],
-    library: Sequence[str],
-    seed: int,
+    race: _Race, candidates: Sequence[Candidate], library: Sequence[str]
 ) -> tuple[Candidate, ...]:
     """Pairs of the best single effects with others, and what could be confused with the best pair.
 
     The first are fitted from the single effects' fits. One that is as good as the best pair may not
     be reached from there: it is, from the best pair without one of its effects.
     """
-    trials = fitter.trials
+    trials, seed = race.fitter.trials, race.seed
     singles = [c for c in candidates if not c.is_form][:NUM_JOINED]
     gains = np.stack(
         [
@@ -220,16 +269,24 @@ def _pairs(
             for one in singles
         ]
     )
-    made = []
+    sets, starts = [], []
     for one, pairs in zip(singles, pairs_to_try(singles, library, gains), strict=True):
-        if pairs:
-            made += _candidates(fitter, base, one.hypothesis, pairs, seed)
-    best = ranked(made)[:1]
-    for kept in best[0].effects if best else ():
-        start = reduced(trials, best[0].hypothesis, [kept])
+        sets += pairs
+        starts += [one.hypothesis] * len(pairs)
+    if not sets:
+        return ()
+    made = race(starts, sets)
+    best = ranked(made)[0]
+    sets, starts = [], []
+    for kept in best.effects:
+        start = reduced(trials, best.hypothesis, [kept])
         if others := not_tried(kept, library, made):
             gains = best_gains(trials, start.fit, others, seed)
-            made += _candidates(fitter, base, start, most_alike(others, gains), seed)
+            alike = most_alike(others, gains)
+            sets += alike
+            starts += [start] * len(alike)
+    if sets:
+        made += race(starts, sets)
     return ranked(made)
 
 

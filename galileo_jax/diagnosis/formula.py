@@ -25,7 +25,7 @@ NOTHING, NOT_SIMPLE = "nothing", "no simple formula"
 MAX_TERMS = 3
 WORTH = 0.02  # of the misfit: a parameter that explains less makes no formula simpler
 CLEARLY_BETTER = 10.0  # of BIC: very strong evidence (Kass and Raftery 1995)
-AS_GOOD = 6.0  # a formula with a BIC so near to the best's is told as well
+AS_GOOD = 6.0  # a formula with a BIC so near to the best's is reported as well
 EXPLAINED = 0.8  # a formula that leaves more than a fifth is none
 CERTAIN = 3.0  # log Bayes factor from which on there is something to explain
 

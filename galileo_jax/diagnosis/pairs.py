@@ -19,7 +19,7 @@ def pairs_to_try(
     Args:
       singles: the best single effects, which others may join.
       library: the effects that may join them.
-      gains: `[single, effect]`, nats that each would add, from `candidates.best_gains`.
+      gains: `[single, effect]`, nats that each would add, from `score_tests.best_gains`.
     """
     promise = np.array([c.log_evidence for c in singles])[:, None] + gains
     found: dict[frozenset[str], tuple[int, tuple[str, str]]] = {}
@@ -44,6 +44,6 @@ def most_alike(pairs: Sequence[tuple[str, str]], gains: np.ndarray) -> list[tupl
 
     Args:
       pairs: from `not_tried`.
-      gains: `[pair]`, nats, from `candidates.best_gains`.
+      gains: `[pair]`, nats, from `score_tests.best_gains`.
     """
     return [pairs[i] for i in np.argsort(-gains)[:NUM_SWAPPED]]

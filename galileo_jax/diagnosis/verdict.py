@@ -16,6 +16,7 @@ from scipy.special import softmax
 
 from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.diagnosis import reasons
+from galileo_jax.diagnosis.candidates import MAY_STILL_GAIN
 from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
 
 # Difference in log odds, in nats, at which the weaker of two hypotheses is given up: it is then
@@ -185,14 +186,40 @@ def within_luck(
       candidates: ranked.
       decisive: nats by which a rival must be behind.
     """
-    farthest = decisive + MOST_LUCK * sqrt(2 * decisive)
     return [
         c
         for c in candidates
         if c.effects != named.effects
         and (c.p_value is None or explains(c))
-        and named.log_odds - c.log_odds < farthest
+        and named.log_odds - c.log_odds < _farthest(decisive)
     ]
+
+
+def _farthest(decisive: float) -> float:
+    """How far behind, in nats, a hypothesis may be only by bad luck."""
+    return decisive + MOST_LUCK * sqrt(2 * decisive)
+
+
+def may_decide(
+    log_odds: np.ndarray, is_form: np.ndarray, best: float, decisive: float, is_base_adequate: bool
+) -> np.ndarray:
+    """On which hypotheses, `[hypothesis]`, the verdict may hang: these are fitted in every valley.
+
+    Each may still gain `MAY_STILL_GAIN` nats by that. Where the model without effects will do and
+    no named effect can come to convince, on none.
+
+    Args:
+      log_odds: `[hypothesis]`, so far.
+      is_form: `[hypothesis]`, whether it is a form without a name.
+      best: of the log odds of others, so far; -inf where there are none.
+      decisive: nats by which a rival must be behind.
+      is_base_adequate: whether the model without effects leaves nothing but noise.
+    """
+    named = log_odds[~is_form].max(initial=best)
+    if is_base_adequate and named + MAY_STILL_GAIN < CONVINCING:
+        return np.zeros(len(log_odds), bool)
+    leads = max(best, float(log_odds.max()))
+    return log_odds > leads - _farthest(decisive) - MAY_STILL_GAIN
 
 
 def looked_at_again(

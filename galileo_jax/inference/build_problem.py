@@ -24,7 +24,7 @@ def noise_of(clip: Clip, scene: Surroundings) -> NoiseModel:
     """Which imperfections a clip's observation has.
 
     Positions on a ramp in metres, without any scale in pixels, were measured by no camera that
-    anybody knows of. Those of a fall were read off a picture, whoever told them.
+    anybody knows of. Those of a fall were read off a picture, whoever declared them.
     """
     has_pixels = clip.video is not None or clip.pixels_per_metre is not None
     is_measured = scene.has_surface and scene.is_scale_known and not has_pixels

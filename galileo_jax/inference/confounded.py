@@ -24,7 +24,7 @@ def confounded_with_gravity(
       has_surface: whether the objects slide on something.
 
     Returns:
-      names, gravity's own among them; empty where it is told, or not inferred.
+      names, gravity's own among them; empty where it is determined, or not inferred.
     """
     if "gravity" not in parameters:
         return set(), None
@@ -32,7 +32,7 @@ def confounded_with_gravity(
     unknown = [name for name in ("gravity", *alike) if not parameters[name]["identified"]]
     if not unknown:
         return set(), None
-    # A prior may narrow one of them: it is no more told by the clip than the others are.
+    # A prior may narrow one of them: the clip determines it no more than the others.
     names = {"gravity", *alike}
     frictions = [name for name in parameters if has_surface and FRICTION.fullmatch(name)]
     others = [*frictions, *(name for name in ("density_ratio",) if name in parameters)]
@@ -42,7 +42,7 @@ def confounded_with_gravity(
 def _reason(alike: Sequence[str], frictions: Sequence[str], others: Sequence[str]) -> str:
     if "pixels_per_metre" in alike:
         return (
-            "gravity and the scale of the picture cannot both be told from one motion: give "
+            "gravity and the scale of the picture cannot both be determined from one motion: give "
             "--pixels-per-metre, or leave gravity as declared"
         )
     if alike:
@@ -52,12 +52,13 @@ def _reason(alike: Sequence[str], frictions: Sequence[str], others: Sequence[str
         )
     if frictions:
         return (
-            "gravity and friction cannot both be told from one slope: only "
+            "gravity and friction cannot both be determined from one slope: only "
             "g (sin a - k cos a) shows; let the object run out on a level table, or fit clips of "
             "several angles together"
         )
     if others:
         return (
-            "gravity and density_ratio cannot both be told: declare mass, size and liquid_density"
+            "gravity and density_ratio cannot both be determined: declare mass, size and "
+            "liquid_density"
         )
     return "this motion does not depend on gravity enough to tell it"

@@ -44,7 +44,7 @@ def force_constants(trials: JointProblem) -> dict[str, str]:
 
 
 def is_any_weighed(trials: JointProblem) -> bool:
-    """Whether a mass was declared, so that masses and forces can be told at all."""
+    """Whether a mass was declared, so that masses and forces can be determined at all."""
     return any(
         mass is not None
         for problem in trials.problems

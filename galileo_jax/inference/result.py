@@ -27,11 +27,11 @@ from galileo_jax.model.effects.effect import true_surroundings
 from galileo_jax.model.parameters import inverse, prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
-# In z every prior is a standard normal: above this the data told less than half.
+# In z every prior is a standard normal: above this less than half comes from the data.
 IDENTIFIED_SD_Z = 0.5
 
 SCALE_WARNING = (
-    "friction and scale cannot both be told from one clip: give --pixels-per-metre, or fit "
+    "friction and scale cannot both be determined from one clip: give --pixels-per-metre, or fit "
     "clips of several angles together"
 )
 
@@ -138,7 +138,7 @@ def per_mass_entries(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[
 
 
 def undetermined_by_mass(trials: JointProblem, forces: Mapping[str, Any]) -> set[str]:
-    """Masses that nothing told of, and the force constants that are known per mass only.
+    """Masses that nothing determines, and the force constants that are known per mass only.
 
     Several masses tied by their ratios share what the prior says, which looks like knowledge.
 
@@ -164,7 +164,7 @@ def _derived_by_laws(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[
     model = trials.problems[0].model
     effects = model.effects + model.nuisances
 
-    def told(rows: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
+    def by_name(rows: np.ndarray) -> dict[str, tuple[np.ndarray, str]]:
         found: dict[str, tuple[np.ndarray, str]] = {}
         named = model.by_name(rows)
         scene = true_surroundings(effects, named, model.scene.surroundings)
@@ -174,14 +174,14 @@ def _derived_by_laws(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[
         return found
 
     z = np.random.default_rng(0).standard_normal((NUM_PRIOR_DRAWS, len(trials.parameters)))
-    before = told(trials.theta(z))
+    before = by_name(trials.theta(z))
     return {
         name: {
             **summarise(values),
             "unit": unit,
             "identified": _width(values) < IDENTIFIED_SD_Z * _width(before[name][0]),
         }
-        for name, (values, unit) in told(draws).items()
+        for name, (values, unit) in by_name(draws).items()
     }
 
 
@@ -201,7 +201,7 @@ def make_result(
     Args:
       trials: what was fitted.
       posterior: draws in the parameters' units.
-      z_best: `[parameter]`, the mode in z, noise scale last; errors are told at it.
+      z_best: `[parameter]`, the mode in z, noise scale last; errors are stated at it.
       clips: the files fitted.
       method: "grad", "mh" or "cnn".
       seed: of everything random.
@@ -221,7 +221,7 @@ def make_result(
     masses = [name for name in posterior.names if re.fullmatch(r"m\d+", name)]
     ratios = mass_ratios([posterior[name].reshape(-1) for name in masses])
     for name, values in ratios.items():
-        # Of two masses that nothing told of.
+        # Of two masses that nothing determines.
         prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
         logs = np.log(ratios["mass_ratio"] if name == "phi" else values)
         is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
@@ -245,12 +245,12 @@ def make_result(
         unscaled = SCALE_WARNING if has_surface else FREE_SCALE_WARNING
         said = [*notes.get("warnings", []), unscaled]
         notes = notes | {"warnings": list(dict.fromkeys(said))}
-    # Every parameter takes from the residuals what the data told of it.
+    # Every parameter takes from the residuals what the data say of it.
     is_fitted = np.array([p.role != "nuisance" for p in trials.model_parameters])
-    told = 1 - np.clip(spread[: len(is_fitted)] ** 2, 0, 1)
+    share_from_data = 1 - np.clip(spread[: len(is_fitted)] ** 2, 0, 1)
     away = prior_deviations(trials.model_parameters, z_best[: len(is_fitted)])
     theta = trials.theta(z_best)
-    num_fitted, pull = float(np.sum(told[is_fitted])), float(np.sum(away**2))
+    num_fitted, pull = float(np.sum(share_from_data[is_fitted])), float(np.sum(away**2))
     pulled = [
         {"parameter": p.name, "value": float(theta[i]), "unit": p.unit, "z": float(away[i])}
         for i, p in enumerate(trials.model_parameters)

@@ -51,7 +51,7 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
     """The objects whose tracks are not to be believed to their ends.
 
     Args:
-      clip: without a scale leaps are not told.
+      clip: without a scale leaps are not reported.
       observation: the track in metres, as far as it is used.
       track: in pixels, to the clip's end.
     """

@@ -18,7 +18,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
 
-LEAST_FACTOR = 1.6  # of the frame rate, that is told of; half the friction or rolling gives 1.4
+LEAST_FACTOR = 1.6  # of the frame rate, that is reported; half the friction or rolling gives 1.4
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
 COMMON_FPS = (24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
 WINDOWS, MIN_POINTS = 5, 5  # of a stretch; points in each, to tell an acceleration
@@ -51,14 +51,14 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
     wanted = clip.fps * factor
     likely = _likely(wanted, clip.container_fps, found.is_least)
     name, more = observation.names[0], "at least " if found.is_least else ""
-    told = (
+    doubt = (
         f"{clip.path}: fps: {clip.fps:g}, but by {name}'s path gravity would be {more}"
         f"{found.value:.2g} m/s^2, not {clip.gravity:g}; likely {likely}"
     )
     if clip.pixels_per_metre is not None:
         scale = clip.pixels_per_metre * found.value / clip.gravity
-        told += f" (or pixels_per_metre is off: {scale:.3g} in place of {clip.pixels_per_metre:g})"
-    return told
+        doubt += f" (or pixels_per_metre is off: {scale:.3g} in place of {clip.pixels_per_metre:g})"
+    return doubt
 
 
 def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | None:

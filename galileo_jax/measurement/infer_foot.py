@@ -61,7 +61,7 @@ def infer_foot(clip: Clip, observation: Observation) -> np.ndarray:
     if first.size_m is None:
         raise InputError(
             f"{clip.path}: origin_px: null, and {first.name}'s size_m is null, too; the foot of "
-            f"the ramp is told by its path only with its height; {remedy}"
+            f"the path shows the ramp only together with its height; {remedy}"
         )
     points = observation.position_m[0][:, observation.mask[0]]
     count = points.shape[1]
@@ -69,7 +69,7 @@ def infer_foot(clip: Clip, observation: Observation) -> np.ndarray:
     best = min(splits, key=lambda at: _misfit(points, at), default=None)
     no_bend = InputError(
         f"{clip.path}: origin_px: null, and {first.name}'s path does not bend: the foot of the "
-        f"ramp is not told; {remedy}"
+        f"ramp is not declared; {remedy}"
     )
     if best is None:
         raise no_bend

@@ -92,7 +92,7 @@ def measure(clip: Clip) -> Measurement:
             "what follows is left out"
         )
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
-    told = (
+    other_doubts = (
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
         for one in astray
     )
@@ -101,7 +101,7 @@ def measure(clip: Clip) -> Measurement:
         observation=observation,
         inferred={**found, **measured.inferred},
         astray=astray,
-        doubts=(*([] if doubt is None else [doubt]), *told),
+        doubts=(*([] if doubt is None else [doubt]), *other_doubts),
         remarks=tuple(remarks),
     )
 

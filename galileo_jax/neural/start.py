@@ -2,7 +2,8 @@
 
     1. Levenberg-Marquardt from the middle of the network's posterior: no scattered starts.
     2. Every chain starts at a draw of the network's posterior of masses and frictions, and of the
-       nuisances given these, by the normal approximation at the fit.
+       nuisances given these, by the normal approximation at the fit: of a few draws the one that
+       fits best, because a small coefficient of restitution is anything but normal.
 
 As Galileo's recognition network starts its chains. The network's intervals are wider than the
 posterior, so that chains start apart, as R-hat needs it.
@@ -21,6 +22,9 @@ from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.estimate import cnn_posterior
+
+
+NUM_COMPLETIONS = 4
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,11 @@ def start_from_network(trials: JointProblem, seed: int, num_chains: int) -> Star
     drawn = posterior.flat()[generator.choice(posterior.draws.shape[1], num_chains)]
     known = np.array([parameter.role == "main" for parameter in trials.parameters])
     z = np.asarray(inverse(trials.parameters, jnp.asarray(drawn)))
-    return Start(fit, completed(z, known, fit, generator), {"init": "cnn"} | _warnings(notes))
+    tried = completed(np.repeat(z, NUM_COMPLETIONS, axis=0), known, fit, generator)
+    costs = fitter.search_costs(tried[:, : len(free)], np.tile(free, (len(tried), 1)))
+    best = np.argmin(costs.reshape(num_chains, -1), axis=1)
+    z = tried.reshape(num_chains, NUM_COMPLETIONS, -1)[np.arange(num_chains), best]
+    return Start(fit, z, {"init": "cnn"} | _warnings(notes))
 
 
 def completed(

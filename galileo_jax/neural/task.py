@@ -43,7 +43,7 @@ class Task(Trainable, Protocol):
     """A preset: it can be tested, too."""
 
     def test(self, network: Any, data: Arrays, seed: int) -> dict[str, float]:
-        """What is to be told of a trained network on new samples."""
+        """What is to be reported of a trained network on new samples."""
         ...
 
     def reference(self) -> dict[str, float]:

@@ -37,8 +37,8 @@ def train(task: Trainable, config: TrainConfig, data: Arrays, folder: Path) -> P
     state = State(learned, learned, adam.init(learned))
     progress = Progress(0, config.learning_rate, float("inf"), 0, 0, ())
     checkpoints = Checkpoints(folder, config)
-    if kept := checkpoints.restore(state):
-        state, progress = kept
+    if restored := checkpoints.restore(state):
+        state, progress = restored
     fresh_on_device = {name: jnp.asarray(values) for name, values in fresh.items()}
     held_on_device = {name: jnp.asarray(values) for name, values in held_out.items()}
     saved, saved_s = progress.epoch, time.monotonic()

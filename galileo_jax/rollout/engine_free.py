@@ -89,7 +89,7 @@ def floor_of(
 ) -> Bounce | None:
     """The floor at its true height, never above the body's start.
 
-    Its height is told as measured; what magnifies the picture magnifies its depth, too.
+    Its height is given as measured; what magnifies the picture magnifies its depth, too.
     """
     floor = next((f for e in effects if (f := e.bounce(theta, scene)) is not None), None)
     if floor is None:

@@ -13,7 +13,7 @@ from galileo_jax.sweeping.work import measure_files, run_cell
 
 @dataclass(frozen=True)
 class Watch:
-    """Who is told how far a sweep is.
+    """Who is notified how far a sweep is.
 
     Attributes:
       on_begin: called with "tracking" or "cells", and how many there are.
@@ -41,7 +41,7 @@ def carry_out(
       cells: of the sweep.
       store: where results are and go; each is written before the next is waited for.
       engine: carries out the tasks.
-      watch: is told.
+      watch: is notified.
       with_page: names of the cells that get a page of their own.
       computed_again: names of cells that are computed though they have a result.
 

@@ -1,4 +1,4 @@
-"""What one worker of a sweep may use, and how its process is told, before it imports JAX."""
+"""What one worker of a sweep may use, and how its process learns of it before it imports JAX."""
 
 import os
 from collections.abc import Mapping

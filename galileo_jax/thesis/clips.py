@@ -18,7 +18,7 @@ TEST_NOISE_M = 2.2e-5  # 0.02 px at 900 px/m: the tracker's on the shared clips,
 
 
 def thesis_clips(
-    key: jax.Array, count: int, noise_m: float, told_noise_m: float | None = None
+    key: jax.Array, count: int, noise_m: float, stated_noise_m: float | None = None
 ) -> Arrays:
     """The thesis's setting, seen with a little noise, in the form `GalileoTask.make` gives.
 
@@ -26,7 +26,7 @@ def thesis_clips(
       key: of everything random.
       count: how many samples.
       noise_m: of every coordinate.
-      told_noise_m: what the network is told of it; default: the truth.
+      stated_noise_m: what the network is given for it; default: the truth.
 
     Returns:
       the samples, and with them `collides`: whether object 2 moves by more than 0.1 mm.
@@ -37,7 +37,7 @@ def thesis_clips(
     theta = setting.draw(of_theta, count)
     clean = setting.positions(theta)
     seen = clean + noise_m * np.asarray(jax.random.normal(of_noise, clean.shape))
-    made = to_clips(theta, seen, setting.surroundings, told_noise_m or noise_m)
+    made = to_clips(theta, seen, setting.surroundings, stated_noise_m or noise_m)
     collides = np.ptp(clean[:, 1, 0], axis=-1) > 1e-4
     return made | {"collides": collides}
 

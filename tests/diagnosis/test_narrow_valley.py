@@ -56,7 +56,9 @@ def test_the_search_arrives_where_a_start_at_the_truth_does(slowly_released):
                 start[i] = parameter.prior.inverse(jnp.asarray(truth[parameter.name]))
         free = trials.free(("stribeck",))[:count]
         (from_truth,) = fitter.fit_from(start[None], free[None], np.zeros(1, int))
-        searched = fit_candidates(fitter, base, [("stribeck",), ("force_at_a_time",)], seed=0)
+        searched = fit_candidates(
+            fitter, [base, base], [("stribeck",), ("force_at_a_time",)], seed=0
+        )
     named, form = (one.fit.log_evidence for one in searched)
     assert named > from_truth.log_evidence - 1.0
     assert named > form + DECISIVE

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from galileo_jax.diagnosis.candidates import _best_strengths
+from galileo_jax.diagnosis.candidate_starts import best_strengths
 
 HELD = 1e6  # chi2 / 2 of a body that never sets off
 
@@ -28,7 +28,7 @@ class Cliff:
 def test_the_edge_is_approached_from_below(edge: float):
     fitter: Any = Cliff(edge)
     start = np.array([[0.3, 2.5], [0.7, -1.0]])
-    found = _best_strengths(fitter, start, np.ones((2, 2), bool), [np.array([1])] * 2)
+    found = best_strengths(fitter, start, np.ones((2, 2), bool), [np.array([1])] * 2)
     assert np.all(found[:, 1] <= edge)
     assert found[:, 1] == pytest.approx(edge, abs=2e-3)
     np.testing.assert_array_equal(found[:, 0], start[:, 0])

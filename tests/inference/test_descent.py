@@ -28,7 +28,8 @@ class Banana:
         white = np.stack([10 * (z[:, 1] - z[:, 0] ** 2), 3 - z[:, 0]], axis=1)
         jacobian = np.zeros((len(z), 2, 3))
         jacobian[:, 0, 0], jacobian[:, 0, 1], jacobian[:, 1, 0] = -20 * z[:, 0], 10, -1
-        return Slopes([np.where(points.free[:, None], jacobian, 0.0)], [white])
+        index = np.tile(np.arange(3), (len(white), 1))
+        return Slopes([np.where(points.free[:, None], jacobian, 0.0)], [white], index, 3)
 
 
 def batch(*z, free: np.ndarray | bool = True):

@@ -150,7 +150,9 @@ def test_without_a_scale_nothing_is_told(tmp_path):
     entries = result["parameters"]
     assert not entries["gravity"]["identified"]
     assert not entries["pixels_per_metre"]["identified"]
-    assert any("the scale of the picture cannot both be told" in w for w in result["warnings"])
+    assert any(
+        "the scale of the picture cannot both be determined" in w for w in result["warnings"]
+    )
 
 
 @pytest.mark.parametrize(

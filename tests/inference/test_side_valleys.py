@@ -8,6 +8,7 @@ import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.fits.descent import Descended
 from galileo_jax.inference.fits.gradient import Code, Ends, GradientFitter
 from galileo_jax.inference.fits.programs import Quadratic
 from galileo_jax.inference.fits.stages import before_moving
@@ -101,12 +102,14 @@ def test_nothing_is_cut_where_an_object_moves_from_the_first_frame_on():
 
 
 def test_ends_are_sorted_by_valleys():
-    """Two in the first, at 0 and one of 0.1 nats; one in a second; one far behind counts not."""
-    z = np.array([[3.0, 0.0], [0.0, 0.0], [0.1, 0.1], [9.0, 9.0]])
-    cost_nats, normal = np.array([15.0, 10.0, 10.1, 40.0]), np.tile(4 * np.eye(2), (4, 1, 1))
-    ends = Ends.of(Quadratic(z, cost_nats, np.zeros((4, 2)), normal), num_steps=7)
+    """Three in the first, one of which joined another; one in a second; one far behind is none."""
+    z = np.array([[3.0, 0.0], [0.0, 0.0], [0.1, 0.1], [9.0, 9.0], [0.8, 0.0]])
+    cost_nats, normal = np.array([15.0, 10.0, 10.1, 40.0, 12.0]), np.tile(4 * np.eye(2), (5, 1, 1))
+    best = Quadratic(z, cost_nats, np.zeros((5, 2)), normal)
+    joined = np.array([0, 1, 2, 3, 2])  # the last stopped where it had come near the third
+    ends = Ends.of(Descended(best, cost_nats, z, np.ones(5, bool), 7, joined))
     np.testing.assert_array_equal(ends.best.z, z[[1, 0]])
-    assert (ends.num_agreeing, ends.num_steps) == (2, 7)
+    assert (ends.num_agreeing, ends.num_steps) == (3, 7)
 
 
 def test_starts_keep_what_is_known():

@@ -84,7 +84,7 @@ class TrackReader(ABC):
 
     Attributes:
       name: in the registry.
-      meaning: what the user is told it reads.
+      meaning: how messages to the user describe it.
     """
 
     name: ClassVar[str]

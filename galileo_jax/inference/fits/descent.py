@@ -22,6 +22,7 @@ from galileo_jax.runtime.batching import in_chunks, one_at_a_time
 # plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
 CATCHES_UP = 0.1  # what the next step must promise of what one is behind
+SAME_VALLEY_NATS = 1.0  # by which points differ that are of one valley
 
 
 class GiveUp(NamedTuple):
@@ -31,19 +32,25 @@ class GiveUp(NamedTuple):
       owner: `[point]`, whose each is; those of one owner are rivals.
       behind: nats behind the best rival, if the next step promises little of it.
       price: `[point]`, what belongs to the cost beside chi2 / 2 and the prior's part.
+      behind_all: the same behind the best point of all owners.
+      lowest: total that somebody beside these points has come to.
     """
 
     owner: np.ndarray
     behind: float
     price: Any = 0.0
+    behind_all: float = np.inf
+    lowest: float = np.inf
 
     def __call__(self, cost: np.ndarray, promised: np.ndarray) -> np.ndarray:
         """Which, `[point]`, by their costs and what the next steps promise, `[point]`, nats."""
         total = cost + self.price
         lowest = np.full(self.owner.max() + 1, np.inf)
         np.minimum.at(lowest, self.owner, total)
-        behind = total - lowest[self.owner]
-        return (behind > self.behind) & (promised < CATCHES_UP * behind)
+        behind, behind_all = total - lowest[self.owner], total - min(lowest.min(), self.lowest)
+        return ((behind > self.behind) & (promised < CATCHES_UP * behind)) | (
+            (behind_all > self.behind_all) & (promised < CATCHES_UP * behind_all)
+        )
 
 
 class Descended(NamedTuple):
@@ -55,6 +62,8 @@ class Descended(NamedTuple):
       widths: `[point, model parameter]`, half a conditional sd, see `Descent.half_sd`.
       is_settled: `[point]`; False where steps ran out or it was given up.
       num_steps: how many there were.
+      joined: `[point]`, which point of its owner each is in the same valley as, and behind; its
+        own index where none.
     """
 
     best: Quadratic
@@ -62,6 +71,43 @@ class Descended(NamedTuple):
     widths: np.ndarray
     is_settled: np.ndarray
     num_steps: int
+    joined: np.ndarray
+
+
+def in_valley(best: Quadratic, first: int, others: np.ndarray) -> np.ndarray:
+    """Which of `others` `[point]` are in a point's valley; nearness is measured by its slopes."""
+    step = best.z[others] - best.z[first]
+    far = 0.5 * np.einsum("pi,ij,pj->p", step, best.normal[first], step)
+    return np.maximum(far, best.cost[others] - best.cost[first]) < SAME_VALLEY_NATS
+
+
+def join(best: Quadratic, owner: np.ndarray, joined: np.ndarray) -> None:
+    """Marks in `joined` the points that have come to the valley of a better one of their owner.
+
+    Many starts of one hypothesis end in one valley: one of them may walk it for all.
+    """
+    left = np.flatnonzero(joined == np.arange(len(joined)))
+    for own in np.flatnonzero(np.bincount(owner[left]) > 1):
+        rivals = left[owner[left] == own]
+        rivals = rivals[np.argsort(best.cost[rivals], kind="stable")]
+        while rivals.size > 1:
+            first, rivals = rivals[0], rivals[1:]
+            is_same = in_valley(best, first, rivals)
+            step = best.z[rivals] - best.z[first]
+            # By the slopes of either: one of them may be where little shows.
+            is_same &= (
+                np.einsum("pi,pij,pj->p", step, best.normal[rivals], step) < 2 * SAME_VALLEY_NATS
+            )
+            joined[rivals[is_same]] = first
+            rivals = rivals[~is_same]
+
+
+def ends_of(joined: np.ndarray) -> np.ndarray:
+    """Where each point that joined another is in the end, `[point]`: an index."""
+    ends = joined
+    while (ends != (further := joined[ends])).any():
+        ends = further
+    return ends
 
 
 @dataclass(frozen=True)
@@ -87,7 +133,7 @@ class Descent:
         best = Quadratic(points.z.copy(), np.full(count, np.inf), np.zeros((count, size)), eye)
         proposed, widths = points.z.copy(), np.tile(self.coarse_steps, (count, 1))
         region, promised, first_cost = np.ones(count), np.full(count, np.inf), best.cost
-        active, num_steps = np.arange(count), 0
+        active, num_steps, joined = np.arange(count), 0, np.arange(count)
         while active.size and num_steps < max_steps:
             there = points.take(active)._replace(z=proposed[active])
             slopes = self.slopes(there, widths[active])
@@ -106,9 +152,11 @@ class Descent:
             goes_on = ~(promised < enough)
             if give_up is not None:
                 goes_on &= ~give_up(best.cost, promised)
+                join(best, give_up.owner, joined)
+                goes_on &= joined == np.arange(count)
             active = active[goes_on[active]]
         is_settled = promised < enough
-        return Descended(best, first_cost, widths, is_settled, num_steps)
+        return Descended(best, first_cost, widths, is_settled, num_steps, joined)
 
     def slopes(self, points: Batch, widths: np.ndarray) -> Slopes:
         """Over small steps where motion is smooth, else over `widths` `[point, parameter]`."""
@@ -122,7 +170,7 @@ class Descent:
         Conditional, the others held: along a ridge (all masses by the same factor) the
         marginal sd is large, and differences over it would bend the ridge.
         """
-        squares = sum(np.sum(j**2, axis=1) for j in slopes.jacobian)
+        squares = sum(slopes.among_all(np.sum(j**2, axis=1)) for j in slopes.jacobian)
         smallest = SMALLEST_STEP if self.is_smooth else SMALLEST_ROUGH_STEP
         half = 0.5 / np.sqrt(1 + squares)
         return np.clip(half, smallest * self.coarse_steps, LARGEST_STEP * self.coarse_steps)

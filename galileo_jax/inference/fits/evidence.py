@@ -84,6 +84,7 @@ def laplace_fits(
     slopes = residuals.slopes(found.points, found.widths, is_central=True)
     stats = stats | {"num_rollouts": residuals.num_rollouts}
     normal = quadratic(slopes, found.points.z).normal
+    slopes = slopes._replace(jacobian=[slopes.among_all(j, axis=2) for j in slopes.jacobian])
     return [
         _laplace_fit(trials, residuals, found, slopes, own, stats, i)
         for i, own in enumerate(normal)

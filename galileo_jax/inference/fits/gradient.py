@@ -15,14 +15,14 @@ are compared; scattered starting points cost only one batch. Which optimiser, an
 docs/explanation/optimiser.md.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import chi2
 
-from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
+from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp, ends_of, in_valley
 from galileo_jax.inference.fits.evidence import Code as Code
 from galileo_jax.inference.fits.evidence import GradientFit as GradientFit
 from galileo_jax.inference.fits.evidence import laplace_fits
@@ -37,7 +37,7 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
-SAME_VALLEY_NATS = 1.0  # by which ends of a search differ that are of one valley: they stop at 0.1
+OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
 LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
 MOST_VALLEYS = 4  # that are polished
 CHANCE = 0.01  # a fit that noise leaves so seldom as bad or worse is searched for once more
@@ -92,19 +92,22 @@ class Ends:
     num_steps: int
 
     @classmethod
-    def of(cls, ends: Quadratic, num_steps: int) -> "Ends":
-        """Sorts ends by valleys: nearness is measured by the slopes of the better one."""
-        left, valleys, num_agreeing = np.argsort(ends.cost), [], 0
-        left = left[ends.cost[left] < ends.cost[left[0]] + BEHIND_IN_SEARCH]
-        while left.size and len(valleys) < MOST_VALLEYS:
-            best = left[0]
-            step = ends.z[left] - ends.z[best]
-            far = 0.5 * np.einsum("pi,ij,pj->p", step, ends.normal[best], step)
-            is_same = np.maximum(far, ends.cost[left] - ends.cost[best]) < SAME_VALLEY_NATS
-            num_agreeing = num_agreeing or int(is_same.sum())
-            valleys.append(best)
-            left = left[~is_same]
-        return cls(Quadratic(*(leaf[valleys] for leaf in ends)), num_agreeing, num_steps)
+    def of(cls, found: Descended) -> "Ends":
+        """Sorts ends by valleys."""
+        ends, whose = found.best, ends_of(found.joined)
+        rows = valleys(ends, np.unique(whose))
+        agree = in_valley(ends, rows[0], whose)
+        return cls(Quadratic(*(leaf[rows] for leaf in ends)), int(agree.sum()), found.num_steps)
+
+
+def valleys(ends: Quadratic, rows: np.ndarray) -> list[int]:
+    """The best point of every valley among `rows` that is not far behind, best first."""
+    left, found = rows[np.argsort(ends.cost[rows], kind="stable")], []
+    left = left[ends.cost[left] < ends.cost[left[0]] + BEHIND_IN_SEARCH]
+    while left.size and len(found) < MOST_VALLEYS:
+        found.append(int(left[0]))
+        left = left[~in_valley(ends, found[-1], left)]
+    return found
 
 
 class GradientFitter:
@@ -190,7 +193,76 @@ class GradientFitter:
             own = np.flatnonzero(owner == hypothesis)
             best.append(own[np.argmin(found.best.cost[own])])
         ends = points._replace(z=found.best.z).take(np.array(best))
-        return self._polish(ends, found.num_steps)
+        return list(self._polish(ends, np.arange(len(best)), found.num_steps).values())
+
+    def race(
+        self,
+        starts: Float[np.ndarray, "start parameter"],
+        free: Bool[np.ndarray, "start parameter"],
+        owner: Int[np.ndarray, " start"],
+        lowest: float = np.inf,
+    ) -> Descended:
+        """Searches for several hypotheses at once, as long as each may still win.
+
+        A start stops where it joins a better one of its hypothesis, or is far behind: of its
+        hypothesis, or of the best of all. Costs are those at the search's noise, which is no less
+        than the clip's: who is far behind by them is farther behind by the clip's own.
+
+        Args:
+          starts: `[start, model parameter]`, z.
+          free: `[start, model parameter]`, see `JointProblem.free`.
+          owner: `[start]`, which hypothesis each belongs to.
+          lowest: cost that others have already come to, nats.
+        """
+        give_up = GiveUp(owner, BEHIND_IN_SEARCH, 0.0, OUT_OF_THE_RACE, lowest)
+        settings = self.settings
+        points = self._batch(starts, free)
+        return self._descent(points, settings.enough, settings.max_steps, give_up)
+
+    def polish(
+        self,
+        z: Float[np.ndarray, "point parameter"],
+        free: Bool[np.ndarray, "point parameter"],
+        owner: Int[np.ndarray, " point"],
+    ) -> dict[int, GradientFit]:
+        """Fits from where a search ended, one fit for each valley of each hypothesis.
+
+        Args:
+          z: `[point, model parameter]`.
+          free: `[point, model parameter]`.
+          owner: `[point]`, which hypothesis each belongs to.
+
+        Returns:
+          By the index of the point from which it came.
+        """
+        return self._polish(self._batch(z, free), owner, 0)
+
+    def polish_in_turn(
+        self,
+        z: Float[np.ndarray, "hypothesis parameter"],
+        free: Bool[np.ndarray, "hypothesis parameter"],
+        parts: Sequence[np.ndarray],
+    ) -> Iterator[tuple[int, GradientFit]]:
+        """Fits one end of each of several hypotheses, part by part of them.
+
+        Those far behind what an earlier part came to are left where they are.
+
+        Args:
+          z: `[hypothesis, model parameter]`.
+          free: `[hypothesis, model parameter]`.
+          parts: indices of hypotheses.
+        """
+        lowest = np.inf
+        for own in parts:
+            points = self._batch(z[own], free[own])
+            fits, lowest = self._polish_below(points, np.arange(len(own)), 0, lowest)
+            for row, fit in fits.items():
+                yield int(own[row]), fit
+
+    def with_variants(self, fit: GradientFit) -> np.ndarray:
+        """A fit and it with other values of the positive nuisances, `[variant, z]`."""
+        count = self._count
+        return np.stack(self._variants(fit.z[:count], fit.free[:count]))
 
     def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
@@ -201,7 +273,7 @@ class GradientFitter:
         points = self._batch(starts, free)
         best = np.argsort(self._residuals.costs(points))[:num_refined]
         found = self._search(points.take(best), np.zeros(len(best), int))
-        return Ends.of(found.best, found.num_steps)
+        return Ends.of(found)
 
     def _starts_by_phases(self, free: np.ndarray, num: int, seed: int) -> np.ndarray:
         """Starts that suit what was seen before each further object moved, `[start, z]`."""
@@ -223,16 +295,18 @@ class GradientFitter:
         """Polishes the best of every valley and variants of the first; the most evident fit."""
         first, *others = ends.best.z
         variants = self._variants(first, free)
-        fits = self._polish(self._batch(np.stack([*variants, *others]), free), ends.num_steps)
-        best = int(np.argmax([fit.log_evidence for fit in fits]))
+        points = self._batch(np.stack([*variants, *others]), free)
+        fits = self._polish(points, np.zeros(len(points.z), int), ends.num_steps)
+        best = max(fits, key=lambda row: fits[row].log_evidence)
         if best < len(variants):
             return fits[best]
         return self._best_variant(fits[best].z[: self._count], free, ends.num_steps)
 
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
         """Polishes z and variants of it; the most evident fit."""
-        variants = np.stack(self._variants(z, free))
-        return max(self._polish(self._batch(variants, free), num_steps), key=_evidence)
+        points = self._batch(np.stack(self._variants(z, free)), free)
+        fits = self._polish(points, np.zeros(len(points.z), int), num_steps)
+        return max(fits.values(), key=_evidence)
 
     def _variants(self, z: np.ndarray, free: np.ndarray) -> list[np.ndarray]:
         """z, and it with other values of the positive nuisances.
@@ -268,10 +342,19 @@ class GradientFitter:
         give_up = GiveUp(owner, BEHIND_IN_SEARCH)
         return self._descent(points, settings.enough, settings.max_steps, give_up)
 
-    def _polish(self, points: Batch, num_steps: int) -> list[GradientFit]:
-        found = polish(self._descent, points, self._settled, self.settings.max_polish_steps)
+    def _polish(self, points: Batch, owner: np.ndarray, num_steps: int) -> dict[int, GradientFit]:
+        """By the row of the point from which each came; who joined another has none."""
+        return self._polish_below(points, owner, num_steps, np.inf)[0]
+
+    def _polish_below(
+        self, points: Batch, owner: np.ndarray, num_steps: int, lowest: float
+    ) -> tuple[dict[int, GradientFit], float]:
+        """As `_polish`, and the least cost; `lowest`: that of others."""
+        most = self.settings.max_polish_steps
+        found = polish(self._descent, points, owner, self._settled, most, lowest)
         stats: dict[str, float] = {"num_steps": num_steps + found.num_steps}
-        return laplace_fits(self.trials, self._residuals, found, stats)
+        fits = laplace_fits(self.trials, self._residuals, found, stats)
+        return dict(zip(found.rows.tolist(), fits, strict=True)), found.lowest
 
 
 def _evidence(fit: GradientFit) -> float:

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from galileo_jax.inference.fits.descent import CATCHES_UP, Descent, GiveUp
 from galileo_jax.inference.fits.residuals import Batch, Residuals
@@ -24,15 +24,27 @@ class Polished(NamedTuple):
       widths: `[point, model parameter]`, steps of differences at the posterior's scale, in z.
       is_settled: `[point]`.
       num_steps: how many it took.
+      lowest: the least cost with what noise scales cost, nats.
+      rows: `[point]`, which of the points given: those that came to the valley of a better one of
+        their owner are left out.
     """
 
     points: Batch
     widths: Float[np.ndarray, "point parameter"]
     is_settled: Bool[np.ndarray, " point"]
     num_steps: int
+    lowest: float
+    rows: Int[np.ndarray, " point"]
 
 
-def polish(descent: Descent, points: Batch, settled: float, max_steps: int) -> Polished:
+def polish(
+    descent: Descent,
+    points: Batch,
+    owner: np.ndarray,
+    settled: float,
+    max_steps: int,
+    lowest: float = np.inf,
+) -> Polished:
     """Descends again and again, each time with noise scales that suit the residuals.
 
     Each round begins with no damping to speak of, so that one that was stuck in a curved valley
@@ -41,14 +53,16 @@ def polish(descent: Descent, points: Batch, settled: float, max_steps: int) -> P
     Args:
       descent: of the trials.
       points: where the search ended.
+      owner: `[point]`, whose each is.
       settled: nats.
       max_steps: of one round.
+      lowest: as in what was returned, of other points polished before.
     """
     z, noise = points.z.copy(), points.noise.copy()
     count, size = z.shape
     normal, widths = np.tile(np.eye(size), (count, 1, 1)), np.tile(descent.coarse_steps, (count, 1))
     is_settled, total = np.zeros(count, bool), np.full(count, np.inf)
-    active, num_steps = np.arange(count), 0
+    active, num_steps, is_alone = np.arange(count), 0, np.ones(count, bool)
     num_values = np.array([clip.data.whitening.num_values for clip in descent.residuals.clips])
     for _ in range(MAX_ROUNDS):
         here = Batch(z, points.free, noise).take(active)
@@ -57,19 +71,23 @@ def polish(descent: Descent, points: Batch, settled: float, max_steps: int) -> P
         drifts = np.abs(scales / noise[active] - 1).max(axis=1) > DRIFT
         noise[active] = scales
         price = np.log(noise) @ num_values  # what the noise scales cost
-        give_up = GiveUp(np.zeros(len(active), int), BEHIND, price[active])
+        give_up = GiveUp(owner[active], BEHIND, price[active], BEHIND, lowest)
         found = descent(here._replace(noise=scales), SHARE_PROMISED * settled, max_steps, give_up)
         z[active], normal[active], widths[active] = found.best.z, found.best.normal, found.widths
         num_steps += found.num_steps
         total[active] = found.best.cost + price[active]
         gains = found.first_cost - found.best.cost
         is_settled[active] = (gains < settled) & ~drifts & found.is_settled
-        behind = total[active] - total.min()
+        lowest = min(lowest, float(total.min()))
+        behind = total[active] - lowest
         gives_up = (behind > BEHIND) & (gains < CATCHES_UP * behind)
-        active = active[~is_settled[active] & ~gives_up]
+        is_alone[active] = found.joined == np.arange(len(active))
+        active = active[~is_settled[active] & ~gives_up & is_alone[active]]
         if not active.size:
             break
-    return Polished(Batch(z, points.free, noise), widths, is_settled, num_steps)
+    rows = np.flatnonzero(is_alone)
+    ends = Batch(z, points.free, noise).take(rows)
+    return Polished(ends, widths[rows], is_settled[rows], num_steps, lowest, rows)
 
 
 def noise_scales(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from galileo_jax.inference.fits.programs import (
     ClipArrays,
@@ -52,15 +52,27 @@ class Batch(NamedTuple):
 
 
 class Slopes(NamedTuple):
-    """Residuals of points and how they change.
+    """Residuals of points and how they change with each point's free parameters.
 
     Attributes:
-      jacobian: for each clip `[point, value, model parameter]`; 0 where pinned.
+      jacobian: for each clip `[point, value, free]`; 0 beyond a point's own number of them.
       white: for each clip `[point, value]`.
+      index: `[point, free]`, where these stand among the models'; beyond, the count of all.
+      count: of the models' parameters.
     """
 
-    jacobian: list[Float[np.ndarray, "point value parameter"]]
+    jacobian: list[Float[np.ndarray, "point value free"]]
     white: list[Float[np.ndarray, "point value"]]
+    index: Int[np.ndarray, "point free"]
+    count: int
+
+    def among_all(self, values: np.ndarray, axis: int = 1) -> np.ndarray:
+        """Numbers of free parameters along an axis as numbers of all: 0 of those pinned."""
+        shape = [1] * values.ndim
+        shape[0], shape[axis] = self.index.shape
+        found = np.zeros((*values.shape[:axis], self.count + 1, *values.shape[axis + 1 :]))
+        np.put_along_axis(found, self.index.reshape(shape), values, axis)
+        return np.delete(found, self.count, axis)
 
 
 @dataclass(frozen=True)
@@ -202,10 +214,8 @@ class Residuals:
                 *(points.z, points.free, points.noise[:, c], index, *motion),
             )
             whites.append(white)
-            full = np.zeros((len(points.z), white.shape[1], self._count + 1))
-            np.put_along_axis(full, index[:, None], jacobian, axis=2)
-            jacobians.append(full[..., :-1])
-        return Slopes(jacobians, whites)
+            jacobians.append(jacobian)
+        return Slopes(jacobians, whites, index, self._count)
 
     def _simulate(self, clip: FittedClip, z: np.ndarray, free: np.ndarray, noise: np.ndarray):
         """`[point, ...]`: parameters in their units, centres and velocities."""
@@ -222,10 +232,15 @@ def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
 
 def quadratic(slopes: Slopes, z: np.ndarray) -> Quadratic:
     """The cost round points z `[point, model parameter]`."""
-    pairs = list(zip(slopes.jacobian, slopes.white, strict=True))
-    gradient = z + sum(np.einsum("pvi,pv->pi", j, w) for j, w in pairs)
-    normal = np.eye(z.shape[1]) + sum(np.swapaxes(j, 1, 2) @ j for j, _ in pairs)
-    return Quadratic(z, cost(slopes.white, z), gradient, normal)
+    gradient = np.zeros(slopes.index.shape)
+    normal = np.zeros((*slopes.index.shape, slopes.index.shape[1]))
+    for j, w in zip(slopes.jacobian, slopes.white, strict=True):
+        turned = np.swapaxes(j, 1, 2)
+        gradient += (turned @ w[..., None])[..., 0]
+        normal += turned @ j
+    whole = slopes.among_all(slopes.among_all(normal), axis=2)
+    whole += np.eye(z.shape[1])
+    return Quadratic(z, cost(slopes.white, z), z + slopes.among_all(gradient), whole)
 
 
 def _free_index(free: np.ndarray) -> np.ndarray:

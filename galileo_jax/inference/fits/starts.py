@@ -51,7 +51,7 @@ def scattered_round(
 
 
 def _in_range(trials: JointProblem, index: int, share: np.ndarray) -> np.ndarray:
-    """Shares of a parameter's prior, those of friction within what can be told from motion."""
+    """Shares of a parameter's prior, those of friction within what motion can show."""
     parameter = trials.model_parameters[index]
     if parameter.role != "main" or not parameter.name.startswith("k"):
         return share

@@ -1,4 +1,4 @@
-"""Coordinates in which a bent valley of the posterior is straight.
+"""Coordinates in which a curved valley of the posterior is straight.
 
     z = mode + R (u + B u^2 + C u^3)        R R^T the covariance; B, C strictly lower triangular
 
@@ -90,7 +90,7 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     # Noise scales, behind the others, hardly depend on these.
     root[count:, count:] = np.diag(np.sqrt(np.diag(fit.covariance)[count:]))
     slopes = residuals.slopes(_near(fit, fit.z[None]), fit.steps[None], is_central=True)
-    jacobian = np.concatenate([clip[0] for clip in slopes.jacobian])
+    jacobian = np.concatenate([slopes.among_all(clip, axis=2)[0] for clip in slopes.jacobian])
     step = REACH * np.eye(count)
     z = np.tile(fit.z, (1 + 2 * count, 1))
     z[:, :count] += np.concatenate([np.zeros((1, count)), step, -step]) @ own.T

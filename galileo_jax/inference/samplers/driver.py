@@ -302,7 +302,7 @@ def _refitted(sampler: AbstractTunedSampler, history: History) -> AbstractTunedS
     return sampler.fitted(jnp.asarray(flat.mean(axis=0)), jnp.asarray(covariance))
 
 
-def _kept(history: History, settings: Settings) -> History:
+def _thinned(history: History, settings: Settings) -> History:
     first = settings.warmup_steps + settings.thin - 1
     return History(*(leaf[:, first :: settings.thin] for leaf in history))
 
@@ -321,7 +321,7 @@ def _diagnose(
     settings: Settings,
     monitor: Callable[[np.ndarray], Mapping[str, np.ndarray]],
 ) -> dict[str, Convergence]:
-    return convergences(monitor(_kept(history, settings).position))
+    return convergences(monitor(_thinned(history, settings).position))
 
 
 def _is_enough(state: Mapping[str, Convergence], settings: Settings) -> bool:
@@ -339,7 +339,7 @@ def _posterior(
     settings: Settings,
     state: Mapping[str, Convergence],
 ) -> Posterior:
-    kept = _kept(history, settings)
+    thinned = _thinned(history, settings)
     sampled = history.is_accepted[:, settings.warmup_steps :]
     if not settings.stops_early:
         status = Status.FIXED_LENGTH
@@ -352,8 +352,8 @@ def _posterior(
     num_chains = history.position.shape[0]
     return Posterior(
         names=tuple(names),
-        draws=kept.position,
-        log_density=kept.log_density,
+        draws=thinned.position,
+        log_density=thinned.log_density,
         status=status,
         stats={
             "num_chains": num_chains,

@@ -42,5 +42,5 @@ class Perspective(Effect):
         past = growth * (fallen - inside)
         seen = inside / (inside + (1.0 - inside) * growth) + past
         # y itself where nothing grows, to the last bit.
-        bent = y - length * (seen - fallen)
-        return xp.stack([position_m[:, 0], bent], axis=1)
+        distorted = y - length * (seen - fallen)
+        return xp.stack([position_m[:, 0], distorted], axis=1)

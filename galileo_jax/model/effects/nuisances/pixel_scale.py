@@ -11,7 +11,7 @@ class PixelScale(Effect):
     """Measured lengths are true ones times pixels_per_metre / nominal scale.
 
     A frictionless fall tells the scale from gravity; on one slope only
-    scale * (sin a - k cos a) shows, and neither it nor k can be told.
+    scale * (sin a - k cos a) shows, and neither it nor k can be determined.
     """
 
     name: ClassVar[str] = "pixel_scale"

@@ -5,7 +5,7 @@ from typing import ClassVar
 from galileo_jax.model.effects.effect import ORIGIN, Array, Effect, Surroundings, Theta
 from galileo_jax.model.parameters import Normal, Parameter
 
-SD_M = 0.003  # a point set by hand, sizes told to a millimetre
+SD_M = 0.003  # a point set by hand, sizes declared to a millimetre
 
 
 class StartOffset(Effect):

@@ -1,0 +1,152 @@
+"""Where candidates are fitted from: scattered starts, and starts that match the residuals.
+
+The position, time or wavelength of an effect has many local optima near the right value. Two kinds
+of starting points deal with this: scattered ones, and matched ones, whose derivative at zero
+strength removes most of the misfit (the score test over all shapes).
+"""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from scipy.special import ndtri
+
+from galileo_jax.diagnosis.score_tests import (
+    SHOWS,
+    explained,
+    latin,
+    shapes_beside,
+    slopes_along,
+    strength_of,
+)
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.parameters import inverse
+
+STARTS_PER_PARAMETER, MOST_STARTS = 32, 96
+NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
+NUM_MATCHED = 3  # shapes kept as starts
+MOST_Z = 2.5  # of a matched strength's prior
+NUM_STRENGTHS, NUM_ZOOMS = 15, 4  # a grid over all strengths, then between neighbours of the best
+SPREAD_Z = 0.7  # of starts round the fit without the candidate
+
+
+def scattered(
+    fitter: GradientFitter, bases: Sequence[GradientFit], free: np.ndarray, seed: int
+) -> list[np.ndarray]:
+    """For each hypothesis the best of its scattered starts in each way, `[way, z]`.
+
+    Args:
+      fitter: of the trials.
+      bases: of each hypothesis the fit without its new effect.
+      free: `[hypothesis, model parameter]`.
+      seed: of the starts.
+    """
+    starts = [
+        _starts(fitter.trials, base, row, seed) for base, row in zip(bases, free, strict=True)
+    ]
+    of = np.repeat(np.arange(len(free)), [len(own) for own in starts])
+    costs = fitter.search_costs(np.concatenate(starts), free[of])
+    chosen = []
+    for i, own in enumerate(starts):
+        cost = costs[of == i]
+        ways = [np.arange(way, len(own), NUM_WAYS) for way in range(NUM_WAYS)]
+        chosen.append(own[[way[np.argmin(cost[way])] for way in ways]])
+    return chosen
+
+
+def matched(
+    fitter: GradientFitter,
+    bases: Sequence[GradientFit],
+    candidates: Sequence[tuple[str, ...]],
+    seed: int,
+) -> list[np.ndarray]:
+    """For each candidate starts that match its base fit's residuals, `[start, z]`, best first.
+
+    Those whose effect has a strength and no shape get one more: the best of all its strengths. As
+    far as the slope goes is too far where a little more of an effect changes everything, as
+    friction does that nearly holds.
+    """
+    trials, count = fitter.trials, len(fitter.trials.model_parameters)
+    starts: list[np.ndarray] = [np.empty(0)] * len(candidates)
+    for base in {id(base): base for base in bases}.values():
+        own = [i for i, other in enumerate(bases) if other is base]
+        for i, found in zip(
+            own, _matched_shapes(trials, base, [candidates[i] for i in own], seed), strict=True
+        ):
+            starts[i] = found
+    plain = [i for i, own in enumerate(starts) if len(own) == 1]
+    if not plain:
+        return starts
+    free = np.stack([trials.free(candidates[i])[:count] for i in plain])
+    where = [strength_of(trials, candidates[i][-1])[0] for i in plain]
+    found = best_strengths(fitter, np.concatenate([starts[i] for i in plain]), free, where)
+    for i, best in zip(plain, found, strict=True):
+        starts[i] = np.stack([best, starts[i][0]])
+    return starts
+
+
+def best_strengths(
+    fitter: GradientFitter, z: np.ndarray, free: np.ndarray, where: Sequence[np.ndarray]
+) -> np.ndarray:
+    """`z` `[candidate, z]` with the strength of least cost, all else as it is: ever finer grids."""
+    middle, reach = np.zeros(len(z)), MOST_Z
+    for _ in range(NUM_ZOOMS):
+        tried = np.repeat(z[:, None], NUM_STRENGTHS, axis=1)
+        steps = np.linspace(-reach, reach, NUM_STRENGTHS)
+        for own, columns, centre in zip(tried, where, middle, strict=True):
+            own[:, columns] = (centre + steps)[:, None]
+        of = np.repeat(np.arange(len(z)), NUM_STRENGTHS)
+        costs = fitter.search_costs(tried.reshape(len(of), -1), free[of]).reshape(len(z), -1)
+        best = np.argmin(costs, axis=1)
+        middle = middle + steps[best]
+        reach = steps[1] - steps[0]
+    return tried[np.arange(len(z)), best]
+
+
+def _matched_shapes(
+    trials: JointProblem, base: GradientFit, candidates: Sequence[tuple[str, ...]], seed: int
+) -> list[np.ndarray]:
+    """Of each candidate the shapes of its last effect that match the residuals, `[start, z]`.
+
+    For each shape the strength is the one that its slope at no strength asks for.
+    """
+    beside = [shapes_beside(trials, base, effects, seed) for effects in candidates]
+    ends = np.cumsum([len(z) for z, _ in beside])[:-1]
+    found = slopes_along(trials, base, np.concatenate([probes for _, probes in beside]))
+    parts = (np.split(values, ends) for values in found)
+    starts = []
+    for effects, (z, probes), along, power in zip(candidates, beside, *parts, strict=True):
+        where, size = strength_of(trials, effects[-1])
+        best = np.argsort(-explained(along, power))[:NUM_MATCHED]
+        # As far as the slope goes: the strength at which the residuals along it would vanish.
+        wanted = probes[best]
+        wanted[:, where] = (-along / np.maximum(power, SHOWS))[best, None] * size
+        priors = [trials.model_parameters[i].prior for i in where]
+        for column, prior in zip(where, priors, strict=True):
+            own = np.asarray(prior.inverse(jnp.asarray(wanted[:, column])))
+            z[best, column] = np.clip(np.nan_to_num(own, nan=-MOST_Z), -MOST_Z, MOST_Z)
+        free = trials.free(effects)[: len(trials.model_parameters)]
+        starts.append(np.where(free, z[best, : len(free)], 0.0))
+    return starts
+
+
+def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int) -> np.ndarray:
+    """Starts in z: new parameters over their priors, the others in one of three ways."""
+    count = len(trials.model_parameters)
+    generator = np.random.default_rng([seed, 41])
+    new = np.flatnonzero(free & ~base.free[:count])
+    size = min(STARTS_PER_PARAMETER * len(new), MOST_STARTS)
+    starts = np.tile(base.z[:count], (size, 1))
+    starts[:, new] = ndtri(np.clip(latin(generator, size, len(new)), 0.02, 0.98))
+    parameters = trials.model_parameters
+    zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
+    rest = np.clip(zero, -1.0, 1.0)
+    nuisance = np.array([p.role == "nuisance" for p in parameters])
+    main = np.array([p.role != "nuisance" for p in parameters]) & base.free[:count]
+    spread = generator.standard_normal((size, int(main.sum())))
+    way = np.arange(size) % NUM_WAYS
+    # Near the base fit; with the nuisances that it bent let go; and with all else let go, too.
+    starts[np.ix_(way > 0, nuisance)] = rest[nuisance]
+    starts[:, main] += np.where(way[:, None] == 2, SPREAD_Z, 0.1 * (way[:, None] == 1)) * spread
+    return np.where(free, starts, 0.0)

@@ -1,0 +1,125 @@
+"""Score tests: how much of the misfit the slope to an effect explains, before the effect is fitted.
+
+Along the derivative with respect to the effect's strength at zero, after removing what the other
+parameters can absorb. It needs one rollout per effect; of an effect with a shape (a position, a
+time, a wavelength) one for each shape that is tried: a matched filter.
+"""
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from galileo_jax.comparison.bootstrap import whitened
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
+
+# Of a strength's prior: small enough to be a slope, large enough to be seen.
+PROBE_Z = 0.1
+SMALL_QUANTILE_Z = -2.0
+NUM_SHAPES = 96  # tried per candidate whose effect has a shape
+SHOWS = 1e-9  # a slope below does not
+
+
+def score_tests(
+    trials: JointProblem, base: GradientFit, candidates: Sequence[tuple[str, ...]]
+) -> np.ndarray:
+    """How many standard deviations each candidate's slope stands out, at zero strength.
+
+        z = d.r / |d|,   d = the slope of the whitened residuals r, made orthogonal to those of
+                             the parameters that are there already
+
+    Returns:
+      `[candidate]`, of the last effect of each, without a refit; signed strengths by size.
+    """
+    probes = np.tile(trials.theta(base.z, base.free), (len(candidates), 1))
+    for probe, effects in zip(probes, candidates, strict=True):
+        where, size = strength_of(trials, effects[-1])
+        probe[where] = size
+    residual, slopes = _beside(trials, base, probes)
+    length = np.linalg.norm(slopes, axis=1)
+    return np.abs(slopes @ residual) / np.where(length > SHOWS, length, np.inf)
+
+
+def best_gains(
+    trials: JointProblem, base: GradientFit, candidates: Sequence[tuple[str, ...]], seed: int
+) -> np.ndarray:
+    """By how many nats the last effect of each candidate lowers the misfit, as far as slopes tell.
+
+    Half the square of the score test's z, of the best of the effect's shapes.
+
+    Returns:
+      `[candidate]`.
+    """
+    probes = [shapes_beside(trials, base, effects, seed)[1] for effects in candidates]
+    found = explained(*slopes_along(trials, base, np.concatenate(probes)))
+    ends = np.cumsum([len(own) for own in probes])[:-1]
+    return np.array([0.5 * own.max() for own in np.split(found, ends)])
+
+
+def strength_of(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:
+    """Where an effect's strengths stand (one per clip, or one), and a small one."""
+    names = [p.name for p in trials.model_parameters]
+    where = [i for i, n in enumerate(names) if n == effect or n.startswith(f"{effect}_")]
+    first = trials.model_parameters[where[0]]
+    own = [i for i in where if trials.model_parameters[i].prior == first.prior]
+    is_signed = float(first.prior.forward(jnp.asarray(-1.0))) < first.absent
+    at = PROBE_Z if is_signed else SMALL_QUANTILE_Z
+    return np.array(own if first.per_clip else own[:1]), float(first.prior.forward(jnp.asarray(at)))
+
+
+def shapes_beside(
+    trials: JointProblem, base: GradientFit, effects: Sequence[str], seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shapes of the last effect beside a fit: `[shape, z]`, and in units at a probe's size."""
+    count = len(trials.model_parameters)
+    where, size = strength_of(trials, effects[-1])
+    new = np.flatnonzero(trials.free(effects)[:count] & ~base.free[:count])
+    shape = np.setdiff1d(new, where)
+    number = NUM_SHAPES if len(shape) else 1
+    generator = np.random.default_rng([seed, 43])
+    z = np.tile(base.z, (number, 1))
+    z[:, shape] = ndtri(np.clip(latin(generator, number, len(shape)), 0.02, 0.98))
+    probes = np.array(trials.theta(z, trials.free(effects)))
+    probes[:, where] = size
+    return z, probes
+
+
+def slopes_along(
+    trials: JointProblem, base: GradientFit, probes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The slopes to each of `probes` along the base fit's residuals, and their squares."""
+    residual, slopes = _beside(trials, base, probes)
+    return slopes @ residual, np.sum(slopes**2, axis=1)
+
+
+def explained(along: np.ndarray, power: np.ndarray) -> np.ndarray:
+    """How much of the squared residuals each slope explains; none where it does not show."""
+    return np.where(power > SHOWS, along**2 / np.maximum(power, SHOWS), 0.0)
+
+
+def _beside(
+    trials: JointProblem, base: GradientFit, probes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The base fit's whitened residuals, and how they change to each of `probes`.
+
+    Both without what the parameters that are there can take up. The priors' residuals count
+    among them: a nuisance that is bent is a misfit, too.
+    """
+    here = trials.theta(base.z, base.free)
+    scale = here[len(trials.model_parameters) :]
+    white = np.concatenate(whitened(trials, np.vstack([here, probes]), scale), axis=1)
+    residual, slopes = white[0], white[1:] - white[:1]
+    free = base.free[: base.jacobian.shape[1]]
+    used = np.vstack([base.jacobian[:, free], np.eye(int(free.sum()))])
+    basis, _ = np.linalg.qr(used)
+    whole = np.append(residual, base.z[: len(free)][free])
+    padded = np.pad(slopes, [(0, 0), (0, int(free.sum()))])
+    return whole - basis @ (basis.T @ whole), padded - (padded @ basis) @ basis.T
+
+
+def latin(generator: np.random.Generator, size: int, num: int) -> np.ndarray:
+    """A Latin hypercube in the unit cube, `[point, axis]`."""
+    return qmc.LatinHypercube(num, rng=generator).random(size)
