@@ -23,7 +23,6 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.estimate import cnn_posterior
 
-
 NUM_COMPLETIONS = 4
 
 

@@ -19,6 +19,7 @@ from galileo_jax.studio.sheet import Sheet, changed, opened, redone, undone
 from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import Store
 
+MOST_AT_ONCE = 12  # videos of a folder that are decoded before the page opens
 MOST_FRAMES = 4  # clips whose frames are held
 
 
@@ -73,34 +74,47 @@ class Session:
         self._ids = itertools.count()
         self._context: dict[str, Any] = {}
         self.worker = Worker(str(self.root), self._from_worker)
+        self._unopened: dict[str, Path] = {}
         self.scan()
-        names = list(self.sheets)
-        if names or clip:
-            self.show(clip if clip in self.sheets else next(iter(names), ""))
+        self.show(clip if clip in self.names else next(iter(self.names), ""))
 
     # clips
 
     def scan(self) -> None:
-        """Looks at the folder again."""
+        """Looks at the folder again; a video is decoded once to know it, the first ones now."""
         for name, path in videos(self.root).items():
             if name in self.sheets:
                 continue
+            self._unopened[name] = path
+            if len(self.sheets) < MOST_AT_ONCE:
+                self._open(name)
+        self._changed("clips")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all clips that can be shown."""
+        return tuple(sorted({*self.sheets, *self._unopened}))
+
+    def show(self, name: str) -> None:
+        """Turns to one clip, alone."""
+        if self._open(name):
+            self.active, self.chosen = name, (name,)
+            self._reopen()
+
+    def _open(self, name: str) -> bool:
+        path = self._unopened.pop(name, None)
+        if path is not None:
             try:
                 self.sheets[name] = opened(self.root, path, self.store)
                 self.broken.pop(name, None)
             except InputError as error:
                 self.broken[name] = str(error).replace(f"{path}: ", "")
-        self._changed("clips")
-
-    def show(self, name: str) -> None:
-        """Turns to one clip, alone."""
-        if name in self.sheets:
-            self.active, self.chosen = name, (name,)
-            self._reopen()
+                self._changed("clips")
+        return name in self.sheets
 
     def choose(self, names: tuple[str, ...]) -> None:
         """Which clips are trials of the same objects; the active one is among them."""
-        chosen = tuple(name for name in self.sheets if name in names)
+        chosen = tuple(name for name in self.names if name in names and self._open(name))
         if chosen:
             self.chosen = chosen
             self.active = self.active if self.active in chosen else chosen[0]

@@ -105,3 +105,17 @@ def test_trials_are_chosen_and_named_as_the_commands_name_them(tmp_path):
     assert session.states["track"] == "open" and session.states["fit"] == "locked"
     session.choose(())
     assert session.chosen == ("again", "slide"), "there is always one"
+
+
+@pytest.mark.video
+def test_of_a_large_folder_a_clip_is_opened_when_it_is_turned_to(tmp_path, monkeypatch):
+    monkeypatch.setattr("galileo_jax.studio.session.MOST_AT_ONCE", 1)
+    for name in ("a", "b", "c"):
+        clip_in(tmp_path, name)
+    (tmp_path / "b.mp4").write_bytes(b"no video")
+    session = Session(tmp_path)
+    assert list(session.sheets) == ["a"] and session.names == ("a", "b", "c")
+    session.show("c")
+    assert session.active == "c"
+    session.show("b")
+    assert session.active == "c" and "cannot be decoded" in session.broken["b"]

@@ -28,7 +28,7 @@ def build(tab: "Tab") -> None:
         ui.label("").classes("said small")
     for name, problem in session.broken.items():
         ui.label(f"{name}: {problem}").classes("trouble")
-    if not session.sheets:
+    if not session.names:
         ui.label(f"No video in {session.root}.").classes("soft")
         return
     _clips(tab)
@@ -56,7 +56,7 @@ def build(tab: "Tab") -> None:
 
 def _clips(tab: "Tab") -> None:
     session = tab.session
-    names = list(session.sheets)
+    names = session.names
     if len(names) == 1:
         return
     ui.label("Clips; those that are ticked are trials of the same objects").classes("small soft")
