@@ -41,9 +41,10 @@ class Tab:
       placing: a click into the video adds an object.
       dark: the colours.
       said: the job, the error and the note that are shown.
-      drawn: what the panel was built of, where it can be refreshed in part.
+      drawn, lamps: what the panel and the row of stages were built of.
       refresh: does that.
       redraw: shows everything anew.
+      redraw_curves: only the video and what is below it.
     """
 
     session: Session
@@ -53,8 +54,10 @@ class Tab:
     dark: bool = False
     said: tuple[str, str, str] = ("", "", "")
     drawn: Any = None
+    lamps: Any = None
     refresh: Callable[[], None] = lambda: None
     redraw: Callable[[], None] = lambda: None
+    redraw_curves: Callable[[], None] = lambda: None
 
     def go(self, stage: str) -> None:
         """Turns to a stage."""
@@ -74,7 +77,7 @@ class Tab:
         """Looks at a candidate's curve."""
         if candidate != self.candidate:
             self.candidate = candidate
-            self.redraw()
+            self.redraw_curves()  # and not the panel: a click that follows must find its button
 
 
 def build_page(session: Session) -> None:
@@ -118,18 +121,23 @@ def build_page(session: Session) -> None:
     def show() -> None:
         seen.update(session.versions)
         lamps()
-        now = marks.drawn(tab)
-        if now is not None and now == tab.drawn:
+        if tab.drawn == (now := _shown(tab)):
             tab.refresh()
         else:
+            tab.refresh = lambda: None
             panel.clear()
             with panel:
                 _panel(tab)
-            tab.drawn = marks.drawn(tab)
+            tab.drawn = now
         curves()
         bar()
 
     def lamps() -> None:
+        task = session.job.task if session.job is not None else ""
+        now = (tab.stage, task, *session.states.values())
+        if now == tab.lamps:
+            return
+        tab.lamps = now
         stages.clear()
         with stages:
             _stage_buttons(tab)
@@ -165,7 +173,7 @@ def build_page(session: Session) -> None:
                 tab.said = now_said
                 show()
 
-    tab.redraw = show
+    tab.redraw, tab.redraw_curves = show, curves
     seen.update(session.versions)
     show()
     if tab.stage in ("fit", "compare", "diagnose", "predict"):
@@ -173,6 +181,20 @@ def build_page(session: Session) -> None:
     if session.sheet is not None and not session.sheet.is_drawn and session.job is None:
         ui.timer(0.2, lambda: _propose_once(session), once=True)
     ui.timer(POLL_S, look)
+
+
+def _shown(tab: Tab) -> Any:
+    """What a panel is built of: while it is the same, the panel stays as it is."""
+    if (now := marks.drawn(tab)) is not None:
+        return now
+    session = tab.session
+    found = session.results
+    views = (found.tracks, found.fit, found.compare, found.diagnosis, found.prediction)
+    return (
+        tab.stage, tab.dark, session.active, session.chosen, session.names, session.error,
+        session.note, session.job is None, tuple(session.states.values()), tuple(map(id, views)),
+        found.candidates, found.rounds, tuple(session.broken), session.sheet,
+    )  # fmt: skip
 
 
 def _propose_once(session: Session) -> None:

@@ -70,7 +70,7 @@ def build(tab: "Tab") -> None:
 
 def _candidate(tab: "Tab", row: Mapping[str, Any], is_best: bool) -> None:
     session, name = tab.session, str(row["effect"])
-    pick = ui.element("div").classes("pick" + (" seen" if tab.candidate == name else ""))
+    pick = ui.element("div").classes("pick")
     pick.props(f'data-candidate="{name}" tabindex=0')
     for event in ("mouseenter", "focus", "click"):
         pick.on(event, lambda: tab.preview(name))

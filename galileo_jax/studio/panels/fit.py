@@ -40,8 +40,7 @@ def build(tab: "Tab") -> None:
         _parameter(tab, one, values)
     ui.timer(0.15, lambda: misfit.set_text(_misfit(tab)))
     with ui.element("div").classes("rowline"):
-        if values:
-            plain_button("Back to the best", lambda: _back(tab), "back")
+        plain_button("Back to the best", lambda: _back(tab), "back")
         if state == "stale":
             main_button("Fit again", lambda: session.fit(session.effects), tab, "fit")
         else:
@@ -91,4 +90,5 @@ def _move(tab: "Tab", values: dict[str, float], name: str, value: Any) -> None:
 
 def _back(tab: "Tab") -> None:
     tab.session.put_back()
+    tab.drawn = None  # the sliders, too
     tab.redraw()

@@ -30,6 +30,7 @@ def build(tab: "Tab") -> None:
     title("Marks")
     marks = sheet.marks
     fields: dict[str, Any] = {}
+    shown: dict[str, Any] = {}
     with ui.element("div").classes("rowline"):
         scene = ui.select(sorted(SCENARIOS), value=marks.scenario, label="scenario")
         scene.props("outlined dense options-dense").style("min-width: 130px")
@@ -54,6 +55,10 @@ def build(tab: "Tab") -> None:
         stick.set_value(sheet.marks.stick_m)
         for one in sheet.marks.objects:
             fields[one.name].set_value(_text(one.size_m))
+        now = (sheet.remarks, sheet.is_complete, session.job is None)
+        if now == shown.get("check"):
+            return  # a button that is about to be pressed stays where it is
+        shown["check"] = now
         place.clear()
         with place:
             _check(tab)
