@@ -4,6 +4,8 @@ Everything else lies in the files of the commands. Where this file is missing or
 is lost.
 """
 
+import copy
+import functools
 import hashlib
 import json
 from collections.abc import Mapping
@@ -55,6 +57,16 @@ def fingerprint(*parts: Any) -> str:
 def yaml_content(path: Path) -> dict[str, Any]:
     """A yaml's keys; empty where it is missing or wrong."""
     try:
-        return read_mapping(path) if path.is_file() else {}
+        found = path.stat()
+    except OSError:
+        return {}
+    return copy.deepcopy(_content(path, found.st_mtime_ns, found.st_size))
+
+
+@functools.lru_cache(64)
+def _content(path: Path, changed_ns: int, size: int) -> dict[str, Any]:
+    """Read once for every change: the stages' states are asked for at every click."""
+    try:
+        return read_mapping(path)
     except InputError:
         return {}

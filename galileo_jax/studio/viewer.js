@@ -6,7 +6,7 @@ export default {
   template: `
   <div class="viewer" tabindex="0" ref="root" @keydown="key" :aria-label="'video ' + name">
     <div class="screen"><div class="stage" ref="stage" :style="{ '--ratio': width / height }">
-      <img ref="img" class="frame" :src="url(shown)" draggable="false" alt="" @load="loaded">
+      <img ref="img" class="frame" :src="url(shown)" draggable="false" alt="" @load="loaded" @error="loaded">
       <svg ref="svg" :viewBox="'0 0 ' + width + ' ' + height" @pointerdown="background"
            @pointermove="drag" @pointerup="drop" @pointercancel="drop" :class="{ placing: placing }">
         <g v-if="track">
@@ -71,7 +71,7 @@ export default {
                  timer: null, cache: new Map() }),
   watch: {
     marks: { handler(now) { if (!this.held) this.at = { ...now }; }, immediate: true, deep: true },
-    name() { this.cache.clear(); this.go(0); this.fetchAhead(); },
+    name() { this.cache.clear(); this.waiting = false; this.go(0); this.fetchAhead(); },
   },
   mounted() {
     this.observer = new ResizeObserver(() => {
@@ -107,7 +107,7 @@ export default {
       frame = Math.max(0, Math.min(frame, this.count - 1));
       if (!Number.isFinite(frame)) return;
       this.frame = frame;
-      if (!this.waiting) { this.waiting = true; this.shown = frame; }
+      if (!this.waiting && frame !== this.shown) { this.waiting = true; this.shown = frame; }
       window.galileoTime = frame / this.fps;
       window.dispatchEvent(new CustomEvent("galileo-time", { detail: frame / this.fps }));
       clearTimeout(this.telling);

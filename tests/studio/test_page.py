@@ -93,6 +93,7 @@ def test_the_keyboard_steps_through_frames_and_moves_marks(browser, folder):
     with started(folder) as studio, opened(browser, studio) as page:
         page.click("[data-stage=marks]")
         page.focus(".viewer")
+        page.keyboard.press("Home")  # where it is already
         page.keyboard.press("ArrowRight")
         page.keyboard.press("ArrowRight")
         page.keyboard.press("ArrowLeft")

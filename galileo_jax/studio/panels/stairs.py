@@ -34,7 +34,7 @@ def stairs(rounds: Sequence[Mapping[str, Any]]) -> str:
         f'<svg class="stairs" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="velocity error '
         f'round by round"><line x1="0" x2="{WIDTH}" y1="{floor:.1f}" y2="{floor:.1f}" '
         f'stroke="var(--soft)" stroke-dasharray="3 4"/><text class="soft" x="{WIDTH - 2}" '
-        f'y="{floor - 5:.1f}" text-anchor="end">noise</text>'
+        f'y="{floor + 14:.1f}" text-anchor="end">noise</text>'
         f'<path d="{path}" fill="none" stroke="var(--accent)" stroke-width="3"/>'
         f"{''.join(texts)}</svg>"
     )
