@@ -136,9 +136,7 @@ def point(x: np.ndarray) -> dict[str, dict[str, Any]]:
 def _mujoco(problem: Problem) -> Callable[[np.ndarray], np.ndarray]:
     """`[batch, 4]` to centres `[batch, object, 2, frame]`: MuJoCo alone, without nuisances."""
     scene = problem.model.scene
-    spec = scene.spec.copy()
-    spec.option.timestep = STEP_S
-    plain = replace(scene, spec=spec, model=spec.compile())
+    plain = replace(scene, timestep_s=STEP_S)
     engine = EngineC(Model(plain, problem.model.duration_s, nuisances=()))
     surroundings, names = scene.surroundings, engine.model.names
     steps = round(float(np.diff(problem.observation.times_s)[0]) / STEP_S)

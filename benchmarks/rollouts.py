@@ -49,8 +49,8 @@ def main(argv: Sequence[str]) -> int | None:
         engine = make_engine(name, model)
         steps = model.num_records * (1 if name == "rigid" else SUBSTEPS)
         for size in sizes:
-            seconds = _seconds(_simulation(engine, size), call.repeats)
-            figures[f"{name}_{size}"] = _report(f"{name} {size}", size, steps, seconds)
+            taken = seconds(_simulation(engine, size), call.repeats)
+            figures[f"{name}_{size}"] = _report(f"{name} {size}", size, steps, taken)
     figures["pybullet_1"] = _pybullet(truth, call.repeats)
     if not call.no_compile:
         for name in ("rigid", "mjx"):
@@ -61,7 +61,12 @@ def main(argv: Sequence[str]) -> int | None:
 
 def rigid_batch(size: int) -> Callable[[], object]:
     """A batch of rollouts with the rigid engine."""
-    return _simulation(make_engine("rigid", _model(_truth())), size)
+    return batch_of("rigid", size)
+
+
+def batch_of(name: str, size: int) -> Callable[[], object]:
+    """A batch of rollouts with an engine."""
+    return _simulation(make_engine(name, _model(_truth())), size)
 
 
 def _truth() -> Truth:
@@ -83,7 +88,7 @@ def _simulation(engine: Engine, size: int) -> Callable[[], object]:
     return lambda: engine.simulate(batch)
 
 
-def _seconds(run: Callable[[], object], repeats: int) -> float:
+def seconds(run: Callable[[], object], repeats: int) -> float:
     """The median of some runs after a first one that warms up."""
     run()
     taken = []
@@ -113,9 +118,9 @@ def _pybullet(truth: Truth, repeats: int) -> dict[str, float] | None:
         return None
     client = pybullet.connect(pybullet.DIRECT)
     steps = round(DURATION_S / bullet_scene.STEP_S)
-    seconds = _seconds(lambda: bullet_scene.roll_out(truth, steps, client), repeats)
+    taken = seconds(lambda: bullet_scene.roll_out(truth, steps, client), repeats)
     pybullet.disconnect(client)
-    return _report("pybullet 1", 1, steps, seconds)
+    return _report("pybullet 1", 1, steps, taken)
 
 
 def _first_seconds(name: str) -> dict[str, float]:

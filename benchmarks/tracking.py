@@ -23,7 +23,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.commands import command
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking import track_clip
+from galileo_jax.tracking.clip import track_clip
 from galileo_jax.tracking.track import Track
 
 MOVES_PX = 0.02

@@ -35,7 +35,7 @@ class Score:
       is_named_right: one hypothesis, the true one. Of "none": that nothing is missing.
       is_covered: named right, or ambiguous with the truth among at most three.
       is_confident_wrong: one hypothesis, a wrong one. Of "none": any alarm.
-      is_recognised: that something is missing which cannot be named: unknown or ambiguous.
+      is_recognised: that something is missing which cannot be named: unknown, ambiguous or a law.
       set_size: number of hypotheses reported; NaN where the truth is not among them.
       before, after: rms residual in units of the noise, without and with what was added.
     """
@@ -71,8 +71,8 @@ def judge(truth: str, library: Sequence[str], diagnosis: Mapping[str, Any]) -> S
         case "ambiguous":
             answers = [frozenset(each.split("+")) for each in told]
             label = " or ".join(sorted(told))
-        case "unknown":
-            answers, label = [], "unknown"
+        case "unknown" | "law":
+            answers, label = [], status
         case _:
             raise ValueError(f"unknown status {status!r} in a diagnosis")
     is_right = len(answers) == 1 and answers[0] == there and kind != "exotic"
@@ -86,8 +86,8 @@ def judge(truth: str, library: Sequence[str], diagnosis: Mapping[str, Any]) -> S
         is_covered=is_right or (is_among and len(answers) <= LARGEST_SET),
         is_confident_wrong=status != "none"
         if kind == "none"
-        else status == "named" and not is_right,
-        is_recognised=status in ("unknown", "ambiguous"),
+        else (status == "named" and not is_right) or (status == "law" and kind == "library"),
+        is_recognised=status in ("unknown", "ambiguous", "law"),
         set_size=len(answers) if is_among else math.nan,
         before=math.sqrt(history[0]["chi2_per_dof"]),
         after=math.sqrt(history[-1]["chi2_per_dof"]),

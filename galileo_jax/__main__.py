@@ -19,6 +19,8 @@ VERBS = (
     ("label", "write points and scale into a clip's yaml"),
     ("simulate", "make a clip with known truth"),
     ("predict", "continue a fitted scene beyond its clip"),
+    ("next", "choose the experiment that would tell most"),
+    ("discover", "let a lab measure until the verdict stands"),
     ("export", "write tracks and fits as csv, parquet or netCDF"),
     ("train", "train and test the neural estimators"),
     ("sweep", "many clips, many ways, from one config"),

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,19 +21,24 @@ from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
+from galileo_jax.diagnosis.laws.source import proposed_file
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
+from galileo_jax.experiment.advise import with_next
+from galileo_jax.experiment.belief import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import Code
+from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.observation.observation import Observation
+from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.results.truth import hidden_effect
 from galileo_jax.runtime import progress
-from galileo_jax.runtime.atomic_write import write_json
+from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
@@ -43,6 +48,7 @@ if TYPE_CHECKING:
     import pandas as pd
     import plotly.graph_objects as go
 
+DOCUMENT = "diagnosis.json"
 TRACKED = 0.2  # share of the work, for progress
 STAGES = {  # how a stage begins, and how much is done by then
     "fitting the model": 0.02,
@@ -51,7 +57,8 @@ STAGES = {  # how a stage begins, and how much is done by then
     "comparing the best": 0.6,
     "fitting pairs": 0.65,
     "looking at what": 0.82,
-    "inferring": 0.85,
+    "inferring": 0.83,
+    "looking for": 0.86,
     "predicting": 0.92,
     "looking at each": 0.95,
 }
@@ -79,7 +86,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """`status` (none, named, ambiguous, unknown), `effects`, `form`, `advice`, `reasons`."""
+        """`status` (none, named, ambiguous, law, unknown), `effects`, `law`, `reasons`, ..."""
         return self.found.verdict
 
     @property
@@ -123,7 +130,7 @@ class Diagnosis:
 
     @property
     def missing_force(self) -> "pd.DataFrame | None":
-        """Where the verdict is unknown: the missing acceleration itself, else None.
+        """Where the verdict is unknown or a law: the missing acceleration itself, else None.
 
         `object, time_s, path_m, speed_m_s, acceleration_m_s2, sd_m_s2, formula`.
         """
@@ -160,23 +167,36 @@ class Diagnosis:
     @cached_property
     @in_float64
     def best(self) -> Fit:
-        """The fit of the last round's model, as `fit` with its effects gives it."""
-        last, seed = self.found.rounds[-1].hypothesis, int(self.document["seed"])
+        """The fit of the last round's model, as `fit` with its effects gives it.
+
+        Where the verdict is unknown: that of the model without effects, with an acceleration of
+        any form allowed for, as `fit` with `discrepancy="gp"` gives it.
+        """
+        is_unknown, seed = self.verdict.status == "unknown", int(self.document["seed"])
+        chosen = self.found.rounds[0 if is_unknown else -1].hypothesis
+        whole = chosen.of(self.problem)
+        effects = whole.problems[0].model.effects
         part = make_joint_problem(
             [one.clip for one in self.measurements],
             [one.observation for one in self.measurements],
             self.problem.problems[0].engine.name,
-            make_effects(last.effects),
+            tuple(effect for effect in effects if effect.name in chosen.effects),
         )
-        gradient = restricted_fit(last.fit, self.problem, part)
+        gradient = restricted_fit(chosen.fit, whole, part)
         notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
         notes["status"] = gradient.code.value
         if self.effects_from:
             notes["effects_from"] = [str(Path(path).resolve()) for path in self.effects_from]
+        if is_unknown:
+            wide = fit_discrepancy(part, gradient.z, gradient.free, seed)
+            part, gradient, posterior = wide.free.trials, wide.free.gradient, wide.posterior
+            notes["discrepancy"] = wide.summary
+        else:
+            posterior = laplace_posterior(part, gradient, seed)
         return make_fit(
             self.measurements,
             part,
-            laplace_posterior(part, gradient, seed),
+            posterior,
             gradient.z,
             gradient,
             method="grad",
@@ -221,11 +241,23 @@ class Diagnosis:
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:
-        """Writes diagnosis.json, report.html and, below model/, the run of the last model."""
-        folder = Path(folder)
-        write_json(folder / "diagnosis.json", self.document)
+        """Writes diagnosis.json, report.html and, below model/, the run of the last model.
+
+        And hypotheses.npz, of which `next_experiment` is made; where the verdict is a law, its
+        effect, too: proposed_effect.py, for `--effects-from`.
+        """
+        folder, best = Path(folder), self.best
+        proposed = folder / PROPOSED
+        proposed.unlink(missing_ok=True)
+        if self.verdict.law is not None:
+            clips = [Path(clip).name for clip in self.document["clips"]]
+            write_text(proposed, proposed_file(self.verdict.law, clips))
+            files = [*best.result.get("effects_from", []), str(proposed.resolve())]
+            best = replace(best, result={**best.result, "effects_from": files})
+        write_json(folder / DOCUMENT, self.document)
+        write_beliefs(folder / FILE, self.problem, beliefs_of(self.found))
         self.report(folder / "report.html")
-        self.best.save(folder / "model", report=False)
+        best.save(folder / "model", report=False)
         return folder
 
     def __repr__(self) -> str:
@@ -266,7 +298,8 @@ def diagnose(
       pixels_per_metre: overrides the clips' scale; None: the yaml's.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
         `{"round": row}` for the base model and for what is added, as in diagnosis.json's history,
-        and `{"candidate": row}` for each candidate.
+        and `{"candidate": row}` for each candidate as soon as it is fitted, and once more in the
+        end: until then its fit may get better, and probabilities change.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Raises:
@@ -303,12 +336,12 @@ def diagnose(
 
 def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
     def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
-        fitter_of(_with_library(some, seen, engine)).compile()
+        fitter_of(with_library(some, seen, engine)).compile()
 
     return precompile(clips, compile_for).join
 
 
-def _with_library(
+def with_library(
     clips: Sequence[Clip], observations: Sequence[Observation], engine: str
 ) -> JointProblem:
     """The joint problem with all effects and nameless forms that have a place in the scene."""
@@ -336,7 +369,7 @@ def _diagnosed(
 ) -> Diagnosis:
     clips, observations = [one.clip for one in measured], [one.observation for one in measured]
     began = time.perf_counter()
-    problem = _with_library(clips, observations, engine)
+    problem = with_library(clips, observations, engine)
     if add not in ("auto", "none", *problem.all_effects):
         raise InputError(f"--add: {add} has no place in {clips[0].path}")
 
@@ -370,12 +403,14 @@ def _diagnosed(
         on_round=on_round,
         on_candidate=on_candidate,
     )
+    found = with_next(found, clips[0], problem, seed)
     record = diagnosis_document(problem, found, seed)
     document = {
         "clips": [clip.source for clip in clips],
         TRACKS: [digest(observation) for observation in observations],
         **record,
         **inferred(measured),
+        **({"effects_from": [str(Path(path).resolve()) for path in files]} if files else {}),
         "left_out": [name for name in effect_names() if name not in problem.all_effects],
         "engine": problem.problems[0].engine.name,
         "timings_s": {

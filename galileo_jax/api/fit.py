@@ -16,9 +16,9 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
+from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
-from galileo_jax.inference.metropolis import NUM_CHAINS
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.effects.free_quantities import make_free_quantities
@@ -44,6 +44,7 @@ def fit(
     effects: EffectsLike = (),
     effects_from: Sequence[str | Path] = (),
     free: EffectsLike = (),
+    discrepancy: Literal["none", "gp"] = "none",
     motion: str = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
@@ -71,6 +72,8 @@ def fit(
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
       free: declared quantities to infer instead, such as "gravity".
+      discrepancy: what no model explains: "none", or "gp": an acceleration of any form, whose size
+        and smoothness are inferred, is allowed for (method "grad").
       motion: "planar", or "free": from the first hit on objects turn and tip (MuJoCo's C engine).
       engine: what rolls the model out: "auto" (rigid), "rigid", "c" or "mjx".
       noise: the errors a track is taken to have: "camera", "bodies" or "tracker"; None: as the
@@ -87,7 +90,8 @@ def fit(
       selection: of preset "thesis": how the answer is taken from the chains, "best" or
         "least_variance".
       checkpoint: a file; chains that were interrupted go on from it.
-      on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
+      on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
+        of method "mh" first the gradient fit that the chains start from, a `Fit`.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Returns:
@@ -109,6 +113,7 @@ def fit(
         effects=names_of(effects),
         effects_from=tuple(str(path) for path in effects_from),
         free=names_of(free),
+        discrepancy=discrepancy,
         motion=motion,
         engine=engine,
         noise=noise,
@@ -138,16 +143,24 @@ def _check(options: FitOptions) -> None:
     Raises:
       InputError: an option that this method does not have, or a value that it does not know.
     """
-    from galileo_jax.inference.samplers import sampler_names
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
     check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
+    check_known("--discrepancy", "discrepancy", options.discrepancy, ("none", "gp"))
+    if options.discrepancy != "none" and (options.method, options.motion) != ("grad", "planar"):
+        raise InputError(
+            f"--discrepancy {options.discrepancy}: of --method grad and --motion planar, not of "
+            f"--method {options.method} and --motion {options.motion}"
+        )
     check_known("--engine", "engine", options.engine, ENGINES)
     check_known("--motion", "motion", options.motion, MOTIONS)
-    check_known("--sampler", "sampler", options.sampler, sampler_names())
     check_known("--init", "init", options.init, ("grad", "cnn"))
     check_known("--preset", "preset", options.preset, ("galileo", "thesis"))
     _refuse_ignored(options)
+    if options.method == "mh":
+        from galileo_jax.inference.samplers import sampler_names
+
+        check_known("--sampler", "sampler", options.sampler, sampler_names())
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
             f"--max-steps: {options.max_steps} is no multiple of {BLOCK_STEPS}, {BLOCK_STEPS} or "
@@ -213,6 +226,20 @@ def _fitted(
     timings = {"track": track_s, "compile": 0.0, "fit": 0.0}
     notes: dict[str, Any] = {"engine": problem.problems[0].engine.name}
     gradient: GradientFit | None = None
+
+    def finish(posterior: Posterior, z_best: np.ndarray, notes: dict[str, Any]) -> Fit:
+        return make_fit(
+            tuple(measured),
+            problem,
+            posterior,
+            z_best,
+            gradient,
+            method=options.method,
+            seed=options.seed,
+            timings=timings,
+            notes=notes,
+        )
+
     began = time.perf_counter()
     if options.method == "cnn":
         posterior, z_best, extra = _by_network(problem, options)
@@ -227,9 +254,17 @@ def _fitted(
         gradient, starts, extra = _gradient(fitter, options)
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
-        posterior, z_best = laplace_posterior(problem, gradient, options.seed), gradient.z
+        if options.discrepancy == "gp":
+            progress.report("allowing for what no model explains", FITTED)
+            found = fit_discrepancy(problem, gradient.z, gradient.free, options.seed)
+            problem, gradient, posterior = found.free.trials, found.free.gradient, found.posterior
+            extra |= {"discrepancy": found.summary}
+        else:
+            posterior = laplace_posterior(problem, gradient, options.seed)
+        z_best = gradient.z
         extra = {"status": gradient.code.value} | extra
         if options.method == "mh":
+            progress.report("fitted by gradient", FITTED, finish(posterior, z_best, notes | extra))
             posterior = _by_chains(problem, gradient, starts, measured, options, checkpoint)
             extra |= {
                 "status": _status_of_chains(posterior, gradient),
@@ -244,17 +279,7 @@ def _fitted(
         notes["free"] = sorted(options.free)
     if options.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
-    made = make_fit(
-        tuple(measured),
-        problem,
-        posterior,
-        z_best,
-        gradient,
-        method=options.method,
-        seed=options.seed,
-        timings=timings,
-        notes=notes,
-    )
+    made = finish(posterior, z_best, notes)
     progress.report("fitted", 1.0, made)
     return made
 
@@ -264,6 +289,7 @@ def _gradient(
 ) -> tuple[GradientFit, np.ndarray | None, dict[str, Any]]:
     """The mode, where chains start in z (None: dispersed round it), and notes."""
     if options.init == "cnn":
+        from galileo_jax.inference.metropolis import NUM_CHAINS
         from galileo_jax.neural.start import start_from_network
 
         chains = options.chains or NUM_CHAINS
@@ -292,7 +318,7 @@ def _by_chains(
     checkpoint: Path | None,
 ) -> Posterior:
     """Samples; resumes what an interruption left in the checkpoint."""
-    from galileo_jax.inference.metropolis import metropolis_posterior
+    from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
     from galileo_jax.inference.samplers.driver import Progress, Settings
 
     settings = Settings(
@@ -324,6 +350,8 @@ def checkpoint_identity(
     measured: Sequence[Measurement], problem: JointProblem, options: FitOptions
 ) -> str:
     """What the chains sample: a checkpoint of anything else is refused."""
+    from galileo_jax.inference.metropolis import NUM_CHAINS
+
     chains = options.chains or NUM_CHAINS
     chosen = (
         *(options.sampler, options.seed, options.effects, options.free, options.init, chains),
@@ -344,8 +372,6 @@ def _by_thesis(
     problem: JointProblem, options: FitOptions
 ) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
-    import jax.numpy as jnp
-
     from galileo_jax.model.parameters import inverse
     from galileo_jax.thesis.estimate import thesis_posterior
 
@@ -355,6 +381,6 @@ def _by_thesis(
     )
     middle = problem.theta(np.zeros(len(problem.names)))
     theta = [best.get(name, rest) for name, rest in zip(problem.names, middle, strict=True)]
-    z_best = np.asarray(inverse(problem.parameters, jnp.asarray(theta)))
+    z_best = inverse(problem.parameters, np.asarray(theta))
     notes = {"status": posterior.status.value, "preset": options.preset, **chosen, "best": best}
     return posterior, z_best, notes

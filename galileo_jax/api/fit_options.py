@@ -17,6 +17,7 @@ class FitOptions:
     effects: tuple[str, ...] = ()
     effects_from: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
+    discrepancy: Literal["none", "gp"] = "none"
     motion: str = "planar"
     engine: str = "auto"
     noise: Literal["camera", "bodies", "tracker"] | None = None

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.api.motion import Motion, motions_at, replaced
@@ -161,7 +160,7 @@ class Fit:
         if self.z_best is not None:
             return self.z_best
         median = np.median(self.posterior.flat(), axis=0)
-        return np.asarray(inverse(self.problem.parameters, jnp.asarray(median)))
+        return inverse(self.problem.parameters, np.asarray(median))
 
     def runs(self, folder: Path) -> tuple[Run, ...]:
         """The fit of every clip, as `save` leaves it in `folder` and below."""

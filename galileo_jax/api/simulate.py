@@ -66,6 +66,8 @@ def simulate(
     solver: Solver = "rigid",
     values: Mapping[str, float] | None = None,
     floor: bool = False,
+    release: float | None = None,
+    like: str | Path | None = None,
     series: int | None = None,
     track_only: bool = False,
     track_noise: float = 0.0002,
@@ -110,6 +112,11 @@ def simulate(
       values: further parameters of the scenario, such as {"k3": 0.2} or
         {"floor_restitution": 0.7}, SI units (the command's --set).
       floor: of a fall or a flight: the object bounces.
+      release: of a ramp: how far up it object 1 is released, from the foot to the point under its
+        centre, m. None: drawn.
+      like: NAME.truth.json of a clip on a ramp: the same objects in the same places, and what was
+        hidden, filmed once more at this call's angle, frame rate, release and noise. None: other
+        objects.
       series: so many trials of the same objects: NAME_1, NAME_2, ...
       track_only: a csv track in place of the video.
       track_noise: standard deviation of a track's coordinates, m.
@@ -163,6 +170,8 @@ def simulate(
         solver=solver,
         values=values or {},
         floor=floor,
+        release=release,
+        like=like,
         series=series,
         track_only=track_only,
         track_noise=track_noise,

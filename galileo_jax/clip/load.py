@@ -24,7 +24,6 @@ from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import did_you_mean
-from galileo_jax.video import decode
 
 YAML_SUFFIXES = (".yaml", ".yml")
 
@@ -323,6 +322,8 @@ def _filmed(path: Path, file: ClipFile) -> dict[str, Any]:
     video = path.parent / file.video
     if not video.exists():
         raise InputError(f"{path}: video: {video}: no such file")
+    from galileo_jax.video import decode  # and OpenCV, which a csv track does not need
+
     info = decode.probe(video, file.fps)
     return {
         "video": video,

@@ -99,6 +99,7 @@ def _parser() -> command.Parser:
     add("effects", metavar="A,B", help="effects in the model (default: none)")
     add("free", metavar="A,B", help=f"declared quantities to infer: {FREE} (default: none)")
     add_clip_options(parser, "fit", out="folder of the run (default runs/CLIP)")
+    add("discrepancy", choices=("none", "gp"), metavar=None)
     add("motion", choices=MOTIONS, metavar=None)
     add("noise", choices=("camera", "bodies", "tracker"), metavar=None)
     add = adder(parser.add_argument_group("--method mh"), "fit")

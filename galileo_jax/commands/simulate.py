@@ -57,9 +57,10 @@ def _parser() -> command.Parser:
     add("floor", "track_only", "track_noise")
     add = adder(parser.add_argument_group("on a ramp"), "simulate")
     add("shapes", type=_shapes, metavar="SHAPE,...", action=None, default=None)
-    add("angle", "m1", "k1", "m2", "k2")
+    add("angle", "release", "m1", "k1", "m2", "k2")
     add("motion", "solver", choices=None, metavar="NAME")
     add("z2", "series")
+    add("like", metavar="NAME.truth.json")
     hidden = parser.add_argument_group("what is hidden", "in the truth, and not in the yaml")
     add = adder(hidden, "simulate")
     add(

@@ -18,7 +18,7 @@ failure, because the residuals no longer show that misfit.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import ndtr
 
 from galileo_jax.comparison.bootstrap import replicates, whitened
 from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
@@ -196,7 +196,7 @@ def _p_value(
         highest = np.max(np.concatenate([d for _, d in of_cells], axis=1), axis=1)
         p_local = _tail(max(float(m.max()) for m, _ in of_cells), highest)
     if pulls:
-        p_pull = 2 * len(pulls) * float(stats.norm.sf(max(abs(p.z) for p in pulls)))
+        p_pull = 2 * len(pulls) * float(ndtr(-max(abs(p.z) for p in pulls)))
     p = float(np.clip(min(p_local / (1 - PULL_SHARE), p_pull / PULL_SHARE), 0.0, 1.0))
     return p, np.array([float(own.max()) for own, _ in of_cells])
 
@@ -218,7 +218,8 @@ def _tail(value: float, drawn: np.ndarray) -> float:
     if counted > 5 / len(drawn):
         return float(counted)
     scale = np.sqrt(6) / np.pi * drawn.std()
-    return float(stats.gumbel_r.sf(value, drawn.mean() - np.euler_gamma * scale, scale))
+    # Of a Gumbel distribution with the draws' mean and spread.
+    return float(-np.expm1(-np.exp(-((value - drawn.mean()) / scale + np.euler_gamma))))
 
 
 def _pulls(trials: JointProblem, fit: GradientFit, theta: np.ndarray) -> list[Pull]:

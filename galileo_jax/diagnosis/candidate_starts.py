@@ -7,14 +7,12 @@ strength removes most of the misfit (the score test over all shapes).
 
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
 from galileo_jax.diagnosis.score_tests import (
     SHOWS,
     explained,
-    latin,
     shapes_beside,
     slopes_along,
     strength_of,
@@ -22,6 +20,7 @@ from galileo_jax.diagnosis.score_tests import (
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
+from galileo_jax.runtime.latin_hypercube import latin_hypercube
 
 STARTS_PER_PARAMETER, MOST_STARTS = 32, 96
 NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
@@ -124,7 +123,7 @@ def _matched_shapes(
         wanted[:, where] = (-along / np.maximum(power, SHOWS))[best, None] * size
         priors = [trials.model_parameters[i].prior for i in where]
         for column, prior in zip(where, priors, strict=True):
-            own = np.asarray(prior.inverse(jnp.asarray(wanted[:, column])))
+            own = prior.inverse(wanted[:, column])
             z[best, column] = np.clip(np.nan_to_num(own, nan=-MOST_Z), -MOST_Z, MOST_Z)
         free = trials.free(effects)[: len(trials.model_parameters)]
         starts.append(np.where(free, z[best, : len(free)], 0.0))
@@ -138,9 +137,9 @@ def _starts(trials: JointProblem, base: GradientFit, free: np.ndarray, seed: int
     new = np.flatnonzero(free & ~base.free[:count])
     size = min(STARTS_PER_PARAMETER * len(new), MOST_STARTS)
     starts = np.tile(base.z[:count], (size, 1))
-    starts[:, new] = ndtri(np.clip(latin(generator, size, len(new)), 0.02, 0.98))
+    starts[:, new] = ndtri(np.clip(latin_hypercube(size, len(new), generator), 0.02, 0.98))
     parameters = trials.model_parameters
-    zero = np.array(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
+    zero = inverse(parameters, np.array([p.absent for p in parameters]))
     rest = np.clip(zero, -1.0, 1.0)
     nuisance = np.array([p.role == "nuisance" for p in parameters])
     main = np.array([p.role != "nuisance" for p in parameters]) & base.free[:count]

@@ -23,7 +23,8 @@ import numpy as np
 
 from galileo_jax.diagnosis.candidate_starts import matched, scattered
 from galileo_jax.inference.fits.descent import Descended, ends_of, in_valley
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter, valleys
+from galileo_jax.inference.fits.ends import valleys
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 
 NUM_REFITTED, OUT_OF_THE_RACE = 6, 100.0  # candidates, unless so many nats behind the best
@@ -38,10 +39,16 @@ class Hypothesis:
     Attributes:
       effects: names, in the order in which they were added.
       fit: of all parameters.
+      trials: whose parameters these are, where not the diagnosis's own: of a law.
     """
 
     effects: tuple[str, ...]
     fit: GradientFit
+    trials: JointProblem | None = None
+
+    def of(self, trials: JointProblem) -> JointProblem:
+        """The trials that it was fitted to, where the diagnosis's own are `trials`."""
+        return self.trials or trials
 
     @property
     def misfit(self) -> float:

@@ -10,8 +10,10 @@
    same table (rules: `verdict`).
 4. What leaves only noise and is far more probable than all else is named, unless a clip like this
    one would not tell it from another (`expected_lead`). Several are ambiguous.
-5. Where only a form explains the data, or nothing does, the verdict is unknown, and the missing
-   force is inferred without a form (`missing_force`).
+5. Where only a form explains the data, or nothing does, the missing force is inferred without a
+   form (`missing_force`). Short formulas that it suggests are fitted in the model (`laws`) and
+   stand in the same table. The verdict is law where one does what a named effect must; else it
+   is unknown.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,11 +25,12 @@ from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, reduced
-from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
+from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Law, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
+from galileo_jax.diagnosis.laws.in_model import fitted_laws
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
-from galileo_jax.diagnosis.missing_force import infer_missing_force
+from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_to_try
 from galileo_jax.diagnosis.score_tests import best_gains, score_tests
 from galileo_jax.diagnosis.verdict import (
@@ -36,11 +39,17 @@ from galileo_jax.diagnosis.verdict import (
     best_named,
     decisive_margin,
     form_that_leads,
+    is_contested_by_law,
     is_nothing_missing,
+    law_contested,
+    law_odds,
+    law_verdict,
     log_prior,
     looked_at_again,
     may_decide,
+    needs_laws,
     needs_pairs,
+    other_formulas,
     ranked,
     rivals,
     to_add,
@@ -126,25 +135,35 @@ def diagnose(
         alike = within_luck(named, candidates, decisive)
         leads = expected_leads(trials, named, alike)
         verdict = looked_at_again(verdict, named, list(zip(alike, leads, strict=True)), decisive)
+    views: list[View] = []
+    if needs_laws(verdict):
+        on_stage("inferring the missing force without a form")
+        views = views_of(trials, base)
+        on_stage("looking for a law")
+        laws = _laws(trials, base, views, len(library))
+        for candidate in ranked(laws):
+            on_candidate(candidate)
+        candidates = _compared(trials, (*candidates, *laws), decisive, seed, compared)
+        verdict = _law_or(trials, verdict, candidates, decisive)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
         comparison = compared.get(chosen.effects)
         if comparison is None:
-            comparison = compare(trials, chosen.hypothesis.fit, seed)
+            comparison = compare(chosen.hypothesis.of(trials), chosen.hypothesis.fit, seed)
         rounds.append(Round(chosen.hypothesis, comparison))
         on_round(rounds[-1])
     scene = trials.problems[0].model.scene.surroundings
     verdict = replace(verdict, advice=advice(verdict, scene, len(trials.problems)))
     missing = None
-    if verdict.status == "unknown":
-        on_stage("inferring the missing force without a form")
-        missing = infer_missing_force(trials, base, seed)
+    if verdict.status in ("unknown", "law"):
+        missing = infer_missing_force(trials, base, seed, views)
     left_out: tuple[tuple[str, float, float], ...] = ()
     if len(trials.problems) > 1 and len(rounds) > 1:
         on_stage("predicting each clip from the others")
         before = leave_one_out_rmse(trials, rounds[0].hypothesis)
-        after = leave_one_out_rmse(trials, rounds[-1].hypothesis)
+        last = rounds[-1].hypothesis
+        after = leave_one_out_rmse(last.of(trials), last)
         left_out = tuple(zip((p.name for p in trials.problems), before, after, strict=True))
     each: tuple[EachClip, ...] = ()
     if len(trials.problems) > 1:
@@ -243,6 +262,53 @@ class _Race:
         )
 
 
+def _laws(
+    trials: JointProblem, base: Hypothesis, views: Sequence[View], num_effects: int
+) -> list[Candidate]:
+    """Formulas that the missing force suggests, fitted in the model."""
+    made = []
+    for law in fitted_laws(trials, base, views):
+        fit, own = law.hypothesis.fit, law.hypothesis.of(trials)
+        values = {name: f"{value:.4g}" for name, value in law.constants().items()}
+        made.append(
+            Candidate(
+                effects=law.hypothesis.effects,
+                hypothesis=law.hypothesis,
+                error=error_of(own, own.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
+                score_z=float(np.sqrt(2 * max(law.score, 0.0))),
+                log_evidence=fit.log_evidence - base.fit.log_evidence,
+                log_prior=log_prior([law_odds(len(law.structure.factors))], num_effects),
+                probability=0.0,
+                p_value=None,
+                confounded_with=(),
+                law=Law(law.text, law.structure.family, law.source, values),
+            )
+        )
+    return made
+
+
+def _law_or(
+    trials: JointProblem, before: Verdict, candidates: Sequence[Candidate], decisive: float
+) -> Verdict:
+    """The verdict law where a formula does what a named effect must; else as before.
+
+    A pair of effects that a formula explains as well is named no more.
+    """
+    unknown = replace(before, status="unknown", effects=())
+    verdict = law_verdict(candidates, decisive)
+    if verdict is None:
+        said = law_contested(candidates, decisive)
+        is_open = is_contested_by_law(before, candidates, decisive)
+        return replace(unknown if is_open else before, reasons=(*before.reasons, *said))
+    best = next(c for c in candidates if c.effects == verdict.effects)
+    alike = within_luck(best, other_formulas(best, candidates), decisive)
+    leads = expected_leads(trials, best, alike)
+    again = looked_at_again(verdict, best, list(zip(alike, leads, strict=True)), decisive)
+    if again.status == "law":
+        return again
+    return replace(unknown, reasons=(*unknown.reasons, *again.reasons))
+
+
 def _odds(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:
     """Of each effect of a hypothesis, as far as the clip leads to expect it."""
     problem = trials.problems[0]
@@ -309,7 +375,7 @@ def _compared(
     table = ranked(candidates)
     for c in to_compare(table, decisive):
         if c.effects not in compared:
-            compared[c.effects] = compare(trials, c.hypothesis.fit, seed)
+            compared[c.effects] = compare(c.hypothesis.of(trials), c.hypothesis.fit, seed)
     done = [
         replace(c, p_value=compared[c.effects].p_value) if c.effects in compared else c
         for c in table

@@ -13,9 +13,26 @@ from scipy.special import softmax
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.each_clip import EachClip
-from galileo_jax.model.effects.forms import FORM_NAMES
+from galileo_jax.model.effects.forms import FORM_FAMILIES, FORM_NAMES
 
-Status = Literal["none", "named", "ambiguous", "unknown"]
+Status = Literal["none", "named", "ambiguous", "law", "unknown"]
+
+
+@dataclass(frozen=True)
+class Law:
+    """A formula that the missing force suggested, as fitted.
+
+    Attributes:
+      text: with its constants: `a = 0.83 t^0.48, object 1`.
+      family: its shape; two of a family are one formula.
+      source: its effect as Python.
+      constants: their values as text, by name.
+    """
+
+    text: str
+    family: str
+    source: str
+    constants: Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -32,6 +49,7 @@ class Candidate:
       probability: among all candidates and the model without any of them.
       p_value: of its adequacy; None where it was not compared (too improbable).
       confounded_with: candidates that these data do not tell from it.
+      law: the formula, where it is a law that the missing force suggested; else None.
     """
 
     effects: tuple[str, ...]
@@ -43,6 +61,7 @@ class Candidate:
     probability: float
     p_value: float | None
     confounded_with: tuple[str, ...]
+    law: "Law | None" = None
 
     @property
     def name(self) -> str:
@@ -58,6 +77,13 @@ class Candidate:
     def is_form(self) -> bool:
         """Whether it is a form without a name."""
         return any(name in FORM_NAMES for name in self.effects)
+
+    @property
+    def family(self) -> str | None:
+        """The shape of a law's or a form's formula; None of all else."""
+        if self.law is not None:
+            return self.law.family
+        return FORM_FAMILIES[self.effects[-1]] if self.is_form and len(self.effects) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -80,9 +106,10 @@ class Verdict:
     """What is missing.
 
     Attributes:
-      status: none, named, ambiguous or unknown.
+      status: none, named, ambiguous, law or unknown.
       effects: one effect (or set) where it is named, all that explain the data equally well
-        where it is ambiguous; a form without a name stands last.
+        where it is ambiguous; a form without a name stands last; the proposed effect of a law.
+      law: the formula, where the verdict is a law.
       form: where it is unknown: the form without a name that explains the data; None if not
         even that is known.
       advice: what would tell more, one sentence each.
@@ -94,6 +121,7 @@ class Verdict:
     form: str | None = None
     advice: tuple[str, ...] = ()
     reasons: tuple[Reason, ...] = ()
+    law: Law | None = None
 
 
 @dataclass(frozen=True)
@@ -133,7 +161,7 @@ class Diagnosis:
       rounds: of the loop; the first is the model without effects (or with those given).
       candidates: all hypotheses but the model without effects, the most probable first.
       verdict: what is missing.
-      missing: the missing force, where the verdict is unknown.
+      missing: the missing force, where the verdict is unknown or a law.
       each_clip: of a series that no model without effects fits, each clip against the model of
         all and by itself; else empty.
       left_one_out: per clip of a series, the rmse (m/s) predicted from the others, before and

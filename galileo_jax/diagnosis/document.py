@@ -39,6 +39,7 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             "status": diagnosis.verdict.status,
             "effects": list(diagnosis.verdict.effects),
             "form": diagnosis.verdict.form,
+            "law": None if diagnosis.verdict.law is None else diagnosis.verdict.law.text,
             "advice": list(diagnosis.verdict.advice),
         },
         "reasons": [
@@ -76,7 +77,7 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
 def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:
     """One round: effects, errors, p and what is said of the friction coefficients with them."""
     error = one.comparison.error
-    entries = parameter_entries(trials, one.hypothesis.fit, seed)
+    entries = parameter_entries(one.hypothesis.of(trials), one.hypothesis.fit, seed)
     return {
         "effects": list(one.hypothesis.effects),
         "rmse": error["rmse"],
@@ -120,9 +121,10 @@ def _entries(
 
 
 def _candidate(trials: JointProblem, candidate: Candidate, seed: int) -> dict[str, Any]:
-    parameters, derived = _entries(trials, candidate.hypothesis.fit, seed)
+    parameters, derived = _entries(candidate.hypothesis.of(trials), candidate.hypothesis.fit, seed)
     return {
         "effect": candidate.name,
+        "law": None if candidate.law is None else candidate.law.text,
         "parameters": parameters,
         "derived": derived,
         "rmse": candidate.error["rmse"],

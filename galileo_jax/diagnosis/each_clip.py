@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from scipy import stats
+from scipy.special import chdtrc
 
 from galileo_jax.comparison.compare import ADEQUATE_P, JUDGED_SCALE_RANGE, Comparison
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
@@ -82,7 +82,7 @@ def kind_of(found: tuple[EachClip, ...]) -> Kind:
     weight = 1.0 / np.stack([one.sd_m_s2 for one in found]) ** 2
     mean = (weight * extra).sum(axis=0) / weight.sum(axis=0)
     apart = float((weight * (extra - mean) ** 2).sum())
-    is_alike = stats.chi2.sf(apart, extra.size - mean.size) >= ALIKE_P
+    is_alike = chdtrc(extra.size - mean.size, apart) >= ALIKE_P
     return "alike" if is_alike else "different"
 
 
@@ -106,7 +106,7 @@ def _one(trials: JointProblem, fit: GradientFit, comparison: Comparison, clip: i
         clip=problem.name,
         chi2_together=together / degrees(1.0),
         chi2_alone=stated / degrees(1.0),
-        p_alone=float(stats.chi2.sf(left, degrees(scale))),
+        p_alone=float(chdtrc(degrees(scale), left)),
         way_m=way,
         extra_m_s2=extra,
         sd_m_s2=sd,

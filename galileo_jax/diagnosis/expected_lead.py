@@ -28,14 +28,25 @@ def expected_leads(
     """
     if not rivals:
         return []
-    fitter = GradientFitter(turned_round(trials, candidate.hypothesis.fit))
+    turned = turned_round(candidate.hypothesis.of(trials), candidate.hypothesis.fit)
+    fitter = GradientFitter(turned)
     own = fitter.refit(candidate.hypothesis.fit).log_evidence
+    fitters = {id(candidate.hypothesis.of(trials)): fitter}
     found = []
     for rival in rivals:
-        lead = own - fitter.refit(rival.hypothesis.fit).log_evidence
+        its = rival.hypothesis.of(trials)
+        if id(its) not in fitters:
+            fitters[id(its)] = GradientFitter(_with_observations_of(its, turned))
+        lead = own - fitters[id(its)].refit(rival.hypothesis.fit).log_evidence
         lead += candidate.log_prior - rival.log_prior
         found.append(0.5 * (lead + candidate.log_odds - rival.log_odds))
     return found
+
+
+def _with_observations_of(trials: JointProblem, seen: JointProblem) -> JointProblem:
+    """The trials, with other measurements of the same clips."""
+    pairs = zip(trials.problems, seen.problems, strict=True)
+    return JointProblem(tuple(replace(a, observation=b.observation) for a, b in pairs))
 
 
 def turned_round(trials: JointProblem, fit: GradientFit) -> JointProblem:

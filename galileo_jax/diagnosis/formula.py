@@ -19,7 +19,6 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from sklearn.linear_model import orthogonal_mp
 
 NOTHING, NOT_SIMPLE = "nothing", "no simple formula"
 MAX_TERMS = 3
@@ -163,6 +162,8 @@ def _pursue(sights: Sequence[Sight], target: np.ndarray, terms: Sequence[Term]) 
     plain = [i for i, term in enumerate(kept) if not term.scanned]
     chosen = [[i] for i in plain]
     chosen += [list(pair) for pair in combinations(plain, 2)]
+    from sklearn.linear_model import orthogonal_mp  # and pandas: only where a force is missing
+
     path = orthogonal_mp(columns, target, n_nonzero_coefs=MAX_TERMS, return_path=True)
     chosen += [np.flatnonzero(step).tolist() for step in np.reshape(path, (len(kept), -1)).T]
     fits = []

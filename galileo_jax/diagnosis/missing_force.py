@@ -23,28 +23,36 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.diagnosis.formula import NOT_SIMPLE, Formula, Sight, find_formula
-from galileo_jax.diagnosis.free_acceleration import FreeAcceleration, Span
-from galileo_jax.diagnosis.free_fit import FreeFit, free_fit
+from galileo_jax.inference.free_force.along_path import along_path
+from galileo_jax.inference.free_force.free_fit import FreeFit, free_fit
+from galileo_jax.inference.free_force.spans import MOVES_M_S
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
+from galileo_jax.model.effects.free_acceleration import FreeAcceleration
 from galileo_jax.model.model import Model
-from galileo_jax.rollout.engines import make_engine
 from galileo_jax.rollout.motion import dynamics, state_at
 
 NUM_TIMES, NUM_DRAWS = 200, 400
-MOVES_M_S = 0.01
-LONGER = 1.05  # than the hypothesis says, the objects may move
-SHORTEST_S = 0.05  # of a piece
-NUM_SPANS = 2  # pieces by the hypothesis, then by the fit with the acceleration
 
 
-def infer_missing_force(trials: JointProblem, hypothesis: Hypothesis, seed: int) -> MissingForce:
+def views_of(trials: JointProblem, hypothesis: Hypothesis) -> list["View"]:
+    """Each clip fitted with a free acceleration beside a hypothesis."""
+    return [view_of(trials, hypothesis, clip) for clip in range(len(trials.problems))]
+
+
+def infer_missing_force(
+    trials: JointProblem,
+    hypothesis: Hypothesis,
+    seed: int,
+    views: Sequence["View"] | None = None,
+) -> MissingForce:
     """Infers the acceleration along the path that a hypothesis lacks, and a formula for it.
 
     Args:
       trials: whose models have the hypothesis' effects.
       hypothesis: fitted to them.
       seed: of the posterior's draws.
+      views: from `views_of`, where they are there already.
 
     Returns:
       The first clip's, NaN where an object is at rest or not seen. Its zero is the hypothesis
@@ -53,7 +61,7 @@ def infer_missing_force(trials: JointProblem, hypothesis: Hypothesis, seed: int)
       and so is the share it explains: of the misfit that an acceleration of any form takes
       away.
     """
-    views = [_view(trials, hypothesis, clip) for clip in range(len(trials.problems))]
+    views = views or views_of(trials, hypothesis)
     count = len(views[0].path_m)
     formulas = [find_formula([_sight(view, i) for view in views]) for i in range(count)]
     first = views[0]
@@ -70,7 +78,7 @@ def infer_missing_force(trials: JointProblem, hypothesis: Hypothesis, seed: int)
 
 
 @dataclass(frozen=True)
-class _View:
+class View:
     """One clip fitted with a free acceleration.
 
     Attributes:
@@ -94,6 +102,7 @@ class _View:
 
     @property
     def model(self) -> Model:
+        """With the free acceleration."""
         return self.trials.problems[0].model
 
     @property
@@ -125,101 +134,31 @@ class _View:
         return -self.fit.jacobian[:, self.knots(index)] @ weights
 
 
-def _view(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> _View:
+def view_of(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> View:
     """Fits one clip with a free acceleration."""
     # A formula is judged in a linear model, some way from the truth: what a camera may bend is
     # allowed for, whoever measured, so that a bend of the model is not taken for a force.
     problem = replace(trials.problems[clip], noise="camera")
     column = trials.columns_of(clip)
     z, free = hypothesis.fit.z[column], hypothesis.fit.free[column]
-    alone = JointProblem((problem,))
-    spans = _spans(problem, alone.theta(z, free)[:-1])
-    for _ in range(NUM_SPANS):
-        effect = FreeAcceleration(spans)
-        model = replace(problem.model, effects=(*problem.model.effects, effect))
-        engine = make_engine(problem.engine.name, model)
-        extended = JointProblem((replace(problem, model=model, engine=engine),))
-        where = np.array([extended.names.index(name) for name in alone.names])
-        before = np.zeros(len(extended.names))
-        is_free = np.zeros(len(extended.names), bool)
-        before[where], is_free[where] = np.where(free, z, 0.0), free
-        acceleration = [name for i in range(len(spans)) for name in effect.knots(i)]
-        is_free[[extended.names.index(name) for name in acceleration]] = True
-        fit = free_fit(extended, before, is_free)
-        theta = extended.theta(fit.z, fit.free)
-        spans = _spans(extended.problems[0], theta[:-1])
+    fit = free_fit(JointProblem((problem,)), z, free)
+    extended = fit.trials
+    (effect,) = fit.effects
+    theta = extended.theta(fit.z, fit.free)
     time_s, path, speed = _motion(
         extended.problems[0], theta[:-1], max(own[-1][1] for own in effect.spans_s)
     )
     moves = _seen(problem, time_s) & (np.abs(speed) > MOVES_M_S)
     for i, own in enumerate(effect.spans_s):
         moves[i] &= (time_s >= own[0][0]) & (time_s <= own[-1][1])
-    return _View(extended, before, fit, effect, time_s, path, speed, moves)
-
-
-def _spans(problem: Problem, theta: np.ndarray) -> tuple[tuple[Span, ...], ...]:
-    """When each object moves by a rollout, in pieces; all the time where it says never.
-
-    Object 1 has a piece on the ramp, one on the table, and one from when object 2 begins to
-    move.
-    """
-    last = float(problem.observation.times_s[-1])
-    position, velocity = problem.engine.simulate(theta[None])
-    times = np.arange(velocity.shape[-1]) * problem.model.record_dt_s
-    scene = problem.model.scene.surroundings
-    speeds = np.hypot(velocity[0, :, 0], velocity[0, :, 1])
-    moved = np.hypot(*(position[0] - position[0, ..., :1]).transpose(1, 0, 2))
-    found = []
-    for way, speed in zip(moved, speeds, strict=True):
-        moving = np.flatnonzero((speed > MOVES_M_S) & (times <= last))
-        begin, end = (moving[0], moving[-1]) if moving.size > 2 else (0, len(times) - 1)
-        # Records are 4 ms apart; a knock is in between.
-        since = min(way[begin] / max(speed[begin], MOVES_M_S), times[1])
-        start = max(float(times[begin] - since), 0.0)
-        found.append((start, float(min(last, start + LONGER * (times[end] - start)))))
-    (begin, end), *others = found
-    events = [start for start, _ in others]
-    beyond = position[0, 0, 0] - scene.corner_m[0]
-    if scene.comes_down[0] and (beyond >= 0).any():
-        events.append(float(_first_s(beyond, times)))
-    edges = [begin]
-    for event in sorted(events):
-        if event > edges[-1] + SHORTEST_S and end > event + SHORTEST_S:
-            edges.append(event)
-    pieces = tuple(zip(edges, [*edges[1:], end], strict=True))
-    return (pieces, *((span,) for span in others))
-
-
-def _first_s(value: np.ndarray, times_s: np.ndarray) -> float:
-    """When `value` `[time]` first reaches zero."""
-    reached = int(np.argmax(value >= 0))
-    pair = slice(max(reached - 1, 0), reached + 1)
-    return float(np.interp(0.0, value[pair], times_s[pair]))
+    return View(extended, fit.start, fit, effect, time_s, path, speed, moves)
 
 
 def _motion(
     problem: Problem, theta: np.ndarray, end_s: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times `[time]`, and path and speed `[object, time]` of a rollout."""
-    model = problem.model
-    scene = model.scene.surroundings
-    position, velocity = (values[0] for values in problem.engine.simulate(theta[None]))
-    law = dynamics(model.effects + model.nuisances, scene, model.by_name(theta[None]), np)
-    if scene.has_table:
-        corner = np.asarray(scene.corner_m)
-        origin = np.stack([corner, np.asarray(scene.half_height_m)], axis=1)
-        slope = np.where(position[:, 0] < corner[:, None], law.ramp_rad, law.table_rad)
-    else:
-        origin = np.asarray(scene.start_m)
-        slope = np.broadcast_to(law.ramp_rad, position[:, 0].shape)
-    tangent = np.stack([np.cos(slope), -np.sin(slope)], axis=1)
-    path = np.sum((position - origin[..., None]) * tangent, axis=1)
-    speed = np.sum(velocity * tangent, axis=1)
-    if scene.moves_in_plane:
-        speed = np.hypot(velocity[:, 0], velocity[:, 1])
-        steps = np.hypot(*np.diff(position, axis=-1).transpose(1, 0, 2))
-        path = np.pad(np.cumsum(steps, axis=-1), [(0, 0), (1, 0)])
-    recorded = np.arange(path.shape[-1]) * model.record_dt_s
+    recorded, path, speed = along_path(problem, theta)
     chosen = np.unique(np.linspace(0, np.searchsorted(recorded, end_s), NUM_TIMES).astype(int))
     chosen = chosen[chosen < len(recorded)]
     return recorded[chosen], path[:, chosen], speed[:, chosen]
@@ -234,7 +173,7 @@ def _seen(problem: Problem, time_s: np.ndarray) -> np.ndarray:
     )
 
 
-def _sight(view: _View, index: int) -> Sight:
+def _sight(view: View, index: int) -> Sight:
     """What a clip says of one object's acceleration, all that else is unknown taken out.
 
     The prior of the rest, unit normal in z, makes the target's covariance  S = 1 + N N'.
@@ -262,13 +201,13 @@ def _sight(view: _View, index: int) -> Sight:
 
 
 def _told(
-    view: _View, formulas: Sequence[Formula], generator: np.random.Generator
+    view: View, formulas: Sequence[Formula], generator: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """The acceleration over the model that goes with the formulas and its sd, `[object, time]`."""
     fit, trials = view.fit, view.trials
     with_knots = np.tile(fit.z, (NUM_DRAWS, 1))
     with_knots[:, :-1] = generator.multivariate_normal(
-        fit.z[:-1], fit.covariance, NUM_DRAWS, method="svd"
+        fit.z[:-1], fit.covariance[:-1, :-1], NUM_DRAWS, method="svd"
     )
     whole = _accelerations(view, trials.theta(with_knots, fit.free))
     base = _accelerations(view, trials.theta(_bases(view, formulas, generator), fit.free))
@@ -278,7 +217,7 @@ def _told(
     return missing.mean(axis=0), missing.std(axis=0)
 
 
-def _bases(view: _View, formulas: Sequence[Formula], generator: np.random.Generator) -> np.ndarray:
+def _bases(view: View, formulas: Sequence[Formula], generator: np.random.Generator) -> np.ndarray:
     """Draws of all but the knots with the formulas in the model, `[draw, parameter]`, z.
 
     Coefficients of formulas are free. An object without one keeps its free acceleration.
@@ -305,7 +244,7 @@ def _bases(view: _View, formulas: Sequence[Formula], generator: np.random.Genera
     return z
 
 
-def _accelerations(view: _View, theta: np.ndarray) -> np.ndarray:
+def _accelerations(view: View, theta: np.ndarray) -> np.ndarray:
     """Of a model along the fitted motion, `[draw, parameter]` to `[draw, object, time]`, m/s^2."""
     model = view.model
     scene = model.scene.surroundings

@@ -116,6 +116,17 @@ def nothing_explains(best: Candidate) -> Reason:
     )
 
 
+def no_law_explains(best: Candidate) -> Reason:
+    """No formula that the missing force suggested leaves only noise."""
+    law = best.law.text if best.law is not None else best.name
+    return Reason(
+        "no_law_explains",
+        f"No formula leaves only noise: the most probable, {law}, leaves "
+        f"{p_equals(best.p_value or 0.0)}.",
+        {"hypothesis": best.name, "p_value": best.p_value},
+    )
+
+
 def less_probable_than_none(best: Candidate) -> Reason:
     """What explains the data is less probable than no effect at all."""
     return Reason(

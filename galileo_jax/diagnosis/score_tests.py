@@ -10,11 +10,11 @@ from collections.abc import Sequence
 import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.runtime.latin_hypercube import latin_hypercube
 
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1
@@ -81,7 +81,7 @@ def shapes_beside(
     number = NUM_SHAPES if len(shape) else 1
     generator = np.random.default_rng([seed, 43])
     z = np.tile(base.z, (number, 1))
-    z[:, shape] = ndtri(np.clip(latin(generator, number, len(shape)), 0.02, 0.98))
+    z[:, shape] = ndtri(np.clip(latin_hypercube(number, len(shape), generator), 0.02, 0.98))
     probes = np.array(trials.theta(z, trials.free(effects)))
     probes[:, where] = size
     return z, probes
@@ -118,8 +118,3 @@ def _beside(
     whole = np.append(residual, base.z[: len(free)][free])
     padded = np.pad(slopes, [(0, 0), (0, int(free.sum()))])
     return whole - basis @ (basis.T @ whole), padded - (padded @ basis) @ basis.T
-
-
-def latin(generator: np.random.Generator, size: int, num: int) -> np.ndarray:
-    """A Latin hypercube in the unit cube, `[point, axis]`."""
-    return qmc.LatinHypercube(num, rng=generator).random(size)

@@ -17,7 +17,8 @@ from scipy.special import softmax
 from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.candidates import MAY_STILL_GAIN
-from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
+from galileo_jax.diagnosis.diagnosis import Candidate, Reason, Verdict
+from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 
 # Difference in log odds, in nats, at which the weaker of two hypotheses is given up: it is then
 # twenty times less probable (e^3 = 20).
@@ -40,6 +41,15 @@ NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 3
 # The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
 # sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
 MOST_LUCK = 4.0
+
+
+# A formula of two factors is a tenth as probable as one of one factor, which has a form's odds.
+LENGTH_ODDS = 0.1
+
+
+def law_odds(num_factors: int) -> float:
+    """How many times as likely as an effect with a name a formula is, before the data."""
+    return UNNAMED_ODDS * LENGTH_ODDS ** (num_factors - 1)
 
 
 def log_prior(odds: Sequence[float], num_effects: int) -> float:
@@ -82,8 +92,8 @@ def is_nothing_missing(is_base_accepted: bool, candidates: Sequence[Candidate]) 
 
 
 def best_named(candidates: Sequence[Candidate]) -> Candidate:
-    """The first of ranked candidates that is no form without a name."""
-    return next(c for c in candidates if not c.is_form)
+    """The first of ranked candidates that is neither a form without a name nor a law."""
+    return next(c for c in candidates if not c.is_form and c.law is None)
 
 
 def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidate, ...]:
@@ -171,6 +181,70 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     alike = [*names, *forms[:1]]
     contests = (reasons.contested(names[0], rival, decisive) for rival in alike[1:])
     return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *contests))
+
+
+def needs_laws(verdict: Verdict) -> bool:
+    """Whether formulas are to be tried: nothing explains the data, or only two effects at once do.
+
+    Two effects come close to almost any motion, and one formula may be simpler.
+    """
+    return verdict.status == "unknown" or any("+" in name for name in joined_names(verdict)[:1])
+
+
+def joined_names(verdict: Verdict) -> tuple[str, ...]:
+    """The hypotheses that a verdict is about; several effects of one are joined by +."""
+    if verdict.status == "named":
+        return ("+".join(verdict.effects),)
+    return verdict.effects
+
+
+def is_contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive: float) -> bool:
+    """Whether a formula explains the data about as well as the pair that a verdict is about."""
+    law = next((c for c in candidates if c.law is not None and explains(c)), None)
+    own = next((c for c in candidates if c.name in joined_names(verdict)), None)
+    return law is not None and own is not None and own.log_odds - law.log_odds < decisive
+
+
+def other_formulas(law: Candidate, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates without those that are the law's formula in another way."""
+    return tuple(c for c in candidates if c.effects == law.effects or c.family != law.family)
+
+
+def law_verdict(candidates: Sequence[Candidate], decisive: float) -> Verdict | None:
+    """The verdict that a formula explains the data; None where none does and beats all others.
+
+    It must do what a hypothesis that is named must, in a table without forms and laws of the same
+    formula: whether it pushes or changes friction may not be told.
+
+    Args:
+      candidates: as of `verdict_of`, laws among them.
+      decisive: difference in log odds, nats, at which one hypothesis rules out another.
+    """
+    best = next((c for c in candidates if c.law is not None and explains(c)), None)
+    if best is None:
+        return None
+    found = verdict_of(other_formulas(best, candidates), decisive)
+    if found.status != "named" or found.effects != best.effects:
+        return None
+    return replace(found, status="law", law=best.law)
+
+
+def law_contested(candidates: Sequence[Candidate], decisive: float) -> tuple[Reason, ...]:
+    """Why there is no law, where formulas were fitted.
+
+    Args:
+      candidates: as of `law_verdict`, which found none.
+      decisive: nats.
+    """
+    laws = [c for c in candidates if c.law is not None]
+    if not laws:
+        return ()
+    best = next((c for c in laws if explains(c)), None)
+    if best is None:
+        return (reasons.no_law_explains(laws[0]),)
+    others = [c for c in other_formulas(best, candidates) if c.effects != best.effects]
+    ahead = [c for c in others if best.log_odds - c.log_odds < decisive]
+    return tuple(reasons.contested(best, c, decisive) for c in ahead[:1])
 
 
 def within_luck(

@@ -135,7 +135,7 @@ class JointProblem:
         free = np.ones(len(self.parameters), bool)
         for problem, column in zip(self.problems, self.columns, strict=True):
             for parameter, joint in zip(problem.parameters, column, strict=True):
-                free[joint] = parameter.name not in absent
+                free[joint] = parameter.name not in absent and parameter.role != "given"
         return free
 
     @property

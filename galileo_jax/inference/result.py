@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax import __version__
@@ -38,6 +37,8 @@ SCALE_WARNING = (
 FREE_SCALE_WARNING = (
     "nothing in this motion tells the scale: give --pixels-per-metre to have lengths in metres"
 )
+
+UNSHOWN = ("latent", "given")  # roles that have no entry of their own in result.json
 
 PULLED_Z = 3.0  # of a nuisance's prior standard deviations; one in four hundred is by chance
 
@@ -209,9 +210,11 @@ def make_result(
       notes: what else the method has to say ("engine", "status", warnings).
     """
     draws = posterior.flat()
-    spread = np.asarray(inverse(trials.parameters, jnp.asarray(draws))).std(axis=0)
+    spread = inverse(trials.parameters, np.asarray(draws)).std(axis=0)
     table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
     for i, parameter in enumerate(trials.parameters):
+        if parameter.role in UNSHOWN:
+            continue
         entry: dict[str, Any] = summarise(draws[:, i])
         entry["unit"] = parameter.unit
         entry["identified"] = bool(spread[i] < IDENTIFIED_SD_Z)
@@ -246,7 +249,7 @@ def make_result(
         said = [*notes.get("warnings", []), unscaled]
         notes = notes | {"warnings": list(dict.fromkeys(said))}
     # Every parameter takes from the residuals what the data say of it.
-    is_fitted = np.array([p.role != "nuisance" for p in trials.model_parameters])
+    is_fitted = np.array([p.role not in ("nuisance", "given") for p in trials.model_parameters])
     share_from_data = 1 - np.clip(spread[: len(is_fitted)] ** 2, 0, 1)
     away = prior_deviations(trials.model_parameters, z_best[: len(is_fitted)])
     theta = trials.theta(z_best)

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
-from scipy import stats
+from scipy.special import chdtri
 
 from galileo_jax.observation.observation import Observation
 
@@ -40,7 +40,7 @@ def with_noise_at_rest(observation: Observation) -> Observation:
     if len(found) < MIN_WINDOWS:
         return observation
     # The median: a window that holds the begin of a motion does not count.
-    share = float(np.median(found) / stats.chi2.median(WINDOW - 1))
+    share = float(np.median(found) / chdtri(WINDOW - 1, 0.5))
     scale2 = np.where(is_still, np.clip(share, LEAST_SCALE**2, 1.0), 1.0)
     covariance = observation.covariance_m2 * scale2[:, None, None]
     return replace(observation, covariance_m2=covariance)

@@ -18,7 +18,7 @@ import numpy as np
 from galileo_jax.clip.schema import Clip
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.compilation_cache import cache_folder
-from galileo_jax.tracking import Track, track_clip
+from galileo_jax.tracking.track import Track
 
 FOLDER = "tracks"
 ROOMS = ("clip", "tracking", "video")  # whose code decides what a track is
@@ -32,8 +32,10 @@ def track_once(clip: Clip) -> Track:
     """The clip's track, read from the cache where it was tracked before.
 
     Raises:
-      InputError: as `tracking.track_clip`.
+      InputError: as `tracking.clip.track_clip`.
     """
+    from galileo_jax.tracking.clip import track_clip  # and OpenCV: a csv track needs neither
+
     folder = cache_folder()
     if folder is None or clip.video is None:
         return track_clip(clip)

@@ -64,7 +64,7 @@ class Model:
     @property
     def record_dt_s(self) -> float:
         """Time between recorded steps, s."""
-        return SUBSTEPS * float(self.scene.model.opt.timestep)
+        return SUBSTEPS * self.scene.timestep_s
 
     @property
     def num_records(self) -> int:

@@ -8,14 +8,15 @@ ignorance the data have taken away.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import ndtr, ndtri
+from scipy import special
 
-Role = Literal["main", "nuisance", "effect"]
+Role = Literal["main", "nuisance", "effect", "latent", "given"]
 
 
 class Prior(Protocol):
@@ -25,8 +26,8 @@ class Prior(Protocol):
         """Maps `z ~ N(0, 1)` to the parameter; monotonic and differentiable."""
         ...
 
-    def inverse(self, theta: jax.Array) -> jax.Array:
-        """Maps the parameter to `z`."""
+    def inverse(self, theta: Any) -> Any:
+        """Maps the parameter, an array of NumPy or JAX, to `z`."""
         ...
 
     def encode(self) -> tuple[int, float, float]:
@@ -45,7 +46,7 @@ class Normal:
         """`mean + sd z`."""
         return self.mean + self.sd * z
 
-    def inverse(self, theta: jax.Array) -> jax.Array:
+    def inverse(self, theta: Any) -> Any:
         """`(theta - mean) / sd`."""
         return (theta - self.mean) / self.sd
 
@@ -65,9 +66,10 @@ class LogNormal:
         """`median exp(sd z)`."""
         return self.median * jnp.exp(self.sd * z)
 
-    def inverse(self, theta: jax.Array) -> jax.Array:
-        """`log(theta / median) / sd`."""
-        return jnp.log(theta / self.median) / self.sd
+    def inverse(self, theta: Any) -> Any:
+        """`log(theta / median) / sd`; NaN below 0."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return theta.__array_namespace__().log(theta / self.median) / self.sd
 
     def encode(self) -> tuple[int, float, float]:
         """As `PriorTable` holds it."""
@@ -85,10 +87,10 @@ class Uniform:
         """`low + (high - low) Phi(z)`."""
         return self.low + (self.high - self.low) * ndtr(z)
 
-    def inverse(self, theta: jax.Array) -> jax.Array:
+    def inverse(self, theta: Any) -> Any:
         """`Phi^-1((theta - low) / (high - low))`, finite at the ends."""
         share = (theta - self.low) / (self.high - self.low)
-        return ndtri(jnp.clip(share, 1e-9, 1 - 1e-9))
+        return _ndtri(share.clip(1e-9, 1 - 1e-9))
 
     def encode(self) -> tuple[int, float, float]:
         """As `PriorTable` holds it."""
@@ -105,9 +107,9 @@ class HalfNormal:
         """`sd Phi^-1((1 + Phi(z)) / 2)`."""
         return self.sd * ndtri(0.5 + 0.5 * jnp.clip(ndtr(z), 0.0, 1 - 1e-12))
 
-    def inverse(self, theta: jax.Array) -> jax.Array:
+    def inverse(self, theta: Any) -> Any:
         """The `z` of `theta`, finite at 0."""
-        return ndtri(jnp.clip(2 * ndtr(theta / self.sd) - 1, 1e-9, 1 - 1e-9))
+        return _ndtri((2 * _ndtr(theta / self.sd) - 1).clip(1e-9, 1 - 1e-9))
 
     def encode(self) -> tuple[int, float, float]:
         """As `PriorTable` holds it."""
@@ -123,7 +125,8 @@ class Parameter:
       unit: SI; "1" for a pure number.
       prior: what is known before the data.
       absent: the value at which what the parameter stands for is not there.
-      role: "main" (what the user asks for), "nuisance" or "effect".
+      role: "main" (what the user asks for), "nuisance" or "effect"; "latent": of a function that
+        is told as a whole; "given": a number that compiled code needs and nobody infers.
       step: a coarse step in `z` for the first finite differences, before the scale of the
         posterior is known; None: no rollout depends on it (clock, camera).
       per_clip: whether each clip of a series has its own (nuisances always do).
@@ -190,9 +193,19 @@ def forward(parameters: Sequence[Parameter], z: jax.Array) -> jax.Array:
     return jnp.stack([p.prior.forward(z[..., i]) for i, p in enumerate(parameters)], axis=-1)
 
 
-def inverse(parameters: Sequence[Parameter], theta: jax.Array) -> jax.Array:
-    """Maps `theta` `[..., parameter]` to `z`."""
-    return jnp.stack([p.prior.inverse(theta[..., i]) for i, p in enumerate(parameters)], axis=-1)
+def inverse(parameters: Sequence[Parameter], theta: Any) -> np.ndarray:
+    """Maps `theta` `[..., parameter]` to `z`; in NumPy, where nothing is compiled."""
+    columns = np.moveaxis(np.asarray(theta, float), -1, 0)
+    found = [p.prior.inverse(column) for p, column in zip(parameters, columns, strict=True)]
+    return np.stack(found, axis=-1)
+
+
+def _ndtr(value: Any) -> Any:
+    return ndtr(value) if isinstance(value, jax.Array) else special.ndtr(value)
+
+
+def _ndtri(share: Any) -> Any:
+    return ndtri(share) if isinstance(share, jax.Array) else special.ndtri(share)
 
 
 def absent(parameters: Sequence[Parameter]) -> np.ndarray:

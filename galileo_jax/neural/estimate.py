@@ -75,7 +75,7 @@ def cnn_posterior(
     found = _estimate(network, seen, summary, seed)
     theta = _complete(trials, found, seed)
     middle = np.zeros(len(trials.names))
-    means = np.asarray(inverse(trials.parameters, jnp.asarray(theta.mean(0))))
+    means = inverse(trials.parameters, np.asarray(theta.mean(0)))
     for i, parameter in enumerate(trials.parameters):
         if parameter.role == "main":
             middle[i] = means[i]

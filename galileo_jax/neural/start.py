@@ -15,7 +15,6 @@ engine with deep learning, NIPS 2015, section 5.
 from dataclasses import dataclass, replace
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
@@ -59,7 +58,7 @@ def start_from_network(trials: JointProblem, seed: int, num_chains: int) -> Star
     generator = np.random.default_rng([seed, 8])
     drawn = posterior.flat()[generator.choice(posterior.draws.shape[1], num_chains)]
     known = np.array([parameter.role == "main" for parameter in trials.parameters])
-    z = np.asarray(inverse(trials.parameters, jnp.asarray(drawn)))
+    z = inverse(trials.parameters, np.asarray(drawn))
     tried = completed(np.repeat(z, NUM_COMPLETIONS, axis=0), known, fit, generator)
     costs = fitter.search_costs(tried[:, : len(free)], np.tile(free, (len(tried), 1)))
     best = np.argmin(costs.reshape(num_chains, -1), axis=1)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from html import escape
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -78,11 +79,26 @@ def write_comparison_page(path: Path, title: str, report: ComparisonReport) -> N
     write_text(path, document(f"{title}: comparison", sections))
 
 
-def motion(clips: Sequence[Clip], trials: JointProblem, theta: Mapping[str, np.ndarray]) -> str:
-    """Every clip with the motion of each of `theta` `[parameter]`, by its name."""
+def motion(
+    clips: Sequence[Clip],
+    trials: JointProblem,
+    theta: Mapping[str, np.ndarray],
+    others: Mapping[str, JointProblem] = MappingProxyType({}),
+) -> str:
+    """Every clip with the motion of each of `theta` `[parameter]`, by its name.
+
+    Args:
+      clips: as declared.
+      trials: of these.
+      theta: by the name of what moves so.
+      others: the trials of those that have another model.
+    """
     found = []
     for i, (clip, problem) in enumerate(zip(clips, trials.problems, strict=True)):
-        predicted = {name: problem.simulate(trials.of_clip(one, i)) for name, one in theta.items()}
+        predicted = {}
+        for name, one in theta.items():
+            own = others.get(name, trials)
+            predicted[name] = own.problems[i].simulate(own.of_clip(one, i))
         if len(clips) > 1:
             found.append(f"<h3>{escape(problem.name)}</h3>")
         found.append(animation(clip, problem, predicted))

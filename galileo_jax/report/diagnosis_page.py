@@ -57,7 +57,7 @@ def write_diagnosis_page(
     """Writes the page, and the residuals before and after each effect as SVG into plots/."""
     diagnosis = report.diagnosis
     shown = [
-        path_residuals(trials, one.hypothesis.fit, one.comparison, report.seed)
+        path_residuals(one.hypothesis.of(trials), one.hypothesis.fit, one.comparison, report.seed)
         for one in diagnosis.rounds
     ]
     rounds = list(pairwise(zip(shown, map(_title, diagnosis.rounds), strict=True)))
@@ -69,7 +69,12 @@ def write_diagnosis_page(
         _reasons(diagnosis.verdict.reasons),
         _rounds(diagnosis.rounds, report.record["history"]),
         _candidates(diagnosis, report.record["candidates"]),
-        motion(report.clips, trials, _fitted(trials, diagnosis)),
+        motion(
+            report.clips,
+            trials,
+            _fitted(trials, diagnosis),
+            {_title(one): one.hypothesis.of(trials) for one in diagnosis.rounds},
+        ),
         failures(f"Where the model fails: {_title(diagnosis.rounds[0])}", shown[0]),
         *(_added(name, charts) for name, charts in added),
         _missing(report, trials.problems[0].observation.names),
@@ -88,7 +93,7 @@ def write_diagnosis_page(
 def _fitted(trials: JointProblem, diagnosis: Diagnosis) -> dict[str, Any]:
     """The parameters of every round, `[parameter]`, by its effects."""
     return {
-        _title(one): trials.theta(one.hypothesis.fit.z, one.hypothesis.fit.free)
+        _title(one): one.hypothesis.of(trials).theta(one.hypothesis.fit.z, one.hypothesis.fit.free)
         for one in diagnosis.rounds
     }
 

@@ -13,6 +13,7 @@ from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fit_text import number
 
 NO_EFFECTS = "no effects"
+PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis whose verdict is a law
 
 
 def effects_text(effects: Sequence[str]) -> str:
@@ -63,6 +64,13 @@ def verdict(diagnosis: Diagnosis) -> str:
     if found.status == "ambiguous":
         names = ", ".join(found.effects)
         return f"This clip cannot distinguish between {names}; each of them explains the data."
+    if found.law is not None:
+        (chosen,) = (c for c in diagnosis.candidates if c.effects == found.effects)
+        p = p_equals(chosen.p_value or 0.0)
+        return (
+            f"No known effect explains the data; a law does: {found.law.text} "
+            f"({p_equals(first.p_value)} without, {p} with)."
+        )
     where = "; see the missing force" if diagnosis.missing is not None else ""
     return f"No known effect explains the data{where}."
 
@@ -104,7 +112,10 @@ def next_command(
         return f"galileo fit {files}"
     if found.status == "unknown":
         return f"galileo diagnose {files}{more} --effects-from my_effect.py"
-    effects = found.effects if found.status == "named" else found.effects[0].split("+")
+    if found.status == "law":
+        more += f" --effects-from {PROPOSED}"
+    chosen = found.status in ("named", "law")
+    effects = found.effects if chosen else found.effects[0].split("+")
     return f"galileo fit {files}{more} --effects {','.join(effects)}"
 
 

@@ -1,80 +1,27 @@
-"""Draws a `Chart`: as a Plotly figure for pages and notebooks, as SVG for papers and slides.
+"""Draws a `Chart`: as a Plotly figure for notebooks, as SVG for papers and slides.
 
 Two libraries, because neither does both: Plotly's figures are interactive and need no network,
-but its still pictures need Chrome; Matplotlib's SVG needs nothing. Both follow one `_Layout`.
+but its still pictures need Chrome; Matplotlib's SVG needs nothing. Both follow one `Layout`. Pages
+have Plotly's figures as plain JSON (`plotly_figure.py`).
 """
 
-from dataclasses import dataclass
-from functools import cache
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from galileo_jax.report.chart import Band, Bars, Boxes, Chart, Line, Mark, Panel, Points, Values
+from galileo_jax.report.chart import Band, Bars, Boxes, Chart, Line, Mark, Panel, Points
+from galileo_jax.report.layout import CELL_PX, RIGHT_PX, SLANT_DEG, layout_of
+from galileo_jax.report.plotly_figure import figure
 from galileo_jax.report.style import matplotlib_style, palette, save_svg
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     from matplotlib.axes import Axes
 
-TITLE_PX, PLAIN_PX, LABEL_PX, END_PX, LEFT_PX, RIGHT_PX = 30, 12, 46, 26, 58, 12
-ALONE_PX, STACKED_PX, PANEL_PX, CELL_PX = 210, 150, 410, 100
-LEGEND_PX, LEGEND_WIDTH_PX = 40, 800  # of one line
-LETTER_PX, SLANTED_PX, SLANT_DEG = 6.5, 4.5, 35  # of the names of categories
 PX_PER_INCH, POINTS_PER_PX = 100, 0.72
 SVG_LEFT_PX = 22  # more: the letters of its numbers are wider
 MOST_NAMES = 6  # in a legend over the marks
 MANY = 300  # points; an SVG has so many as a picture
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """Sizes in px: the figure, its margins, the gaps between panels, the panels."""
-
-    width: float
-    height: float
-    top: float
-    bottom: float
-    left: float
-    row_gap: float
-    column_gap: float
-    panel_width: float
-    panel_height: float
-
-
-def _layout(chart: Chart) -> _Layout:
-    first, *lower = chart.rows
-    beside = [panel for row in chart.rows for panel in row[1:] if panel]
-    is_narrow = bool(beside) and not any(panel.has_y_ticks for panel in beside)
-    column_gap = PLAIN_PX if is_narrow else LEFT_PX + RIGHT_PX
-    panel_width = CELL_PX if is_narrow else PANEL_PX
-    lower_top = TITLE_PX if any(p and p.title for row in lower for p in row) else PLAIN_PX
-    row_gap = lower_top if chart.shares_x else LABEL_PX + lower_top
-    panel_height = chart.panel_px or (STACKED_PX if lower else ALONE_PX)
-    marks = chart.marks
-    on_x = [len(name) for mark in marks if isinstance(mark, Boxes) for name in mark.x]
-    on_y = [len(str(x)) for mark in marks if isinstance(mark, Bars) and mark.is_horizontal
-            for x in mark.x]  # fmt: skip
-    top = TITLE_PX if any(panel and panel.title for panel in first) else PLAIN_PX
-    bottom = LABEL_PX if any(panel and panel.xlabel for panel in chart.rows[-1]) else END_PX
-    bottom += SLANTED_PX * max(on_x, default=0)
-    left = max(LEFT_PX, LETTER_PX * max(on_y, default=0))
-    rows, columns = len(chart.rows), chart.columns
-    return _Layout(
-        width=left + columns * (panel_width + column_gap) - column_gap + RIGHT_PX,
-        height=top + rows * (panel_height + row_gap) - row_gap + bottom,
-        top=top,
-        bottom=bottom,
-        left=left,
-        row_gap=row_gap,
-        column_gap=column_gap,
-        panel_width=panel_width,
-        panel_height=panel_height,
-    )
-
-
-# ---- Plotly
 
 
 def to_plotly(chart: Chart, has_legend: bool = True) -> "go.Figure":
@@ -84,166 +31,26 @@ def to_plotly(chart: Chart, has_legend: bool = True) -> "go.Figure":
       chart: what is drawn.
       has_legend: whether the figure itself says what the marks mean.
     """
-    from plotly.subplots import make_subplots
-
-    size = _layout(chart)
-    figure = make_subplots(
-        rows=len(chart.rows),
-        cols=chart.columns,
-        specs=[[{} if panel else None for panel in row] for row in chart.rows],
-        shared_xaxes=chart.shares_x,
-        vertical_spacing=size.row_gap / (size.height - size.top - size.bottom),
-        horizontal_spacing=size.column_gap / size.width,
-    )
-    named: set[str] = set()
-    for i, panels in enumerate(chart.rows, 1):
-        for j, panel in enumerate(panels, 1):
-            for mark in panel.marks if panel else ():
-                trace, group = _trace(mark), f"{mark.name} {mark.colour}"
-                trace.update(legendgroup=group, showlegend=bool(mark.name) and group not in named)
-                named.add(group)
-                figure.add_trace(trace, i, j)
-            if panel:
-                _furnish(figure, panel, {"row": i, "col": j})
-    if size.panel_width == CELL_PX:
-        figure.update_xaxes(nticks=3, tickangle=0, tickfont={"size": 10})
-    letters_px = sum(LETTER_PX * len(group) for group in named)
-    legend_px = LEGEND_PX * (1 + letters_px // LEGEND_WIDTH_PX) if has_legend else 0
-    is_grouped = any(isinstance(mark, Boxes) and mark.offset for mark in chart.marks)
-    return figure.update_layout(
-        template=_template(),
-        height=round(size.height + legend_px),
-        margin={"l": size.left, "r": RIGHT_PX, "t": size.top, "b": size.bottom + legend_px},
-        showlegend=has_legend and len(named) > 1,
-        barmode="overlay",
-        boxmode="group" if is_grouped else "overlay",
-    )
-
-
-def _rgba(colour: str, opacity: float = 1.0) -> str:
-    """A colour of the palette; page.js exchanges it for that of dark pages."""
-    red, green, blue = bytes.fromhex(palette()[colour][1:])
-    return f"rgba({red},{green},{blue},{opacity:g})"
-
-
-@cache
-def _template() -> "go.layout.Template":
-    """The look of all figures."""
     import plotly.graph_objects as go
 
-    soft = _rgba("soft")
-    axis = {
-        "linecolor": soft, "tickcolor": soft, "gridcolor": _rgba("line"), "zeroline": False,
-        "ticklen": 4, "tickfont": {"color": soft}, "hoverformat": ".4g", "automargin": False,
-        "title": {"font": {"color": soft, "size": 12}, "standoff": 8},
-    }  # fmt: skip
-    return go.layout.Template(layout={
-        "font": {"family": "sans-serif", "size": 12, "color": _rgba("ink")},
-        "paper_bgcolor": _rgba("paper"), "plot_bgcolor": _rgba("paper", 0),
-        "hovermode": "closest",
-        "hoverlabel": {"bgcolor": _rgba("card"), "font": {"color": _rgba("ink")}},
-        "legend": {"orientation": "h", "x": 0, "y": 0, "yref": "container", "yanchor": "bottom"},
-        "xaxis": {**axis, "ticks": "outside", "showgrid": False, "showline": True, "nticks": 7},
-        "yaxis": {**axis, "ticks": "", "nticks": 5},
-    })  # fmt: skip
-
-
-def _values(values: Values) -> Any:
-    """Escaped names, or short floats: hover texts have four figures."""
-    if isinstance(values[0] if len(values) else 0, str):
-        return [escape(str(value)) for value in values]
-    return np.asarray(values, np.float32)
-
-
-def _trace(mark: Mark) -> Any:
-    import plotly.graph_objects as go
-
-    name, colour = escape(mark.name), _rgba(mark.colour, getattr(mark, "opacity", 1.0))
-    if isinstance(mark, Band):
-        known = np.isfinite(mark.x) & np.isfinite(mark.low) & np.isfinite(mark.high)
-        x, low, high = (np.asarray(v)[known] for v in (mark.x, mark.low, mark.high))
-        return go.Scatter(
-            x=_values(np.concatenate([x, x[::-1]])), y=_values(np.concatenate([low, high[::-1]])),
-            mode="lines", fill="toself", fillcolor=colour, line={"width": 0}, hoverinfo="skip",
-            name=name,
-        )  # fmt: skip
-    if isinstance(mark, Bars):
-        x, y = _values(mark.x), _values(mark.height)
-        return go.Bar(
-            x=y if mark.is_horizontal else x, y=x if mark.is_horizontal else y, width=mark.width,
-            orientation="h" if mark.is_horizontal else "v",
-            marker={"color": colour, "line_width": 0}, text=mark.texts or None,
-            textposition="outside", cliponaxis=False, name=name,
-        )  # fmt: skip
-    places = {"x": _values(mark.x), "y": _values(mark.y), "name": name}
-    if isinstance(mark, Line):
-        dash = "dash" if mark.is_dashed else "solid"
-        look = {"color": colour, "width": mark.width_px, "dash": dash}
-        return go.Scatter(mode="lines", line=look, **places)
-    if isinstance(mark, Boxes):
-        return go.Box(
-            boxpoints="all", jitter=0.5, pointpos=0, marker={"color": colour, "size": 4},
-            line={"width": 1}, fillcolor=_rgba(mark.colour, 0.15), **places,
-        )  # fmt: skip
-    if mark.sd is not None:
-        places["error_y"] = {"array": _values(1.96 * np.asarray(mark.sd)), "thickness": 1,
-                             "color": _rgba(mark.colour, 0.4), "width": 0}  # fmt: skip
-    symbol = "circle-open" if mark.is_hollow else "circle"
-    look = {"color": colour, "size": mark.size_px, "symbol": symbol}
-    return go.Scatter(mode="markers", marker=look, **places)
-
-
-def _furnish(figure: "go.Figure", panel: Panel, at: dict[str, Any]) -> None:
-    """Axes, title, and what is shaded, named or ruled in a panel."""
-    each = {"type": "category", "tickmode": "linear", "dtick": 1}
-    on_x = each | {"tickangle": -SLANT_DEG} if isinstance(panel.marks[0], Boxes) else {}
-    is_flipped = isinstance(panel.marks[0], Bars) and panel.marks[0].is_horizontal
-    on_y = each | {"autorange": "reversed"} if is_flipped else {}
-    if panel.is_log_y:
-        on_y = {"type": "log"}
-    figure.update_xaxes(title_text=escape(panel.xlabel), range=panel.xlim, **on_x, **at)
-    figure.update_yaxes(
-        title_text=escape(panel.ylabel), range=panel.ylim, showgrid=panel.has_y_ticks,
-        showticklabels=panel.has_y_ticks, **on_y, **at,
-    )  # fmt: skip
-    for start, end, colour, opacity in panel.spans:
-        look = {"fillcolor": _rgba(colour, opacity), "line_width": 0, "layer": "below"}
-        figure.add_vrect(start, end, **look, **at)
-    ruled = {"line": {"color": _rgba("soft"), "width": 1}, **at}
-    if panel.level is not None:
-        figure.add_hline(panel.level, **ruled)
-    text = {"yref": "y domain", "showarrow": False, "font": {"size": 11, "color": _rgba("soft")}}
-    for x, name in panel.names:
-        figure.add_annotation(x=x, y=1, yanchor="top", text=escape(name), **text, **at)
-    if panel.divider is not None:
-        x, name = panel.divider
-        figure.add_vline(x, **ruled)
-        corner = {"x": x, "y": 0, "xanchor": "left", "yanchor": "bottom"}
-        figure.add_annotation(text=escape(name), **corner, **text, **at)
-    if panel.title:
-        corner = {"xref": "x domain", "x": 0, "y": 1, "yshift": 20, "xanchor": "left"}
-        text["font"] = {"size": 13}
-        figure.add_annotation(text=escape(panel.title), yanchor="middle", **corner, **text, **at)
-
-
-# ---- Matplotlib
+    return go.Figure(figure(chart, has_legend))
 
 
 def to_svg(chart: Chart) -> str:
     """The chart as an SVG document; the same text for the same chart."""
     from matplotlib.figure import Figure
 
-    size = _layout(chart)
+    size = layout_of(chart)
     width = size.width + SVG_LEFT_PX
     with matplotlib_style(chart.name):
-        figure = Figure(figsize=(width / PX_PER_INCH, size.height / PX_PER_INCH))
-        figure.subplots_adjust(
+        drawn = Figure(figsize=(width / PX_PER_INCH, size.height / PX_PER_INCH))
+        drawn.subplots_adjust(
             left=(size.left + SVG_LEFT_PX) / width, right=1 - RIGHT_PX / width,
             bottom=size.bottom / size.height, top=1 - size.top / size.height,
             hspace=size.row_gap / size.panel_height, wspace=size.column_gap / size.panel_width,
         )  # fmt: skip
         shared = "col" if chart.shares_x else False
-        grid = figure.subplots(len(chart.rows), chart.columns, squeeze=False, sharex=shared)
+        grid = drawn.subplots(len(chart.rows), chart.columns, squeeze=False, sharex=shared)
         for axes, panel in zip(grid.flat, chart.panels, strict=True):
             if panel is None:
                 axes.set_visible(False)
@@ -257,8 +64,8 @@ def to_svg(chart: Chart) -> str:
         if 1 < len(named) <= MOST_NAMES:
             look = {"loc": "best", "handlelength": 1.4, "labelspacing": 0.25}
             grid[0, 0].legend(named.values(), named.keys(), **look)
-        figure.align_ylabels()
-        return save_svg(figure, chart.name)
+        drawn.align_ylabels()
+        return save_svg(drawn, chart.name)
 
 
 def _draw_panel(axes: "Axes", panel: Panel) -> None:

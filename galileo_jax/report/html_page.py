@@ -1,15 +1,19 @@
 """The parts of HTML pages: each page is one file that needs nothing else, not even a network."""
 
 import base64
+import contextlib
 import gzip
 import re
 from collections.abc import Iterable, Sequence
 from functools import cache
 from html import escape
 from importlib import resources
+from importlib.metadata import version
 
 from galileo_jax.report.chart import Chart
-from galileo_jax.report.draw import to_plotly
+from galileo_jax.report.plotly_figure import figure, to_json
+from galileo_jax.runtime.atomic_write import replacing
+from galileo_jax.runtime.compilation_cache import cache_folder
 
 NO_SCRIPT = (
     '<noscript><p class="warn">Charts and clip need JavaScript; text and tables do not.</p>'
@@ -63,12 +67,12 @@ def header(kind: str, title: str, lead: str, more: str = "", is_good: bool = Tru
 
 def chart_element(chart: Chart) -> str:
     """The chart as HTML; page.js draws it in the colours of the page."""
-    figure = to_plotly(chart, has_legend=False)
-    encoded = str(figure.to_json()).replace("<", "\\u003c")
+    drawn = figure(chart, has_legend=False)
+    encoded = to_json(drawn).replace("<", "\\u003c")
     clock = "" if chart.clip is None else f' data-clip="{escape(chart.clip, quote=True)}"'
     return (
         f'<div class="chart" role="img" aria-label="{escape(chart.label, quote=True)}" '
-        f'style="height:{figure.layout.height}px"{clock}>'
+        f'style="height:{drawn["layout"]["height"]}px"{clock}>'
         f'<script type="application/json">{encoded}</script></div>'
     )
 
@@ -157,6 +161,22 @@ def _asset(name: str) -> str:
 
 @cache
 def _plotly() -> str:
-    """Plotly's script as the Python package has it: gzip, base64; 4.8 MB become 2.0."""
+    """Plotly's script as the Python package has it: gzip, base64; 4.8 MB become 2.0.
+
+    Packed once per machine: it takes as long as the rest of a page.
+    """
+    folder = cache_folder()
+    path = None if folder is None else folder / f"plotly-{version('plotly')}.base64"
+    if path is not None:
+        with contextlib.suppress(OSError):
+            return path.read_text("ascii")
+    packed = _packed_plotly()
+    if path is not None:  # a cache that cannot be written is no reason to stop
+        with contextlib.suppress(OSError), replacing(path) as temporary:
+            temporary.write_text(packed, "ascii")
+    return packed
+
+
+def _packed_plotly() -> str:
     script = resources.files("plotly").joinpath("package_data", "plotly.min.js").read_bytes()
     return base64.b64encode(gzip.compress(script, 6, mtime=0)).decode("ascii")

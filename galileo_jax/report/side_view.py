@@ -6,7 +6,6 @@
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
@@ -126,6 +125,8 @@ def draw_still(clip: Clip, scene: Scene, view: View, position_m: np.ndarray) -> 
 
 
 def _fill(picture: np.ndarray, view: View, corners_m: np.ndarray, colour: str) -> None:
+    import cv2
+
     scale = view.width_px / (view.right_m - view.left_m)
     pixels = scale * (corners_m - (view.left_m, view.top_m)) * (1, -1) - 0.5
     fixed = np.round(pixels * 2**SUBPIXEL_BITS).astype(np.int32)

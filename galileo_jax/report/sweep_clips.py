@@ -210,6 +210,8 @@ def _verdict(verdict: Mapping[str, Any]) -> tuple[str, bool]:
         return "nothing is missing", True
     if status == "named":
         return " and ".join(effects), True
+    if status == "law":
+        return str(verdict["law"]), True
     if status == "ambiguous":
         return " or ".join(effects), False
     return "something unknown is missing", False

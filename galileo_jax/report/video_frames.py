@@ -5,10 +5,7 @@ from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
-
-from galileo_jax.video import decode
 
 BUDGET_BYTES = 2_500_000  # of all pictures, before base64
 LARGEST_PX = 720
@@ -39,6 +36,8 @@ def sample_frames(video: Path, num_frames: int) -> VideoFrames:
     """
     stride = -(-num_frames // MOST_PICTURES)
     wanted = range(0, num_frames, stride)
+    from galileo_jax.video import decode
+
     share = BUDGET_BYTES / len(wanted)
     frames, pictures, quality, size = [], [], 0, (0, 0)
     for index, frame in enumerate(decode.frames(video)):
@@ -59,6 +58,8 @@ def sample_frames(video: Path, num_frames: int) -> VideoFrames:
 
 def first_and_last_frame(video: Path) -> list[np.ndarray]:
     """The two frames, `[height, width, 3]`, RGB; one where there are no more."""
+    from galileo_jax.video import decode
+
     stream = decode.frames(video)
     first = next(stream)
     return [frame[..., ::-1] for frame in (first, *deque(stream, maxlen=1))]
@@ -71,5 +72,7 @@ def _size(frame: np.ndarray) -> tuple[int, int]:
 
 
 def _jpeg(frame: np.ndarray, size: tuple[int, int], quality: int) -> bytes:
+    import cv2
+
     small = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
     return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()

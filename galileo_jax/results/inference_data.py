@@ -183,7 +183,7 @@ def _drawn_again(
     """
     at, thinned = _thinned(posterior, NUM_WEIGHTED_DRAWS)
     theta = thinned.reshape(-1, thinned.shape[-1])
-    z = np.asarray(inverse(trials.parameters, jnp.asarray(theta)))
+    z = inverse(trials.parameters, np.asarray(theta))
     weights = -0.5 * np.sum(z**2, axis=1) - posterior.log_density[:, at].reshape(-1)
     for clip, problem in enumerate(trials.problems):
         scale = jnp.asarray(_noise_scales(trials, theta, clip))

@@ -18,6 +18,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
 from galileo_jax.inference.build_problem import make_problem
+from galileo_jax.inference.free_force.free_fit import with_free_acceleration
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
@@ -112,4 +113,7 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     motion = result.get("motion", "planar")
     free = result.get("free", [])
     problem = make_problem(clip, observation, engine, effects, motion=motion, free=free)
+    if (discrepancy := result.get("discrepancy")) is not None:
+        spans = discrepancy["spans_s"][Path(result["clips"][0]).stem]
+        problem = with_free_acceleration(problem, spans)
     return Run(folder, clip, problem, posterior, result)

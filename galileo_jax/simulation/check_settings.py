@@ -26,8 +26,10 @@ from galileo_jax.simulation.settings import (
 DEFAULT = Settings()
 RAMP_ONLY = (
     *("angle", "shapes", "m1", "k1", "m2", "k2", "series", "solver"),
-    *("faults", "hand", "camera_fault", "no_points", "missed_frames"),
+    *("faults", "hand", "camera_fault", "no_points", "missed_frames", "release", "like"),
 )
+LIKE_HAS = ("shapes", "m1", "k1", "m2", "k2", "values", "series", "effects", "strength")
+
 FILM_ONLY = (
     *("camera_fault", "size", "direction", "no_points", "hand"),
     *("noise", "exposure", "defocus", "missed_frames"),
@@ -54,6 +56,7 @@ LIMITS = {
     "m2": Limit(0.01, 100),
     "k2": Limit(0, 2),
     "z2": Limit(-MAX_ACROSS_M, MAX_ACROSS_M),
+    "release": Limit(0.01, 10),
     "series": Limit(1, 99, is_whole=True),
     "track_noise": Limit(1e-6, 0.1),
     "strength": Limit(0, 1),
@@ -81,6 +84,10 @@ def options_without_part(settings: Settings) -> Iterator[tuple[tuple[str, ...], 
         yield FILM_ONLY, "a track (--track-only) has no camera"
     else:
         yield ("track_noise",), "of a track only (--track-only)"
+    if settings.like is not None:
+        yield LIKE_HAS, "is that of --like"
+    if settings.series is not None:
+        yield ("release",), "drawn for every trial of a --series"
     if not settings.effects:
         yield ("strength",), "of what? name an effect with --effect NAME"
         yield ("effects_from",), "nothing of it is used without --effect"

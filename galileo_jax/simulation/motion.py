@@ -140,8 +140,7 @@ def _roll_out_free(truth: Truth, seconds: float) -> Motion:
 
     shapes = [each.shape for each in truth.objects]
     scene = compile_scene(truth.surroundings, shapes, truth.objects)
-    scene.spec.option.timestep = RECORD_S / SUBSTEPS
-    scene = replace(scene, model=scene.spec.compile())
+    scene = replace(scene, timestep_s=RECORD_S / SUBSTEPS)
     model = Model(scene, seconds, truth.motion_effects, nuisances=(), motion="free")
     with jax.enable_x64(True):
         poses = EngineCFree(model).poses(np.array([[truth.theta[name] for name in model.names]]))

@@ -1,6 +1,7 @@
 """Clips of objects on a ramp: drawn, and then written one by one."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,10 @@ from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
 from galileo_jax.simulation.declared import Declared
 from galileo_jax.simulation.filming import film_ramp, ramp_camera, ramp_filming
 from galileo_jax.simulation.hidden import Hidden
-from galileo_jax.simulation.motion import LONGEST_S, Motion
+from galileo_jax.simulation.like import truth_like
+from galileo_jax.simulation.motion import LONGEST_S, Motion, roll_out
 from galileo_jax.simulation.record import truth_record
-from galileo_jax.simulation.series import draw_series
+from galileo_jax.simulation.series import draw_series, with_faults
 from galileo_jax.simulation.settings import Settings
 from galileo_jax.simulation.truth import Truth
 from galileo_jax.video import synthetic
@@ -47,6 +49,8 @@ def ramp_clips(settings: Settings, hidden: Sequence[Hidden], stem: str) -> list[
         scenario=settings.scenario,
         shapes=shapes_of(settings),
     )
+    if settings.like is not None or settings.release is not None:
+        trials = [_set_up(settings, trials[0][0], secrets)]
     series = stem if settings.series else None
     return [
         partial(
@@ -54,6 +58,20 @@ def ramp_clips(settings: Settings, hidden: Sequence[Hidden], stem: str) -> list[
         )
         for i, (truth, motion) in enumerate(trials)
     ]
+
+
+def _set_up(settings: Settings, drawn: Truth, secrets: np.random.Generator) -> tuple[Truth, Motion]:
+    """The truth that was drawn, or that of an earlier clip, with the release that is asked for."""
+    truth = drawn
+    if settings.like is not None:
+        truth = with_faults(
+            truth_like(Path(settings.like), settings.angle, settings.scenario),
+            secrets,
+            1 / settings.fps if settings.faults else None,
+        )
+    if settings.release is not None:
+        truth = replace(truth, release_m=settings.release)
+    return truth, roll_out(truth, "free" if settings.motion == "free" else settings.solver)
 
 
 def _write(

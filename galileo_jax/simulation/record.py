@@ -44,6 +44,8 @@ def truth_record(
         "release_m": truth.release_m,
         **{f"object{i}_y_m": place for i, place in enumerate(stand_m, 2)},
         **{f"size{i}_m": each.size_m for i, each in enumerate(truth.objects, 1)},
+        "shapes": [each.shape for each in truth.objects],
+        "rolls": [each.rolls for each in truth.objects],
         "events_s": {
             name: None if time is None else round(time + declared.release_s, 4)
             for name, time in events.items()

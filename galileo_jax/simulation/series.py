@@ -92,6 +92,17 @@ def _with_hidden(
 ) -> Truth:
     for each in hidden:
         truth = hide(truth, each, rng)
+    return with_faults(truth, rng, frame_s)
+
+
+def with_faults(truth: Truth, rng: np.random.Generator, frame_s: float | None) -> Truth:
+    """The truth with the small faults of real clips, drawn anew; without where `frame_s` is None.
+
+    Args:
+      truth: what is hidden in it stays.
+      rng: of the faults.
+      frame_s: time between frames.
+    """
     if frame_s is None:
         return truth
     faults = {

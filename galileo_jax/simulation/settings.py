@@ -42,6 +42,8 @@ class Settings:
     solver: Solver = "rigid"
     values: Mapping[str, float] = field(default_factory=dict)
     floor: bool = False
+    release: float | None = None
+    like: str | Path | None = None
     series: int | None = None
     track_only: bool = False
     track_noise: float = 0.0002

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refine import FINE_PX, align
 from galileo_jax.tracking.template import Template
@@ -66,7 +67,7 @@ class Exposure:
         return UNLEARNT if self.frames < LEARNT_FRAMES else (self.share,)
 
     def add(
-        self, image: np.ndarray, template: Template, pose: np.ndarray, velocity: np.ndarray
+        self, picture: Picture, template: Template, pose: np.ndarray, velocity: np.ndarray
     ) -> None:
         """Counts one frame in, where the object stands at `pose` and moves by `velocity`."""
         if np.hypot(*velocity[:2]) < MIN_SPEED_PX or self.frames >= MAX_FRAMES:
@@ -74,5 +75,5 @@ class Exposure:
         self.frames += 1
         motion = own_motion(velocity, pose[2])
         for i, share in enumerate(SHARES):
-            fit = align(image, template.target(share * motion, FINE_PX), pose, steps=3)
+            fit = align(picture, template.target(share * motion, FINE_PX), pose, steps=1)
             self.misfit[i] += 1 - fit.correlation**2

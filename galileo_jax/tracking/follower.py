@@ -6,8 +6,9 @@ import numpy as np
 
 from galileo_jax.tracking.exposure import Exposure, distinct, own_motion
 from galileo_jax.tracking.lucas_kanade import follow
+from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import patch_at, rotation
-from galileo_jax.tracking.refine import Fit
+from galileo_jax.tracking.refine import FINE_PX, Fit, align
 from galileo_jax.tracking.rigid import rigid_motion
 from galileo_jax.tracking.search import SURE, best_fit, candidate_poses, is_alike
 from galileo_jax.tracking.template import Template, median_template
@@ -20,6 +21,9 @@ REACH_SHARE = 0.2
 moves that far within a frame."""
 WORSE = 0.1
 """A fit that correlates this much less than the one before is worth a wide search."""
+AS_EXPECTED_PX, AS_SEEN = 1.0, 0.02
+"""An object that is this close to where it should be, and correlates by no more than this less than
+in the frame before, is not looked for by its features."""
 MAX_TURN_RAD = 0.7
 """An object does not turn further between two frames in which it is seen."""
 SETTLED_FRAMES, MAX_LEAP_FRAMES = 4, 4
@@ -49,7 +53,7 @@ class Follower:
     Attributes:
       template: from the first frame at first, hand and noise included.
       pose: the last one found.
-      first_image: the grey frame in which it began: the scene without it, elsewhere.
+      first_picture: the frame in which it began: the scene without it, elsewhere.
       velocity: change of the pose per frame, extrapolated to the last one.
       poses: pose of every frame so far, NaN where not found.
       patches: sharp aligned patches, thinned evenly to at most `MAX_PATCHES`.
@@ -58,7 +62,7 @@ class Follower:
     template: Template
     pose: np.ndarray
     exposure: Exposure
-    first_image: np.ndarray
+    first_picture: Picture
     velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     mean_velocity: np.ndarray = field(default_factory=lambda: np.zeros(3))
     poses: list[np.ndarray] = field(default_factory=list)
@@ -72,14 +76,14 @@ class Follower:
     def __post_init__(self) -> None:
         self.first_pose = self.pose
 
-    def step(self, before: np.ndarray | None, image: np.ndarray) -> None:
-        """Finds the object in the next grey frame; `before` is the frame preceding it."""
+    def step(self, before: Picture | None, picture: Picture) -> None:
+        """Finds the object in the next frame; `before` is the frame preceding it."""
         if self.frames_missed > LONG_GONE_FRAMES and self.frames_missed % LOOK_EVERY:
             fit = None
         else:
-            fit = self._near(before, image)
+            fit = self._near(before, picture)
         if fit is None or fit.correlation < min(SURE, self.correlation - WORSE):
-            fit = max((f for f in (fit, self._far(image)) if f), key=_correlation, default=None)
+            fit = max((f for f in (fit, self._far(picture)) if f), key=_correlation, default=None)
         if fit is None:
             self.poses.append(np.full(3, np.nan))
             self.frames_missed += 1
@@ -99,8 +103,8 @@ class Follower:
         self.frames_missed = self.frames_held = 0
         self.pose = fit.pose
         self.poses.append(fit.pose)
-        self.exposure.add(image, self.template, self.pose, self.velocity)
-        self._keep(image)
+        self.exposure.add(picture, self.template, self.pose, self.velocity)
+        self._keep(picture)
 
     @property
     def _frames_since(self) -> int:
@@ -119,29 +123,40 @@ class Follower:
         path = self._frames_since * self.velocity
         return bool(np.hypot(*off[:2]) < AS_BEFORE * np.hypot(*path[:2]))
 
-    def _near(self, before: np.ndarray | None, image: np.ndarray) -> Fit | None:
+    def _near(self, before: Picture | None, picture: Picture) -> Fit | None:
         """The best fit around where the object was, went, or is led to by its features."""
         guesses = [self._expected(), self.pose]
         if before is not None and not self.frames_missed:
+            if (fit := self._as_expected(picture)) is not None:
+                return fit
             reach = int(np.ceil(2 * self._frames_since * np.hypot(*self.velocity[:2]))) + 16
-            motion = rigid_motion(*follow(before, image, self.pose, self.template.region, reach))
-            if motion is not None:
+            features = follow(before.grey, picture.grey, self.pose, self.template.region, reach)
+            if (motion := rigid_motion(*features)) is not None:
                 angle, shift = motion
                 place = rotation(angle) @ self.pose[:2] + shift
                 turned = self.pose[2] + (angle if self.template.shows_turns else 0.0)
                 guesses.insert(0, np.array([*place, turned]))
-        return self._best(image, guesses, FOUND)
+        return self._best(picture, guesses, FOUND)
 
-    def _far(self, image: np.ndarray) -> Fit | None:
+    def _as_expected(self, picture: Picture) -> Fit | None:
+        """The object where it should be, looking as it did; its features would tell no more."""
+        expected = self._expected()
+        motion = self.exposure.share * own_motion(self.velocity, expected[2])
+        fit = align(picture, self.template.target(motion, FINE_PX), expected)
+        is_there = np.hypot(*(fit.pose - expected)[:2]) < AS_EXPECTED_PX
+        is_it = is_alike(fit) and fit.correlation > max(SURE, self.correlation - AS_SEEN)
+        return fit if is_there and is_it and not self._is_scene(picture, fit) else None
+
+    def _far(self, picture: Picture) -> Fit | None:
         """The best fit in a wide neighbourhood; rarely looked for while the object is gone."""
         missed = self.frames_missed
         if missed & (missed - 1):  # at once, after 1, 2, 4, 8, ... frames
             return None
-        reach = max(2 * np.hypot(*self.velocity[:2]), REACH_SHARE * max(image.shape))
-        guesses = candidate_poses(image, self.template, self._expected(), float(reach))
-        return self._best(image, guesses, FOUND_AGAIN)
+        reach = max(2 * np.hypot(*self.velocity[:2]), REACH_SHARE * max(picture.size_px))
+        guesses = candidate_poses(picture.grey, self.template, self._expected(), float(reach))
+        return self._best(picture, guesses, FOUND_AGAIN)
 
-    def _best(self, image: np.ndarray, poses: list[np.ndarray], least: float) -> Fit | None:
+    def _best(self, picture: Picture, poses: list[np.ndarray], least: float) -> Fit | None:
         """The best fit from the guessed `poses` if it can be the object."""
         guesses: list[tuple[np.ndarray, np.ndarray]] = []
         for pose in poses:
@@ -150,27 +165,25 @@ class Follower:
             guesses += [(pose, smear) for smear in distinct(motions, self.template.radius)]
         if not guesses:
             return None
-        fit = best_fit(image, self.template, guesses)
-        height, width = image.shape
+        fit = best_fit(picture, self.template, guesses)
+        width, height = picture.size_px
         is_inside = 0 <= fit.pose[0] < width and 0 <= fit.pose[1] < height
         leaps = [np.hypot(*(fit.pose - p)[:2]) for p in (self.pose, self._expected())]
         is_near = min(leaps) <= self._leap_px()
         is_upright = abs(fit.pose[2] - self.pose[2]) <= MAX_TURN_RAD
         is_it = is_alike(fit) and fit.correlation >= least
         is_possible = is_inside and is_near and is_upright and is_it
-        return fit if is_possible and not self._is_scene(image, fit) else None
+        return fit if is_possible and not self._is_scene(picture, fit) else None
 
-    def _is_scene(self, image: np.ndarray, fit: Fit) -> bool:
+    def _is_scene(self, picture: Picture, fit: Fit) -> bool:
         """Whether what was found stood there before the object came.
 
         A region with some background in it can fit the scene once the object has gone.
         """
-        radius, region = self.template.radius, self.template.region
-        if np.hypot(*(fit.pose - self.first_pose)[:2]) < radius:
+        if np.hypot(*(fit.pose - self.first_pose)[:2]) < self.template.radius:
             return False
-        then, now = (
-            patch_at(scene, fit.pose, radius)[region] for scene in (self.first_image, image)
-        )
+        target = self.template.sharp(FINE_PX)
+        then, now = (target.values_at(one, fit.pose) for one in (self.first_picture, picture))
         return float(np.corrcoef(then, now)[0, 1]) > fit.correlation
 
     def _expected(self) -> np.ndarray:
@@ -195,11 +208,11 @@ class Follower:
         is_blow = np.hypot(*change[:2]) > 0.5 * np.hypot(*mean[:2])
         return mean if is_blow else mean + change / 2
 
-    def _keep(self, image: np.ndarray) -> None:
+    def _keep(self, picture: Picture) -> None:
         if np.hypot(*self.velocity[:2]) * self.exposure.share > SHARP_PX:
             return
         if self.frames_sharp % self.stride == 0:
-            self.patches.append(patch_at(image, self.pose, self.template.radius))
+            self.patches.append(patch_at(picture.grey, self.pose, self.template.radius))
             if len(self.patches) > MAX_PATCHES:
                 del self.patches[1::2]
                 self.stride *= 2

@@ -8,9 +8,8 @@ the image seen in the object's own axes: its centre pixel is the followed point.
 import cv2
 import numpy as np
 
-SUBPIXELS = 32
-"""OpenCV samples at multiples of 1/32 px; poses are rounded to them before sampling, so that
-the sampled place is known exactly and no quantisation error enters."""
+SHARP_PX = 0.1
+"""A motion during the exposure that is shorter leaves the picture as it is."""
 
 
 def rotation(angle_rad: float) -> np.ndarray:
@@ -22,11 +21,6 @@ def rotation(angle_rad: float) -> np.ndarray:
 def compose(pose: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """`pose` followed by `motion`, a small pose given in the object's own axes."""
     return np.array([*(pose[:2] + rotation(pose[2]) @ motion[:2]), pose[2] + motion[2]])
-
-
-def on_sampling_grid(pose: np.ndarray) -> np.ndarray:
-    """`pose` with its place rounded to the multiples of 1/32 px that OpenCV samples at."""
-    return np.array([*(np.round(pose[:2] * SUBPIXELS) / SUBPIXELS), pose[2]])
 
 
 def patch_at(image: np.ndarray, pose: np.ndarray, radius: int) -> np.ndarray:
@@ -61,14 +55,19 @@ def smear(image: np.ndarray, motion: np.ndarray) -> np.ndarray:
     constant velocity and turn, centred on the pose itself.
     """
     radius = (image.shape[0] - 1) / 2
-    length = np.hypot(*motion[:2]) + abs(motion[2]) * radius / 2
-    if length < 0.1:
+    turning = abs(motion[2]) * radius / 2
+    length = np.hypot(*motion[:2]) + turning
+    if length < SHARP_PX:
         return image
     samples = int(np.ceil(length)) + 1
+    shares = (np.arange(samples) + 0.5) / samples - 0.5
+    if turning < SHARP_PX:
+        kernel = _kernel(shares[:, None] * motion[:2])
+        return cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_REPLICATE)
     total = np.zeros_like(image)
-    for share in (np.arange(samples) + 0.5) / samples - 0.5:
+    centre = np.array([radius, radius])
+    for share in shares:
         turn = rotation(share * motion[2])
-        centre = np.array([radius, radius])
         shift = centre + share * motion[:2] - turn @ centre
         total += cv2.warpAffine(
             image,
@@ -78,3 +77,21 @@ def smear(image: np.ndarray, motion: np.ndarray) -> np.ndarray:
             borderMode=cv2.BORDER_REPLICATE,
         )
     return total / samples
+
+
+def _kernel(shifts: np.ndarray) -> np.ndarray:
+    """The filter that averages an image over `shifts` `[n, 2]`, each by linear interpolation."""
+    reach = int(np.ceil(np.abs(shifts).max()))
+    kernel = np.zeros((2 * reach + 3, 2 * reach + 3), np.float32)
+    # The filter reads at +offset what is shifted by -offset; the shifts are symmetric.
+    low = np.floor(shifts).astype(int)
+    x, y = (shifts - low).T
+    column, row = (low + reach + 1).T
+    for i, j, part in (
+        (0, 0, (1 - x) * (1 - y)),
+        (1, 0, x * (1 - y)),
+        (0, 1, (1 - x) * y),
+        (1, 1, x * y),
+    ):
+        np.add.at(kernel, (row + j, column + i), part)
+    return kernel / len(shifts)

@@ -11,12 +11,14 @@ Source: S. Baker, I. Matthews, "Lucas-Kanade 20 Years On: A Unifying Framework",
 Int. J. Computer Vision 56 (2004), doi:10.1023/B:VISI.0000011205.11775.fd.
 """
 
+import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from galileo_jax.tracking.pose import compose, on_sampling_grid, patch_at, rotation
+from galileo_jax.tracking.picture import Picture
+from galileo_jax.tracking.pose import compose, rotation
 
 HUBER, REJECT = 2.0, 5.0
 """Residuals beyond this many noise sigmas weigh less (Huber), or nothing (a hand)."""
@@ -32,7 +34,7 @@ COVERED = 4.0
 """A pixel that differs by more noise sigmas shows something else than the object."""
 NEIGHBOURS = (0.1, 0.9)
 """Bounds of what neighbouring pixels' noise is believed to correlate by."""
-SETTLED_RAD = 3e-4
+SETTLED_PX, SETTLED_RAD = 0.01, 3e-4
 """A turn that moves the rim of a 30 px object by 0.005 px; smaller steps change nothing."""
 
 
@@ -60,86 +62,91 @@ class Fit:
 
 
 class Target:
-    """A smoothed template with its gradients: what patches are aligned with."""
+    """A smoothed template with its gradients: what pictures are aligned with."""
 
     def __init__(self, image: np.ndarray, region: np.ndarray, width_px: float):
         """`image` and `region` (bool) are `[size, size]`; `width_px` the smoothing."""
         self.width_px = width_px
         self.radius = (image.shape[0] - 1) // 2
         self.region = region
+        inside = np.flatnonzero(region)
+        y, x = np.divmod(inside, region.shape[1])
+        self.places = np.stack([x - self.radius, y - self.radius]).astype(np.float32)
+        self.reach_px = float(np.sqrt((self.places**2).sum(axis=0).max(initial=0)))
         smooth = cv2.GaussianBlur(image, (0, 0), width_px)
-        dx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8)[region]
-        dy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=3, scale=1 / 8)[region]
-        y, x = np.nonzero(region)
-        turned = dy * (x - self.radius) - dx * (y - self.radius)
-        self.values = smooth[region].astype(np.float64)
-        # Columns: the pose in the object's axes, gain, offset.
-        self.jacobian = np.column_stack(
-            [dx, dy, turned, self.values, np.ones_like(self.values)]
-        ).astype(np.float64)
+        dx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8).take(inside)
+        dy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=3, scale=1 / 8).take(inside)
+        turned = dy * self.places[0] - dx * self.places[1]
+        self.values = smooth.take(inside).astype(np.float64)
+        # Rows: the pose in the object's axes, gain, offset.
+        self.jacobian = np.stack([dx, dy, turned, self.values, np.ones_like(self.values)])
+        self.normal = self.jacobian @ self.jacobian.T
 
         self.shows_turns = self._shows_turns()
         # Holds the angle fast where it cannot be told; otherwise only against 0 / 0.
         self.ridge = np.diag([1e-9, 1e-9, 1e-9 if self.shows_turns else 1e12, 1e-9, 1e-9])
 
     def _shows_turns(self) -> bool:
-        normal = self.jacobian.T @ self.jacobian + 1e-9 * np.eye(5)
+        normal = self.normal + 1e-9 * np.eye(5)
         information = 1 / np.linalg.inv(normal)[2, 2]
         possible = self.radius**2 * (normal[0, 0] + normal[1, 1]) / 2
         return bool(information > TURNLESS * possible)
 
-    def values_at(self, image: np.ndarray, pose: np.ndarray) -> np.ndarray:
-        """The smoothed pixels of `image` in the region at `pose`."""
-        patch = patch_at(image, pose, self.radius)
-        return cv2.GaussianBlur(patch, (0, 0), self.width_px)[self.region].astype(np.float64)
+    def values_at(self, picture: Picture, pose: np.ndarray) -> np.ndarray:
+        """The smoothed pixels of `picture` in the region at `pose`."""
+        return picture.at(pose, self.places, self.reach_px, self.width_px).astype(np.float64)
 
 
 def align(
-    image: np.ndarray, target: Target, start: np.ndarray, *, steps: int = 12, robust: bool = True
+    picture: Picture, target: Target, start: np.ndarray, *, steps: int = 12, robust: bool = True
 ) -> Fit:
-    """Aligns `target` with the grey `image` from the pose `start`; see the module."""
-    pose = on_sampling_grid(start)
+    """Aligns `target` with the `picture` from the pose `start`; see the module."""
+    pose = np.array(start, dtype=float)
     jacobian, values = target.jacobian, target.values
-    weight = np.ones_like(values)
+    weight, weighted, normal = np.ones_like(values), jacobian, target.normal
     limit_px = 2 * target.width_px
     for step in range(steps):
-        seen = target.values_at(image, pose)
-        weighted = jacobian * weight[:, None]
-        normal = weighted.T @ jacobian
-        solution = np.linalg.solve(normal + target.ridge, weighted.T @ seen)
-        residual = seen - jacobian @ solution
+        seen = target.values_at(picture, pose)
+        solution = np.linalg.solve(normal + target.ridge, weighted @ seen)
+        residual = seen - solution @ jacobian
         size = np.abs(residual)
-        # The median of an even number but for one place, in a third of np.median's time.
-        noise = 1.4826 * np.partition(size, len(size) // 2)[len(size) // 2] + 1e-6
+        # The median of an even number but for one place, in a fraction of np.median's time.
+        noise = 1.4826 * _middle(size) + 1e-6
         if robust:
-            weight = np.minimum(1.0, HUBER * noise / np.maximum(size, 1e-9))
+            weight = (HUBER * noise / np.maximum(size, 1e-9)).clip(max=1.0)
             weight *= size < REJECT * noise
         # seen(x) = gain T(x + move) + offset: the pose has to follow by `move`, and the
         # gradient columns carry the gain.
         gain = solution[3] if abs(solution[3]) > 0.1 else np.copysign(0.1, solution[3] or 1.0)
         move = -solution[:3] / gain
-        length = np.hypot(move[0], move[1])
+        length = math.hypot(move[0], move[1])
         if length > limit_px:
             move[:2] *= limit_px / length
-        move[2] = np.clip(move[2], -0.15, 0.15)
-        sampled, pose = pose, compose(pose, move)
-        following = on_sampling_grid(pose)
-        if np.array_equal(following[:2], sampled[:2]) and abs(move[2]) < SETTLED_RAD:
+        move[2] = min(max(move[2], -0.15), 0.15)
+        pose = compose(pose, move)
+        if step == steps - 1 or (length < SETTLED_PX and abs(move[2]) < SETTLED_RAD):
             break
-        if step < steps - 1:
-            pose = following
-    a = seen - np.average(seen, weights=weight)
-    b = values - np.average(values, weights=weight)
-    scale = np.sqrt((weight * a * a).sum() * (weight * b * b).sum()) + 1e-9
+        if robust:
+            weighted = jacobian * weight
+            normal = weighted @ jacobian.T
+    total = weight.sum() + 1e-300
+    a = seen - (weight @ seen) / total
+    b = values - (weight @ values) / total
+    wb = weight * b
+    scale = math.sqrt((weight * a) @ a * (wb @ b)) + 1e-9
     return Fit(
         pose=pose,
-        correlation=float((weight * a * b).sum() / scale),
+        correlation=float(wb @ a / scale),
         noise=float(noise),
-        covered=float(np.mean(np.abs(residual) > COVERED * noise)),
+        covered=float(np.mean(size > COVERED * noise)),
         gain=float(solution[3]),
         weight=weight,
         residual=residual,
     )
+
+
+def _middle(size: np.ndarray) -> float:
+    return float(np.partition(size.astype(np.float32), len(size) // 2)[len(size) // 2])
 
 
 def covariance_of(fit: Fit, target: Target) -> np.ndarray:
@@ -151,15 +158,14 @@ def covariance_of(fit: Fit, target: Target) -> np.ndarray:
     wider, what sampling does to a sharp texture is narrower): s is told by the residual.
     """
     width_px = _correlation_width_px(fit, target)
-    weighted = target.jacobian * fit.weight[:, None]
-    normal = weighted.T @ target.jacobian
-    inverse = np.linalg.inv(normal + target.ridge)
+    weighted = target.jacobian * fit.weight
+    inverse = np.linalg.inv(weighted @ target.jacobian.T + target.ridge)
     scores = np.zeros((*target.region.shape, 5))
-    scores[target.region] = weighted
+    scores[target.region] = weighted.T
     spread = cv2.GaussianBlur(
         scores, (0, 0), np.sqrt(2) * width_px, borderType=cv2.BORDER_CONSTANT
     )[target.region]
-    middle = weighted.T @ spread * (4 * np.pi * width_px**2)
+    middle = weighted @ spread * (4 * np.pi * width_px**2)
     own = fit.noise**2 * (inverse @ middle @ inverse)[:3, :3] / max(fit.gain**2, 1e-6)
     turn = np.eye(3)
     turn[:2, :2] = rotation(fit.pose[2])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.tracking.exposure import distinct, own_motion
+from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refine import FINE_PX, Fit, Target, align, covariance_of
 from galileo_jax.tracking.template import Template
@@ -53,7 +54,7 @@ class Refined:
 
 
 def refine_pose(
-    image: np.ndarray, template: Template, pose: np.ndarray, velocities: Velocities, share: float
+    picture: Picture, template: Template, pose: np.ndarray, velocities: Velocities, share: float
 ) -> Refined:
     """The pose aligned with `template`, smeared by the motion that fits best.
 
@@ -68,7 +69,7 @@ def refine_pose(
     fits: list[tuple[Fit, Target]] = []
     for motion in distinct(motions, template.radius):
         target = template.target(motion, FINE_PX)
-        fits.append((align(image, target, pose), target))
+        fits.append((align(picture, target, pose), target))
     best, target = max(fits, key=lambda item: item[0].correlation)
     covariance = covariance_of(best, target)[:2, :2]
     return Refined(
@@ -76,12 +77,14 @@ def refine_pose(
         covariance=covariance,
         correlation=best.correlation,
         covered=best.covered,
-        outside=_outside(image, template, best.pose),
+        outside=_outside(picture, template.sharp(FINE_PX), best.pose),
     )
 
 
-def _outside(image: np.ndarray, template: Template, pose: np.ndarray) -> float:
-    own = np.argwhere(template.region)[:, ::-1] - template.radius
-    places = own @ rotation(pose[2]).T + pose[:2]
-    last = np.array(image.shape[::-1]) - 1
+def _outside(picture: Picture, target: Target, pose: np.ndarray) -> float:
+    last = np.array(picture.size_px) - 1
+    reach = target.reach_px
+    if (pose[:2] >= reach).all() and (pose[:2] <= last - reach).all():
+        return 0.0
+    places = target.places.T @ rotation(pose[2]).T + pose[:2]
     return float(np.mean(((places < 0) | (places > last)).any(axis=1)))

@@ -19,9 +19,13 @@ def rigid_motion(before: np.ndarray, after: np.ndarray) -> tuple[float, np.ndarr
     if len(before) < MIN_POINTS:
         return None
     angle, shift = 0.0, np.median(after - before, axis=0)
+    agreed: np.ndarray | None = None
     for _ in range(5):
         residual = np.linalg.norm(before @ rotation(angle).T + shift - after, axis=1)
         is_inlier = residual <= max(INLIER_PX, 3 * float(np.median(residual)))
+        if agreed is not None and (is_inlier == agreed).all():
+            break
+        agreed = is_inlier
         if is_inlier.sum() < MIN_POINTS:
             return None
         a, b = before[is_inlier], after[is_inlier]

@@ -3,6 +3,7 @@
 import cv2
 import numpy as np
 
+from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refine import COARSE_PX, FINE_PX, Fit, align
 from galileo_jax.tracking.template import Template
@@ -17,7 +18,7 @@ MAX_PEAKS = 4
 
 
 def best_fit(
-    image: np.ndarray, template: Template, guesses: list[tuple[np.ndarray, np.ndarray]]
+    picture: Picture, template: Template, guesses: list[tuple[np.ndarray, np.ndarray]]
 ) -> Fit:
     """The best alignment over guesses, at least one, each a pose and a motion during the exposure.
 
@@ -25,12 +26,12 @@ def best_fit(
     sure one. Fits whose contrast is not the template's count only if there is no other.
     """
     pose, motion = guesses[0]
-    best = align(image, template.target(motion, FINE_PX), pose)
+    best = align(picture, template.target(motion, FINE_PX), pose)
     if _is_sure(best):
         return best
     for pose, motion in guesses:
-        coarse = align(image, template.target(motion, COARSE_PX), pose, steps=6, robust=False)
-        fit = align(image, template.target(motion, FINE_PX), coarse.pose)
+        coarse = align(picture, template.target(motion, COARSE_PX), pose, steps=6, robust=False)
+        fit = align(picture, template.target(motion, FINE_PX), coarse.pose)
         best = max(best, fit, key=_rank)
         if _is_sure(best):
             break

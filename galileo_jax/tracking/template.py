@@ -1,6 +1,6 @@
 """An object's template: its patch, the region that belongs to it, and its smeared versions."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import cv2
@@ -20,6 +20,8 @@ PLAIN = 2.0e3
 levels its place would be known to 0.1 px only."""
 WINDOW_PX = 21
 """Side of the region when the size is unknown: the object and some of what is around it."""
+ALWAYS = 0.99
+"""A pixel is compared that the object covers for at least this share of the exposure."""
 MIN_REGION_SHARE = 0.3
 """A smeared region never shrinks below this share of the sharp one."""
 
@@ -45,6 +47,7 @@ class Template:
 
     image: np.ndarray
     region: np.ndarray
+    _sharp: dict[float, Target] = field(default_factory=dict, repr=False)
 
     @property
     def radius(self) -> int:
@@ -54,13 +57,24 @@ class Template:
     @cached_property
     def shows_turns(self) -> bool:
         """False for a plain disc, which looks the same however it is turned."""
-        return Target(self.image, self.region, FINE_PX).shows_turns
+        return self.sharp(FINE_PX).shows_turns
 
     def target(self, motion: np.ndarray, width_px: float) -> Target:
         """What a patch looks like that moves by `motion` (own axes) during the exposure."""
+        smeared = smear(self.image, motion)
+        if smeared is self.image:
+            return self.sharp(width_px)
         share = smear(self.region.astype(np.float32), motion)
-        least = np.quantile(share, 1 - MIN_REGION_SHARE * self.region.mean())
-        return Target(smear(self.image, motion), share >= min(0.99, least), width_px)
+        least, region = MIN_REGION_SHARE * self.region.mean(), share >= ALWAYS
+        if region.mean() < least:
+            region = share >= np.quantile(share, 1 - least)
+        return Target(smeared, region, width_px)
+
+    def sharp(self, width_px: float) -> Target:
+        """What a patch looks like that does not move."""
+        if width_px not in self._sharp:
+            self._sharp[width_px] = Target(self.image, self.region, width_px)
+        return self._sharp[width_px]
 
 
 def template_at(image: np.ndarray, point_px: np.ndarray, outline: Outline) -> Template:
@@ -79,9 +93,8 @@ def texture_of(template: Template) -> float:
 
     The variance of the place is the noise's variance divided by it.
     """
-    target = Target(template.image, template.region, FINE_PX)
-    gradients = target.jacobian[:, :2]
-    return float(np.linalg.eigvalsh(gradients.T @ gradients)[0])
+    gradients = Target(template.image, template.region, FINE_PX).normal[:2, :2]
+    return float(np.linalg.eigvalsh(gradients)[0])
 
 
 def region_of(outline: Outline, share: float) -> np.ndarray:

@@ -192,14 +192,14 @@ def test_a_wrong_call_is_one_sentence(options, said, drag):
 
 def test_a_track_is_tracked_once(video, monkeypatch):
     """By content: under another name it is known, too."""
-    from galileo_jax.measurement import track_cache
+    from galileo_jax.tracking import clip
 
     first = gx.track(video)
 
     def again(*_):
         raise AssertionError("tracked again")
 
-    monkeypatch.setattr(track_cache, "track_clip", again)
+    monkeypatch.setattr(clip, "track_clip", again)
     second = gx.track(video)
     assert first.pixels is not None and second.pixels is not None
     np.testing.assert_array_equal(first.pixels.position_px, second.pixels.position_px)

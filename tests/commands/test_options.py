@@ -8,7 +8,19 @@ import galileo_jax as gx
 from galileo_jax.commands.command import Parser
 from galileo_jax.commands.options import REQUIRED, adder, arguments_of
 
-VERBS = ("fit", "compare", "diagnose", "track", "simulate", "predict", "export", "train", "sweep")
+VERBS = (
+    "fit",
+    "compare",
+    "diagnose",
+    "track",
+    "simulate",
+    "predict",
+    "export",
+    "train",
+    "sweep",
+    "next_experiment",
+    "discover",
+)
 
 
 @pytest.mark.parametrize("verb", VERBS)

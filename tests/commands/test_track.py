@@ -12,7 +12,7 @@ from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.commands import command
 from galileo_jax.commands.track import main
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking import track_clip
+from galileo_jax.tracking.clip import track_clip
 from tests.tracking.moving_box import Box, film
 
 pytestmark = pytest.mark.video

@@ -19,6 +19,7 @@ from galileo_jax.diagnosis.verdict import (
     is_nothing_missing,
     log_prior,
     looked_at_again,
+    may_decide,
     needs_pairs,
     ranked,
     rivals,
@@ -421,3 +422,30 @@ def test_of_the_unknown_the_best_name_is_shown_if_it_helps():
     form, helps = candidate(FORM, 60.0), candidate("air_drag", 8.0 + EDGE, log_prior=-2.0)
     assert to_add(Verdict("unknown", (), FORM), (form, helps)) is helps
     assert to_add(Verdict("unknown", ()), (form, replace(helps, log_evidence=10.0))) is None
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "is_adequate", "expected"),
+    [
+        # 3 + 4 sqrt(6) = 12.8 nats that luck can make, and 5 that another valley may bring.
+        ([50.0, 33.0, 31.0], False, [True, True, False]),
+        # The margin is twice as wide: 6 + 4 sqrt(12) = 19.9.
+        ([50.0, 26.0, 24.0], True, [True, True, False]),
+        # The best may still come to convince, at 7 nats.
+        ([2.5, -10.0], True, [True, True]),
+        ([1.5, -10.0], True, [False, False]),
+        ([1.5, -10.0], False, [True, True]),
+    ],
+)
+def test_on_whom_the_verdict_may_hang(log_odds, is_adequate, expected):
+    margin = DECISIVE * (2 if is_adequate else 1)
+    is_form = np.zeros(len(log_odds), bool)
+    found = may_decide(np.array(log_odds), is_form, -np.inf, margin, is_adequate)
+    assert found.tolist() == expected
+
+
+def test_a_form_alone_convinces_nobody_and_what_leads_elsewhere_counts():
+    alone = may_decide(np.array([30.0, 0.0]), np.array([True, False]), -np.inf, 6.0, True)
+    assert not alone.any()
+    behind = may_decide(np.array([30.0, 0.0]), np.array([False, False]), 60.0, 3.0, False)
+    assert not behind.any()

@@ -5,8 +5,9 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from galileo_jax.inference.fits.descent import Descent, GiveUp
+from galileo_jax.inference.fits.descent import Descent, GiveUp, ends_of, join
 from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.programs import Quadratic
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
 from galileo_jax.inference.fits.starts import scattered_starts
 from tests.oracle_trials import make_trials
@@ -83,6 +84,37 @@ def test_only_who_is_behind_a_rival_and_does_not_catch_up_is_given_up():
     assert give_up(cost_nats, promised).tolist() == [False, True, False, False]
     alone = GiveUp(np.zeros(2, int), behind=20.0, price=np.array([0.0, 25.0]))
     assert alone(np.array([1.0, 1.0]), np.zeros(2)).tolist() == [False, True]
+
+
+def test_who_is_far_behind_another_hypothesis_is_given_up_unless_it_may_catch_up():
+    owner, cost_nats = np.array([0, 1, 1, 2]), np.array([1.0, 70.0, 75.0, 40.0])
+    promised = np.array([0.1, 1.0, 30.0, 0.1])
+    assert not GiveUp(owner, behind=20.0)(cost_nats, promised).any()
+    give_up = GiveUp(owner, behind=20.0, behind_all=60.0)
+    assert give_up(cost_nats, promised).tolist() == [False, True, False, False]
+    elsewhere = give_up._replace(lowest=-30.0)
+    assert elsewhere(cost_nats, promised).tolist() == [False, True, False, True]
+
+
+def test_starts_that_meet_go_on_as_one():
+    """Two of one owner in one valley, one of another owner, one where nothing shows yet."""
+    z = np.array([[0.0, 0.0], [0.5, 0.0], [0.1, 0.0], [0.0, 1.2]])
+    cost_nats, normal = np.array([1.0, 1.3, 1.0, 1.2]), np.tile(np.eye(2), (4, 1, 1))
+    normal[3] *= 4.0
+    best = Quadratic(z, cost_nats, np.zeros((4, 2)), normal)
+    joined = np.arange(4)
+    join(best, np.array([0, 0, 1, 0]), joined)
+    assert joined.tolist() == [0, 0, 2, 3]
+    assert ends_of(np.array([0, 0, 1, 2])).tolist() == [0, 0, 0, 0]
+
+
+def test_those_that_joined_cost_no_more_steps():
+    starts = batch([-1.2, 1.0, 0.5], [-1.2001, 1.0, 0.5], [-1.2, 1.0, 0.5])
+    found = descend(starts, give_up=GiveUp(np.array([0, 0, 1]), behind=20.0))
+    assert found.joined[1] == 0 or found.joined[0] == 1
+    best = expected_minimum().cost
+    np.testing.assert_allclose(found.best.cost[ends_of(found.joined)], best, atol=1e-8)
+    assert not found.is_settled[:2].all() and found.is_settled[2]
 
 
 def test_scattered_starts_fill_every_range_once():

@@ -240,9 +240,7 @@ def test_nothing_moves_above_the_friction_angle(angle_deg):
 def test_halving_the_steps(friction):
     experiment = replace(HIT, friction=friction)
     model = make_model(experiment, 1.4)
-    spec = model.scene.spec.copy()
-    spec.option.timestep /= 2
-    fine = Model(replace(model.scene, model=spec.compile()), 1.4)
+    fine = Model(replace(model.scene, timestep_s=model.scene.timestep_s / 2), 1.4)
     theta = make_theta(model, experiment)[None]
     coarse = EngineC(model).simulate(theta)[1][0]
     halved = EngineC(fine).simulate(theta)[1][0][..., ::2]

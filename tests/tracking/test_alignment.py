@@ -9,6 +9,7 @@ from galileo_jax.tracking.noise import (
     is_in_motion,
     motion_variance,
 )
+from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refine import FINE_PX, align, covariance_of
 from galileo_jax.tracking.rigid import rigid_motion
@@ -22,13 +23,17 @@ ALIGNED_PX = 0.02
 """Interpolation error of Lanczos sampling, measured 0.005 px; bicubic has 0.048."""
 
 
-def picture(pose, noise=0.0, seed=1):
+def grey_picture(pose, noise=0.0, seed=1):
     return grey(film([(BOX, np.array([pose]))], size_px=(120, 100), noise=noise, seed=seed)[0])
+
+
+def picture(pose, noise=0.0, seed=1):
+    return Picture(grey_picture(pose, noise, seed))
 
 
 @pytest.fixture(scope="module")
 def target():
-    template = template_at(picture(START), START[:2], OUTLINE)
+    template = template_at(grey_picture(START), START[:2], OUTLINE)
     return template.target(np.zeros(3), FINE_PX)
 
 
@@ -59,9 +64,9 @@ def test_covariance_of_white_noise_is_the_scatter(target):
 
 def test_alignment_ignores_what_covers_a_quarter(target):
     pose = START + np.array([0.4, 0.2, 0.0])
-    covered = picture(pose, noise=2.0)
+    covered = grey_picture(pose, noise=2.0)
     covered[:, :52] = 170
-    fit = align(covered, target, pose)
+    fit = align(Picture(covered), target, pose)
     assert 0.1 < fit.covered < 0.45
     assert np.abs(fit.pose[:2] - pose[:2]).max() < 0.05
 

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.tracking import rows_of
 from galileo_jax.clip.load import load_clip
-from galileo_jax.tracking import track_clip
+from galileo_jax.tracking.clip import track_clip
 
 pytestmark = pytest.mark.video
 

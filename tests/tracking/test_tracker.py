@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from galileo_jax.tracking import Start, track_video
 from galileo_jax.tracking.exposure import Exposure
+from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.template import Outline, grey, template_at
+from galileo_jax.tracking.tracker import Start, track_video
 from tests.tracking.moving_box import Box, film, slide
 
 pytestmark = pytest.mark.video
@@ -50,7 +51,7 @@ def test_exposure_is_learned_from_the_smear():
     template = template_at(grey(sharp), path[0, :2], Outline(BOX.size_px))
     exposure = Exposure()
     for index in range(3, 15):
-        exposure.add(grey(frames[index]), template, path[index], np.array([6.0, 0.0, 0.0]))
+        exposure.add(Picture(grey(frames[index])), template, path[index], np.array([6.0, 0.0, 0.0]))
     # Seven instants from end to end spread a little wider than an even exposure.
     assert exposure.share == pytest.approx(0.5 * 8 / 7, abs=0.08)
 

@@ -20,15 +20,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
-from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp, ends_of, in_valley
+from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
+from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH, Ends
 from galileo_jax.inference.fits.evidence import Code as Code
 from galileo_jax.inference.fits.evidence import GradientFit as GradientFit
 from galileo_jax.inference.fits.evidence import laplace_fits
 from galileo_jax.inference.fits.polish import BEHIND as BEHIND
 from galileo_jax.inference.fits.polish import polish
-from galileo_jax.inference.fits.programs import Quadratic
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.fits.stages import before_moving
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
@@ -36,10 +36,8 @@ from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
-BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
 LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
-MOST_VALLEYS = 4  # that are polished
 CHANCE = 0.01  # a fit that noise leaves so seldom as bad or worse is searched for once more
 OPEN_SD_Z = 0.5  # of the prior's 1: what a phase leaves so open is scattered in the next one
 # What a fit that has come to rest says of itself, well or ill.
@@ -75,39 +73,6 @@ class Settings:
     enough: float = 0.1
     settled: float = 0.05
     settled_if_rough: float = 0.5
-
-
-@dataclass(frozen=True)
-class Ends:
-    """Where a search ended.
-
-    Attributes:
-      best: the best point of every valley that is not far behind, best first.
-      num_agreeing: starts that ended in the first's.
-      num_steps: how many it took.
-    """
-
-    best: Quadratic
-    num_agreeing: int
-    num_steps: int
-
-    @classmethod
-    def of(cls, found: Descended) -> "Ends":
-        """Sorts ends by valleys."""
-        ends, whose = found.best, ends_of(found.joined)
-        rows = valleys(ends, np.unique(whose))
-        agree = in_valley(ends, rows[0], whose)
-        return cls(Quadratic(*(leaf[rows] for leaf in ends)), int(agree.sum()), found.num_steps)
-
-
-def valleys(ends: Quadratic, rows: np.ndarray) -> list[int]:
-    """The best point of every valley among `rows` that is not far behind, best first."""
-    left, found = rows[np.argsort(ends.cost[rows], kind="stable")], []
-    left = left[ends.cost[left] < ends.cost[left[0]] + BEHIND_IN_SEARCH]
-    while left.size and len(found) < MOST_VALLEYS:
-        found.append(int(left[0]))
-        left = left[~in_valley(ends, found[-1], left)]
-    return found
 
 
 class GradientFitter:
@@ -268,7 +233,7 @@ class GradientFitter:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
         return self._residuals.costs(self._batch(z, free))
 
-    def _ends(self, starts: np.ndarray, free: np.ndarray, num_refined: int) -> "Ends":
+    def _ends(self, starts: np.ndarray, free: np.ndarray, num_refined: int) -> Ends:
         """Refines the best of some starts."""
         points = self._batch(starts, free)
         best = np.argsort(self._residuals.costs(points))[:num_refined]
@@ -291,7 +256,7 @@ class GradientFitter:
             centres, is_open = ends.best.z, is_main & (variance > OPEN_SD_Z**2)
         return scattered_round(self.trials, centres, is_open, num, seed)
 
-    def _best_valley(self, ends: "Ends", free: np.ndarray) -> GradientFit:
+    def _best_valley(self, ends: Ends, free: np.ndarray) -> GradientFit:
         """Polishes the best of every valley and variants of the first; the most evident fit."""
         first, *others = ends.best.z
         variants = self._variants(first, free)
@@ -326,7 +291,7 @@ class GradientFitter:
             for clip in self._residuals.clips
         )
         left = fit.chi2 / noise_scale**2
-        return bool(chi2.sf(left, max(degrees - fit.num_used, 1.0)) > CHANCE)
+        return bool(chdtrc(max(degrees - fit.num_used, 1.0), left) > CHANCE)
 
     def _batch(self, z: np.ndarray, free: np.ndarray) -> Batch:
         free = np.broadcast_to(free, z.shape)

@@ -7,12 +7,9 @@ many clips have.
 
 from typing import Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
-import lineax as lx
 import numpy as np
-import optimistix as optx
 
 from galileo_jax.inference.problem import seen
 from galileo_jax.model.effects.effect import Surroundings
@@ -23,7 +20,7 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, White
 
 # Damping is lowered where a step brought three quarters of what it promised: the textbook's value
 # (Nocedal and Wright, 2006, ch. 4). optimistix's own, 0.99, crawls in a curved valley.
-REGION, DESCENT = optx.ClassicalTrustRegion(high_cutoff=0.75), optx.DampedNewtonDescent()
+HIGH_CUTOFF = 0.75
 FAILED = 1e6  # the whitened residual of a rollout that failed: worse than any that did not
 
 
@@ -136,20 +133,28 @@ def propose(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
       The next size; `[point]`, whether `there` is accepted; the next proposals
       `[point, model parameter]`, z; and `[point]`, what these promise to lower the cost by.
     """
+    import equinox as eqx
+    import optimistix as optx  # traced programs are kept: most calls need none of these
+
+    trust = optx.ClassicalTrustRegion(high_cutoff=HIGH_CUTOFF)
+    descent = optx.DampedNewtonDescent()
 
     def one(size: Any, is_first: Any, here: Quadratic, there: Quadratic):
         info = (_function_info(here), _function_info(there))
-        region = eqx.tree_at(lambda s: s.step_size, REGION.init(here.z, info[0]), size)
-        size, accepts, _, _ = REGION.step(is_first, here.z, there.z, *info, region)
+        region = eqx.tree_at(lambda s: s.step_size, trust.init(here.z, info[0]), size)
+        size, accepts, _, _ = trust.step(is_first, here.z, there.z, *info, region)
         best = jax.tree.map(lambda a, b: jnp.where(accepts, b, a), here, there)
-        state = DESCENT.query(best.z, _function_info(best), DESCENT.init(best.z, info[0]))
-        step, _ = DESCENT.step(size, state)
-        promised = -REGION.predict_reduction(step, _function_info(best))
+        state = descent.query(best.z, _function_info(best), descent.init(best.z, info[0]))
+        step, _ = descent.step(size, state)
+        promised = -trust.predict_reduction(step, _function_info(best))
         return size, accepts, best.z + step, promised
 
     return jax.vmap(one)(size, is_first, here, there)
 
 
 def _function_info(at: Quadratic) -> Any:
+    import lineax as lx
+    import optimistix as optx
+
     hessian = lx.MatrixLinearOperator(at.normal, lx.positive_semidefinite_tag)
     return optx.FunctionInfo.EvalGradHessian(at.cost, at.gradient, hessian)

@@ -1,12 +1,11 @@
 """Starts of a search: scattered over what the objects' parameters may be."""
 
-import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
+from galileo_jax.runtime.latin_hypercube import latin_hypercube
 
 
 def scattered_starts(trials: JointProblem, free: np.ndarray, num: int, seed: int) -> np.ndarray:
@@ -42,7 +41,7 @@ def scattered_round(
     """
     turn = np.arange(num) % len(centres)
     some = np.flatnonzero(is_scattered.any(axis=0)).tolist()
-    shares = qmc.LatinHypercube(len(some), rng=np.random.default_rng(seed)).random(num)
+    shares = latin_hypercube(num, len(some), np.random.default_rng(seed))
     starts = centres[turn].copy()
     for i, share in zip(some, shares.T, strict=True):
         column = ndtri(np.clip(_in_range(trials, i, share), 0.01, 0.99))
@@ -70,5 +69,5 @@ def _in_range(trials: JointProblem, index: int, share: np.ndarray) -> np.ndarray
 def absent_z(trials: JointProblem) -> np.ndarray:
     """Where nothing but the scene is there, as far as priors reach, `[model parameter]`, z."""
     parameters = trials.model_parameters
-    z = np.asarray(inverse(parameters, jnp.asarray([p.absent for p in parameters])))
+    z = inverse(parameters, np.asarray([p.absent for p in parameters]))
     return np.clip(z, -1.0, 1.0)

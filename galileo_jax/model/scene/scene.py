@@ -1,4 +1,7 @@
-"""The scene: a clip's geometry as a MuJoCo model, set up through `mujoco.MjSpec`."""
+"""The scene: a clip's geometry, and as a MuJoCo model, set up through `mujoco.MjSpec`.
+
+The rigid engine needs no MuJoCo model: it is compiled, and MuJoCo imported, when first asked for.
+"""
 
 # mujoco's classes live in a compiled module without stubs.
 # pyright: reportAttributeAccessIssue=false
@@ -6,9 +9,9 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
@@ -19,6 +22,10 @@ from galileo_jax.model.scene.expected import expected
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
+if TYPE_CHECKING:
+    import mujoco
+
+TIMESTEP_S = 1 / 960
 # Where nothing else is declared; an incline's dynamics do not depend on it.
 UNKNOWN_BOX_M: tuple[float, ...] = (0.04, 0.04, 0.04)
 UNKNOWN_ROUND_M: tuple[float, ...] = (0.02, 0.01)
@@ -30,20 +37,43 @@ BUMPER_RADIUS_M = 2.0  # nearly flat: faces that meet at different heights do no
 
 @dataclass(frozen=True)
 class Scene:
-    """A compiled scene; what the rollouts need besides the parameters.
+    """A scene; what the rollouts need besides the parameters.
 
     Attributes:
-      spec: the MjSpec the model was compiled from (for pictures and the viewer).
-      model: the compiled model, its masses and frictions still the file's.
       surroundings: names, geometry and start, as effects see them.
-      z_m: `[object]`, how far each centre is from the plane of the motion, towards the camera;
-        the planar scene has no use for it.
+      shapes: `[object]`, what is drawn of each.
+      objects: as declared.
+      timestep_s: of MuJoCo's engines.
     """
 
-    spec: mujoco.MjSpec
-    model: mujoco.MjModel
     surroundings: Surroundings
-    z_m: tuple[float, ...]
+    shapes: tuple[str, ...]
+    objects: tuple[ClipObject, ...]
+    timestep_s: float = TIMESTEP_S
+
+    @property
+    def spec(self) -> "mujoco.MjSpec":
+        """The MjSpec the model was compiled from (for pictures and the viewer)."""
+        return self._compiled[0]
+
+    @property
+    def model(self) -> "mujoco.MjModel":
+        """The compiled model, its masses and frictions still the file's."""
+        return self._compiled[1]
+
+    @cached_property
+    def _compiled(self) -> "tuple[mujoco.MjSpec, mujoco.MjModel]":
+        spec = _spec(self.surroundings, self.shapes, self.objects)
+        spec.option.timestep = self.timestep_s
+        return spec, spec.compile()
+
+    @property
+    def z_m(self) -> tuple[float, ...]:
+        """`[object]`, how far each centre is from the plane of the motion, towards the camera.
+
+        The planar scene has no use for it.
+        """
+        return tuple(each.z_m for each in self.objects)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -199,9 +229,17 @@ def _on_ramp(along: float, height: float, angle: float) -> tuple[float, float]:
 
 
 def compile_scene(
-    surroundings: Surroundings, shapes: list[str], declared: tuple[ClipObject, ...]
+    surroundings: Surroundings, shapes: Sequence[str], declared: tuple[ClipObject, ...]
 ) -> Scene:
-    """Compiles the MuJoCo model of the given surroundings."""
+    """The scene of the given surroundings; its MuJoCo model is compiled when it is needed."""
+    return Scene(surroundings, tuple(shapes), declared[: len(surroundings.names)])
+
+
+def _spec(
+    surroundings: Surroundings, shapes: Sequence[str], declared: tuple[ClipObject, ...]
+) -> "mujoco.MjSpec":
+    import mujoco
+
     spec = mujoco.MjSpec.from_file(str(scene_path("ramp.xml")))
     spec.option.gravity = [0, 0, -surroundings.gravity]
     has_table = math.isfinite(surroundings.corner_m[0])
@@ -242,15 +280,10 @@ def compile_scene(
             if "table" in (pair.geomname1, pair.geomname2):
                 spec.delete(pair)
         spec.delete(spec.geom("table"))
-    return Scene(
-        spec=spec,
-        model=spec.compile(),
-        surroundings=surroundings,
-        z_m=tuple(each.z_m for each in declared[:count]),
-    )
+    return spec
 
 
-def _add_object(spec: mujoco.MjSpec, i: int) -> None:
+def _add_object(spec: "mujoco.MjSpec", i: int) -> None:
     """Adds object i (counted from 0) behind the last one, as object 2 stands in the file."""
     name, before = f"object{i + 1}", f"object{i}"
     like, table, hit = (
@@ -271,7 +304,9 @@ def _add_object(spec: mujoco.MjSpec, i: int) -> None:
     _add_pair(spec, hit, f"{before}_{name}", f"{before}_front", f"{name}_back")
 
 
-def _add_pair(spec: mujoco.MjSpec, like: mujoco.MjsPair, name: str, one: str, other: str) -> None:
+def _add_pair(
+    spec: "mujoco.MjSpec", like: "mujoco.MjsPair", name: str, one: str, other: str
+) -> None:
     spec.add_pair(
         name=name,
         geomname1=one,
@@ -284,9 +319,11 @@ def _add_pair(spec: mujoco.MjSpec, like: mujoco.MjsPair, name: str, one: str, ot
 
 
 def _draw(
-    geom: mujoco.MjsGeom, shape: str, declared: ClipObject, length: float, height: float
+    geom: "mujoco.MjsGeom", shape: str, declared: ClipObject, length: float, height: float
 ) -> None:
     """Sets the drawn (not touching) geom to the declared shape; a torus is drawn as a disc."""
+    import mujoco
+
     depth = length
     if shape == "box" and declared.size_m is not None:
         depth = declared.size_m[1] / 2

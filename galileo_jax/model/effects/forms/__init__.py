@@ -34,4 +34,5 @@ FORMS: tuple[Form, ...] = (
 """In the order in which their hooks are applied, after the library's."""
 
 FORM_NAMES = tuple(form.name for form in FORMS)
+FORM_FAMILIES = {form.name: form.family for form in FORMS}
 FORM_MEANINGS = {form.name: form.meaning for form in FORMS}

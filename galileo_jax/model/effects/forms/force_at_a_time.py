@@ -21,6 +21,7 @@ class ForceAtATime(Form):
 
     name: ClassVar[str] = "force_at_a_time"
     meaning: ClassVar[str] = "a push or pull on object 1 at one moment"
+    family: ClassVar[str] = "pulse_t"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How strong, when, and how long."""

@@ -11,6 +11,8 @@ class Form(Effect):
     """An effect without a name; `meaning` says what it does, `name` only labels it."""
 
     meaning: ClassVar[str]
+    family: ClassVar[str]
+    """The shape of its formula, as `diagnosis.laws` calls it; a law of that shape is the same."""
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
         """One in twenty."""

@@ -21,6 +21,7 @@ class FrictionWavesInPlace(Form):
 
     name: ClassVar[str] = "friction_waves_in_place"
     meaning: ClassVar[str] = "friction that waves along the path"
+    family: ClassVar[str] = "wave_q"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two strengths, a quarter of a wave apart, and its length; none in a fall."""

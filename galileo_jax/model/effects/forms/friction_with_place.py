@@ -17,6 +17,7 @@ class FrictionWithPlace(Form):
 
     name: ClassVar[str] = "friction_with_place"
     meaning: ClassVar[str] = "friction that grows or falls along the path"
+    family: ClassVar[str] = "linear_q"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per metre; none in a fall."""

@@ -17,6 +17,7 @@ class FrictionWithTime(Form):
 
     name: ClassVar[str] = "friction_with_time"
     meaning: ClassVar[str] = "friction that grows or falls with time"
+    family: ClassVar[str] = "power_t"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By which share per second; none in a fall."""

@@ -1,0 +1,94 @@
+"""What an accelerator is worth: `python benchmarks/accelerator.py`.
+
+Runs on whatever `jax.devices()` has. By size of the batch, rollouts of a ramp clip of 1.2 s per
+minute: the rigid engine and MJX on the device, and MuJoCo's C engine (`mujoco.batch`) on all cores
+of the machine beside it. Then simulated tracks one after the other: fits per second and diagnoses
+per minute, programs compiled. The last line is JSON.
+"""
+
+import argparse
+import os
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import jax
+import rollouts
+import tables
+
+import galileo_jax as gx
+from galileo_jax.commands import command
+from galileo_jax.runtime import compilation_cache
+
+ENGINES = ("rigid", "mjx", "c")
+SIZES = (1, 16, 256, 4096, 65536)
+MOST_ON_CORES = 1024
+"""Larger batches of the C engine only take longer: they are no faster per rollout."""
+
+
+def main(argv: Sequence[str]) -> int | None:
+    call = _parser().parse_args(argv)
+    jax.config.update("jax_enable_x64", True)
+    compilation_cache.enable()
+    device = jax.devices()[0]
+    figures: dict[str, Any] = {"device": f"{device.platform} {device.device_kind}"}
+    figures["cores"] = os.cpu_count()
+    tables.row("rollouts per minute", [*call.engine])
+    for size in call.batch:
+        found = {name: _rollouts_per_minute(name, size, call.repeats) for name in call.engine}
+        figures[f"rollouts_per_minute_{size}"] = found
+        tables.row(f"  batch {size}", list(found.values()))
+    with tempfile.TemporaryDirectory() as folder:
+        most = max(call.fits, call.diagnoses)
+        clips = [_track(Path(folder), call.seed + i) for i in range(most + (most > 0))]
+        figures["fits_per_s"] = _rate(gx.fit, clips[: call.fits + 1])
+        figures["diagnoses_per_minute"] = 60 * _rate(gx.diagnose, clips[: call.diagnoses + 1])
+    for name in ("fits_per_s", "diagnoses_per_minute"):
+        tables.row(name, [figures[name]])
+    tables.finish("accelerator", figures)
+    return None
+
+
+def _rollouts_per_minute(name: str, size: int, repeats: int) -> float | None:
+    """None where the batch was not tried."""
+    if name == "c" and size > MOST_ON_CORES:
+        return None
+    seconds = rollouts.seconds(rollouts.batch_of(name, size), repeats)
+    return 60 * size / seconds
+
+
+def _track(folder: Path, seed: int) -> Path:
+    path = folder / f"clip{seed}.csv"
+    gx.simulate(path, seed=seed, track_only=True)
+    return path
+
+
+def _rate(function: Callable[..., Any], clips: Sequence[Path]) -> float:
+    """Calls per second, after a first one that compiles; 0 if there is nothing else."""
+    if len(clips) < 2:
+        return 0.0
+    function(clips[0])
+    began = time.perf_counter()
+    for clip in clips[1:]:
+        function(clip)
+    return (len(clips) - 1) / (time.perf_counter() - began)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = command.Parser(prog="accelerator.py", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--engine", nargs="+", choices=ENGINES, default=list(ENGINES))
+    parser.add_argument("--batch", nargs="+", type=int, default=list(SIZES))
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--fits", type=int, default=20, help="tracks that are fitted")
+    parser.add_argument("--diagnoses", type=int, default=5, help="tracks that are diagnosed")
+    parser.add_argument("--seed", type=int, default=7100, help="of the first track")
+    return parser
+
+
+if __name__ == "__main__":
+    import sys
+
+    raise SystemExit(command.run(main, sys.argv[1:]))

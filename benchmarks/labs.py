@@ -1,0 +1,87 @@
+"""Labs in this process: objects with a sealed effect that can be measured at other settings."""
+
+import json
+import math
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import galileo_jax as gx
+from galileo_jax.experiment.lab import Described, described
+
+SETTINGS = {
+    "height_m": {"low": 0.08, "high": 0.25},
+    "angle_deg": {"low": 12.0, "high": 28.0},
+    "fps": {"choices": [30]},
+}
+NOISES = ("px", "speed")
+PIXEL_M = 0.3 / 900  # 0.3 px at 900 px/m
+SPEED_SHARE = 0.075  # of the range of object 1's speed, as the noise of a velocity
+NONE = "none"
+
+
+@dataclass(frozen=True)
+class SimulatedLab:
+    """Simulated by the integrator that does not fit, with the small faults of real clips.
+
+    Attributes:
+      folder: of its files.
+      effect: hidden; "none".
+      seed: of objects, strength and noise.
+      noise: "px": 0.3 px; "speed": velocities known to 7.5 % of the speed's range.
+    """
+
+    folder: Path
+    effect: str
+    seed: int
+    noise: str
+
+    @property
+    def truth(self) -> Path:
+        """What is sealed; made when first asked for."""
+        path = self.folder / "sealed.truth.json"
+        if not path.is_file():
+            told: dict[str, Any] = {"effects": {} if self.effect == NONE else {self.effect: {}}}
+            gx.simulate(
+                self.folder / "sealed.csv", seed=self._seed("objects"), track_only=True, **told
+            )
+        return path
+
+    def describe(self) -> Described:
+        """As the protocol has it."""
+        truth = json.loads(self.truth.read_text())
+        objects = [
+            {"name": f"object{i}", "shape": shape, "size_m": truth[f"size{i}_m"]}
+            for i, shape in enumerate(truth["shapes"], 1)
+        ]
+        return described({"settings": SETTINGS, "clip": {"scenario": "ramp", "objects": objects}})
+
+    def measure(self, settings: Mapping[str, Any]) -> str:
+        """A track; each time with other noise and other faults."""
+        number = len(list(self.folder.glob("m*.csv"))) + 1
+        path = self.folder / f"m{number:03}.csv"
+        angle = float(settings["angle_deg"])
+        options: dict[str, Any] = {
+            "like": self.truth,
+            "release": settings["height_m"] / math.sin(math.radians(angle)),
+            "angle": angle,
+            "fps": float(settings["fps"]),
+            "seed": self._seed(number),
+            "solver": "fine",
+            "faults": True,
+            "track_only": True,
+        }
+        noise_m = PIXEL_M
+        if self.noise == "speed":
+            made = gx.simulate(path, **options)
+            speed = np.hypot(*(made.truths[0]["trajectory"]["object1"][v] for v in ("vy", "vz")))
+            noise_m = SPEED_SHARE * float(np.ptp(speed)) / (math.sqrt(2) * options["fps"])
+        gx.simulate(path, **options, track_noise=noise_m)
+        return path.read_text()
+
+    def _seed(self, what: object) -> int:
+        return zlib.crc32(f"{self.effect} {self.seed} {what}".encode())

@@ -1,0 +1,129 @@
+"""Clips until `named`: settings that `next` chooses against settings at random.
+
+    python benchmarks/next_experiment.py --out DIR --most 6 --first 100
+
+For every pair of docs/reference/effects.md that is easily confused, the first effect is hidden in a
+lab. Both ways begin with the same clip (the middle of what the lab allows); then one asks
+`next_experiment`, the other draws a setting, and all clips are diagnosed together until the effect
+is named, or `--most` clips are made. A lab whose first clip names the effect already says nothing
+here and is left out. What is finished stays in DIR. The last line is JSON.
+"""
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import labs
+import numpy as np
+import tables
+
+import galileo_jax as gx
+from galileo_jax.commands import command
+from galileo_jax.experiment.measured import write_clip
+from galileo_jax.experiment.plan import middle
+from galileo_jax.experiment.settings import Range
+from galileo_jax.runtime.atomic_write import write_json
+
+PAIRS = (
+    ("air_drag", "viscous_drag"),
+    ("viscous_drag", "air_drag"),
+    ("viscous_drag", "magnetic_brake"),
+    ("stribeck", "static_friction"),
+    ("static_friction", "release_delay"),
+    ("rolling", "scale_error"),
+    ("rolling", "frame_rate"),
+    ("release_delay", "static_friction"),
+    ("table_tilt", "surface_friction"),
+    ("friction_patch", "surface_friction"),
+    ("friction_patch", "magnetic_brake"),
+    ("surface_friction", "table_tilt"),
+    ("magnetic_brake", "friction_patch"),
+    ("spring_tether", "constant_force"),
+    ("scale_error", "frame_rate"),
+    ("frame_rate", "scale_error"),
+    ("frame_rate", "rolling"),
+)
+"""(hidden, easily confused with): the pairs of the table whose partner is an effect, too."""
+
+WAYS = ("next", "random")
+
+
+def main(argv: Sequence[str]) -> int | None:
+    call = _parser().parse_args(argv)
+    hidden = list(dict.fromkeys(first for first, _ in PAIRS))
+    chosen = call.effects.split(",") if call.effects else hidden
+    tables.row("hidden", ("next", "random"))
+    rows = []
+    for seed in range(call.first, call.first + call.seeds):
+        for effect in chosen:
+            row = _race(call, effect, seed)
+            tables.row(f"{effect} {seed}", [row["next"], row["random"]])
+            rows.append(row)
+    told = [row for row in rows if row["next"] > 1]
+    medians = {way: float(np.median([row[way] for row in told] or [0])) for way in WAYS}
+    tables.row(f"median of {len(told)}", [medians[way] for way in WAYS])
+    tables.finish("next_experiment", {"most": call.most, "medians": medians, "labs": rows})
+    return None
+
+
+def _race(call: argparse.Namespace, effect: str, seed: int) -> dict[str, Any]:
+    folder: Path = call.out / f"{effect}_{seed}"
+    done = folder / "row.json"
+    if done.is_file():
+        return json.loads(done.read_text())
+    (folder / "lab").mkdir(parents=True, exist_ok=True)
+    lab = labs.SimulatedLab(folder / "lab", effect, seed, call.noise)
+    can = lab.describe().can
+    first = _clip(lab, folder, "first", middle(can))
+    found = gx.diagnose([first], seed=seed, add="none")
+    row: dict[str, Any] = {"hidden": effect, "seed": seed}
+    row["first"] = [found.verdict.status, *found.verdict.effects]
+    generator = np.random.default_rng(seed)
+    for way in WAYS:
+        clips, at = [first], found
+        # One more than allowed stands for "not named within them".
+        while not _is_named(at, effect) and len(clips) <= call.most:
+            if way == "next":
+                setting = gx.next_experiment(at, can=labs.SETTINGS, seed=seed).best
+            else:
+                setting = {
+                    name: float(generator.uniform(kind.low, kind.high))
+                    if isinstance(kind, Range)
+                    else kind.values[int(generator.integers(len(kind.values)))]
+                    for name, kind in can.items()
+                }
+            clips.append(_clip(lab, folder, f"{way}{len(clips) + 1}", setting))
+            if len(clips) <= call.most:
+                at = gx.diagnose(clips, seed=seed, add="none")
+        row[way] = len(clips)
+        row[f"{way}_says"] = [at.verdict.status, *at.verdict.effects]
+    write_json(done, row)
+    return row
+
+
+def _is_named(found: gx.Diagnosis, effect: str) -> bool:
+    return found.verdict.status == "named" and found.verdict.effects == (effect,)
+
+
+def _clip(lab: labs.SimulatedLab, folder: Path, name: str, setting: Mapping[str, Any]) -> Path:
+    path = folder / f"{name}.csv"
+    write_clip(path, lab.measure(setting), lab.describe().clip, setting)
+    return path
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="benchmarks/next_experiment.py", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--effects", default="", help="hidden ones (default: of all pairs)")
+    parser.add_argument("--noise", choices=labs.NOISES, default="px")
+    parser.add_argument("--most", type=command.whole_number(2), default=6, help="clips")
+    parser.add_argument("--seeds", type=command.whole_number(1), default=1)
+    parser.add_argument("--first", type=command.whole_number(0), default=100, help="seed")
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(command.run(main))

@@ -1,0 +1,316 @@
+"""`discover`: measure, diagnose, choose the next setting, until the verdict stands."""
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from galileo_jax.api.diagnose import Diagnosis, diagnose
+from galileo_jax.api.next_experiment import rehearsed
+from galileo_jax.experiment.choose import LITTLE
+from galileo_jax.experiment.journal import Journal, open_journal
+from galileo_jax.experiment.lab import Described, Lab, LabError, program_of
+from galileo_jax.experiment.measured import same_as, write_clip
+from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
+from galileo_jax.experiment.settings import Can
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, Cancelled, OnProgress
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+DIAGNOSIS = "diagnosis"  # folder of the last one
+LABS_SHARE = 0.1  # of the work of an experiment, for progress
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """What a lab was found to do.
+
+    Attributes:
+      document: discover.json: every experiment with the reason for it, every verdict.
+      found: the last diagnosis; None where no experiment gave a track, or nothing was left to do.
+      folder: with clips, verdicts and pages; None where none was given.
+    """
+
+    document: Mapping[str, Any]
+    found: Diagnosis | None
+    folder: Path | None
+
+    @property
+    def status(self) -> str | None:
+        """Of the last verdict: none, named, ambiguous, unknown; None without any."""
+        rounds = self.document["rounds"]
+        return rounds[-1]["status"] if rounds else None
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Of the last verdict."""
+        rounds = self.document["rounds"]
+        return tuple(rounds[-1]["effects"]) if rounds else ()
+
+    @property
+    def sentence(self) -> str:
+        """The result in one sentence."""
+        made = len(self.document["experiments"])
+        rounds = self.document["rounds"]
+        said = rounds[-1]["sentence"] if rounds else "No experiment gave a track."
+        return f"After {made} experiment{'' if made == 1 else 's'}: {said}"
+
+    @property
+    def experiments(self) -> "pd.DataFrame":
+        """One row per experiment: `number, settings, reason, outcome, line, clip`."""
+        import pandas as pd
+
+        return pd.DataFrame(self.document["experiments"])
+
+    @property
+    def rounds(self) -> "pd.DataFrame":
+        """One row per verdict: `clips, status, effects, form, sentence, hypotheses`."""
+        import pandas as pd
+
+        return pd.DataFrame(self.document["rounds"])
+
+    def report(self, path: str | Path) -> Path:
+        """Writes the page: one HTML file, no network needed."""
+        from galileo_jax.report.experiment_page import write_discovery_page
+
+        write_discovery_page(Path(path), self.document, self.sentence)
+        return Path(path)
+
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"<Discovery: {self.sentence}>"
+
+
+@in_float64
+def discover(
+    lab: str | Path | Lab,
+    *,
+    budget: int = 16,
+    out: str | Path | None = None,
+    timeout: float = 60.0,
+    effects_from: Sequence[str | Path] = (),
+    seed: int = 0,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Discovery:
+    """Finds out what a lab's objects do: measures, diagnoses, chooses the next setting.
+
+    Ends when the verdict stands (docs/how-to/discover.md) or the budget is spent. An experiment
+    that comes to nothing (the lab dies, hangs, answers rubbish or repeats itself) costs one of the
+    budget. Interrupted and called again with the same folder, it goes on where it was.
+
+    Args:
+      lab: a program (docs/how-to/discover.md has the protocol), or an object with its two methods
+        `describe` and `measure`.
+      budget: at most so many experiments, 1 to 999.
+      out: folder for clips, verdicts and pages. None: nothing is left on disk.
+      timeout: after so long the lab is taken to hang, s.
+      effects_from: Python files that register more candidates.
+      seed: of everything random; the same seed gives the same numbers.
+      on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
+        `{"experiment": row}` when one is made, `{"round": row}` for each verdict.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Raises:
+      InputError: there is no such lab, it does not describe itself, or `out` is another lab's.
+      Cancelled: `cancel` was set; what was measured stays in `out`.
+
+    Examples:
+      >>> import galileo_jax as gx
+      >>> found = gx.discover("./lab.py", budget=8, out="runs/lab")  # doctest: +SKIP
+      >>> found.status, found.effects  # doctest: +SKIP
+      ('named', ('air_drag',))
+    """
+    if not 1 <= budget <= 999:
+        raise InputError(f"--budget: {budget} is no number of experiments; 1 to 999 expected")
+    if not 0 < timeout < float("inf"):
+        raise InputError(f"--timeout: {timeout:g} is no time; seconds above 0 expected")
+    if isinstance(lab, str | Path):
+        lab = program_of(lab, timeout)
+    with ExitStack() as stack:
+        stack.enter_context(progress.scope(on_progress, cancel))
+        folder = out
+        if folder is None:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="galileo."))
+        folder = Path(folder)
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"--out: {folder} is a file; a folder expected")
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"--out: {folder}: {error.strerror or error}") from error
+        try:
+            described = lab.describe()
+        except LabError as error:
+            raise InputError(f"LAB: {error}") from error
+        can, held = parted(described.can)
+        journal = open_journal(folder, described.document, seed)
+        journal.held = held
+        loop = _Loop(lab, described, can, journal, budget, tuple(map(str, effects_from)))
+        found = loop.run()
+        made = Discovery(journal.document, found, None if out is None else folder)
+        if out is not None:
+            progress.report("writing the pages", 0.99)
+            made.report(folder / "report.html")
+            if found is not None:
+                found.save(folder / DIAGNOSIS)
+        progress.report("discovered", 1.0)
+        return made
+
+
+class _Loop:
+    """One discovery. What is done stands in the journal before the next thing is begun."""
+
+    def __init__(
+        self,
+        lab: Lab,
+        described: Described,
+        can: Can,
+        journal: Journal,
+        budget: int,
+        effects_from: tuple[str, ...],
+    ):
+        self._lab, self._described, self._can = lab, described, can
+        self._journal, self._budget, self._effects_from = journal, budget, effects_from
+
+    def run(self) -> Diagnosis | None:
+        """Goes on until the verdict stands or the budget is spent."""
+        journal, found = self._journal, None
+        while True:
+            experiments = journal.experiments
+            pending = experiments[-1] if experiments and not experiments[-1]["outcome"] else None
+            if pending is not None:
+                self._measure(pending)
+                continue
+            new = self._undiagnosed()
+            if new is not None:
+                found = self._diagnose(new) or found
+                continue
+            if why := self._end():
+                journal.ended = why
+                journal.write()
+                return found
+            settings, reason = self._choose(found)
+            self._journal.add({**settings, **journal.held}, reason)
+
+    def _share(self) -> float:
+        return min(max(len(self._journal.experiments) - 1, 0) / self._budget, 0.98)
+
+    def _measure(self, row: dict[str, Any]) -> None:
+        journal = self._journal
+        progress.report(f"experiment {row['number']}", self._share())
+        path = journal.folder / "clips" / f"e{row['number']:03}.csv"
+        try:
+            text = self._lab.measure(row["settings"])
+            write_clip(path, text, self._described.clip, row["settings"])
+            others = journal.tracks
+            same = same_as(path, [journal.folder / one["clip"] for one in others])
+            if same is not None:
+                _remove(path)
+                raise LabError(f"the same track as in experiment {others[same]['number']}")
+        except Cancelled:
+            raise
+        except Exception as error:  # whatever a lab does must cost one experiment
+            journal.close(row, line=_line(error))
+        else:
+            journal.close(row, clip=str(path.relative_to(journal.folder)))
+        progress.report("measured", self._share(), {"experiment": row})
+
+    def _undiagnosed(self) -> dict[str, Any] | None:
+        """The last track, where no verdict has it yet."""
+        tracks, last = self._journal.tracks, self._journal.last
+        if not tracks or (last is not None and last["clips"] == [one["clip"] for one in tracks]):
+            return None
+        return tracks[-1]
+
+    def _diagnose(self, new: dict[str, Any]) -> Diagnosis | None:
+        journal, share = self._journal, self._share()
+        clips = [one["clip"] for one in journal.tracks]
+        try:
+            with progress.part(share + LABS_SHARE / self._budget, share + 1 / self._budget):
+                found = self._diagnosed(clips)
+        except Cancelled:
+            raise
+        except Exception as error:  # whatever a lab's numbers bring about must cost one experiment
+            journal.close(new, line=f"cannot be diagnosed: {_line(error)}")
+            progress.report("measured", share, {"experiment": new})
+            return None
+        verdict = found.verdict
+        row = {
+            "clips": clips,
+            "status": verdict.status,
+            "effects": list(verdict.effects),
+            "form": verdict.form,
+            "sentence": found.sentence,
+            "p_value": found.document["p_value"],
+        }
+        journal.rounds.append(row)
+        journal.write()
+        progress.report("diagnosed", share, {"round": row})
+        return found
+
+    def _diagnosed(self, clips: Sequence[str]) -> Diagnosis:
+        return diagnose(
+            [self._journal.folder / clip for clip in clips],
+            effects_from=self._effects_from,
+            seed=self._journal.seed,
+        )
+
+    def _end(self) -> str | None:
+        """Why it ends; None where it goes on."""
+        rounds = self._journal.rounds
+        if stands(rounds):
+            return f"the verdict ({rounds[-1]['status']}) has stood"
+        if len(self._journal.experiments) >= self._budget:
+            return f"the budget of {self._budget} experiments is spent"
+        return None
+
+    def _choose(self, found: Diagnosis | None) -> tuple[Mapping[str, Any], str]:
+        """The next setting, and why."""
+        journal, names = self._journal, list(self._can)
+        tried = [{name: one["settings"][name] for name in names} for one in journal.experiments]
+        lost = [
+            row
+            for row, one in zip(tried, journal.experiments, strict=True)
+            if one["outcome"] == "lost"
+        ]
+        if not self._can:
+            return {}, "the lab has nothing to set that is known here: the same again"
+        if not tried:
+            return middle(self._can), "nothing is known yet: the middle of what the lab allows"
+        settings = candidates(self._can, lost, journal.seed)
+        if not journal.tracks:
+            return farthest(self._can, settings, tried), (
+                "no track yet: as different as can be from what came to nothing"
+            )
+        if found is None:  # begun again after the budget was spent
+            found = self._diagnosed([one["clip"] for one in journal.tracks])
+        try:
+            ahead = rehearsed(found, settings, journal.seed)
+        except InputError as error:  # of scenes that nobody can set up here
+            said = f"not rehearsed ({_line(error)}): as different as can be from those so far"
+            return farthest(self._can, settings, tried), said
+        best = ahead.expected[0]
+        journal.rounds[-1]["hypotheses"] = dict(ahead.hypotheses)
+        if best.gain_nats < LITTLE:
+            return farthest(self._can, settings, tried), (
+                f"no setting is expected to tell more than {best.gain_nats:.2f} nats: as different "
+                "as can be from those so far, to see whether the verdict holds"
+            )
+        odds = ", ".join(f"{name} {p:.2f}" for name, p in list(ahead.hypotheses.items())[:3])
+        return dict(best.setting), f"{ahead.sentence}; now: {odds}"
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200] or type(error).__name__
+
+
+def _remove(path: Path) -> None:
+    path.unlink(missing_ok=True)
+    path.with_suffix(".yaml").unlink(missing_ok=True)

@@ -1,0 +1,250 @@
+"""`next_experiment`: which setting of the lab would tell most?"""
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from galileo_jax import __version__
+from galileo_jax.api.diagnose import DOCUMENT, Diagnosis, diagnose, with_library
+from galileo_jax.api.run import load_run
+from galileo_jax.api.track import Track
+from galileo_jax.clip.schema import Clip
+from galileo_jax.experiment.belief import FILE, Beliefs, beliefs_of, read_beliefs
+from galileo_jax.experiment.choose import (
+    Expected,
+    best_first,
+    default_can,
+    expect,
+    sentence_of,
+)
+from galileo_jax.experiment.settings import check_can, grid, parse_can
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.effects.registry import load_file
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.atomic_write import write_json
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import plotly.graph_objects as go
+
+Found = Diagnosis | str | Path
+COLUMNS = ("gain_nats", "named", "lead_nats", "hit")
+DIAGNOSED = 0.8  # share of the work where runs are to be diagnosed together first
+
+
+@dataclass(frozen=True, eq=False)
+class NextExperiment:
+    """What is expected of every setting that a lab allows.
+
+    Attributes:
+      expected: the settings, the most telling first.
+      about: the parameter that was asked about; None: which hypothesis holds.
+      hypotheses: name to probability, before the experiment.
+      document: next.json.
+    """
+
+    expected: tuple[Expected, ...]
+    about: str | None
+    hypotheses: Mapping[str, float]
+    document: Mapping[str, Any]
+
+    @property
+    def best(self) -> Mapping[str, Any]:
+        """The setting with the largest gain."""
+        return self.expected[0].setting
+
+    @property
+    def sentence(self) -> str:
+        """What to do next, in one sentence."""
+        return str(self.document["sentence"])
+
+    @property
+    def table(self) -> "pd.DataFrame":
+        """One row per setting, the most telling first.
+
+        The settings by their names, `gain_nats`, `named` and `hit` (probabilities), `lead_nats`.
+        """
+        import pandas as pd
+
+        return pd.DataFrame(self.document["settings"])
+
+    def plot(self) -> "go.Figure":
+        """The gain against every setting."""
+        from galileo_jax.report.experiment_page import gains_figure
+
+        return gains_figure(self.document)
+
+    def report(self, path: str | Path) -> Path:
+        """Writes the page: one HTML file, no network needed."""
+        from galileo_jax.report.experiment_page import write_next_page
+
+        write_next_page(Path(path), self.document)
+        return Path(path)
+
+    def save(self, folder: str | Path) -> Path:
+        """Writes next.json and next.html into `folder`."""
+        folder = Path(folder)
+        write_json(folder / "next.json", self.document)
+        self.report(folder / "next.html")
+        return folder
+
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"<NextExperiment: {self.sentence}>"
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<p>{escape(self.sentence)}</p>{self.table.head(10)._repr_html_()}"  # pyright: ignore
+
+
+@in_float64
+def next_experiment(
+    found: Found | Sequence[Found],
+    *,
+    can: str | Mapping[str, Any] | None = None,
+    about: str | None = None,
+    seed: int = 0,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> NextExperiment:
+    """Says for every setting that a lab allows how much an experiment there is expected to tell.
+
+    The gain is the mutual information, in nats, between the data of the experiment and which
+    hypothesis holds, or a parameter; by rollouts of draws of every hypothesis' posterior
+    (docs/explanation/next_experiment.md).
+
+    Args:
+      found: a diagnosis or the folder of one. Of other runs, or several, the clips are diagnosed
+        together first.
+      can: what the lab allows, such as height=0.1:0.5,angle=10:30,fps=30|60|240,swap (lengths in
+        m, angles in degrees, masses in kg); known: height, release, angle, fps, place2, swap,
+        mass1, mass2. None: other heights, and angles, near those of the first clip.
+      about: a parameter, such as k2 or mass_ratio. None: which hypothesis holds.
+      seed: of everything random; the same seed gives the same numbers.
+      on_progress: called with the stage, the share done (0 to 1) and None.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Raises:
+      InputError: a run, a setting or the parameter is wrong.
+      Cancelled: `cancel` was set.
+
+    Examples:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("faint.csv", seed=11, effects={"air_drag": {}}, strength=0.1,
+      ...     track_only=True, track_noise=0.0004)
+      >>> ahead = gx.next_experiment(gx.diagnose("faint.csv"), can="height=0.1:0.6")
+      >>> ahead.table.columns.tolist()
+      ['height', 'gain_nats', 'named', 'lead_nats', 'hit']
+    """
+    began = time.perf_counter()
+    parsed = None if can is None else parse_can(can)
+    if parsed is not None:
+        check_can(parsed)
+    with progress.scope(on_progress, cancel):
+        clip, trials, beliefs, sources = _loaded(found)
+        allowed = parsed or parse_can(default_can(clip, trials))
+        settings = grid(allowed, seed)
+        with progress.part(DIAGNOSED, 1.0):
+            rows = expect(clip, trials, beliefs, settings, about, seed)
+        progress.report("rehearsed", 1.0)
+    made = make_next(rows, beliefs, about)
+    document = {
+        "clips": sources,
+        "can": {name: _as_json(kind) for name, kind in allowed.items()},
+        **made.document,
+        "timings_s": {"next": round(time.perf_counter() - began, 3)},
+        "version": __version__,
+        "seed": seed,
+    }
+    return NextExperiment(made.expected, about, made.hypotheses, document)
+
+
+def rehearsed(
+    found: Diagnosis, settings: Sequence[Mapping[str, Any]], seed: int = 0
+) -> NextExperiment:
+    """What is expected of these settings after a diagnosis; the document is of them alone."""
+    beliefs = beliefs_of(found.found)
+    rows = expect(found.measurements[0].clip, found.problem, beliefs, settings, None, seed)
+    return make_next(rows, beliefs)
+
+
+def make_next(
+    rows: Sequence[Expected], beliefs: Beliefs, about: str | None = None
+) -> NextExperiment:
+    """The result, the most telling setting first."""
+    ordered = best_first(rows)
+    shares = beliefs.probability
+    hypotheses = {one.name: float(p) for one, p in zip(beliefs.of, shares, strict=True)}
+    document = {
+        "about": about,
+        "hypotheses": hypotheses,
+        "sentence": sentence_of(ordered[0], about),
+        "settings": [
+            {**one.setting, **{key: getattr(one, key) for key in COLUMNS}} for one in ordered
+        ],
+    }
+    return NextExperiment(ordered, about, hypotheses, document)
+
+
+def _as_json(kind: Any) -> dict[str, Any]:
+    if hasattr(kind, "values"):
+        return {"choices": list(kind.values)}
+    return {"low": kind.low, "high": kind.high}
+
+
+def _loaded(
+    found: Found | Sequence[Found],
+) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
+    """The first clip, the joint problem, the hypotheses and the clips' names."""
+    given = [found] if isinstance(found, str | Path | Diagnosis) else list(found)
+    if not given:
+        raise InputError("no run given; one or more expected")
+    if len(given) == 1 and not isinstance(given[0], Diagnosis):
+        folder = _diagnosis_folder(Path(given[0]))
+        if folder is not None:
+            return _read(folder)
+    if len(given) == 1 and isinstance(given[0], Diagnosis):
+        one = given[0]
+    else:
+        with progress.part(0.0, DIAGNOSED):
+            one = diagnose([clip for run in given for clip in _tracks(run)], add="none")
+    sources = [str(source) for source in one.document["clips"]]
+    return one.measurements[0].clip, one.problem, beliefs_of(one.found), sources
+
+
+def _diagnosis_folder(folder: Path) -> Path | None:
+    for place in (folder, folder / "diagnosis"):
+        if (place / DOCUMENT).is_file():
+            return place
+    return None
+
+
+def _read(folder: Path) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
+    try:
+        document = json.loads((folder / DOCUMENT).read_text(encoding="utf-8"))
+        files, sources = document.get("effects_from", []), [str(one) for one in document["clips"]]
+    except (ValueError, KeyError, AttributeError, TypeError) as error:
+        raise InputError(f"{folder / DOCUMENT}: not a diagnosis ({error})") from error
+    for path in files:
+        load_file(path)
+    fit = load_run(folder / "model")
+    clips = [one.clip for one in fit.measurements]
+    engine = str(document.get("engine", "auto"))
+    trials = with_library(clips, [one.observation for one in fit.measurements], engine)
+    return clips[0], trials, read_beliefs(folder / FILE, trials.names), sources
+
+
+def _tracks(run: Found) -> list[Track]:
+    if isinstance(run, Diagnosis):
+        return [Track(one.clip, one.pixels, one) for one in run.measurements]
+    folder = Path(run)
+    place = _diagnosis_folder(folder)
+    fit = load_run(place / "model" if place else folder)
+    return [Track(one.clip, None, one) for one in fit.measurements]

@@ -1,0 +1,61 @@
+"""`galileo discover`: a lab and a loop: measure, diagnose, choose the next setting."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.commands import command
+from galileo_jax.commands.options import adder
+from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
+
+
+def main(argv: Sequence[str]) -> int | None:
+    """Runs the loop; prints every experiment and every verdict when it is there."""
+    asked = vars(_parser().parse_args(argv))
+    out = Path(asked.pop("out") or Path("runs") / (Path(asked["lab"]).stem or "lab"))
+    from galileo_jax.api.discover import discover
+
+    with progress_display() as display:
+        found = discover(**asked, out=out, on_progress=_Printer(display))
+    print(found.sentence)
+    print(f"{found.document['ended']}")
+    command.say(f"{out}/discover.json, {out}/report.html")
+    return None
+
+
+class _Printer:
+    """Prints what was done; shows progress otherwise."""
+
+    def __init__(self, display: ProgressDisplay):
+        self._display = display
+
+    def __call__(self, stage: str, share_done: float, partial: Any) -> None:
+        self._display(stage, share_done)
+        if isinstance(partial, dict) and "experiment" in partial:
+            self._display.print(_experiment(partial["experiment"]))
+        elif isinstance(partial, dict) and "clips" in partial.get("round", {}):
+            self._display.print(f"  {partial['round']['sentence']}")
+
+
+def _experiment(row: Mapping[str, Any]) -> str:
+    settings = json.dumps(row["settings"])
+    became = "" if row["outcome"] == "track" else f"\n  lost: {row['line']}"
+    return f"experiment {row['number']}: {settings}\n  why: {row['reason']}{became}"
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="galileo discover", description=__doc__)
+    parser.add_argument("lab", metavar="LAB", help="a program; protocol: docs/how-to/discover.md")
+    add = adder(parser, "discover")
+    add("budget", type=command.whole_number(1))
+    parser.add_argument("--out", metavar="DIR", help="folder (default runs/LAB); called again with "
+                        "the same, an interrupted discovery goes on")  # fmt: skip
+    add("timeout", metavar="S")
+    add("effects_from", metavar="FILE.py")
+    add("seed", type=command.whole_number(0))
+    parser.examples(
+        "galileo discover examples/lab.py                      until the verdict stands",
+        "galileo discover ./my_lab --budget 8 --out runs/lab   again: goes on where it was",
+    )
+    return parser

@@ -1,0 +1,278 @@
+"""The formulas that are tried: a nature, whom it acts on, and one or two factors.
+
+A factor is a shape in time, in place or in speed with a few constants: a power, a decay, a wave, a
+pulse, a step, a pull to a place. Time counts in seconds, place in metres, speed in metres a
+second, so that every factor is a pure number and the strength carries the unit.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.model.effects.law import Nature
+from galileo_jax.model.parameters import LogNormal, Normal, Prior, Uniform
+
+Variable = str  # "t", "q" or "v"
+
+
+@dataclass(frozen=True)
+class Constant:
+    """One constant of a factor.
+
+    Attributes:
+      unit: SI.
+      prior: a prior, or "within": uniform over what is seen of the variable.
+      grid: values tried, or how many of what is seen of the variable.
+    """
+
+    unit: str
+    prior: Prior | None
+    grid: Sequence[float] | int
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A shape.
+
+    Attributes:
+      name: of the shape in its variable: "power", "wave".
+      variable: t, q or v.
+      code: Python, of t, q, v, xp and the constants.
+      text: as a physicist writes it; constants in braces.
+      constants: by name.
+    """
+
+    name: str
+    variable: Variable
+    code: str
+    text: str
+    constants: Mapping[str, Constant]
+
+    @property
+    def label(self) -> str:
+        """`power_v`."""
+        return f"{self.name}_{self.variable}"
+
+
+POWERS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0)
+TIMES_S = tuple(np.geomspace(0.05, 1.5, 12).tolist())
+PERIODS_S = tuple(np.geomspace(0.08, 1.5, 40).tolist())
+LENGTHS_M = tuple(np.geomspace(0.06, 1.0, 60).tolist())
+PHASES = tuple((np.arange(8) * np.pi / 4).tolist())
+WIDTHS_S = (0.02, 0.04, 0.08, 0.16)
+WIDTHS_M = (0.02, 0.04, 0.08, 0.16)
+RATES = (-10.0, -5.0, -2.5, -1.0, 1.0, 2.5, 5.0, 10.0)
+
+
+def _power(top: float = 3.0) -> Constant:
+    return Constant("1", Uniform(0.0, top), POWERS)
+
+
+FACTORS = (
+    Factor("power", "t", "(xp.abs(t) + 1e-9) ** {p}", "t^{p}", {"p": _power()}),
+    Factor(
+        "decay",
+        "t",
+        "xp.exp(-t / {tau})",
+        "exp(-t/{tau})",
+        {"tau": Constant("s", LogNormal(0.3, 0.8), TIMES_S)},
+    ),
+    Factor(
+        "wave",
+        "t",
+        "xp.sin(6.283185307 * t / {period} + {phase})",
+        "sin(2π t/{period} + {phase})",
+        {
+            "period": Constant("s", LogNormal(0.4, 0.7), PERIODS_S),
+            "phase": Constant("1", Uniform(-4.0, 8.0), PHASES),
+        },
+    ),
+    Factor(
+        "pulse",
+        "t",
+        "xp.exp(-(((t - {moment}) / {width}) ** 2))",
+        "exp(-((t - {moment})/{width})²)",
+        {
+            "moment": Constant("s", None, 30),
+            "width": Constant("s", LogNormal(0.07, 0.7), WIDTHS_S),
+        },
+    ),
+    Factor(
+        "step",
+        "t",
+        "0.5 * (1.0 + xp.tanh((t - {moment}) / {width}))",
+        "step(t - {moment})",
+        {
+            "moment": Constant("s", None, 30),
+            "width": Constant("s", LogNormal(0.03, 0.7), (0.02, 0.05)),
+        },
+    ),
+    Factor(
+        "growth",
+        "q",
+        "xp.exp({rate} * q)",
+        "exp({rate} q)",
+        {
+            "rate": Constant("1/m", Normal(0.0, 6.0), RATES),
+        },
+    ),
+    Factor("linear", "q", "q", "q", {}),
+    Factor(
+        "wave",
+        "q",
+        "xp.sin(6.283185307 * q / {length} + {phase})",
+        "sin(2π q/{length} + {phase})",
+        {
+            "length": Constant("m", LogNormal(0.25, 0.7), LENGTHS_M),
+            "phase": Constant("1", Uniform(-4.0, 8.0), PHASES),
+        },
+    ),
+    Factor(
+        "pulse",
+        "q",
+        "xp.exp(-(((q - {place}) / {width}) ** 2))",
+        "exp(-((q - {place})/{width})²)",
+        {
+            "place": Constant("m", None, 30),
+            "width": Constant("m", LogNormal(0.06, 0.7), WIDTHS_M),
+        },
+    ),
+    Factor(
+        "pull",
+        "q",
+        "-(q - {place}) / {width} / (1.0 + ((q - {place}) / {width}) ** 2) ** 2",
+        "u/(1 + u²)², u = ({place} - q)/{width}",
+        {
+            "place": Constant("m", None, 30),
+            "width": Constant("m", LogNormal(0.05, 0.7), WIDTHS_M),
+        },
+    ),
+    Factor(
+        "slope",
+        "q",
+        "-(q - {place}) / {width} * xp.exp(-(((q - {place}) / {width}) ** 2))",
+        "u exp(-u²), u = ({place} - q)/{width}",
+        {
+            "place": Constant("m", None, 30),
+            "width": Constant("m", LogNormal(0.05, 0.7), WIDTHS_M),
+        },
+    ),
+    Factor(
+        "far",
+        "q",
+        "1.0 / (1.0 + ((q - {place}) / {width}) ** 2)",
+        "1/(1 + ((q - {place})/{width})²)",
+        {
+            "place": Constant("m", None, 30),
+            "width": Constant("m", LogNormal(0.1, 0.7), (*WIDTHS_M, 0.3)),
+        },
+    ),
+    Factor("power", "v", "(v * v + 1e-4) ** ({n} / 2)", "|v|^{n}", {"n": _power(3.5)}),
+    Factor(
+        "decay",
+        "v",
+        "xp.exp(-xp.abs(v) / {speed})",
+        "exp(-|v|/{speed})",
+        {"speed": Constant("m/s", LogNormal(0.3, 0.8), (0.1, 0.2, 0.4, 0.8))},
+    ),
+    Factor("backward", "v", "xp.where(v < 0, 1.0, 0.0 * v)", "(v < 0)", {}),
+)
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A formula without values for its constants.
+
+    Attributes:
+      nature: see `model.effects.law`.
+      is_on_all: else on object 1.
+      factors: one or two, of different variables.
+    """
+
+    nature: Nature
+    is_on_all: bool
+    factors: tuple[Factor, ...]
+
+    @property
+    def family(self) -> str:
+        """What makes two formulas the same: `power_v`.
+
+        Left out is what a passage in one direction does not tell: a push from a change of
+        friction, and often on whom it acts.
+        """
+        return "*".join(sorted(factor.label for factor in self.factors))
+
+    @property
+    def constants(self) -> dict[str, tuple[Factor, Constant]]:
+        """By name, those of a second factor of the same name with a 2."""
+        found: dict[str, tuple[Factor, Constant]] = {}
+        for factor in self.factors:
+            for name, constant in factor.constants.items():
+                found[name if name not in found else f"{name}2"] = factor, constant
+        return found
+
+    def _filled(self, attribute: str, values: Mapping[str, str]) -> list[str]:
+        used: set[str] = set()
+        parts = []
+        for factor in self.factors:
+            own = {}
+            for name in factor.constants:
+                mine = name if name not in used else f"{name}2"
+                used.add(mine)
+                own[name] = values[mine]
+            parts.append(getattr(factor, attribute).format(**own))
+        return parts
+
+    @property
+    def code(self) -> str:
+        """F as Python, of t, q, v, xp and the constants."""
+        parts = self._filled("code", {name: name for name in self.constants})
+        return parts[0] if len(parts) == 1 else " * ".join(f"({part})" for part in parts)
+
+    def text(self, values: Mapping[str, float] | None = None) -> str:
+        """As a physicist writes it, constants by value or by name."""
+        names = {name: name if values is None else f"{values[name]:.3g}" for name in self.constants}
+        shape = " ".join(self._filled("text", names)).replace("- -", "+ ")
+        whom = "all objects" if self.is_on_all else "object 1"
+        head = {
+            "push": f"a = c {shape}",
+            "drag": f"a = -c {shape} sign(v)",
+            "drag_force": f"F = -c {shape} sign(v)",
+            "friction": f"k (1 + c {shape})",
+        }[self.nature]
+        return f"{head}, {whom}"
+
+    def value(self, t: Any, q: Any, v: Any, constants: Mapping[str, Any]) -> Any:
+        """f, in NumPy."""
+        names = {"t": t, "q": q, "v": v, "xp": np, **constants}
+        return eval(self.code, {"__builtins__": {}}, names)
+
+
+ALONE: Mapping[Nature, str] = {"push": "tq", "drag": "v", "drag_force": "v", "friction": "tqv"}
+"""The variables of a single factor, by nature; what else there is is in the library or a push."""
+TOGETHER = ("power_t", "decay_t", "linear_q", "growth_q", "pulse_q", "power_v", "backward_v")
+"""Factors that are tried in pairs."""
+
+
+def structures(has_surface: bool, num_objects: int) -> Iterator[Structure]:
+    """All formulas with one or two factors."""
+    natures: list[Nature] = ["push", "drag"]
+    if num_objects > 1:
+        natures.append("drag_force")
+    if has_surface:
+        natures.append("friction")
+    several = [factor for factor in FACTORS if factor.label in TOGETHER]
+    pairs = [pair for pair in combinations(several, 2) if pair[0].variable != pair[1].variable]
+    for nature, is_on_all in product(natures, (False, True) if num_objects > 1 else (False,)):
+        if nature == "drag_force" and not is_on_all:
+            continue
+        for factor in FACTORS:
+            if factor.variable in ALONE[nature]:
+                yield Structure(nature, is_on_all, (factor,))
+        for pair in pairs:
+            has_speed = any(factor.variable == "v" for factor in pair)
+            if has_speed == nature.startswith("drag"):
+                yield Structure(nature, is_on_all, pair)

@@ -1,0 +1,183 @@
+"""Suggested formulas as effects, fitted to the track in the model with all else free."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.laws.grammar import Structure
+from galileo_jax.diagnosis.laws.screen import Suggestion, suggestions
+from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of
+from galileo_jax.diagnosis.missing_force import View
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.rollout.engines import make_engine
+
+NUM_REFITTED = 3
+MOST_Z = 2.5
+LEAST_FRICTION = 0.05  # a friction's strength is a share of its coefficient
+
+
+@dataclass(frozen=True)
+class FittedLaw:
+    """A law in the model.
+
+    Attributes:
+      structure: its formula.
+      source: its class, as written in proposed_effect.py.
+      hypothesis: the fit, with the trials it is of.
+      score: nats, of the screening.
+    """
+
+    structure: Structure
+    source: str
+    hypothesis: Hypothesis
+    score: float
+
+    def constants(self) -> dict[str, float]:
+        """Values at the fit, the strength first, as `c`."""
+        trials, fit = self.hypothesis.trials, self.hypothesis.fit
+        assert trials is not None
+        theta = dict(zip(trials.names, trials.theta(fit.z, fit.free), strict=True))
+        name = name_of(self.structure)
+        values = {"c": float(theta[name])}
+        return values | {key: float(theta[f"{name}_{key}"]) for key in self.structure.constants}
+
+    @property
+    def text(self) -> str:
+        """The formula with its constants: `a = -0.62 |v|^1.5 sign(v), all objects`."""
+        values = self.constants()
+        text = self.structure.text(values).replace("(1 + c ", "(1 + {c} ")
+        size = values["c"]
+        if self.structure.nature == "friction":
+            return text.replace("+ {c}", f"{'-' if size < 0 else '+'} {abs(size):.3g}")
+        sign = -size if self.structure.nature.startswith("drag") else size
+        return text.replace("= -c ", "= c ").replace("= c ", f"= {sign:.3g} ", 1)
+
+
+def fitted_laws(trials: JointProblem, base: Hypothesis, views: Sequence[View]) -> list[FittedLaw]:
+    """The best few formulas, fitted; the most evident first.
+
+    Args:
+      trials: what was diagnosed.
+      base: the model without effects, fitted to them.
+      views: of each clip, from `missing_force.views_of`.
+    """
+    found = suggestions(views)
+    if not found:
+        return []
+    sources = [class_source(one.structure, views) for one in found]
+    extended = _with_laws(trials, sources)
+    fitter, count = GradientFitter(extended), len(extended.model_parameters)
+    where = [extended.names.index(name) if name in extended.names else -1 for name in trials.names]
+    z = np.zeros(len(extended.names))
+    for old, new in enumerate(where):
+        if new >= 0 and base.fit.free[old]:
+            z[new] = base.fit.z[old]
+    starts, free, owner = [], [], []
+    for i, one in enumerate(found):
+        is_free = extended.free([name_of(one.structure)])[:count]
+        for start in _starts(extended, z, one, views):
+            starts.append(np.where(is_free, start[:count], 0.0))
+            free.append(is_free)
+            owner.append(i)
+    fits = fitter.fit_from(np.stack(starts), np.stack(free), np.array(owner))
+    best = np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]
+    for i in best:
+        fits[i] = max(fits[i], fitter.refit(fits[i]), key=lambda fit: fit.log_evidence)
+    made = [
+        FittedLaw(
+            one.structure,
+            source,
+            Hypothesis((name_of(one.structure),), fit, extended),
+            one.score,
+        )
+        for one, source, fit in zip(found, sources, fits, strict=True)
+    ]
+    return sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence)
+
+
+def _with_laws(trials: JointProblem, sources: Sequence[str]) -> JointProblem:
+    """The trials with these laws in place of the library."""
+    laws = tuple(law_class(source)() for source in sources)
+    laws = tuple(sorted(laws, key=lambda law: law.name))
+    problems = []
+    for problem in trials.problems:
+        model = replace(problem.model, effects=laws)
+        engine = make_engine(problem.engine.name, model)
+        problems.append(replace(problem, model=model, engine=engine))
+    return JointProblem(tuple(problems))
+
+
+def _starts(
+    extended: JointProblem, z: np.ndarray, one: Suggestion, views: Sequence[View]
+) -> list[np.ndarray]:
+    """Starts in z: constants of the screening; all else as without effects, or as goes with it."""
+    name, found = name_of(one.structure), []
+    for constants, strength in zip(one.starts, one.strengths, strict=True):
+        values = {f"{name}_{key}": value for key, value in constants.items()}
+        for others in (z, _with_formula(extended, z, one, constants, strength, views)):
+            start = others.copy()
+            size = strength
+            if one.structure.nature == "friction":
+                theta = dict(zip(extended.names, extended.theta(start), strict=True))
+                size = strength / max(float(theta["k1"]), LEAST_FRICTION)
+            for key, value in {name: size, **values}.items():
+                at = extended.names.index(key)
+                prior = extended.parameters[at].prior
+                inverse = float(prior.inverse(jnp.asarray(value)))
+                start[at] = np.clip(np.nan_to_num(inverse), -MOST_Z, MOST_Z)
+            found.append(start)
+    return found
+
+
+def _with_formula(
+    extended: JointProblem,
+    z: np.ndarray,
+    one: Suggestion,
+    constants: Mapping[str, float],
+    strength: float,
+    views: Sequence[View],
+) -> np.ndarray:
+    """All else where a linear model has it if the formula is there."""
+    total, count = np.zeros(len(z)), np.zeros(len(z))
+    for clip, view in enumerate(views):
+        others = view.others()
+        curves = _accelerations(view, one.structure, constants, strength)
+        left = view.target()
+        for i, curve in enumerate(curves):
+            left = left - view.shows(i)[:, view.moves[i]] @ curve[view.moves[i]]
+        design = view.fit.jacobian[:, others]
+        normal = design.T @ design + np.eye(len(others))
+        solved = -np.linalg.solve(normal, design.T @ left)
+        columns = extended.columns[clip]
+        names = extended.problems[clip].model.names
+        for at, value in zip(others, solved, strict=True):
+            own = view.model.names[at]
+            if own in names:
+                where = columns[names.index(own)]
+                total[where] += value
+                count[where] += 1
+    return np.where(count > 0, total / np.maximum(count, 1), z)
+
+
+def _accelerations(
+    view: View, structure: Structure, constants: Mapping[str, float], strength: float
+) -> list[np.ndarray]:
+    """Of each object `[time]`, m/s^2."""
+    scene, found = view.model.scene.surroundings, []
+    theta = view.trials.theta(view.fit.z, view.fit.free)
+    named = view.model.by_name(view.trials.of_clip(theta, 0))
+    for i in range(len(view.path_m)):
+        q, v = view.path_m[i], view.speed_m_s[i]
+        f = strength * structure.value(view.time_s, q, v, constants) * np.ones_like(q)
+        if structure.nature != "push":
+            f = -np.sign(v) * f
+        if structure.nature == "friction":
+            f = f * scene.gravity * np.where(q < 0, np.cos(scene.angle_rad), 1.0)
+        if structure.nature == "drag_force":
+            f = f * float(named["m1"]) / float(named[f"m{i + 1}"])
+        found.append(f if i == 0 or structure.is_on_all else np.zeros_like(f))
+    return found

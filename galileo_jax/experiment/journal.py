@@ -1,0 +1,98 @@
+"""The journal of a discovery: every experiment with its reason, every verdict; on disk at once.
+
+What is done is in the file before the next thing is begun, so that an interrupted discovery goes on
+where it was.
+"""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.runtime.atomic_write import write_json
+from galileo_jax.runtime.errors import InputError
+
+FILE = "discover.json"
+
+
+@dataclass
+class Journal:
+    """What has been done so far.
+
+    Attributes:
+      folder: it stands there, with the clips.
+      lab: of the lab: `{"settings": ..., "clip": ...}`, as it describes itself.
+      experiments: `{number, settings, reason, outcome, line, clip}` each; outcome: None while it
+        is being made, "track", or "lost" with the line that says why.
+      rounds: a verdict each: `{clips, status, effects, form, sentence, hypotheses}`.
+      held: settings that are left alone, by name.
+      ended: why nothing more is done; None while something is.
+    """
+
+    folder: Path
+    lab: dict[str, Any]
+    seed: int
+    experiments: list[dict[str, Any]] = field(default_factory=list)
+    rounds: list[dict[str, Any]] = field(default_factory=list)
+    held: dict[str, Any] = field(default_factory=dict)
+    ended: str | None = None
+
+    @property
+    def tracks(self) -> list[dict[str, Any]]:
+        """The experiments that gave a track."""
+        return [one for one in self.experiments if one["outcome"] == "track"]
+
+    @property
+    def last(self) -> dict[str, Any] | None:
+        """The last verdict."""
+        return self.rounds[-1] if self.rounds else None
+
+    def add(self, settings: dict[str, Any], reason: str) -> dict[str, Any]:
+        """Writes down that an experiment is to be made, and why."""
+        number = len(self.experiments) + 1
+        row = {"number": number, "settings": settings, "reason": reason}
+        self.experiments.append(row | {"outcome": None, "line": None, "clip": None})
+        self.write()
+        return self.experiments[-1]
+
+    def close(self, row: dict[str, Any], *, clip: str | None = None, line: str = "") -> None:
+        """Writes down what became of an experiment."""
+        row.update(outcome="track" if clip else "lost", clip=clip, line=line or None)
+        self.write()
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """discover.json."""
+        keys = ("lab", "held", "seed", "experiments", "rounds", "ended")
+        return {key: getattr(self, key) for key in keys}
+
+    def write(self) -> None:
+        """Writes discover.json."""
+        write_json(self.folder / FILE, self.document)
+
+
+def open_journal(folder: Path, lab: dict[str, Any], seed: int) -> Journal:
+    """A new journal, or that of the same lab which is there.
+
+    Raises:
+      InputError: the folder has another lab's, or one that is damaged.
+    """
+    path = folder / FILE
+    if not path.exists():
+        return Journal(folder, lab, seed)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        journal = Journal(
+            folder,
+            content["lab"],
+            int(content["seed"]),
+            list(content["experiments"]),
+            list(content["rounds"]),
+            dict(content["held"]),
+        )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: not the journal of a discovery ({error})") from error
+    # Through JSON, as what is on disk went.
+    if journal.lab != json.loads(json.dumps(lab)):
+        raise InputError(f"{path}: of another lab; give another --out, or remove it")
+    return journal

@@ -1,0 +1,144 @@
+"""The gradient fit of one hypothesis and a free acceleration of every object beside it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter, Settings
+from galileo_jax.inference.free_force.spans import spans_of
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.problem import Problem
+from galileo_jax.model.effects.free_acceleration import FreeAcceleration, Span
+from galileo_jax.rollout.engines import make_engine
+
+# What friction takes up of a constant force is a soft direction: it must be followed to its end.
+SETTINGS = Settings(settled=0.005)
+NUM_SPANS = 2  # pieces by the hypothesis, then by the fit with the acceleration
+
+
+@dataclass(frozen=True)
+class FreeFit:
+    """A mode and the normal approximation round it.
+
+    Attributes:
+      trials: with the free acceleration among what is always there.
+      effects: the free acceleration of each clip.
+      gradient: the fit.
+      start: `[parameter]`, z of the hypothesis, no acceleration.
+      residual: `[value]`, whitened at the fitted noise scales.
+    """
+
+    trials: JointProblem
+    effects: tuple[FreeAcceleration, ...]
+    gradient: GradientFit
+    start: np.ndarray
+    residual: np.ndarray
+
+    @property
+    def z(self) -> np.ndarray:
+        """`[parameter]`, noise scales last; 0 where pinned."""
+        return self.gradient.z
+
+    @property
+    def free(self) -> np.ndarray:
+        """`[parameter]`."""
+        return self.gradient.free
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """`[parameter, parameter]`; 0 where pinned."""
+        return self.gradient.covariance
+
+    @property
+    def jacobian(self) -> np.ndarray:
+        """`[value, model parameter]`, of the whitened residuals; 0 where pinned."""
+        return self.gradient.jacobian
+
+
+def with_free_acceleration(
+    problem: Problem, spans_s: Sequence[Sequence[Span]], sizes_m_s2: Sequence[float] = ()
+) -> Problem:
+    """The problem with a free acceleration of every object among what is always there."""
+    spans = tuple(tuple((begin, end) for begin, end in own) for own in spans_s)
+    effect = FreeAcceleration(spans, tuple(sizes_m_s2))
+    always = (e for e in problem.model.nuisances if not isinstance(e, FreeAcceleration))
+    model = replace(problem.model, nuisances=(*always, effect))
+    return replace(problem, model=model, engine=make_engine(problem.engine.name, model))
+
+
+def free_acceleration_of(problem: Problem) -> FreeAcceleration:
+    """That of a problem which has one."""
+    return next(e for e in problem.model.nuisances if isinstance(e, FreeAcceleration))
+
+
+def free_fit(
+    trials: JointProblem, z: np.ndarray, free: np.ndarray, num_spans: int = NUM_SPANS
+) -> FreeFit:
+    """Fits a hypothesis once more, with a free acceleration of every object.
+
+    Args:
+      trials: clips, each of which gets an acceleration of its own.
+      z: `[parameter]`, of the hypothesis' fit, noise scales last.
+      free: `[parameter]`, which parameters the hypothesis has.
+      num_spans: how often the pieces are made, first by the hypothesis, then by the last fit.
+    """
+    extended, theta = trials, trials.theta(z, free)
+    for _ in range(num_spans):
+        problems = []
+        for clip, problem in enumerate(extended.problems):
+            spans = spans_of(problem, extended.of_clip(theta, clip))
+            problems.append(with_free_acceleration(problem, spans))
+        extended = JointProblem(tuple(problems))
+        found = _fitted(extended, [_embedded(trials, extended, z, free)])
+        theta = extended.theta(found.z, found.free)
+    return found
+
+
+def resized(found: FreeFit, sizes_m_s2: Sequence[float]) -> FreeFit:
+    """Fits again with accelerations of other sizes, from none and from those that were found."""
+    extended = JointProblem(
+        tuple(
+            with_free_acceleration(problem, free_acceleration_of(problem).spans_s, sizes_m_s2)
+            for problem in found.trials.problems
+        )
+    )
+    z = found.z.copy()
+    for clip, (problem, effect) in enumerate(
+        zip(found.trials.problems, found.effects, strict=True)
+    ):
+        for i, size in enumerate(sizes_m_s2):
+            own = [problem.model.index(name) for name in effect.knots(i)]
+            z[found.trials.columns[clip][own]] *= effect.size_m_s2(i) / size
+    return _fitted(extended, [found.start, z], found.free)
+
+
+def _embedded(
+    trials: JointProblem, extended: JointProblem, z: np.ndarray, free: np.ndarray
+) -> np.ndarray:
+    """A hypothesis' z among the parameters of the extended trials; NaN where it pins one."""
+    start = np.where(extended.free(()), 0.0, np.nan)
+    start[[extended.names.index(name) for name in trials.names]] = np.where(free, z, np.nan)
+    return start
+
+
+def _fitted(
+    extended: JointProblem, starts: Sequence[np.ndarray], free: np.ndarray | None = None
+) -> FreeFit:
+    """The best fit from several starts `[parameter]`, z."""
+    free = np.isfinite(starts[0]) if free is None else free
+    tried = np.nan_to_num(np.stack(starts))
+    fitter, count = GradientFitter(extended, SETTINGS), len(extended.model_parameters)
+    is_free = np.tile(free[:count], (len(tried), 1))
+    fits = fitter.fit_from(tried[:, :count], is_free, np.arange(len(tried)))
+    # The start is of a wrong model, whose restitution may be in another valley.
+    fit = fitter.refit(max(fits, key=lambda fit: fit.log_evidence))
+    theta = extended.theta(fit.z, fit.free)
+    residual = [
+        problem.whiten(
+            problem.simulate(extended.of_clip(theta, clip)), extended.noise_scale(theta, clip)
+        )
+        for clip, problem in enumerate(extended.problems)
+    ]
+    effects = tuple(free_acceleration_of(problem) for problem in extended.problems)
+    return FreeFit(extended, effects, fit, tried[0], np.concatenate(residual))

@@ -1,0 +1,133 @@
+"""The pages of `next` and `discover`: what to measure next, and what was measured and why."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from galileo_jax.experiment.settings import KNOWN, known_as
+from galileo_jax.report.chart import Chart, Panel, Points
+from galileo_jax.report.diagnosis_text import p_text
+from galileo_jax.report.draw import to_plotly
+from galileo_jax.report.html_page import chart_section, document, header, items, table
+from galileo_jax.runtime.atomic_write import write_text
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+NUM_ROWS = 20
+NUMBERS = ("gain_nats", "named", "lead_nats", "hit")
+
+
+def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
+    """Writes the page of next.json."""
+    names = _names(record)
+    title = ", ".join(Path(clip).stem for clip in record["clips"])
+    about = record["about"] or "which hypothesis holds"
+    lead = str(record["sentence"])
+    odds = [f"{name}: {share:.3f}" for name, share in record["hypotheses"].items()]
+    rows = [
+        [*(_value(row[name]) for name in names), *(_number(row[key]) for key in NUMBERS)]
+        for row in record["settings"][:NUM_ROWS]
+    ]
+    head = [*map(_title, names), f"gain, nats, about {about}", "named", "lead, nats", "hit"]
+    sections = [
+        header("next experiment", title, lead),
+        f"<h2>What is open</h2>\n<p>Probabilities of the hypotheses so far.</p>{items(odds)}",
+        chart_section(
+            "What each setting would tell",
+            f"The expected gain in nats about {about}, against each of the settings; one point for "
+            "every combination that was looked at, the best in colour.",
+            [gains_chart(record)],
+            "stack",
+        ),
+        f"<h2>Settings</h2>\n{table(head, rows)}\n<p class='soft'>named: how probable it is that "
+        "the true hypothesis is then far enough ahead of all others; lead: how far it is ahead on "
+        "average; hit: how probable it is that object 1 hits another object. next.json has all "
+        f"{len(record['settings'])}.</p>",
+    ]
+    write_text(path, document(f"{title}: next experiment", sections))
+
+
+def gains_chart(record: Mapping[str, Any]) -> Chart:
+    """The gain against each setting, one panel each; the best in colour."""
+    rows = record["settings"]
+    panels = []
+    names = _names(record)
+    varied = [name for name in names if len({row[name] for row in rows}) > 1]
+    for name in varied or names[:1]:
+        values = [row[name] for row in rows]
+        gains = [row["gain_nats"] for row in rows]
+        is_number = all(isinstance(v, int | float) for v in values)
+        x = [float(v) for v in values] if is_number else [str(v) for v in values]
+        marks = (
+            Points(x[1:], gains[1:], "soft", "settings"),
+            Points(x[:1], gains[:1], "accent", "the best", size_px=8),
+        )
+        panels.append(Panel("gain, nats", marks, xlabel=_title(name), level=0.0))
+    label = f"expected gain against {', '.join(map(_title, names))}; {record['sentence']}"
+    return Chart("gains", label, tuple(panels))
+
+
+def gains_figure(record: Mapping[str, Any]) -> "go.Figure":
+    """`gains_chart` for notebooks."""
+    return to_plotly(gains_chart(record))
+
+
+def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -> None:
+    """Writes the page of discover.json."""
+    names = list(record["lab"]["settings"])
+    experiments = [
+        [
+            str(one["number"]),
+            *(_value(one["settings"].get(name)) for name in names),
+            escape(one["outcome"] or "not made"),
+        ]
+        for one in record["experiments"]
+    ]
+    verdicts = [
+        [
+            str(len(one["clips"])),
+            escape(one["status"]),
+            escape(", ".join(one["effects"]) or one["form"] or ""),
+            escape(p_text(one["p_value"])),
+        ]
+        for one in record["rounds"]
+    ]
+    reasons = [
+        f"{one['number']}: {one['reason']}" + (f"; lost: {one['line']}" if one["line"] else "")
+        for one in record["experiments"]
+    ]
+    words = [f"{len(one['clips'])}: {one['sentence']}" for one in record["rounds"]]
+    held = [f"{name} = {value}" for name, value in record["held"].items()]
+    ended = f"<p>{escape(str(record['ended']))}.</p>" if record["ended"] else ""
+    is_good = bool(record["rounds"]) and record["rounds"][-1]["status"] in ("named", "none", "law")
+    sections = [
+        header("discovery", path.parent.name or "lab", sentence, ended, is_good),
+        "<h2>Experiments</h2>\n"
+        + table(["no.", *map(_title, names), "what came of it"], experiments)
+        + f"\n<h3>Why</h3>\n{items(reasons)}",
+        "<h2>Verdicts</h2>\n"
+        + table(["clips", "verdict", "effects", "p without"], verdicts)
+        + f"\n<h3>In words</h3>\n{items(words)}",
+        f"<h2>Left alone</h2>\n{items(held)}" if held else "",
+    ]
+    write_text(path, document("discovery", [part for part in sections if part]))
+
+
+def _names(record: Mapping[str, Any]) -> Sequence[str]:
+    return [name for name in record["settings"][0] if name not in NUMBERS]
+
+
+def _title(name: str) -> str:
+    known = known_as(name)
+    unit = KNOWN[known][2] if known in KNOWN else ""
+    return f"{known}, {unit}" if unit else known
+
+
+def _value(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, int | float) else escape(str(value))
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.2f}"

@@ -1,0 +1,76 @@
+"""`galileo next` and `galileo discover`: what they print, and wrong calls in one line."""
+
+import json
+import types
+
+import pytest
+
+from galileo_jax import __main__
+from galileo_jax.commands import command
+
+
+def galileo(*words: object) -> int:
+    return command.run(__main__.main, [str(word) for word in words])
+
+
+def test_next_prints_the_table_and_the_sentence(tmp_path, monkeypatch, capsys):
+    from galileo_jax.api import next_experiment as module
+
+    asked = {}
+
+    def fake(runs, **options):
+        asked.update(options, runs=runs)
+        row = {"height": 0.15, "gain_nats": 0.6, "named": 0.93, "lead_nats": 8.0, "hit": None}
+        return types.SimpleNamespace(
+            hypotheses={"air_drag": 0.7, "none": 0.3},
+            document={"settings": [row]},
+            sentence="release object 1 from 0.15 m: named with probability 0.93",
+            save=lambda folder: folder,
+        )
+
+    monkeypatch.setattr(module, "next_experiment", fake)
+    assert galileo("next", tmp_path, "--can", "height=0.1:0.5", "--about", "k2") == 0
+    out = capsys.readouterr().out
+    assert "open: air_drag 0.700, none 0.300" in out and "0.93" in out
+    assert out.splitlines()[-1].startswith("release object 1 from 0.15 m")
+    assert asked["runs"] == [tmp_path]
+    assert (asked["can"], asked["about"], asked["seed"]) == ("height=0.1:0.5", "k2", 0)
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("next", "nowhere"), "nowhere: no result.json"),
+        (("next", "nowhere", "--can", "hight=1:2"), "--can: unknown setting 'hight'"),
+        (("discover", "nowhere"), "LAB: nowhere: no such program"),
+        (("discover", "nowhere", "--budget", "0"), "no whole number, 1 or more"),
+    ],
+)
+def test_wrong_calls_are_one_line(words, line, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert galileo(*words) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and line in err and err.count("\n") == 1
+
+
+def test_a_damaged_diagnosis_is_one_line(tmp_path, capsys):
+    (tmp_path / "diagnosis.json").write_text("[1]")
+    assert galileo("next", tmp_path) == 2
+    assert "not a diagnosis" in capsys.readouterr().err
+
+
+def test_discover_prints_every_experiment(tmp_path, monkeypatch, capsys):
+    """A lab that is out of order: every experiment is one line, and the exit code is 0."""
+    lab = tmp_path / "lab.py"
+    described = {"settings": {"height_m": {"low": 0.1, "high": 0.2}}, "clip": {"scenario": "ramp"}}
+    lab.write_text(
+        "import sys, json\n"
+        f"if len(sys.argv) > 1: print({json.dumps(described)!r})\n"
+        "else: print('out of order', file=sys.stderr); sys.exit(1)\n"
+    )
+    assert galileo("discover", lab, "--budget", 2, "--out", tmp_path / "run") == 0
+    out = capsys.readouterr().out
+    assert out.count("lost: exit code 1: out of order") == 2
+    assert "No experiment gave a track." in out
+    assert (tmp_path / "run" / "report.html").is_file()
+    assert len(json.loads((tmp_path / "run" / "discover.json").read_text())["experiments"]) == 2

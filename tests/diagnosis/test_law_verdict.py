@@ -1,0 +1,123 @@
+"""When a formula is a law: each threshold, at and just beside it, on candidates made by hand."""
+
+from dataclasses import replace
+
+import pytest
+
+from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
+from galileo_jax.diagnosis.verdict import (
+    best_named,
+    is_contested_by_law,
+    law_contested,
+    law_odds,
+    law_verdict,
+    looked_at_again,
+    needs_laws,
+    other_formulas,
+    ranked,
+)
+from tests.diagnosis.test_verdict import DECISIVE, EDGE, candidate
+
+FORM_OF_POWER_V, FORM_OF_PULSE_T = "drag_of_a_power", "force_at_a_time"
+
+
+def law(
+    log_odds: float, p_value: float | None = 0.5, family: str = "power_v", name: str = "law_1"
+) -> Candidate:
+    made = candidate(name, log_odds, p_value)
+    return replace(made, law=Law(f"a = 1 {family}", family, "", {}))
+
+
+def status(*candidates: Candidate) -> str | None:
+    found = law_verdict(ranked(candidates), DECISIVE)
+    return None if found is None else found.status
+
+
+def test_a_formula_that_leaves_nothing_and_beats_all_others_is_a_law():
+    best = law(50.0)
+    found = law_verdict(ranked([best, candidate("air_drag", 20.0, 1e-6)]), DECISIVE)
+    assert found is not None
+    assert (found.status, found.effects, found.law) == ("law", ("law_1",), best.law)
+    assert [why.rule for why in found.reasons] == ["explains", "decisive"]
+
+
+@pytest.mark.parametrize(("p_value", "expected"), [(0.01, "law"), (0.01 - EDGE, None)])
+def test_what_leaves_more_than_noise_is_no_law(p_value, expected):
+    assert status(law(50.0, p_value), candidate("air_drag", 20.0, 1e-6)) == expected
+
+
+@pytest.mark.parametrize(("behind", "expected"), [(DECISIVE, "law"), (DECISIVE - EDGE, None)])
+@pytest.mark.parametrize("name", ["air_drag", "air_drag+rolling", FORM_OF_PULSE_T])
+def test_another_explanation_must_be_far_behind(name, behind, expected):
+    assert status(law(50.0), candidate(name, 50.0 - behind)) == expected
+
+
+@pytest.mark.parametrize(("behind", "expected"), [(DECISIVE, "law"), (DECISIVE - EDGE, None)])
+def test_another_formula_must_be_far_behind(behind, expected):
+    other = law(50.0 - behind, family="power_t", name="law_2")
+    assert status(law(50.0), other) == expected
+
+
+def test_the_same_formula_in_another_way_is_no_rival():
+    assert status(law(50.0), law(49.9, name="law_2"), candidate(FORM_OF_POWER_V, 52.0)) == "law"
+
+
+@pytest.mark.parametrize(("ahead", "expected"), [(DECISIVE, None), (DECISIVE - EDGE, "law")])
+def test_behind_what_the_data_contradict_it_is_not_the_truth(ahead, expected):
+    assert status(law(50.0), candidate("air_drag", 50.0 + ahead, 1e-6)) == expected
+
+
+def test_without_formulas_there_is_no_law():
+    assert status(candidate(FORM_OF_POWER_V, 50.0), candidate("air_drag", 10.0)) is None
+
+
+def test_a_formula_less_probable_than_none_is_no_law():
+    assert status(law(-EDGE), candidate("air_drag", -20.0)) is None
+
+
+def test_a_library_effect_is_named_before_any_law():
+    assert best_named(ranked([law(50.0), candidate("air_drag", 10.0)])).name == "air_drag"
+
+
+def test_why_there_is_no_law_is_told():
+    contested = ranked([law(50.0), law(48.0, family="power_t", name="law_2")])
+    assert [why.rule for why in law_contested(contested, DECISIVE)] == ["contested"]
+    contradicted = ranked([law(50.0, 1e-5)])
+    assert [why.rule for why in law_contested(contradicted, DECISIVE)] == ["no_law_explains"]
+    assert law_contested(ranked([candidate("air_drag", 10.0)]), DECISIVE) == ()
+
+
+@pytest.mark.parametrize(("expected", "said"), [(DECISIVE, "law"), (DECISIVE - EDGE, "ambiguous")])
+def test_luck_does_not_make_a_law(expected, said):
+    best, rival = law(50.0), candidate("air_drag", 40.0)
+    found = law_verdict(ranked([best, rival]), DECISIVE)
+    assert found is not None
+    assert looked_at_again(found, best, [(rival, expected)], DECISIVE).status == said
+
+
+def test_rivals_are_of_another_formula():
+    best, same = law(50.0), law(49.0, name="law_2")
+    other = candidate(FORM_OF_PULSE_T, 45.0)
+    form = candidate(FORM_OF_POWER_V, 44.0)
+    assert other_formulas(best, [best, same, other, form]) == (best, other)
+
+
+@pytest.mark.parametrize(("ahead", "expected"), [(DECISIVE, False), (DECISIVE - EDGE, True)])
+def test_a_pair_that_a_formula_explains_as_well_is_contested(ahead, expected):
+    named = Verdict("named", ("air_drag", "rolling"))
+    table = ranked([candidate("air_drag+rolling", 50.0 + ahead), law(50.0)])
+    assert is_contested_by_law(named, table, DECISIVE) == expected
+    assert not is_contested_by_law(named, ranked([table[0], law(50.0, 0.001)]), DECISIVE)
+
+
+def test_formulas_are_tried_where_nothing_or_only_a_pair_explains():
+    assert needs_laws(Verdict("unknown", ()))
+    assert needs_laws(Verdict("named", ("air_drag", "rolling")))
+    assert needs_laws(Verdict("ambiguous", ("air_drag+rolling", "stribeck+rolling")))
+    assert not needs_laws(Verdict("named", ("air_drag",)))
+    assert not needs_laws(Verdict("ambiguous", ("air_drag", "stribeck+rolling")))
+
+
+def test_a_second_factor_makes_a_formula_a_tenth_as_probable():
+    assert law_odds(1) == pytest.approx(0.05)
+    assert law_odds(2) == pytest.approx(0.005)
