@@ -270,7 +270,8 @@ def _figure(tab: Tab) -> Any:
         return charts.track_figure(track, dark) if track is not None and is_wanted else None
     if tab.stage == "fit":
         return charts.fit_figure(motion, None, dark)
-    stretches = found.compare["stretches"] if found.compare is not None else ()
+    is_of_this_model = found.compare is not None and tab.session.states["compare"] == "done"
+    stretches = found.compare["stretches"] if found.compare and is_of_this_model else ()
     own = [one for one in stretches if one["clip"] == tab.session.active]
     if tab.stage == "compare":
         return charts.residual_figure(motion, own, dark)

@@ -414,8 +414,17 @@ class Session:
             prediction=entry.get("predict_view") if (run / FILES["predict"]).is_file() else None,
             diagnosis=diagnosis if found else None,
             candidates=tuple(found.get("candidates", ())),
-            rounds=tuple(entry.get("rounds") or found.get("history", ())),
+            rounds=tuple(self._rounds(entry.get("rounds") or list(found.get("history", ())))),
         )
+
+    def _rounds(self, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """With that of the fit that lies there, whoever made it."""
+        try:
+            last = results.round_of(results.document(self.trials.run / FILES["fit"]))
+        except (KeyError, TypeError):
+            return known
+        is_last = bool(known) and set(known[-1]["effects"]) == set(last["effects"])
+        return known if is_last else results.with_round(known, last)
 
     def open_run(self, is_pressed: bool = False) -> None:
         """Loads the chosen clips' fit, if there is one.

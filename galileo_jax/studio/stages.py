@@ -114,14 +114,18 @@ def _state(trials: Trials, stage: str, entry: dict[str, Any], now: str) -> State
     path = trials.run / FILES[stage]
     if not path.is_file():
         return "open"
-    return _fresh(path, entry.get(stage), now, trials.sheets)
+    fit = trials.run / FILES["fit"]
+    of_fit = (fit,) if stage in ("compare", "predict") and fit.is_file() else ()
+    return _fresh(path, entry.get(stage), now, trials.sheets, of_fit)
 
 
-def _fresh(path: Path, made: Any, now: str, sheets: tuple[Sheet, ...]) -> State:
+def _fresh(
+    path: Path, made: Any, now: str, sheets: tuple[Sheet, ...], more: tuple[Path, ...] = ()
+) -> State:
     if isinstance(made, dict) and made.get("at") == path.stat().st_mtime_ns:
         return "done" if made.get("of") == now else "stale"
-    yamls = [sheet.yaml for sheet in sheets if sheet.yaml.is_file()]
-    youngest = max((one.stat().st_mtime_ns for one in yamls), default=0)
+    sources = [*more, *(sheet.yaml for sheet in sheets if sheet.yaml.is_file())]
+    youngest = max((one.stat().st_mtime_ns for one in sources), default=0)
     return "done" if path.stat().st_mtime_ns >= youngest else "stale"
 
 

@@ -25,7 +25,8 @@ class Viewer(Element, component="viewer.js"):
         motion = self.motion(session)
         is_measured = stage not in ("video", "marks")
         stretches: Sequence[Any] = ()
-        if stage in ("compare", "diagnose") and found.compare is not None:
+        is_shown = stage in ("compare", "diagnose") and session.states["compare"] == "done"
+        if is_shown and found.compare is not None:
             stretches = [s for s in found.compare["stretches"] if s["clip"] == sheet.name]
         self._put(
             {
