@@ -29,8 +29,10 @@ if TYPE_CHECKING:
     from galileo_jax.api.fit import fit
     from galileo_jax.api.fit_result import Fit
     from galileo_jax.api.label import label
+    from galileo_jax.api.motion import Motion
     from galileo_jax.api.next_experiment import NextExperiment, next_experiment
     from galileo_jax.api.predict import Prediction, predict
+    from galileo_jax.api.propose import Proposal, propose
     from galileo_jax.api.run import load_run
     from galileo_jax.api.simulate import Simulated, simulate
     from galileo_jax.api.track import Track, track
@@ -61,6 +63,8 @@ _PLACES = {
     "galileo_jax.api.fit_result": ("Fit",),
     "galileo_jax.api.next_experiment": ("NextExperiment", "next_experiment"),
     "galileo_jax.api.predict": ("Prediction", "predict"),
+    "galileo_jax.api.propose": ("Proposal", "propose"),
+    "galileo_jax.api.motion": ("Motion",),
     "galileo_jax.api.export": ("export",),
     "galileo_jax.api.label": ("label",),
     "galileo_jax.api.run": ("load_run",),
@@ -94,10 +98,12 @@ __all__ = [
     "HalfNormal",
     "InputError",
     "LogNormal",
+    "Motion",
     "NextExperiment",
     "Normal",
     "Parameter",
     "Prediction",
+    "Proposal",
     "Simulated",
     "State",
     "Surroundings",
@@ -117,6 +123,7 @@ __all__ = [
     "load_run",
     "next_experiment",
     "predict",
+    "propose",
     "register_effect",
     "scenarios",
     "simulate",

@@ -15,6 +15,7 @@ VERBS = (
     ("compare", "see whether the model is adequate, and where it fails"),
     ("diagnose", "learn which effect is missing, add it, watch the error fall"),
     ("track", "follow the objects of a clip; csv and an overlay to check by eye"),
+    ("studio", "do all of this in one page: film, mark, fit, add what is missing"),
     ("label", "write points and scale into a clip's yaml"),
     ("simulate", "make a clip with known truth"),
     ("predict", "continue a fitted scene beyond its clip"),

@@ -81,7 +81,7 @@ class Comparison:
         """Measured and fitted motion along the path, with the stretches where it fails shaded."""
         from galileo_jax.report.figures import comparison_figure
 
-        return comparison_figure(self._paths())
+        return comparison_figure(self.paths)
 
     @in_float64
     def report(self, path: str | Path) -> Path:
@@ -95,7 +95,7 @@ class Comparison:
             problem.theta(gradient.z, gradient.free),
             tuple(one.clip for one in self.fit.measurements),
             problem.all_effects,
-            self._paths(),
+            self.paths,
             self.command,
             self._seed,
         )
@@ -109,7 +109,10 @@ class Comparison:
         write_json(folder / "compare.json", self.document)
         return folder
 
-    def _paths(self) -> tuple[PathResiduals, ...]:
+    @property
+    @in_float64
+    def paths(self) -> tuple[PathResiduals, ...]:
+        """Of every object: motion along its path, residuals, and the stretch where it fails."""
         return path_residuals(self.fit.problem, self.gradient, self.found, self._seed)
 
     @property

@@ -11,6 +11,7 @@ from galileo_jax import __version__
 from galileo_jax.api.command_line import command_line
 from galileo_jax.api.effect_choice import check_addition
 from galileo_jax.api.fit_result import Fit, make_fit
+from galileo_jax.api.motion import Motion, motions_at
 from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.scenarios import SCENARIOS
@@ -39,6 +40,7 @@ from galileo_jax.results.truth import hidden_effect
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 
@@ -146,6 +148,21 @@ class Diagnosis:
             for name, entry in record["objects"].items()
         ]
         return pd.concat(parts, ignore_index=True)
+
+    @in_float64
+    def motions(self, effect: str) -> tuple[Motion, ...]:
+        """Every clip's motion as one of the candidates has it, beside the measured.
+
+        Args:
+          effect: as in `candidates`; a pair is joined by +.
+
+        Raises:
+          InputError: there is no such candidate.
+        """
+        fits = {one.name: one.hypothesis.fit for one in self.found.candidates}
+        check_known("candidate", "candidate", effect, tuple(fits))
+        theta = self.problem.theta(fits[effect].z, fits[effect].free)
+        return motions_at(self.problem, [one.clip for one in self.measurements], theta)
 
     @cached_property
     @in_float64

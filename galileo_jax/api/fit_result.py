@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from galileo_jax.api.motion import Motion, motions_at, replaced
 from galileo_jax.api.track_doubts import taken_as_exact, with_track_doubts
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
@@ -139,6 +140,20 @@ class Fit:
                     columns[f"{axis}_white"] = np.where(is_seen, white[k, i], np.nan)
                 parts.append(pd.DataFrame(columns))
         return pd.concat(parts, ignore_index=True)
+
+    @in_float64
+    def motions(self, values: Mapping[str, float] | None = None) -> tuple[Motion, ...]:
+        """Every clip's motion, measured and as the model has it; takes milliseconds.
+
+        Args:
+          values: parameters by name, in their units, that are to differ from the best fit.
+
+        Raises:
+          InputError: a name is no parameter of the model.
+        """
+        best = self.problem.theta(self._z())
+        theta = replaced(self.problem, best, values)
+        return motions_at(self.problem, [one.clip for one in self.measurements], theta, best)
 
     def _z(self) -> np.ndarray:
         """The best fit; of a run that an earlier version wrote the posterior's median."""

@@ -38,6 +38,7 @@ class Mover:
       num_features: how many features agree on it.
       leaves_picture: whether its features were last seen going over the border.
       places_px: `[feature, 2]`, the features in the first frame.
+      goes_right: whether its features were last seen to the right of where they began.
     """
 
     point_px: tuple[float, float]
@@ -45,6 +46,7 @@ class Mover:
     num_features: int
     leaves_picture: bool
     places_px: np.ndarray
+    goes_right: bool = True
 
 
 def find_movers(
@@ -83,6 +85,7 @@ def find_movers(
                 num_features=len(members),
                 leaves_picture=bool(np.mean(beyond.any(axis=1)) > 0.3),
                 places_px=path[0, members],
+                goes_right=bool(np.median(last[:, 0] - path[0, members, 0]) >= 0),
             )
         )
     return sorted(movers, key=lambda mover: (mover.leaves_picture, mover.onset_frame))

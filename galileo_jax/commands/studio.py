@@ -1,0 +1,48 @@
+"""`galileo studio`: film, mark, compare, add what is missing, in one page on this machine."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from galileo_jax.commands import command
+
+
+def main(argv: Sequence[str]) -> int | None:
+    """Serves the page until Ctrl-C; prints its address."""
+    call = _parser().parse_args(argv)
+    from galileo_jax.studio.server import serve
+
+    def announce(address: str) -> None:
+        print(address, flush=True)
+        command.say("Only this address opens it; Ctrl-C ends it. Everything is saved at once.")
+
+    serve(call.source, port=call.port, browser=call.browser, announce=announce)
+    return None
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="galileo studio", description=__doc__)
+    parser.add_argument(
+        "source",
+        nargs="?",
+        default=Path("."),
+        type=Path,
+        metavar="CLIP|FOLDER",
+        help="a video, or a folder with videos (default: this folder)",
+    )
+    parser.add_argument(
+        "--port",
+        type=command.whole_number(1),
+        metavar="N",
+        help="of this machine (default: the first free one from 8642 on)",
+    )
+    parser.add_argument(
+        "--no-browser",
+        dest="browser",
+        action="store_false",
+        help="print the address, open no browser (default: off)",
+    )
+    parser.examples(
+        "galileo studio clip.mp4                               one clip",
+        "galileo studio trials/ --no-browser                   a folder of trials",
+    )
+    return parser

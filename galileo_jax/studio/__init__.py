@@ -1,0 +1,1 @@
+"""One local page: film, mark, track, fit, see where it fails, add what is missing, predict."""

@@ -1,0 +1,66 @@
+"""`Check`: what is still missing in a clip's marks, or odd, in words."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from galileo_jax.clip.declaration import CLICK_SD_PX
+from galileo_jax.studio.marks import Marks
+
+ODD_ANGLE_SD_DEG = 0.3  # worse, and the ramp's line decides how well k1 is known
+USUAL_RATES = (24.0, 25.0, 29.97, 30.0)  # what containers of slow-motion clips say, too
+SAME_RATE = 0.01
+
+
+@dataclass(frozen=True)
+class Remark:
+    """One thing to know: `missing` holds tracking up, `odd` does not."""
+
+    kind: Literal["missing", "odd"]
+    sentence: str
+
+
+def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple[Remark, ...]:
+    """What to say of marks.
+
+    Args:
+      marks: as drawn.
+      container_fps: what the video's file says.
+      problem: why the yaml could not be written, if it could not.
+    """
+    found = []
+    if not marks.objects:
+        found.append(Remark("missing", "No object is marked. Add one and drag it to its centre."))
+    if marks.has_ramp and not (marks.upper and marks.foot):
+        found.append(Remark("missing", "The ramp is not marked. Draw its line."))
+    if marks.has_table and marks.stick_m is None:
+        found.append(
+            Remark("missing", "The scale is unknown. Lay the stick on a known length, and type it.")
+        )
+    if problem:
+        found.append(Remark("missing", problem))
+    if not marks.has_table and marks.stick_m is None:
+        found.append(
+            Remark("odd", "The scale is unknown: friction and scale show only in combination.")
+        )
+    is_from_file = abs(marks.fps - container_fps) < SAME_RATE
+    if is_from_file and any(abs(marks.fps - rate) < SAME_RATE for rate in USUAL_RATES):
+        found.append(
+            Remark(
+                "odd",
+                f"{marks.fps:.4g} frames per second is what the file says; slow-motion files "
+                "often say a wrong rate.",
+            )
+        )
+    if marks.has_ramp and marks.upper and marks.foot:
+        length = math.dist(marks.upper, marks.foot)
+        sd = math.degrees(math.sqrt(2) * CLICK_SD_PX / max(length, 1e-6))
+        if sd > ODD_ANGLE_SD_DEG:
+            found.append(
+                Remark(
+                    "odd",
+                    f"The ramp's line is {length:.0f} px long: its angle is known to {sd:.1f} "
+                    "degrees. Draw a longer line.",
+                )
+            )
+    return tuple(found)

@@ -1,0 +1,57 @@
+"""The frames of a video as pictures: decoded once in order, then there for every jump."""
+
+import tempfile
+import threading
+from pathlib import Path
+
+import cv2
+
+from galileo_jax.video import decode
+
+LARGEST_PX = 1280
+QUALITY = 85
+
+
+class Frames:
+    """One video's frames as JPEGs on disk, in a folder that ends with the server.
+
+    Args:
+      video: that is decoded in a thread, beginning now.
+    """
+
+    def __init__(self, video: Path):
+        self._video = video
+        self._folder = tempfile.TemporaryDirectory(prefix="galileo_studio_")
+        self._ready = 0
+        self._is_over = False
+        self._changed = threading.Condition()
+        threading.Thread(target=self._decode, daemon=True).start()
+
+    def picture(self, index: int, patience_s: float = 10.0) -> bytes | None:
+        """The JPEG of a frame; None beyond the end, or where it cannot be decoded in time."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._ready > index or self._is_over, patience_s)
+            if not 0 <= index < self._ready:
+                return None
+        return self._path(index).read_bytes()
+
+    def _decode(self) -> None:
+        try:
+            for index, frame in enumerate(decode.frames(self._video)):
+                height, width = frame.shape[:2]
+                smaller = min(1.0, LARGEST_PX / max(width, height))
+                if smaller < 1:
+                    size = (round(width * smaller), round(height * smaller))
+                    frame = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
+                jpeg = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1]
+                self._path(index).write_bytes(jpeg.tobytes())
+                with self._changed:
+                    self._ready = index + 1
+                    self._changed.notify_all()
+        finally:
+            with self._changed:
+                self._is_over = True
+                self._changed.notify_all()
+
+    def _path(self, index: int) -> Path:
+        return Path(self._folder.name) / f"{index:06d}.jpg"

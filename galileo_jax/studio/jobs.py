@@ -1,0 +1,245 @@
+"""Long work in a process of its own: one job at a time, cancelled between two batches.
+
+The process is spawned (JAX does not survive a fork), is niced so that the page stays quick, and
+ends with the server, however that ends: it waits for its parent beside the work.
+"""
+
+import contextlib
+import itertools
+import multiprocessing
+import os
+import queue
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import Any, Literal
+
+NICENESS = 5
+PATIENCE_S = 20.0  # for work that was cancelled to stop by itself, before its process is ended
+
+Kind = Literal["progress", "partial", "done", "error", "cancelled"]
+
+
+@dataclass(frozen=True)
+class Message:
+    """What a job says.
+
+    Attributes:
+      job: its number.
+      task: what it does.
+      kind: `progress` with (stage, share), `partial` or `done` with a mapping, `error` with a
+        line, `cancelled`.
+      content: see `kind`.
+    """
+
+    job: int
+    task: str
+    kind: Kind
+    content: Any = None
+
+
+OnMessage = Callable[[Message], None]
+
+
+class Worker:
+    """The process, started when it is first needed and again if it ends.
+
+    Args:
+      folder: its working folder.
+      on_message: called in a thread of this process.
+    """
+
+    def __init__(self, folder: str, on_message: OnMessage):
+        self._folder, self._on_message = folder, on_message
+        self._context = multiprocessing.get_context("spawn")
+        self._numbers = itertools.count(1)
+        self._lock = threading.Lock()
+        self._process: Any = None
+        self._pipe: Connection | None = None
+        self._is_cancelled = False
+        self._current: Message | None = None  # the job that runs
+
+    @property
+    def pid(self) -> int | None:
+        """Of the process, while it runs."""
+        return self._process.pid if self._process is not None else None
+
+    def start(self, task: str, **given: Any) -> int:
+        """Starts a job; returns its number.
+
+        Raises:
+          RuntimeError: another is running.
+        """
+        with self._lock:
+            if self._current is not None:
+                raise RuntimeError(f"{self._current.task} is running")
+            number = next(self._numbers)
+            pipe = self._started()
+            self._is_cancelled = False
+            self._current = Message(number, task, "progress")
+            pipe.send(("job", number, task, given))
+            return number
+
+    def ask(self, task: str, **given: Any) -> int:
+        """Sends a quick question, answered beside the job."""
+        with self._lock:
+            number = next(self._numbers)
+            self._started().send(("ask", number, task, given))
+            return number
+
+    def cancel(self) -> None:
+        """Asks the job to stop; its process is ended if it does not."""
+        with self._lock:
+            if self._current is None:
+                return
+            self._is_cancelled = True
+            if self._pipe is not None:
+                with contextlib.suppress(OSError):
+                    self._pipe.send(("cancel", self._current.job))
+            timer = threading.Timer(PATIENCE_S, self._end_if_busy, [self._current.job])
+        timer.daemon = True
+        timer.start()
+
+    def close(self) -> None:
+        """Ends the process."""
+        with self._lock:
+            process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.join(5)
+
+    def _started(self) -> Connection:
+        if self._process is not None and self._process.is_alive() and self._pipe is not None:
+            return self._pipe
+        ours, theirs = self._context.Pipe()
+        self._process = self._context.Process(
+            target=serve, args=(theirs, self._folder), daemon=True
+        )
+        self._process.start()
+        theirs.close()
+        self._pipe = ours
+        threading.Thread(target=self._listen, args=(ours,), daemon=True).start()
+        return ours
+
+    def _listen(self, pipe: Connection) -> None:
+        while True:
+            try:
+                message = pipe.recv()
+            except (EOFError, OSError):
+                break
+            self._hand_on(message)
+        with self._lock:
+            lost = self._current if pipe is self._pipe else None
+            if pipe is self._pipe:
+                self._pipe = None
+            is_cancelled = self._is_cancelled
+        if lost is not None:
+            kind: Kind = "cancelled" if is_cancelled else "error"
+            text = "the process that computed it has ended; try again"
+            self._hand_on(Message(lost.job, lost.task, kind, text))
+
+    def _hand_on(self, message: Message) -> None:
+        if message.kind not in ("progress", "partial"):
+            with self._lock:
+                if self._current is not None and self._current.job == message.job:
+                    self._current = None
+        self._on_message(message)
+
+    def _end_if_busy(self, job: int) -> None:
+        with self._lock:
+            is_busy = self._current is not None and self._current.job == job
+            process = self._process
+        if is_busy and process is not None:
+            process.kill()
+
+
+class _Cancel:
+    """The flag of the job that runs; asked for in the thread that listens."""
+
+    def __init__(self) -> None:
+        self.wanted: set[int] = set()
+        self.job = 0
+
+    def is_set(self) -> bool:
+        return self.job in self.wanted
+
+
+def serve(pipe: Connection, folder: str) -> None:
+    """What the process does: jobs in its main thread, questions in another."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with contextlib.suppress(OSError, AttributeError):
+        os.nice(NICENESS)
+    os.chdir(folder)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    jobs: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    questions: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    lock, cancel = threading.Lock(), _Cancel()
+
+    def send(message: Message) -> None:
+        with lock, contextlib.suppress(OSError):
+            pipe.send(message)
+
+    def receive() -> None:
+        while True:
+            try:
+                kind, *rest = pipe.recv()
+            except (EOFError, OSError):
+                os._exit(0)
+            if kind == "cancel":
+                cancel.wanted.add(rest[0])
+            else:
+                (jobs if kind == "job" else questions).put(rest)
+
+    def answer(line: queue.SimpleQueue[Any], flag: _Cancel | None) -> None:
+        while True:
+            number, task, given = line.get()
+            if flag is not None:
+                flag.job = number
+            _run(number, task, given, send, flag)
+
+    threading.Thread(target=receive, daemon=True).start()
+    threading.Thread(target=answer, args=(questions, None), daemon=True).start()
+    answer(jobs, cancel)
+
+
+def _run(
+    number: int,
+    task: str,
+    given: Mapping[str, Any],
+    send: Callable[[Message], None],
+    cancel: Any,
+) -> None:
+    from galileo_jax.runtime.errors import InputError
+    from galileo_jax.runtime.progress import Cancelled, scope
+
+    def on_progress(stage: str, share: float, partial: Any) -> None:
+        send(Message(number, task, "progress", (stage, share)))
+        if isinstance(partial, dict):
+            send(Message(number, task, "partial", partial))
+
+    def partial(content: Mapping[str, Any]) -> None:
+        send(Message(number, task, "partial", content))
+
+    try:
+        from galileo_jax.studio import work
+
+        with scope(on_progress, cancel):
+            content = work.TASKS[task](partial=partial, **given)
+        send(Message(number, task, "done", content))
+    except Cancelled:
+        send(Message(number, task, "cancelled"))
+    except InputError as error:
+        send(Message(number, task, "error", " ".join(str(error).split())))
+    except Exception as error:  # a bug must not end the process; the page shows it
+        import traceback
+
+        traceback.print_exc()
+        send(Message(number, task, "error", f"{type(error).__name__}: {error}"))
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(0)

@@ -1,0 +1,313 @@
+"""The page of one tab: the stages above, the video and its curves left, the stage's panel right."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from nicegui import ui
+
+from galileo_jax.studio import charts
+from galileo_jax.studio.marks import Marks, moved, with_object
+from galileo_jax.studio.panels import compare, diagnose, fit, marks, predict, track, video
+from galileo_jax.studio.session import Session
+from galileo_jax.studio.stages import STAGES
+from galileo_jax.studio.viewer import Viewer
+
+HERE = Path(__file__).parent
+PANELS = {
+    "video": video.build,
+    "marks": marks.build,
+    "track": track.build,
+    "fit": fit.build,
+    "compare": compare.build,
+    "diagnose": diagnose.build,
+    "predict": predict.build,
+}
+POLL_S = 0.1
+PARTS = {"video": {"clips", "marks"}, "marks": {"clips", "marks"}}  # that their panels show
+RUNNING = {"propose": "marks", "open_run": "fit", "export": "predict"}  # else its own stage
+
+
+@dataclass
+class Tab:
+    """What one tab shows; the session is the same for all.
+
+    Attributes:
+      session: the clips and results.
+      stage: the panel.
+      candidate: whose curve is looked at.
+      placing: a click into the video adds an object.
+      dark: the colours.
+      said: the job, the error and the note that are shown.
+      drawn, lamps: what the panel and the row of stages were built of.
+      refresh: does that.
+      redraw: shows everything anew.
+      redraw_curves: only the video and what is below it.
+    """
+
+    session: Session
+    stage: str = "video"
+    candidate: str = ""
+    placing: bool = False
+    dark: bool = False
+    said: tuple[str, str, str] = ("", "", "")
+    drawn: Any = None
+    lamps: Any = None
+    refresh: Callable[[], None] = lambda: None
+    redraw: Callable[[], None] = lambda: None
+    redraw_curves: Callable[[], None] = lambda: None
+
+    def go(self, stage: str) -> None:
+        """Turns to a stage."""
+        if self.stage == "fit" != stage and self.session.results.live is not None:
+            self.session.put_back()
+        self.stage, self.candidate, self.placing = stage, "", False
+        if stage in ("fit", "compare", "diagnose", "predict"):
+            self.session.open_run()
+        self.redraw()
+
+    def mark(self, marks: Marks) -> None:
+        """Draws, and shows it in this tab at once: what is typed next must not be swept away."""
+        self.session.mark(marks)
+        self.redraw()
+
+    def preview(self, candidate: str) -> None:
+        """Looks at a candidate's curve."""
+        if candidate != self.candidate:
+            self.candidate = candidate
+            self.redraw_curves()  # and not the panel: a click that follows must find its button
+
+
+def build_page(session: Session) -> None:
+    """Builds the page of a new tab."""
+    ui.add_head_html(f"<style>{(HERE / 'studio.css').read_text(encoding='utf-8')}</style>")
+    ui.add_body_html(f"<script>{(HERE / 'studio.js').read_text(encoding='utf-8')}</script>")
+    tab = Tab(session, _first_stage(session))
+    ui.colors(primary="#b34d25")
+    dark = ui.dark_mode(None)
+    seen: dict[str, int] = {}
+
+    with ui.element("header").classes("bar"):
+        ui.label("galileo studio").classes("brand")
+        stages = ui.element("nav").classes("stages").props('aria-label="stages"')
+        with ui.element("div").classes("end"):
+            _icon("undo", "Undo", session.undo)
+            _icon("redo", "Redo", session.redo)
+            _icon("contrast", "Light or dark", lambda: _turn(tab, dark, show))
+    with ui.element("main").classes("work"):
+        with ui.element("section").classes("left"):
+            viewer = Viewer()
+            strip = ui.element("div").classes("strip timed")
+            with strip:
+                chart = ui.plotly(charts._figure([], "", "", False))
+        panel = ui.element("aside").classes("right")
+    job = ui.element("div")
+
+    def on_moved(event: Any) -> None:
+        sheet, given = session.sheet, event.args
+        if sheet is not None:
+            tab.mark(moved(sheet.marks, given["handle"], (given["x"], given["y"])))
+
+    def on_place(event: Any) -> None:
+        if session.sheet is not None and tab.placing:
+            tab.placing = False
+            tab.mark(with_object(session.sheet.marks, tuple(event.args)))
+
+    viewer.on("moved", on_moved)
+    viewer.on("place", on_place)
+
+    def show() -> None:
+        seen.update(session.versions)
+        lamps()
+        if tab.drawn == (now := _shown(tab)):
+            tab.refresh()
+        else:
+            tab.refresh = lambda: None
+            panel.clear()
+            with panel:
+                _panel(tab)
+            tab.drawn = now
+        curves()
+        bar()
+
+    def lamps() -> None:
+        task = session.job.task if session.job is not None else ""
+        now = (tab.stage, task, *session.states.values())
+        if now == tab.lamps:
+            return
+        tab.lamps = now
+        stages.clear()
+        with stages:
+            _stage_buttons(tab)
+
+    def curves() -> None:
+        viewer.show(session, tab.stage, tab.placing)
+        figure = _figure(tab)
+        strip.classes(add="" if figure else "none", remove="none" if figure else "")
+        if figure is not None:
+            chart.update_figure(figure)
+
+    def bar() -> None:
+        job.clear()
+        if session.job is not None:
+            with job:
+                _job_bar(session)
+
+    def look() -> None:
+        now = session.versions
+        new = {part for part in now if seen.get(part) != now[part]}
+        seen.update(now)
+        if new & PARTS.get(tab.stage, {"clips", "marks", "results"}):
+            show()
+        elif new & {"clips", "marks", "results"}:
+            lamps()
+            curves()
+        elif "live" in new:
+            curves()
+        if "job" in new:
+            bar()
+            now_said = (session.job.task if session.job else "", session.error, session.note)
+            if now_said != tab.said:
+                tab.said = now_said
+                show()
+
+    tab.redraw, tab.redraw_curves = show, curves
+    seen.update(session.versions)
+    show()
+    if tab.stage in ("fit", "compare", "diagnose", "predict"):
+        session.open_run()
+    if session.sheet is not None and not session.sheet.is_drawn and session.job is None:
+        ui.timer(0.2, lambda: _propose_once(session), once=True)
+    ui.timer(POLL_S, look)
+
+
+def _shown(tab: Tab) -> Any:
+    """What a panel is built of: while it is the same, the panel stays as it is."""
+    if (now := marks.drawn(tab)) is not None:
+        return now
+    session = tab.session
+    found = session.results
+    views = (found.tracks, found.fit, found.compare, found.diagnosis, found.prediction)
+    return (
+        tab.stage, tab.dark, session.active, session.chosen, session.names, session.error,
+        session.note, session.job is None, tuple(session.states.values()), tuple(map(id, views)),
+        found.candidates, found.rounds, tuple(session.broken), session.sheet,
+    )  # fmt: skip
+
+
+def _propose_once(session: Session) -> None:
+    if session.sheet is not None and not session.sheet.is_drawn and session.job is None:
+        session.propose()
+
+
+def _first_stage(session: Session) -> str:
+    """The stage that a clip has come to."""
+    if session.sheet is None:
+        return "video"
+    if not session.sheet.is_complete:
+        return "marks"
+    states = session.states
+    if states["diagnose"] in ("done", "stale"):
+        return "diagnose"
+    return next((s for s in ("track", "fit", "compare") if states[s] != "done"), "diagnose")
+
+
+def _stage_buttons(tab: Tab) -> None:
+    states = tab.session.states
+    running = ""
+    if tab.session.job is not None:
+        running = RUNNING.get(tab.session.job.task, tab.session.job.task)
+    for stage, title in STAGES.items():
+        state = "running" if stage == running else states[stage]
+        button = (
+            ui.element("button").classes("stagebutton").props(f"type=button data-stage={stage}")
+        )
+        if stage == tab.stage:
+            button.props('aria-current="step"')
+        if states[stage] == "locked":
+            button.props("disabled")
+        button.props(f'title="{title}: {_WORDS[state]}" data-state="{state}"')
+        button.on("click", partial(tab.go, stage))
+        with button:
+            ui.element("span").classes(f"lamp {state}")
+            ui.label(title)
+
+
+_WORDS = {
+    "locked": "waits for the stage before it",
+    "open": "to do",
+    "done": "done",
+    "stale": "made of earlier marks",
+    "running": "running",
+}
+
+
+def _panel(tab: Tab) -> None:
+    session = tab.session
+    if session.error:
+        ui.label(session.error).classes("trouble").props('role="alert"')
+    if session.note:
+        ui.label(session.note).classes("soft small")
+    if len(session.chosen) > 1:
+        with ui.element("div").classes("rowline"):
+            for name in session.chosen:
+                look = "main" if name == session.active else "plain"
+                ui.button(name, on_click=partial(session.look_at, name), color=None).props(
+                    "flat no-caps"
+                ).classes(look)
+    PANELS[tab.stage](tab)
+
+
+def _figure(tab: Tab) -> Any:
+    """The curves below the video."""
+    found, dark = tab.session.results, tab.dark
+    motion = Viewer.motion(tab.session)
+    if tab.stage == "track" or motion is None:
+        track = found.tracks.get(tab.session.active)
+        is_wanted = tab.stage not in ("video", "marks")
+        return charts.track_figure(track, dark) if track is not None and is_wanted else None
+    if tab.stage == "fit":
+        return charts.fit_figure(motion, None, dark)
+    is_of_this_model = found.compare is not None and tab.session.states["compare"] == "done"
+    stretches = found.compare["stretches"] if found.compare and is_of_this_model else ()
+    own = [one for one in stretches if one["clip"] == tab.session.active]
+    if tab.stage == "compare":
+        return charts.residual_figure(motion, own, dark)
+    if tab.stage == "diagnose":
+        return charts.residual_figure(motion, own, dark, _candidate(tab))
+    if tab.stage == "predict" and found.prediction is not None:
+        return charts.prediction_figure(found.prediction, dark)
+    return charts.fit_figure(motion, None, dark) if tab.stage == "predict" else None
+
+
+def _candidate(tab: Tab) -> tuple[str, Any] | None:
+    found = tab.session.results.diagnosis
+    curves = found["curves"].get(tab.candidate, ()) if found is not None else ()
+    own = [one for one in curves if one["clip"] == tab.session.active]
+    is_in = set(tab.candidate.split("+")) <= set(tab.session.effects)
+    return (tab.candidate, own[0]) if own and not is_in else None
+
+
+def _job_bar(session: Session) -> None:
+    job = session.job
+    assert job is not None
+    with ui.element("div").classes("job").props('role="status"'):
+        text = "stopping" if job.is_cancelled else job.stage
+        ui.label(f"{STAGES.get(job.task, 'Looking')}: {text}").classes("small")
+        with ui.element("div").classes("meter"):
+            ui.element("i").style(f"width: {100 * job.share:.0f}%")
+        if not job.is_cancelled:
+            ui.button("Cancel", on_click=session.cancel, color=None).props("flat no-caps")
+
+
+def _icon(name: str, title: str, action: Callable[[], Any]) -> None:
+    button = ui.button(icon=name, on_click=action, color=None).props("flat round").classes("icon")
+    button.props(f'aria-label="{title}" title="{title}"')
+
+
+def _turn(tab: Tab, dark: Any, show: Callable[[], None]) -> None:
+    tab.dark = not tab.dark
+    dark.value = tab.dark
+    show()

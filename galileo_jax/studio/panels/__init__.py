@@ -1,0 +1,1 @@
+"""What stands beside the video at each stage; one file each."""

@@ -1,0 +1,138 @@
+"""What is missing: candidates as they are computed, `Add` and `Remove`, and the staircase."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from galileo_jax.model.effects.forms import FORM_NAMES as NAMES_OF_FORMS
+from galileo_jax.runtime.atomic_write import write_text
+from galileo_jax.studio import charts
+from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
+from galileo_jax.studio.panels.stairs import friction_moves, stairs
+from galileo_jax.studio.paths import below
+
+if TYPE_CHECKING:
+    from galileo_jax.studio.page import Tab
+
+FORM_NAMES = frozenset(NAMES_OF_FORMS)  # they can be tried, not added
+MOST_SHOWN = 6
+OWN_FILE = "my_effect.py"
+TEMPLATE = '''from galileo_jax import Effect, LogNormal, Parameter, register_effect
+
+
+@register_effect
+class CubicDrag(Effect):
+    """A drag that grows with the cube of the speed."""
+
+    name = "cubic_drag"
+
+    def parameters(self, scene):
+        return (Parameter("cubic_drag", "kg s/m^2", LogNormal(0.3, 1.2), 0.0, "effect", 0.1),)
+
+    def force(self, theta, scene):
+        c = theta["cubic_drag"][..., None]
+        return lambda state: -c * state.speed_m_s**3
+'''
+
+
+def build(tab: "Tab") -> None:
+    """The panel."""
+    session = tab.session
+    title("What is missing")
+    found, rounds = session.results.diagnosis, session.results.rounds
+    if found is not None and found.get("sentence"):
+        ui.label(found["sentence"]).classes("say").props("data-verdict")
+    if rounds:
+        ui.html(stairs(rounds), sanitize=False).props("data-stairs")
+        with ui.element("div"):
+            for line in friction_moves(rounds):
+                ui.label(line).style("font-variant-numeric: tabular-nums")
+    if session.effects:
+        with ui.element("div").classes("rowline"):
+            for effect in session.effects:
+                kept = tuple(one for one in session.effects if one != effect)
+                plain_button(
+                    f"Remove {effect}", lambda kept=kept: session.fit(kept), "remove",
+                    session.job is None,
+                )  # fmt: skip
+    if session.states["diagnose"] != "done":
+        text = "Ask again" if found is not None else "What is missing?"
+        main_button(text, session.diagnose, tab, "diagnose")
+    for i, row in enumerate(session.results.candidates[:MOST_SHOWN]):
+        _candidate(tab, row, is_best=i == 0)
+    if found is not None:
+        _beyond(tab, found)
+    if session.effects:
+        main_button("Predict", lambda: tab.go("predict"), tab, "to-predict")
+
+
+def _candidate(tab: "Tab", row: Mapping[str, Any], is_best: bool) -> None:
+    session, name = tab.session, str(row["effect"])
+    pick = ui.element("div").classes("pick")
+    pick.props(f'data-candidate="{name}" tabindex=0')
+    for event in ("mouseenter", "focus", "click"):
+        pick.on(event, lambda: tab.preview(name))
+    probability = float(row["probability"] or 0.0)
+    with pick:
+        ui.label(name.replace("+", " + ")).classes("name")
+        ui.label(f"{100 * probability:.3g} %" if probability > 5e-4 else "~0").classes("p")
+        with ui.element("div").classes("bar2"):
+            ui.element("i").style(f"width: {100 * probability:.1f}%")
+        ui.label(_strength(row)).classes("strength")
+        effects = tuple(name.split("+"))
+        is_in = set(effects) <= set(session.effects)
+        if FORM_NAMES & set(effects):
+            ui.label("form").classes("small soft").props('title="a form without a name"')
+            return
+        add = ui.button("Added" if is_in else "Add", color=None).props(
+            f'unelevated no-caps data-add="{name}"'
+        )
+        add.classes("main" if is_best and not is_in else "plain")
+        add.set_enabled(not is_in and session.job is None)
+        add.on("click.stop", lambda: session.fit(_joined(session.effects, effects)))
+
+
+def _joined(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*one, *other)))
+
+
+def _strength(row: Mapping[str, Any]) -> str:
+    if "parameters" in row:
+        from galileo_jax.report.diagnosis_text import strength_texts
+
+        effects = str(row["effect"]).split("+")
+        found = strength_texts(effects, row)  # pyright: ignore[reportArgumentType]
+        return ", ".join(found.values()).replace("+-", "±")
+    return f"velocity error {row['rmse']:.4f} m/s"
+
+
+def _beyond(tab: "Tab", found: Mapping[str, Any]) -> None:
+    """What to do where no effect is named."""
+    status = found.get("verdict", {}).get("status")
+    for line in found.get("verdict", {}).get("advice", ()):
+        remark("odd", line)
+    record = found.get("missing_force")
+    if record:
+        ui.label("The acceleration that the model lacks").classes("small soft")
+        ui.plotly(charts.missing_figure(record, tab.dark)).style("height: 230px; width: 100%")
+        for name, entry in record["objects"].items():
+            if entry.get("formula"):
+                ui.label(f"{name}: {entry['formula']}").classes("code")
+    if status in ("unknown", "ambiguous"):
+        with ui.expansion("An effect of your own").classes("w-full"):
+            _editor(tab)
+
+
+def _editor(tab: "Tab") -> None:
+    path = below(tab.session.root, OWN_FILE)
+    text = path.read_text(encoding="utf-8") if path.is_file() else TEMPLATE
+    area = ui.textarea(value=text).props("outlined autogrow data-effect").classes("w-full")
+    area.style("font: 13px ui-monospace, monospace; width: 100%")
+
+    def run() -> None:
+        write_text(Path(path), area.value or "")
+        tab.session.diagnose((OWN_FILE,))
+
+    plain_button(f"Save {OWN_FILE} and run it", run, "run-effect", tab.session.job is None)

@@ -1,0 +1,94 @@
+"""Fit: every parameter with its interval and a slider that moves the model at once."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from galileo_jax.studio.panels.parts import main_button, number, plain_button, remark, title
+from galileo_jax.studio.results import program_of
+
+if TYPE_CHECKING:
+    from galileo_jax.studio.page import Tab
+
+
+def build(tab: "Tab") -> None:
+    """The panel."""
+    session = tab.session
+    found = session.results.fit
+    state = session.states["fit"]
+    effects = ", ".join(session.effects)
+    title(f"Fit, with {effects}" if effects else "Fit")
+    if found is None:
+        program = program_of(session.trials.run)
+        if program is not None:
+            text = f"Run {program.rpartition('/')[2]} and open it"
+            plain_button(text, lambda: session.open_run(is_pressed=True), "open-program")
+        elif (session.trials.run / "result.json").is_file():
+            ui.label("Opening the run …").classes("soft")
+        main_button("Fit", session.fit, tab, "fit")
+        return
+    error = found["error"]
+    with ui.element("div").classes("say"):
+        misfit = ui.label(_misfit(tab))
+        ui.label(
+            f"chi2 per degree of freedom {error['chi2_per_dof']:.3g}; velocity error "
+            f"{error['rmse']:.4f} m/s (noise {error['noise']:.4f})"
+        ).classes("soft small")
+    values = dict(session.results.live["values"]) if session.results.live is not None else {}
+    for one in found["parameters"]:
+        _parameter(tab, one, values)
+    ui.timer(0.15, lambda: misfit.set_text(_misfit(tab)))
+    with ui.element("div").classes("rowline"):
+        plain_button("Back to the best", lambda: _back(tab), "back")
+        if state == "stale":
+            main_button("Fit again", lambda: session.fit(session.effects), tab, "fit")
+        else:
+            main_button("Where does it fail?", lambda: tab.go("compare"), tab, "to-compare")
+    for line in found["warnings"]:
+        remark("odd", line.split(": ", 1)[-1])
+    for line in found["exact"]:
+        remark("odd", line.split(": ", 1)[-1])
+
+
+def _misfit(tab: "Tab") -> str:
+    results = tab.session.results
+    if results.fit is None:
+        return ""
+    motions = (results.live or results.fit)["motions"]
+    misfits = [one["misfit"] for one in motions if one["misfit"] is not None]
+    rms = (sum(m**2 for m in misfits) / len(misfits)) ** 0.5 if misfits else 0.0
+    return f"The model misses the points by {rms:.3g} times the noise."
+
+
+def _parameter(tab: "Tab", one: Mapping[str, Any], values: dict[str, float]) -> None:
+    unit = "" if one["unit"] == "1" else f" {one['unit']}"
+    is_known = one["identified"]
+    with ui.element("div").classes("parameter" + ("" if is_known else " unknown")):
+        ui.label(one["name"]).classes("name")
+        with ui.element("div").classes("value"):
+            ui.label(f"{number(one['mean'], one['sd'])}{unit}")
+            interval = f"{number(one['q025'], one['sd'])} to {number(one['q975'], one['sd'])}"
+            ui.label(interval if is_known else "not determined by this clip").classes("small soft")
+        if one["kind"] != "parameters":
+            ui.label("follows from the others").classes("small soft")
+            return
+        start = values.get(one["name"], one["mean"])
+        slider = ui.slider(min=one["low"], max=one["high"], value=start, step=one["step"])
+        slider.props(f'label data-slider="{one["name"]}" aria-label="{one["name"]}"')
+        slider.on(
+            "update:model-value",
+            lambda event: _move(tab, values, one["name"], event.args),
+            throttle=0.06,
+        )
+
+
+def _move(tab: "Tab", values: dict[str, float], name: str, value: Any) -> None:
+    values[name] = float(value)
+    tab.session.move_model(values)
+
+
+def _back(tab: "Tab") -> None:
+    tab.session.put_back()
+    tab.drawn = None  # the sliders, too
+    tab.redraw()

@@ -1,0 +1,145 @@
+"""Marks: everything in the first frame that the program must know, to be dragged; and `Check`."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import SIZE_MEANING
+from galileo_jax.studio.marks import ObjectMark, without_object
+from galileo_jax.studio.panels.parts import (
+    main_button,
+    on_entered,
+    on_number,
+    plain_button,
+    remark,
+    title,
+)
+
+if TYPE_CHECKING:
+    from galileo_jax.studio.page import Tab
+
+
+def build(tab: "Tab") -> None:
+    """The panel."""
+    session = tab.session
+    sheet = session.sheet
+    if sheet is None:
+        return
+    title("Marks")
+    marks = sheet.marks
+    fields: dict[str, Any] = {}
+    shown: dict[str, Any] = {}
+    with ui.element("div").classes("rowline"):
+        scene = ui.select(sorted(SCENARIOS), value=marks.scenario, label="scenario")
+        scene.props("outlined dense options-dense").style("min-width: 130px")
+        scene.on_value_change(lambda event: _mark(tab, scenario=event.value))
+        stick = ui.number("stick, m", value=marks.stick_m, min=0)
+        stick.props("outlined dense data-stick step=any").style("width: 120px")
+        on_number(stick, lambda value: _mark(tab, stick_m=value or None))
+    for one in marks.objects:
+        fields[one.name] = _object(tab, one)
+    with ui.element("div").classes("rowline"):
+        text = "Click on the object" if tab.placing else "Add object"
+        plain_button(text, lambda: _place(tab), "add-object")
+        plain_button("Propose", session.propose, "propose", session.job is None)
+    title("Check")
+    place = ui.element("div").style("display: contents")
+
+    def refresh() -> None:
+        """The rest of the panel stays, so that nothing is swept away while somebody types."""
+        sheet = session.sheet
+        if sheet is None:
+            return
+        stick.set_value(sheet.marks.stick_m)
+        for one in sheet.marks.objects:
+            fields[one.name].set_value(_text(one.size_m))
+        now = (sheet.remarks, sheet.is_complete, session.job is None)
+        if now == shown.get("check"):
+            return  # a button that is about to be pressed stays where it is
+        shown["check"] = now
+        place.clear()
+        with place:
+            _check(tab)
+
+    tab.refresh = refresh
+    refresh()
+
+
+def drawn(tab: "Tab") -> Any:
+    """While this is the same, `Tab.refresh` is enough to show what has changed."""
+    session, sheet = tab.session, tab.session.sheet
+    if tab.stage != "marks" or sheet is None:
+        return None
+    objects = tuple((one.name, one.shape) for one in sheet.marks.objects)
+    said = (session.error, session.note, session.job is None, session.chosen, session.active)
+    return (sheet.marks.scenario, objects, tab.placing, said)
+
+
+def _check(tab: "Tab") -> None:
+    sheet = tab.session.sheet
+    assert sheet is not None
+    for one in sheet.remarks:
+        remark(one.kind, one.sentence)
+    if sheet.is_complete:
+        remark("fine", "Nothing is missing: the clip can be tracked.")
+        main_button("Track", lambda: _track(tab), tab, "track")
+
+
+def _text(size: tuple[float, ...] | None) -> str:
+    return " ".join(f"{side:g}" for side in size or ())
+
+
+def _object(tab: "Tab", one: ObjectMark) -> Any:
+    """A row of the list; returns the field of its size."""
+    name = one.name
+    with ui.element("div").classes("rowline").style("flex-wrap: nowrap"):
+        ui.label(name).style("font-weight: 600; min-width: 68px")
+        shape = ui.select(list(SIZE_MEANING), value=one.shape).props("outlined dense options-dense")
+        shape.style("min-width: 96px")
+        shape.on_value_change(lambda event: _change(tab, name, shape=event.value, size_m=None))
+        size = ui.input(label="size, m", value=_text(one.size_m), placeholder="if known")
+        meaning = f"{SIZE_MEANING[one.shape]}, m"
+        size.props(f'outlined dense title="{meaning}" data-size={name}').style("flex: 1")
+        on_entered(size, lambda text: _size(tab, name, text))
+        drop = ui.button(icon="close", color=None, on_click=lambda: _drop(tab, name))
+        drop.props(f'flat round aria-label="Remove {name}"').classes("icon")
+    return size
+
+
+def _size(tab: "Tab", name: str, text: str) -> None:
+    try:
+        size = tuple(float(part) for part in text.replace(",", " ").split())
+    except ValueError:
+        tab.session.error = f"{name}: {text[:30]!r} is no size; metres expected"
+        tab.redraw()
+        return
+    _change(tab, name, size_m=size or None)
+
+
+def _change(tab: "Tab", name: str, **given: Any) -> None:
+    sheet = tab.session.sheet
+    if sheet is not None:
+        objects = tuple(replace(o, **given) if o.name == name else o for o in sheet.marks.objects)
+        tab.mark(replace(sheet.marks, objects=objects))
+
+
+def _drop(tab: "Tab", name: str) -> None:
+    if tab.session.sheet is not None:
+        tab.mark(without_object(tab.session.sheet.marks, name))
+
+
+def _mark(tab: "Tab", **given: Any) -> None:
+    if tab.session.sheet is not None:
+        tab.mark(replace(tab.session.sheet.marks, **given))
+
+
+def _place(tab: "Tab") -> None:
+    tab.placing = not tab.placing
+    tab.redraw()
+
+
+def _track(tab: "Tab") -> None:
+    tab.go("track")
+    tab.session.track()

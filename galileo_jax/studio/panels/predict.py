@@ -1,0 +1,79 @@
+"""Predict and keep: where it stops, exports, and the commands and API lines that do the same."""
+
+import shlex
+from typing import TYPE_CHECKING
+
+from nicegui import ui
+
+from galileo_jax.studio.panels.parts import main_button, plain_button, title
+
+if TYPE_CHECKING:
+    from galileo_jax.studio.page import Tab
+
+SECONDS = 2.0
+
+
+def build(tab: "Tab") -> None:
+    """The panel."""
+    session = tab.session
+    found = session.results.prediction
+    title("Predict")
+    with ui.element("div").classes("rowline"):
+        seconds = ui.number("seconds beyond the clip", value=SECONDS, min=0.1, max=60)
+        seconds.props("outlined dense step=any")
+        main_button(
+            "Predict", lambda: session.predict(float(seconds.value or SECONDS)), tab, "predict"
+        )
+    if found is not None:
+        for line in found["sentences"]:
+            ui.label(line.strip()).style("margin-left: 14px" if line.startswith(" ") else "")
+        if session.states["predict"] == "done" and len(session.chosen) == 1:
+            version = session.versions["results"]
+            ui.html(
+                f'<img class="still" src="/still/{session.trials.name}?{version}" '
+                'alt="the last frame, and where the objects come to rest">',
+                sanitize=False,
+            )
+    title("Keep")
+    with ui.element("div").classes("rowline"):
+        for kind in ("csv", "netcdf"):
+            plain_button(
+                kind, lambda kind=kind: session.export(kind), f"export-{kind}", session.job is None
+            )
+    ui.label(f"runs/{session.trials.name}/report.html").classes("soft small")
+    ui.label("The same in the terminal").classes("small soft")
+    ui.label(_commands(tab)).classes("code").props("data-commands")
+    ui.label("The same in Python").classes("small soft")
+    ui.label(_lines(tab)).classes("code").props("data-lines")
+
+
+def _commands(tab: "Tab") -> str:
+    session = tab.session
+    clips, effects = shlex.join(session.trials.files), ",".join(session.effects)
+    added = f" --effects {effects}" if effects else ""
+    run = shlex.quote(f"runs/{session.trials.name}")
+    lines = [f"cd {shlex.quote(str(session.root))}"]
+    if session.results.diagnosis is not None:
+        lines.append(f"galileo diagnose {clips} --add none")
+    lines += [f"galileo fit {clips}{added}", f"galileo compare {run}"]
+    if len(session.chosen) == 1:
+        lines.append(f"galileo predict {run} --seconds {SECONDS:g}")
+    return "\n".join(lines)
+
+
+def _lines(tab: "Tab") -> str:
+    session = tab.session
+    files = session.trials.files
+    clips = repr(files[0]) if len(files) == 1 else repr(files)
+    run = f"runs/{session.trials.name}"
+    effects = f", effects={list(session.effects)!r}" if session.effects else ""
+    lines = ["import galileo_jax as gx", ""]
+    if session.results.diagnosis is not None:
+        lines.append(f"found = gx.diagnose({clips}, add='none')")
+    lines += [
+        f"fit = gx.fit({clips}{effects}).save({run!r})",
+        "check = gx.compare(fit)",
+    ]
+    if len(files) == 1:
+        lines.append(f"ahead = gx.predict(fit, seconds={SECONDS:g})")
+    return "\n".join(lines)

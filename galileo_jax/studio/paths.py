@@ -1,0 +1,59 @@
+"""Which files the studio touches: only those below the folder that it was opened on."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.runtime.errors import InputError
+
+VIDEOS = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".mts", ".3gp")
+NAME = re.compile(r"[\w][\w .()+-]{0,79}", re.UNICODE)
+
+
+def below(root: Path, *parts: str | Path) -> Path:
+    """A path below `root`, links resolved.
+
+    Raises:
+      InputError: it leads out of the folder.
+    """
+    root = root.resolve()
+    path = root.joinpath(*parts)
+    if not path.resolve().is_relative_to(root):
+        raise InputError(f"{path.name}: leads out of {root}; files below it expected")
+    return path
+
+
+def safe_name(name: str) -> str:
+    """A file name that stays where it is put.
+
+    Raises:
+      InputError: it has parts of a path, starts with a dot, or is no name.
+    """
+    if not NAME.fullmatch(name) or name.startswith(".") or ".." in name or name != name.strip():
+        raise InputError(f"{name[:60]!r}: no file name; letters, digits, - and _ expected")
+    return name
+
+
+def videos(root: Path) -> dict[str, Path]:
+    """The videos that lie in a folder, by name without suffix; links out of it are left out."""
+    found: dict[str, Path] = {}
+    for path in sorted(root.iterdir()):
+        is_video = path.suffix.lower() in VIDEOS and not path.name.startswith(".")
+        if not is_video or path.stem in found or not NAME.fullmatch(path.stem):
+            continue
+        if path.is_file() and path.resolve().is_relative_to(root.resolve()):
+            found[path.stem] = path
+    return found
+
+
+def check_declared(root: Path, folder: Path, content: Mapping[str, Any]) -> None:
+    """Refuses a yaml that names files outside of the folder.
+
+    Raises:
+      InputError: names the key.
+    """
+    for key in ("video", "track"):
+        value = content.get(key)
+        if isinstance(value, str) and not (folder / value).resolve().is_relative_to(root.resolve()):
+            raise InputError(f"{key}: {value[:60]} leads out of {root}; a file below it expected")

@@ -1,0 +1,168 @@
+"""The server: this machine only, behind the guard, with the page, the frames and uploads."""
+
+import asyncio
+import contextlib
+import secrets
+import signal
+import socket
+import webbrowser
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.studio.guard import Guard
+from galileo_jax.studio.paths import VIDEOS
+from galileo_jax.studio.session import Session
+from galileo_jax.studio.upload import LARGEST_BYTES, receive
+
+HOST = "127.0.0.1"
+FIRST_PORT, NUM_PORTS = 8642, 20
+UPLOAD = "/upload/"
+
+
+def serve(
+    source: str | Path = ".",
+    *,
+    port: int | None = None,
+    browser: bool = True,
+    announce: Callable[[str], object] = lambda _: None,
+    largest_upload: int = LARGEST_BYTES,
+) -> None:
+    """Serves the studio until it is interrupted.
+
+    Args:
+      source: a clip, or a folder with clips.
+      port: None: the first free one from 8642 on.
+      browser: whether to open one.
+      announce: is given the address when the server listens.
+      largest_upload: bytes.
+
+    Raises:
+      InputError: there is no such file or folder, the port is taken, or NiceGUI is missing.
+    """
+    root, clip = _source(Path(source))
+    listening = _listening(port)
+    number = listening.getsockname()[1]
+    token = secrets.token_urlsafe(24)
+    app, session = make_app(root, clip, number, token, largest_upload)
+    import uvicorn
+
+    config = uvicorn.Config(
+        app, log_level="warning", ws="wsproto",
+        timeout_graceful_shutdown=2, access_log=False, server_header=False,
+    )  # fmt: skip
+    address = f"http://{HOST}:{number}/?token={token}"
+
+    class Server(uvicorn.Server):
+        async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+            await super().startup(sockets)
+            announce(address)
+            if browser:
+                await asyncio.get_running_loop().run_in_executor(None, webbrowser.open, address)
+
+    def stop(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, stop)  # so that the worker is ended in any case
+    try:
+        with contextlib.suppress(KeyboardInterrupt):
+            Server(config).run(sockets=[listening])
+    finally:
+        session.close()
+
+
+def make_app(
+    root: Path, clip: str | None, port: int, token: str, largest_upload: int = LARGEST_BYTES
+) -> tuple[Guard, Session]:
+    """The guarded application, and what its page shows.
+
+    Raises:
+      InputError: NiceGUI is missing.
+    """
+    try:
+        from fastapi import FastAPI, Request
+        from nicegui import core, ui
+        from starlette.responses import PlainTextResponse, Response
+    except ImportError as error:
+        raise InputError(
+            f"galileo studio needs NiceGUI ({error}); pip install 'galileo-jax[studio]'"
+        ) from None
+    from galileo_jax.studio.page import build_page
+
+    core.sio.eio.cors_allowed_origins = [f"http://{HOST}:{port}", f"http://localhost:{port}"]
+    session = Session(root, clip)
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+
+    @app.get("/frame/{name}/{index}")
+    def frame(name: str, index: int) -> Response:
+        picture = session.picture(name, index)
+        if picture is None:
+            return PlainTextResponse("no such frame", 404)
+        caching = {"cache-control": "private, max-age=3600"}
+        return Response(picture, media_type="image/jpeg", headers=caching)
+
+    @app.get("/still/{name}")
+    def still(name: str) -> Response:
+        """The first and the last frame of a prediction."""
+        path = session.trials.run / "first_and_last.png"
+        is_inside = path.is_file() and path.resolve().is_relative_to(session.root)
+        if name != session.trials.name or not is_inside:
+            return PlainTextResponse("no such picture", 404)
+        caching = {"cache-control": "no-store"}
+        return Response(path.read_bytes(), media_type="image/png", headers=caching)
+
+    @app.put(UPLOAD + "{name}")
+    async def upload(name: str, request: Request) -> Response:
+        try:
+            path = await receive(session.root, name, _chunks(request), largest_upload)
+        except InputError as error:
+            return PlainTextResponse(f"{error}\n", 422)
+        session.scan()
+        if path.stem in session.sheets:
+            session.show(path.stem)
+        return PlainTextResponse(f"{path.name} is there\n")
+
+    ui.page("/")(lambda: build_page(session))
+    ui.run_with(
+        app, title="galileo studio", dark=None,
+        storage_secret=None, show_welcome_message=False, reconnect_timeout=10.0, tailwind=False,
+    )  # fmt: skip
+    guard = Guard(app, port=port, token=token, upload_path=UPLOAD, largest_upload=largest_upload)
+    return guard, session
+
+
+async def _chunks(request: Any) -> AsyncIterator[bytes]:
+    async for chunk in request.stream():
+        yield chunk
+
+
+def _source(path: Path) -> tuple[Path, str | None]:
+    """The folder to open, and the clip in it."""
+    if path.is_dir():
+        return path.resolve(), None
+    if not path.exists():
+        raise InputError(f"{path}: no such file or folder")
+    if path.suffix.lower() in (".yaml", ".yml", *VIDEOS):
+        return path.parent.resolve(), path.stem
+    raise InputError(f"{path}: a video, its yaml or a folder with videos expected")
+
+
+def _listening(port: int | None) -> socket.socket:
+    """A socket of this machine alone.
+
+    Raises:
+      InputError: the port is taken.
+    """
+    tried = [port] if port is not None else range(FIRST_PORT, FIRST_PORT + NUM_PORTS)
+    for number in tried:
+        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listening.bind((HOST, number))
+        except (OSError, OverflowError):
+            listening.close()
+            continue
+        return listening
+    taken = f"{tried[0]}" if port is not None else f"{FIRST_PORT} to {FIRST_PORT + NUM_PORTS - 1}"
+    raise InputError(f"--port: {taken} is taken or no port; give another")

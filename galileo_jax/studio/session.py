@@ -1,0 +1,456 @@
+"""What all tabs look at: the clips, their marks, the results, and the job that runs."""
+
+import asyncio
+import itertools
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.studio import results
+from galileo_jax.studio.frames import Frames
+from galileo_jax.studio.jobs import Message, Worker
+from galileo_jax.studio.marks import Marks, proposed
+from galileo_jax.studio.paths import videos
+from galileo_jax.studio.sheet import Sheet, changed, opened, redone, undone
+from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
+from galileo_jax.studio.store import Store
+
+MOST_AT_ONCE = 12  # videos of a folder that are decoded before the page opens
+MOST_FRAMES = 4  # clips whose frames are held
+
+
+@dataclass(frozen=True)
+class Job:
+    """The job that runs."""
+
+    task: str
+    stage: str = "starting"
+    share: float = 0.0
+    is_cancelled: bool = False
+
+
+@dataclass(frozen=True)
+class Results:
+    """Views of what was computed for the chosen clips; None: not there."""
+
+    tracks: Mapping[str, Any]
+    fit: Mapping[str, Any] | None = None
+    live: Mapping[str, Any] | None = None  # the model at the sliders
+    compare: Mapping[str, Any] | None = None
+    diagnosis: Mapping[str, Any] | None = None  # diagnosis.json, with sentence and curves
+    candidates: tuple[Mapping[str, Any], ...] = ()  # as they stream in
+    rounds: tuple[Mapping[str, Any], ...] = ()
+    prediction: Mapping[str, Any] | None = None
+
+
+class Session:
+    """State of the studio; all of it is changed in the server's loop.
+
+    Args:
+      root: the folder that was opened.
+      clip: which of its clips is shown first; None: the first.
+    """
+
+    def __init__(self, root: Path, clip: str | None = None):
+        self.root, self.store = root.resolve(), Store(root)
+        self.sheets: dict[str, Sheet] = {}
+        self.broken: dict[str, str] = {}
+        self.active = ""
+        self.chosen: tuple[str, ...] = ()
+        self.job: Job | None = None
+        self.error = ""
+        self.note = ""
+        self.results = Results({})
+        self.versions: Counter[str] = Counter()
+        self._frames: dict[str, Frames] = {}
+        self._next: list[Callable[[], None]] = []
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._asked: Mapping[str, float] | None = None  # the sliders, while an answer is awaited
+        self._waiting: Mapping[str, float] | None = None
+        self._ids = itertools.count()
+        self._context: dict[str, Any] = {}
+        self.worker = Worker(str(self.root), self._from_worker)
+        self._unopened: dict[str, Path] = {}
+        self.scan()
+        self.show(clip if clip in self.names else next(iter(self.names), ""))
+
+    # clips
+
+    def scan(self) -> None:
+        """Looks at the folder again; a video is decoded once to know it, the first ones now."""
+        for name, path in videos(self.root).items():
+            if name in self.sheets:
+                continue
+            self._unopened[name] = path
+            if len(self.sheets) < MOST_AT_ONCE:
+                self._open(name)
+        self._changed("clips")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all clips that can be shown."""
+        return tuple(sorted({*self.sheets, *self._unopened}))
+
+    def show(self, name: str) -> None:
+        """Turns to one clip, alone."""
+        if self._open(name):
+            self.active, self.chosen = name, (name,)
+            self._reopen()
+
+    def _open(self, name: str) -> bool:
+        path = self._unopened.pop(name, None)
+        if path is not None:
+            try:
+                self.sheets[name] = opened(self.root, path, self.store)
+                self.broken.pop(name, None)
+            except InputError as error:
+                self.broken[name] = str(error).replace(f"{path}: ", "")
+                self._changed("clips")
+        return name in self.sheets
+
+    def choose(self, names: tuple[str, ...]) -> None:
+        """Which clips are trials of the same objects; the active one is among them."""
+        chosen = tuple(name for name in self.names if name in names and self._open(name))
+        if chosen:
+            self.chosen = chosen
+            self.active = self.active if self.active in chosen else chosen[0]
+            self._reopen()
+
+    def look_at(self, name: str) -> None:
+        """Which of the chosen clips is drawn."""
+        if name in self.chosen and name != self.active:
+            self.active = name
+            self._changed("clips", "marks", "results")
+
+    @property
+    def sheet(self) -> Sheet | None:
+        """The active clip's."""
+        return self.sheets.get(self.active)
+
+    @property
+    def trials(self) -> Trials:
+        """The chosen clips."""
+        return Trials(self.root, tuple(self.sheets[name] for name in self.chosen))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Of the fitted model."""
+        return tuple(self.results.fit["effects"]) if self.results.fit else ()
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Of effects of one's own that the last diagnosis was asked to try."""
+        found = self.store.get("runs", self.trials.name).get("files", ())
+        return tuple(str(name) for name in found if (self.root / str(name)).is_file())
+
+    @property
+    def states(self) -> dict[str, State]:
+        """Of the seven stages."""
+        return states(self.trials, self.store, self.effects)
+
+    def picture(self, name: str, index: int) -> bytes | None:
+        """A frame of a clip, JPEG."""
+        if name not in self.sheets:
+            return None
+        if name not in self._frames:
+            while len(self._frames) >= MOST_FRAMES:
+                self._frames.pop(next(iter(self._frames)))
+            self._frames[name] = Frames(self.sheets[name].video)
+        return self._frames[name].picture(index)
+
+    # marks
+
+    def mark(self, marks: Marks) -> None:
+        """Draws, and writes it to the yaml at once."""
+        self._set_sheet(lambda sheet: changed(sheet, marks, self.store))
+
+    def undo(self) -> None:
+        """One step of the active clip's marks back."""
+        self._set_sheet(lambda sheet: undone(sheet, self.store))
+
+    def redo(self) -> None:
+        """And forth."""
+        self._set_sheet(lambda sheet: redone(sheet, self.store))
+
+    def _set_sheet(self, change: Callable[[Sheet], Sheet]) -> None:
+        if self.sheet is None:
+            return
+        try:
+            self.sheets[self.active] = change(self.sheet)
+            self.error = ""
+        except (InputError, OSError) as error:
+            self.error = " ".join(str(error).split())
+        self._changed("marks", "job")
+
+    # jobs
+
+    def propose(self) -> None:
+        """Looks for the objects and the ramp of a clip that has no marks."""
+        if self.sheet is not None:
+            self._start("propose", video=self.sheet.video.name)
+
+    def track(self) -> None:
+        """Tracks the chosen clips."""
+        self._start("track", clips=self.trials.files)
+
+    def fit(self, effects: tuple[str, ...] = ()) -> None:
+        """Fits a model with these effects, then compares it with the data."""
+        trials, files = self.trials, self.files if effects else ()
+        self._start(
+            "fit",
+            clips=trials.files,
+            run=self._run,
+            effects=list(effects),
+            effects_from=list(files),
+            of=trials.made_of(list(files)),
+        )
+        self._next = [self.compare]
+
+    def compare(self) -> None:
+        """Where does the model fail?"""
+        self._start("compare", run=self._run)
+
+    def diagnose(self, files: tuple[str, ...] = ()) -> None:
+        """Which effect is missing?"""
+        entry = self.store.get("runs", self.trials.name)
+        self.store.put("runs", self.trials.name, entry | {"files": list(files)})
+        self._set_results(candidates=(), diagnosis=None)
+        self._start("diagnose", clips=self.trials.files, run=self._run, effects_from=list(files))
+
+    def predict(self, seconds: float) -> None:
+        """Where does it go?"""
+        self._start("predict", run=self._run, seconds=seconds)
+
+    def export(self, to: str) -> None:
+        """Writes the run for other programs."""
+        self._start("export", run=self._run, to=to)
+
+    def cancel(self) -> None:
+        """Stops the job between two batches."""
+        if self.job is not None:
+            self._next = []
+            self.job = replace(self.job, is_cancelled=True)
+            self.worker.cancel()
+            self._changed("job")
+
+    def move_model(self, values: Mapping[str, float]) -> None:
+        """Puts the model's parameters somewhere else; the last of many wins."""
+        if self._asked is not None:
+            self._waiting = dict(values)
+        elif self.results.fit is not None:
+            self._asked = dict(values)
+            self.worker.ask("simulate", run=self._run, values=self._asked)
+
+    def close(self) -> None:
+        """Ends the worker."""
+        self.worker.close()
+
+    @property
+    def _run(self) -> str:
+        return str(self.trials.run.relative_to(self.root))
+
+    def _start(self, task: str, **given: Any) -> None:
+        if self.job is not None:
+            self.error = "Something is being computed; cancel it, or wait."
+            self._changed("job")
+            return
+        self._loop = self._loop or asyncio.get_running_loop()
+        self._next = []
+        try:
+            self.trials.run.resolve().relative_to(self.root)
+            self.worker.start(task, **given)
+        except (RuntimeError, ValueError) as error:
+            self.error = f"{task}: {error}"
+            self._changed("job")
+            return
+        trials = self.trials
+        marks = {sheet.name: track_mark(sheet) for sheet in trials.sheets}
+        effects = tuple(given.get("effects", self.effects))
+        self._context = {
+            "trials": trials, "tracks": marks, "clip": self.active,
+            "of": {"marks": trials.made_of(), "model": trials.made_of(effects)},
+        }  # fmt: skip
+        self.job, self.error, self.note = Job(task), "", ""
+        self._changed("job")
+
+    def _from_worker(self, message: Message) -> None:
+        if self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._receive, message)
+
+    def _receive(self, message: Message) -> None:
+        if message.task in ("simulate", "open_run"):
+            self._answered(message)
+        elif message.kind == "progress":
+            stage, share = message.content
+            if self.job is not None:
+                self.job = replace(self.job, stage=stage, share=share)
+                self._changed("job")
+        elif message.kind == "partial":
+            self._partial(message.content)
+        else:
+            self._ended(message)
+
+    def _partial(self, content: Mapping[str, Any]) -> None:
+        if self._context["trials"].name != self.trials.name:
+            return
+        if "track" in content:
+            view = content["track"]
+            self._set_results(tracks={**self.results.tracks, view["clip"]: view})
+        elif "fit" in content:
+            self._set_results(fit=content["fit"], live=None)
+        elif "compare" in content:
+            self._set_results(compare=content["compare"])
+        elif "candidate" in content:
+            row = content["candidate"]
+            others = [c for c in self.results.candidates if c["effect"] != row["effect"]]
+            ranked = sorted([*others, row], key=lambda c: -float(c.get("score") or 0.0))
+            self._set_results(candidates=tuple(ranked))
+        elif "verdict" in content:
+            found = content["verdict"]
+            self._set_results(diagnosis={**found["document"], **_without(found, "document")})
+
+    def _ended(self, message: Message) -> None:
+        follow, self._next, self.job = self._next, [], None
+        if message.kind == "done":
+            self._record(message.task, message.content)
+            for action in follow:
+                action()
+        elif message.kind == "cancelled":
+            self.note = "Cancelled; what was finished before is kept."
+        else:
+            self.error = str(message.content)
+        self._changed("job", "clips")
+
+    def _record(self, task: str, content: Mapping[str, Any]) -> None:
+        """Remembers what a result was made of, and shows it."""
+        trials: Trials = self._context["trials"]
+        of = self._context["of"]
+        if task == "propose":
+            self._propose(content["proposal"])
+            return
+        if task == "track":
+            for sheet in trials.sheets:
+                entry = self.store.get("clips", sheet.name)
+                path = track_files(sheet) / "track_px.csv"
+                mark = made(path, self._context["tracks"][sheet.name])
+                self.store.put("clips", sheet.name, entry | {"tracked": mark})
+            self._changed("results")
+            return
+        if task == "export":
+            self.note = "Written: " + ", ".join(content["files"])
+            return
+        entry = self.store.get("runs", trials.name)
+        mark = of["marks"] if task in ("fit", "diagnose") else of["model"]
+        path = trials.run / FILES[task]
+        if path.is_file():
+            entry[task] = made(path, mark)
+        if task == "fit":
+            new = results.round_of(results.document(trials.run / "result.json"))
+            entry["rounds"] = results.with_round(entry.get("rounds", []), new)
+        if task in ("compare", "predict"):
+            key = {"compare": "compare", "predict": "prediction"}[task]
+            entry[f"{task}_view"] = content[key]
+        if task == "compare" and entry.get("rounds"):
+            entry["rounds"][-1]["p_value"] = content["compare"]["p_value"]
+        if task == "diagnose":
+            entry["diagnose_view"] = content["diagnosis"]
+        self.store.put("runs", trials.name, entry)
+        if trials.name == self.trials.name:
+            self._show_stored()
+
+    def _propose(self, found: Mapping[str, Any]) -> None:
+        sheet = self.sheets.get(self._context["clip"])
+        if sheet is None or sheet.is_drawn:
+            return
+        marks = proposed(found, sheet.info.size_px)
+        self.sheets[sheet.name] = changed(sheet, marks, self.store)
+        self.note = " ".join(found.get("doubts", ()))
+        self._changed("marks")
+
+    def _answered(self, message: Message) -> None:
+        if message.kind == "progress":
+            return
+        if message.task == "open_run":
+            if message.kind == "done" and self.results.fit is None:
+                self._set_results(fit=message.content["fit"])
+            elif message.kind == "error":
+                self.error = str(message.content)
+                self._changed("job")
+            return
+        self._asked, waiting, self._waiting = None, self._waiting, None
+        if message.kind == "done":
+            self._set_results(live=message.content)
+        if waiting is not None:
+            self.move_model(waiting)
+
+    # results
+
+    def put_back(self) -> None:
+        """The model at its best fit again."""
+        self._set_results(live=None)
+
+    def _reopen(self) -> None:
+        """Shows what lies in the folder for the clips that are chosen now."""
+        tracks = {}
+        for sheet in self.trials.sheets:
+            view = results.pixel_track(track_files(sheet) / "track_px.csv")
+            if view is not None:
+                tracks[sheet.name] = {**view, "clip": sheet.name}
+        self.results = Results(tracks)
+        self._show_stored()
+        self._changed("clips", "marks", "results", "job")
+
+    def _show_stored(self) -> None:
+        run = self.trials.run
+        entry = self.store.get("runs", self.trials.name)
+        found = results.document(run / FILES["diagnose"])
+        diagnosis = {"curves": {}, "sentence": "", **found, **entry.get("diagnose_view", {})}
+        self._set_results(
+            compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
+            prediction=entry.get("predict_view") if (run / FILES["predict"]).is_file() else None,
+            diagnosis=diagnosis if found else None,
+            candidates=tuple(found.get("candidates", ())),
+            rounds=tuple(self._rounds(entry.get("rounds") or list(found.get("history", ())))),
+        )
+
+    def _rounds(self, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """With that of the fit that lies there, whoever made it."""
+        try:
+            last = results.round_of(results.document(self.trials.run / FILES["fit"]))
+        except (KeyError, TypeError):
+            return known
+        is_last = bool(known) and set(known[-1]["effects"]) == set(last["effects"])
+        return known if is_last else results.with_round(known, last)
+
+    def open_run(self, is_pressed: bool = False) -> None:
+        """Loads the chosen clips' fit, if there is one.
+
+        One whose effects come from a program is loaded only where somebody has pressed for it.
+        """
+        run = self.trials.run
+        if self.results.fit is not None or not (run / "result.json").is_file():
+            return
+        self._loop = self._loop or asyncio.get_running_loop()
+        try:
+            results.check_run(self.root, run, may_run=is_pressed)
+        except InputError as error:
+            self.error = " ".join(str(error).split())
+            self._changed("job")
+            return
+        self.worker.ask("open_run", run=os.path.relpath(run, self.root))
+
+    def _set_results(self, **given: Any) -> None:
+        self.results = replace(self.results, **given)
+        self._changed("live" if set(given) == {"live"} else "results")
+
+    def _changed(self, *parts: str) -> None:
+        for part in parts:
+            self.versions[part] += 1
+
+
+def _without(found: Mapping[str, Any], key: str) -> dict[str, Any]:
+    return {name: value for name, value in found.items() if name != key}

@@ -1,0 +1,229 @@
+"""One clip being marked: its marks, undo and redo, each step on disk before it is shown."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.api.label import label
+from galileo_jax.clip.label import updated_file
+from galileo_jax.clip.load import check_clip
+from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.runtime.atomic_write import write_text
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.studio.check import Remark, remarks_on
+from galileo_jax.studio.marks import Marks, blank, declared, from_json, labels, to_json
+from galileo_jax.studio.paths import check_declared
+from galileo_jax.studio.store import Store, yaml_content
+from galileo_jax.video.decode import VideoInfo, probe
+
+MOST_STEPS = 60  # that can be undone
+
+
+@dataclass(frozen=True)
+class Step:
+    """Marks, the yaml that says so, and what was wrong with it.
+
+    Attributes:
+      marks: as drawn.
+      yaml: the text of NAME.yaml then; None: there was none.
+      problem: why these marks could not be written to it; None: they are what it says.
+    """
+
+    marks: Marks
+    yaml: str | None
+    problem: str | None = None
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A clip with its marks.
+
+    Attributes:
+      root: the folder that was opened.
+      video: the clip's.
+      info: of the video.
+      present: the marks now.
+      past, future: what undo and redo lead to, the nearest last.
+      is_drawn: whether a person or a proposal has drawn anything yet.
+    """
+
+    root: Path
+    video: Path
+    info: VideoInfo
+    present: Step
+    past: tuple[Step, ...] = ()
+    future: tuple[Step, ...] = ()
+    is_drawn: bool = True
+
+    @property
+    def name(self) -> str:
+        """The clip's, without suffix."""
+        return self.video.stem
+
+    @property
+    def yaml(self) -> Path:
+        """Where what is declared is written."""
+        return self.video.with_suffix(".yaml")
+
+    @property
+    def marks(self) -> Marks:
+        """As drawn now."""
+        return self.present.marks
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is missing or odd."""
+        if not self.is_drawn:
+            return (Remark("missing", "Nothing is marked yet."),)
+        return remarks_on(self.marks, self.info.container_fps, self.present.problem)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the clip can be tracked."""
+        return self.yaml.is_file() and all(one.kind != "missing" for one in self.remarks)
+
+
+def opened(root: Path, video: Path, store: Store) -> Sheet:
+    """A clip as it was left: its yaml, and the marks that were drawn for it.
+
+    Raises:
+      InputError: the video does not decode, or the yaml names a file outside the folder.
+    """
+    info = probe(video)
+    path = video.with_suffix(".yaml")
+    text = _read(path)
+    content = yaml_content(path)
+    check_declared(root, video.parent, content)
+    entry = store.get("clips", video.stem)
+    present = _step(entry.get("present"))
+    past, future = _steps(entry.get("past")), _steps(entry.get("future"))
+    if present is not None and present.yaml == text:
+        return Sheet(root, video, info, present, past, future)
+    found = _of_yaml(content, info)
+    if text is not None and found is not None:  # somebody else has written it meanwhile
+        before = () if present is None else (*past, present)
+        return Sheet(root, video, info, Step(found, text), before)
+    problem = None
+    if text is not None:
+        problem = _problem_of(path)
+    empty = blank(info.container_fps or 30.0, info.size_px)
+    return Sheet(root, video, info, Step(empty, text, problem), is_drawn=text is not None)
+
+
+def changed(sheet: Sheet, marks: Marks, store: Store) -> Sheet:
+    """The sheet with other marks, written to the yaml where they are valid."""
+    if marks == sheet.marks and sheet.is_drawn:
+        return sheet
+    problem = _write(sheet, marks)
+    step = Step(marks, _read(sheet.yaml), problem)
+    past = (*sheet.past, sheet.present)[-MOST_STEPS:] if sheet.is_drawn else sheet.past
+    return _stored(replace(sheet, present=step, past=past, future=(), is_drawn=True), store)
+
+
+def undone(sheet: Sheet, store: Store) -> Sheet:
+    """One step back; the yaml is what it was then, comments included."""
+    if not sheet.past:
+        return sheet
+    *past, step = sheet.past
+    future = (*sheet.future, sheet.present)
+    return _restored(replace(sheet, present=step, past=tuple(past), future=future), store)
+
+
+def redone(sheet: Sheet, store: Store) -> Sheet:
+    """One step forth again."""
+    if not sheet.future:
+        return sheet
+    *future, step = sheet.future
+    past = (*sheet.past, sheet.present)
+    return _restored(replace(sheet, present=step, past=past, future=tuple(future)), store)
+
+
+def _restored(sheet: Sheet, store: Store) -> Sheet:
+    if sheet.present.yaml is None:
+        sheet.yaml.unlink(missing_ok=True)
+    else:
+        write_text(sheet.yaml, sheet.present.yaml)
+    return _stored(sheet, store)
+
+
+def _write(sheet: Sheet, marks: Marks) -> str | None:
+    """Writes marks to the yaml; what is wrong with them, if they cannot be."""
+    before = None
+    text = _read(sheet.yaml)
+    if text is not None:  # relative to what the yaml says, not to what it refused
+        steps = (sheet.present, *reversed(sheet.past))
+        before = next((s.marks for s in steps if s.yaml == text and s.problem is None), None)
+    try:
+        if before is not None:
+            _remove_objects(sheet, before, marks)
+        if wanted := labels(before, marks):
+            label(sheet.video, **wanted)
+    except InputError as error:
+        return said(error, sheet)
+    return None
+
+
+def _remove_objects(sheet: Sheet, before: Marks, after: Marks) -> None:
+    kept = {one.name for one in after.objects}
+    if all(one.name in kept for one in before.objects):
+        return
+    content = read_mapping(sheet.yaml)
+    content["objects"] = [one for one in content["objects"] if one.get("name") in kept]
+    check_clip(sheet.yaml, content)
+    write_text(sheet.yaml, updated_file(sheet.yaml, content)[0])
+
+
+def said(error: Exception, sheet: Sheet) -> str:
+    """An error without the clip's own path, which the page shows anyway."""
+    text = " ".join(str(error).split())
+    for path in (sheet.yaml, sheet.video, sheet.yaml.name, sheet.video.name):
+        text = text.removeprefix(f"{path}: ")
+    return text[:1].upper() + text[1:]
+
+
+def _stored(sheet: Sheet, store: Store) -> Sheet:
+    entry = {
+        "present": _plain(sheet.present),
+        "past": [_plain(step) for step in sheet.past],
+        "future": [_plain(step) for step in sheet.future],
+    }
+    store.put("clips", sheet.name, store.get("clips", sheet.name) | entry)
+    return sheet
+
+
+def _plain(step: Step) -> dict[str, Any]:
+    return {"marks": to_json(step.marks), "yaml": step.yaml, "problem": step.problem}
+
+
+def _step(entry: Any) -> Step | None:
+    try:
+        return Step(from_json(entry["marks"]), entry["yaml"], entry["problem"])
+    except (KeyError, TypeError, ValueError, IndexError):
+        return None
+
+
+def _steps(entries: Any) -> tuple[Step, ...]:
+    found = [_step(one) for one in entries] if isinstance(entries, list) else []
+    return tuple(step for step in found if step is not None)
+
+
+def _of_yaml(content: dict[str, Any], info: VideoInfo) -> Marks | None:
+    try:
+        return declared(content, info.size_px, info.container_fps or 30.0)
+    except (KeyError, TypeError, ValueError, IndexError):
+        return None
+
+
+def _problem_of(path: Path) -> str:
+    try:
+        read_mapping(path)
+    except InputError as error:
+        return str(error)
+    return f"{path.name}: not a clip's yaml"
+
+
+def _read(path: Path) -> str | None:
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError):
+        return None

@@ -1,0 +1,134 @@
+"""The seven stages: which are done, which are out of date, which wait for another."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from galileo_jax.studio.sheet import Sheet
+from galileo_jax.studio.store import Store, fingerprint, yaml_content
+
+State = Literal["locked", "open", "done", "stale"]
+
+STAGES = {
+    "video": "Video",
+    "marks": "Marks",
+    "track": "Track",
+    "fit": "Fit",
+    "compare": "Where it fails",
+    "diagnose": "What is missing",
+    "predict": "Predict",
+}
+FILES = {
+    "fit": "result.json",
+    "compare": "compare/compare.json",
+    "diagnose": "diagnosis/diagnosis.json",
+    "predict": "prediction.json",
+}
+
+
+@dataclass(frozen=True)
+class Trials:
+    """The clips that are fitted together, and where their results lie.
+
+    Attributes:
+      root: the folder that was opened.
+      sheets: of the clips, in their order.
+    """
+
+    root: Path
+    sheets: tuple[Sheet, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the run, as the commands name it."""
+        return "+".join(sheet.name for sheet in self.sheets)
+
+    @property
+    def run(self) -> Path:
+        """The folder of the run."""
+        return self.root / "runs" / self.name
+
+    @property
+    def files(self) -> list[str]:
+        """The clips as a command is given them, in the folder."""
+        return [sheet.video.name for sheet in self.sheets]
+
+    def made_of(self, *more: Any) -> str:
+        """What tells results of these marks from those of others."""
+        return fingerprint([yaml_content(sheet.yaml) for sheet in self.sheets], *more)
+
+
+def track_files(sheet: Sheet) -> Path:
+    """The folder that `galileo track` writes by default."""
+    return sheet.root / f"{sheet.name}_track"
+
+
+def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, State]:
+    """The state of every stage, from the files that are there.
+
+    Args:
+      trials: the clips.
+      store: which marks results were made of; a result without an entry, of a command, is up to
+        date where it is younger than the yaml.
+      effects: of the fitted model.
+    """
+    found: dict[str, State] = {"video": "done" if trials.sheets else "open"}
+    complete = bool(trials.sheets) and all(sheet.is_complete for sheet in trials.sheets)
+    found["marks"] = "locked" if not trials.sheets else "done" if complete else "open"
+    marks = trials.made_of() if complete else ""
+    entry = store.get("runs", trials.name)
+    fit = _state(trials, "fit", entry, marks)
+    tracked = [_track_state(sheet, store) for sheet in trials.sheets]
+    if not complete:
+        found["track"] = "locked"
+    else:
+        found["track"] = "open" if "open" in tracked else "stale" if "stale" in tracked else "done"
+    is_tracked = found["track"] == "done" or fit == "done"
+    found["fit"] = fit if is_tracked or fit == "stale" else "locked"
+    model = trials.made_of(effects) if complete else ""
+    has_fit = found["fit"] in ("done", "stale")
+    found["compare"] = _state(trials, "compare", entry, model) if has_fit else "locked"
+    found["diagnose"] = _state(trials, "diagnose", entry, marks) if has_fit else "locked"
+    found["predict"] = _state(trials, "predict", entry, model) if has_fit else "locked"
+    if found["fit"] == "stale":
+        for stage in ("compare", "predict"):
+            if found[stage] == "done":
+                found[stage] = "stale"
+    return found
+
+
+def track_mark(sheet: Sheet) -> str:
+    """What a track was made of."""
+    return fingerprint(yaml_content(sheet.yaml))
+
+
+def _track_state(sheet: Sheet, store: Store) -> State:
+    path = track_files(sheet) / "track_px.csv"
+    if not path.is_file():
+        return "open"
+    made = store.get("clips", sheet.name).get("tracked")
+    return _fresh(path, made, track_mark(sheet), (sheet,))
+
+
+def _state(trials: Trials, stage: str, entry: dict[str, Any], now: str) -> State:
+    path = trials.run / FILES[stage]
+    if not path.is_file():
+        return "open"
+    fit = trials.run / FILES["fit"]
+    of_fit = (fit,) if stage in ("compare", "predict") and fit.is_file() else ()
+    return _fresh(path, entry.get(stage), now, trials.sheets, of_fit)
+
+
+def _fresh(
+    path: Path, made: Any, now: str, sheets: tuple[Sheet, ...], more: tuple[Path, ...] = ()
+) -> State:
+    if isinstance(made, dict) and made.get("at") == path.stat().st_mtime_ns:
+        return "done" if made.get("of") == now else "stale"
+    sources = [*more, *(sheet.yaml for sheet in sheets if sheet.yaml.is_file())]
+    youngest = max((one.stat().st_mtime_ns for one in sources), default=0)
+    return "done" if path.stat().st_mtime_ns >= youngest else "stale"
+
+
+def made(path: Path, of: str) -> dict[str, Any]:
+    """An entry of the store: this file was made of that."""
+    return {"of": of, "at": path.stat().st_mtime_ns}

@@ -1,0 +1,154 @@
+"""Results as plain data for the page: lists of numbers, words, and nothing else."""
+
+import math
+from collections.abc import Mapping, Sized
+from typing import Any
+
+import numpy as np
+
+import galileo_jax as gx
+
+MOST_POINTS = 400  # of a curve on the page
+CANDIDATE_POINTS = 90
+SIGMAS, SHARE = 8.0, 0.6  # how far a slider reaches to either side
+STEPS = 100  # at least, on either side
+
+
+def motion_view(motion: gx.Motion) -> dict[str, Any]:
+    """One clip's motion."""
+    return {
+        "clip": motion.clip,
+        "objects": list(motion.objects),
+        "times": numbers(motion.times_s, 5),
+        "x": numbers(motion.measured_m[:, 0], 5),
+        "y": numbers(motion.measured_m[:, 1], 5),
+        "sd_x": numbers(motion.sd_m[:, 0], 6),
+        "white": numbers(motion.residuals, 3),
+        "seen_px": numbers(motion.measured_px, 2),
+        "outlines": [numbers(corners, 2) for corners in motion.outlines_px],
+        **model_view(motion),
+    }
+
+
+def model_view(motion: gx.Motion) -> dict[str, Any]:
+    """What changes in it with the model's parameters."""
+    return {
+        "model_x": numbers(motion.predicted_m[:, 0], 5),
+        "model_y": numbers(motion.predicted_m[:, 1], 5),
+        "model_px": numbers(motion.predicted_px, 2),
+        "turned": numbers(np.degrees(motion.turned_rad), 2),
+        "misfit": round(motion.misfit, 4) if np.isfinite(motion.misfit) else None,
+    }
+
+
+def fit_view(fit: gx.Fit) -> dict[str, Any]:
+    """A fit with its motions."""
+    motions = fit.motions()
+    parameters = [
+        {"name": name, "kind": kind, **entry, **_reach(entry)}
+        for kind in ("parameters", "derived")
+        for name, entry in fit.result[kind].items()
+    ]
+    return {
+        "effects": list(fit.effects),
+        "parameters": parameters,
+        "error": dict(fit.result["error"]),
+        "status": fit.result.get("status", ""),
+        "warnings": list(fit.warnings),
+        "exact": list(fit.taken_as_exact),
+        "motions": [motion_view(motion) for motion in motions],
+    }
+
+
+def track_view(track: gx.Track) -> dict[str, Any]:
+    """A track in pixels."""
+    pixels = track.pixels
+    assert pixels is not None  # of a video
+    variance = np.stack([pixels.covariance_px2[..., i, i] for i in (0, 1)], axis=-1)
+    seen = np.where(pixels.is_visible[..., None], pixels.position_px, np.nan)
+    return {
+        "clip": track.name,
+        "objects": list(pixels.names),
+        "times": numbers(pixels.times_s, 5),
+        "seen_px": numbers(seen, 2),
+        "sd_px": numbers(np.sqrt(variance), 3),
+        "warnings": list(track.warnings),
+    }
+
+
+def comparison_view(check: gx.Comparison) -> dict[str, Any]:
+    """Where a model fails, in words."""
+    from galileo_jax.report import diagnosis_text
+
+    stretches = []
+    for one in check.paths:
+        if one.failing_s is None or one.worst is None:
+            continue
+        where = "the whole motion" if one.worst.phase == "whole" else f"phase {one.worst.phase}"
+        stretches.append(
+            {
+                "clip": one.clip,
+                "object": one.index,
+                "start": one.failing_s[0],
+                "end": one.failing_s[1],
+                "sentence": (
+                    f"{one.title} misses the model most from {one.failing_s[0]:.2f} to "
+                    f"{one.failing_s[1]:.2f} s, along {one.worst.axis} ({where}; "
+                    f"z = {one.worst.z:.0f})."
+                ),
+            }
+        )
+    return {
+        "p_value": check.p_value,
+        "is_adequate": check.is_adequate,
+        "sentence": diagnosis_text.adequacy(check.found, check.fit.effects),
+        "stretches": stretches,
+    }
+
+
+def diagnosis_view(found: gx.Diagnosis, curves: int = 8) -> dict[str, Any]:
+    """What diagnosis.json does not hold: a sentence, and the curves of the best candidates."""
+    drawn = {}
+    for name in found.candidates["effect"][:curves]:
+        drawn[name] = [_thin(motion) for motion in found.motions(name)]
+    return {"sentence": found.sentence, "curves": drawn}
+
+
+def _thin(motion: gx.Motion) -> dict[str, Any]:
+    step = max(1, -(-len(motion.times_s) // CANDIDATE_POINTS))
+    return {
+        "clip": motion.clip,
+        "times": numbers(motion.times_s[::step], 4),
+        "model_x": numbers(motion.predicted_m[:, 0, ::step], 4),
+        "white": numbers(motion.residuals[:, 0, ::step], 2),
+    }
+
+
+def _reach(entry: Mapping[str, Any]) -> dict[str, float]:
+    """The ends of a parameter's slider, and its steps, which are round numbers."""
+    mean, sd = entry["mean"], entry["sd"]
+    reach = max(SIGMAS * sd, SHARE * abs(mean), 1e-6)
+    step = 10.0 ** math.floor(math.log10(reach / STEPS))
+    low = math.floor((mean - reach) / step) * step
+    if entry["q025"] >= 0:
+        low = max(low, 0.0)
+    return {"low": low, "high": math.ceil((mean + reach) / step) * step, "step": step}
+
+
+def numbers(values: Any, digits: int) -> Any:
+    """An array as nested lists; None for what is not finite, and for no array."""
+    if values is None:
+        return None
+    array = np.round(np.asarray(values, float), digits)
+    return _listed(array)
+
+
+def _listed(array: np.ndarray) -> Any:
+    if array.ndim > 1:
+        return [_listed(row) for row in array]
+    return [float(value) if np.isfinite(value) else None for value in array]
+
+
+def thinned(values: Sized) -> slice:
+    """So that a curve has no more points than a page can show."""
+    return slice(None, None, max(1, -(-len(values) // MOST_POINTS)))

@@ -1,0 +1,160 @@
+"""The jobs: each calls functions of the API, writes what the commands write, and returns a view.
+
+They run in the worker's process, whose working folder is the one that was opened; results that
+are asked for again are kept in its memory.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import galileo_jax as gx
+from galileo_jax.runtime import progress
+from galileo_jax.studio import views
+from galileo_jax.tracking.pixel_csv import write_pixel_csv
+
+Partial = Callable[[Mapping[str, Any]], None]
+
+_fits: dict[str, gx.Fit] = {}  # by run and what it was made of
+_MOST_FITS = 12
+
+
+def propose(*, video: str, partial: Partial) -> dict[str, Any]:
+    """What a video seems to show."""
+    return {"proposal": asdict(gx.propose(video))}
+
+
+def track(*, clips: Sequence[str], partial: Partial) -> dict[str, Any]:
+    """Tracks clips; NAME_track/track_px.csv, and track_m.csv where the scale is known."""
+    shown = []
+    for i, clip in enumerate(clips):
+        with progress.part(i / len(clips), (i + 1) / len(clips)):
+            found = gx.track(clip)
+        folder = Path(f"{Path(clip).stem}_track")
+        folder.mkdir(exist_ok=True)
+        assert found.pixels is not None  # of a video
+        write_pixel_csv(folder / "track_px.csv", found.pixels)
+        if found.clip.pixels_per_metre is not None:
+            found.save(folder / "track_m.csv")
+        view = views.track_view(found)
+        shown.append(view)
+        partial({"track": view})
+    return {"tracks": shown}
+
+
+def fit(
+    *,
+    clips: Sequence[str],
+    run: str,
+    effects: Sequence[str],
+    effects_from: Sequence[str],
+    of: str,
+    partial: Partial,
+) -> dict[str, Any]:
+    """Fits a model, and writes the run as `galileo fit` does."""
+    key = f"{run} {of} {','.join(effects)}"
+    with progress.part(0.0, 0.9):
+        found = _fits.get(key)
+        if found is None:
+            found = gx.fit(list(clips), effects=list(effects), effects_from=list(effects_from))
+    view = views.fit_view(found)
+    partial({"fit": view})
+    progress.report("writing the report", 0.95)
+    _keep(key, run, found.save(run))
+    return {"fit": view}
+
+
+def compare(*, run: str, partial: Partial) -> dict[str, Any]:
+    """Compares a run with its data; RUN/compare."""
+    check = gx.compare(_fit_of(run))
+    view = views.comparison_view(check)
+    partial({"compare": view})
+    progress.report("writing the page", 0.95)
+    check.save(Path(run) / "compare")
+    return {"compare": view}
+
+
+def diagnose(
+    *, clips: Sequence[str], run: str, effects_from: Sequence[str], partial: Partial
+) -> dict[str, Any]:
+    """Asks which effect is missing, adds nothing; RUN/diagnosis."""
+    found = gx.diagnose(list(clips), add="none", effects_from=list(effects_from))
+    view = views.diagnosis_view(found)
+    partial({"verdict": {**view, "document": found.document}})
+    progress.report("writing the page", 0.97)
+    found.save(Path(run) / "diagnosis")
+    return {"diagnosis": view}
+
+
+def predict(*, run: str, seconds: float, partial: Partial) -> dict[str, Any]:
+    """Continues a run beyond its clip; a joint fit's first clip."""
+    fit = _fit_of(run)
+    folder = Path(run) if len(fit.names) == 1 else Path(run) / fit.names[0]
+    ahead = gx.predict(fit if len(fit.names) == 1 else folder, seconds=seconds)
+    ahead.save(folder)
+    table = ahead.to_dataframe()
+    rows = {name: part for name, part in table.groupby("object", sort=False)}
+    step = views.thinned(ahead.motions.times_s)
+    shown = {
+        name: {
+            key: views.numbers(part[key].to_numpy()[step], 4)
+            for key in ("time_s", "x_m", "x_q025_m", "x_q975_m", "y_m")
+        }
+        for name, part in rows.items()
+    }
+    return {
+        "prediction": {
+            "sentences": list(ahead.sentences),
+            "objects": shown,
+            "clip_end": ahead.document["clip_end_s"],
+            "picture": str(folder / "first_and_last.png"),
+        }
+    }
+
+
+def export(*, run: str, to: str, partial: Partial) -> dict[str, Any]:
+    """Writes a run for other programs."""
+    done = gx.export(run, to=to)  # pyright: ignore[reportArgumentType]
+    return {"files": [str(path) for path in done.paths]}
+
+
+def open_run(*, run: str, partial: Partial) -> dict[str, Any]:
+    """A run that lies there, of whatever command."""
+    return {"fit": views.fit_view(_fit_of(run))}
+
+
+def simulate(*, run: str, values: Mapping[str, float], partial: Partial) -> dict[str, Any]:
+    """Where the model of a run has the objects with other parameters."""
+    motions = _fit_of(run).motions(values)
+    return {"motions": [views.model_view(one) for one in motions], "values": dict(values)}
+
+
+def _fit_of(run: str) -> gx.Fit:
+    """The fit in a run's folder; read from there where the worker did not make it itself."""
+    stamp = (Path(run) / "result.json").stat().st_mtime_ns
+    key = f"{run} {stamp}"
+    if key not in _fits:
+        _keep(key, run, gx.load_run(run))
+    return _fits[key]
+
+
+def _keep(key: str, run: str, fit: gx.Fit) -> None:
+    while len(_fits) >= _MOST_FITS:
+        _fits.pop(next(iter(_fits)))
+    _fits[key] = fit
+    stamp = (Path(run) / "result.json").stat().st_mtime_ns
+    _fits[f"{run} {stamp}"] = fit
+
+
+TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
+    "propose": propose,
+    "track": track,
+    "fit": fit,
+    "compare": compare,
+    "diagnose": diagnose,
+    "predict": predict,
+    "export": export,
+    "open_run": open_run,
+    "simulate": simulate,
+}

@@ -1,0 +1,192 @@
+import math
+from dataclasses import asdict, replace
+
+import pytest
+
+import galileo_jax as gx
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.studio.check import remarks_on
+from galileo_jax.studio.marks import (
+    Marks,
+    ObjectMark,
+    blank,
+    from_json,
+    handles,
+    labels,
+    moved,
+    proposed,
+    to_json,
+    with_object,
+    without_object,
+)
+from galileo_jax.studio.sheet import changed, opened, redone, undone
+from galileo_jax.studio.stages import Trials, made, states, track_files, track_mark
+from galileo_jax.studio.store import FILE, Store
+from tests.studio.clips import clip_in
+
+MARKS = Marks(
+    objects=(ObjectMark("object1", (50.0, 40.0)), ObjectMark("object2", (200.0, 90.0))),
+    upper=(30.0, 50.0), foot=(130.0, 100.0), stick=((10.0, 170.0), (110.0, 170.0)), stick_m=0.2,
+)  # fmt: skip
+
+
+def apart(one, other) -> float:
+    return math.dist(one, other)
+
+
+def test_the_foot_takes_the_ramp_with_it_and_the_upper_end_turns_it():
+    after = moved(MARKS, "foot", (140.0, 110.0))
+    assert after.upper == (40.0, 60.0)
+    assert "ramp" not in labels(MARKS, after), "a measured angle must not be drawn afresh"
+    assert labels(MARKS, after)["origin"] == (140.0, 110.0)
+    assert labels(MARKS, moved(MARKS, "upper", (30.0, 40.0))) == {
+        "ramp": (30.0, 40.0, 130.0, 100.0)
+    }
+
+
+def test_only_what_was_changed_is_declared():
+    assert labels(MARKS, MARKS) == {}
+    assert labels(MARKS, moved(MARKS, "object2", (201.0, 91.0))) == {
+        "point": {"object2": (201.0, 91.0)}
+    }
+    assert labels(MARKS, replace(MARKS, stick_m=0.4))["scale"] == (10.0, 170.0, 110.0, 170.0, 0.4)
+    assert labels(MARKS, replace(MARKS, first_frame=3))["first_frame"] == {
+        "object1": 3, "object2": 3,
+    }  # fmt: skip
+
+
+def test_marks_survive_json_and_everything_in_them_can_be_grabbed():
+    assert from_json(to_json(MARKS)) == MARKS
+    assert set(handles(MARKS)) == {"object1", "object2", "upper", "foot", "stick1", "stick2"}
+    more = with_object(MARKS, (5.0, 6.0))
+    assert handles(more)["object3"] == (5.0, 6.0)
+    assert without_object(more, "object3") == MARKS
+
+
+def test_check_says_what_is_missing_and_what_is_odd():
+    nothing = [one.kind for one in remarks_on(MARKS, 240.0, None)]
+    assert nothing == ["odd"], "a ramp line of 112 px"
+    unknown = remarks_on(replace(MARKS, stick_m=None), 240.0, None)
+    assert [one.kind for one in unknown if "scale" in one.sentence] == ["missing"]
+    assert any("slow-motion" in one.sentence for one in remarks_on(MARKS, 30.0, None))
+    assert remarks_on(replace(MARKS, objects=()), 240.0, None)[0].kind == "missing"
+
+
+@pytest.mark.video
+def test_each_step_is_on_disk_and_can_be_undone_to_the_letter(tmp_path):
+    video = clip_in(tmp_path)
+    text = video.with_suffix(".yaml").read_text()
+    store = Store(tmp_path)
+    sheet = opened(tmp_path, video, store)
+    assert sheet.is_complete
+    x, y = sheet.marks.objects[0].point or (0.0, 0.0)
+    sheet = changed(sheet, moved(sheet.marks, "object1", (x + 1, y)), store)
+    assert gx.load(video).objects[0].point_px == (x + 1, y)
+    assert opened(tmp_path, video, Store(tmp_path)) == sheet, "a new server sees the same"
+    sheet = undone(opened(tmp_path, video, Store(tmp_path)), store)
+    assert video.with_suffix(".yaml").read_text() == text
+    sheet = redone(sheet, store)
+    assert gx.load(video).objects[0].point_px == (x + 1, y)
+
+
+@pytest.mark.video
+def test_marks_that_cannot_be_are_kept_and_explained_but_not_written(tmp_path):
+    video = clip_in(tmp_path)
+    text = video.with_suffix(".yaml").read_text()
+    store = Store(tmp_path)
+    sheet = opened(tmp_path, video, store)
+    good = sheet.marks
+    sheet = changed(sheet, moved(good, "foot", (150.0, 20.0)), store)
+    assert video.with_suffix(".yaml").read_text() == text
+    assert not sheet.is_complete
+    assert "inside" in (sheet.present.problem or "")
+    again = opened(tmp_path, video, Store(tmp_path))
+    assert again.marks == sheet.marks, "what was drawn is not lost"
+    mended = changed(again, good, store)
+    assert mended.present.problem is None and mended.is_complete
+
+
+@pytest.mark.video
+def test_an_edit_by_another_program_is_taken_over(tmp_path):
+    video = clip_in(tmp_path)
+    store = Store(tmp_path)
+    sheet = opened(tmp_path, video, store)
+    changed(sheet, moved(sheet.marks, "object1", (50.0, 50.0)), store)
+    gx.label(video, fps=60.0)
+    again = opened(tmp_path, video, Store(tmp_path))
+    assert again.marks.fps == 60.0
+    assert math.isclose(undone(again, store).marks.fps, sheet.marks.fps)
+
+
+@pytest.mark.video
+def test_an_object_can_be_taken_out_again(tmp_path):
+    video = clip_in(tmp_path)
+    store = Store(tmp_path)
+    sheet = opened(tmp_path, video, store)
+    sheet = changed(sheet, without_object(sheet.marks, "object2"), store)
+    assert [one.name for one in gx.load(video).objects] == ["object1"]
+
+
+@pytest.mark.video
+def test_what_depends_on_a_change_is_stale_and_nothing_else(tmp_path):
+    video = clip_in(tmp_path)
+    store = Store(tmp_path)
+    sheet = opened(tmp_path, video, store)
+    folder = track_files(sheet)
+    folder.mkdir()
+    (folder / "track_px.csv").write_text("time_s\n")
+    store.put("clips", "slide", {"tracked": made(folder / "track_px.csv", track_mark(sheet))})
+    trials = Trials(tmp_path, (sheet,))
+    run = trials.run
+    run.mkdir(parents=True)
+    (run / "result.json").write_text("{}")
+    store.put("runs", "slide", {"fit": made(run / "result.json", trials.made_of())})
+    found = states(trials, store, ())
+    assert (found["track"], found["fit"], found["compare"]) == ("done", "done", "open")
+    x, y = sheet.marks.objects[0].point or (0.0, 0.0)
+    after = changed(sheet, moved(sheet.marks, "object1", (x + 1, y)), store)
+    found = states(Trials(tmp_path, (after,)), store, ())
+    assert (found["marks"], found["track"], found["fit"]) == ("done", "stale", "stale")
+    back = undone(after, store)
+    assert states(Trials(tmp_path, (back,)), store, ())["fit"] == "done"
+
+
+@pytest.mark.video
+def test_a_bare_video_gets_a_proposal_that_lacks_only_the_scale(tmp_path):
+    video = clip_in(tmp_path, is_bare=True)
+    store = Store(tmp_path)
+    sheet = opened(tmp_path, video, store)
+    assert not sheet.is_drawn and not sheet.is_complete
+    truth = gx.load(clip_in(tmp_path, "known"))
+    sheet = changed(sheet, proposed(asdict(gx.propose(video)), sheet.info.size_px), store)
+    for one, known in zip(sheet.marks.objects, truth.objects, strict=True):
+        assert apart(one.point, known.point_px) < 4.0
+    assert apart(sheet.marks.foot, truth.origin_px) < 8.0
+    assert [one.kind for one in sheet.remarks].count("missing") == 1
+    assert gx.load(video).ramp_angle_deg == pytest.approx(truth.ramp_angle_deg, abs=1.0)
+
+
+def test_nothing_is_proposed_where_nothing_moves(tmp_path):
+    import cv2
+    import numpy as np
+
+    path = tmp_path / "still.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (64, 48))
+    for _ in range(6):
+        writer.write(np.full((48, 64, 3), 90, np.uint8))
+    writer.release()
+    with pytest.raises(InputError, match="nothing moves"):
+        gx.propose(path)
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"clips": 3}', '{"clips": {"slide": [1]}}'])
+def test_a_damaged_file_costs_undo_and_nothing_else(tmp_path, content):
+    (tmp_path / FILE).write_text(content)
+    store = Store(tmp_path)
+    assert store.get("clips", "slide") == {}
+    store.put("clips", "slide", {"present": 1})
+    assert Store(tmp_path).get("clips", "slide") == {"present": 1}
+
+
+def test_blank_marks_can_be_dragged():
+    assert set(handles(blank(30.0, (640, 360)))) == {"upper", "foot", "stick1", "stick2"}

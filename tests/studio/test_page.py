@@ -1,0 +1,189 @@
+"""The page in a real browser, on a small rendered clip."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import galileo_jax as gx
+from tests.missing import needed_module
+from tests.studio.clips import clip_in
+from tests.studio.server import Server, started
+
+pytestmark = pytest.mark.video
+PATIENCE_MS = 60_000  # nothing here takes long; a busy machine may
+
+
+@contextmanager
+def opened(browser, studio: Server, size: tuple[int, int] = (1280, 720)) -> Iterator[Any]:
+    """A tab with the page; it must not complain."""
+    context = browser.new_context(viewport={"width": size[0], "height": size[1]})
+    page = context.new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    complaints: list[str] = []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("console", lambda m: complaints.append(m.text) if m.type == "error" else None)
+    page.goto(studio.address)
+    page.wait_for_selector("[data-stage=marks]")
+    yield page
+    context.close()
+    assert not complaints
+
+
+def drag(page, handle: str, dx: float, dy: float) -> None:
+    """Grabs a mark and lets it go elsewhere, as a finger does."""
+    box = page.locator(f"[data-handle={handle}] .target").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + dx / 2, y + dy / 2, steps=3)
+    page.mouse.move(x + dx, y + dy, steps=3)
+    page.mouse.up()
+
+
+def wait_until(is_so: Callable[[], bool]) -> None:
+    """Waits for what the server writes."""
+    end = time.monotonic() + PATIENCE_MS / 1000
+    while not is_so():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.05)
+
+
+def point(video: Path, index: int = 0) -> tuple[float, float]:
+    return gx.load(video).objects[index].point_px or (0.0, 0.0)
+
+
+@pytest.fixture
+def folder(tmp_path) -> Path:
+    needed_module("nicegui")
+    clip_in(tmp_path)
+    return tmp_path
+
+
+def test_marks_are_dragged_undone_and_found_again_after_a_reload(browser, folder):
+    video = folder / "slide.mp4"
+    before, text = point(video), video.with_suffix(".yaml").read_text()
+    with started(folder) as studio, opened(browser, studio) as page:
+        page.click("[data-stage=marks]")
+        page.wait_for_function("document.querySelector('.frame').naturalWidth === 320")
+        drag(page, "object1", 12, -6)
+        wait_until(lambda: point(video) != before)
+        after = point(video)
+        scale = page.locator(".stage").bounding_box()["width"] / 320
+        assert after == pytest.approx((before[0] + 12 / scale, before[1] - 6 / scale), abs=0.02)
+        page.reload()
+        page.click("[data-stage=marks]")
+        shown = page.locator("[data-handle=object1]").get_attribute("transform")
+        assert shown == f"translate({after[0]:g} {after[1]:g})"
+        page.click("[aria-label=Undo]")
+        wait_until(lambda: point(video) == before)
+        assert video.with_suffix(".yaml").read_text() == text
+        page.click("[aria-label=Redo]")
+        wait_until(lambda: point(video) == after)
+
+
+def test_the_keyboard_steps_through_frames_and_moves_marks(browser, folder):
+    video = folder / "slide.mp4"
+    before = point(video)
+    with started(folder) as studio, opened(browser, studio) as page:
+        page.click("[data-stage=marks]")
+        page.focus(".viewer")
+        page.keyboard.press("Home")  # where it is already
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("ArrowLeft")
+        assert page.inner_text(".scrub output").endswith("· 1")
+        assert page.locator(".frame").get_attribute("src") == "/frame/slide/1"
+        page.focus("[data-handle=object2]")
+        page.focus("[data-handle=object1]")
+        page.keyboard.press("ArrowDown")
+        wait_until(lambda: point(video) == (before[0], before[1] + 1))
+
+
+def test_a_second_tab_sees_what_the_first_one_draws(browser, folder):
+    video = folder / "slide.mp4"
+    before = point(video)
+    with started(folder) as studio, opened(browser, studio) as one, opened(browser, studio) as two:
+        for page in (one, two):
+            page.click("[data-stage=marks]")
+        drag(one, "object1", 10, 0)
+        wait_until(lambda: point(video) != before)
+        x, y = point(video)
+        two.wait_for_selector(f'[data-handle=object1][transform="translate({x:g} {y:g})"]')
+        two.click("[aria-label=Undo]")
+        place = f"translate({before[0]:g} {before[1]:g})"
+        one.wait_for_selector(f'[data-handle=object1][transform="{place}"]')
+
+
+def test_killing_the_server_loses_no_mark_and_leaves_no_process(browser, folder):
+    video = folder / "slide.mp4"
+    before = point(video)
+    with started(folder) as studio, opened(browser, studio) as page:
+        page.click("[data-stage=marks]")
+        drag(page, "object1", 10, 0)
+        wait_until(lambda: point(video) != before)
+        after = point(video)
+        page.click("[data-do=track]")
+        page.wait_for_selector("[role=status]")
+        children = children_of(studio.process.pid)
+        assert children, "the job has a process"
+        os.kill(studio.process.pid, signal.SIGKILL)
+        studio.process.wait(20)
+        wait_until(lambda: not any(map(is_alive, children)))
+    with started(folder) as studio, opened(browser, studio) as page:
+        page.click("[data-stage=marks]")
+        shown = page.locator("[data-handle=object1]").get_attribute("transform")
+        assert shown == f"translate({after[0]:g} {after[1]:g})"
+        page.click("[aria-label=Undo]")
+        wait_until(lambda: point(video) == before)
+
+
+def children_of(pid: int) -> list[int]:
+    """Processes that it has started."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid:
+            found.append(int(path.parent.name))
+    return found
+
+
+def is_alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_a_broken_video_is_explained_and_the_others_work(browser, folder):
+    content = (folder / "slide.mp4").read_bytes()
+    (folder / "broken.mp4").write_bytes(content[: len(content) // 2])
+    with started(folder) as studio, opened(browser, studio) as page:
+        page.click("[data-stage=video]")
+        assert page.locator(".trouble").inner_text().startswith("broken: ")
+        page.click("[data-stage=marks]")
+        page.wait_for_selector("[data-handle=object1]")
+
+
+def test_fingers_find_their_targets_on_a_tablet(browser, folder):
+    with started(folder) as studio, opened(browser, studio, (1024, 768)) as page:
+        for stage in ("marks", "video"):
+            page.click(f"[data-stage={stage}]")
+            page.wait_for_selector(f"[data-stage={stage}][aria-current=step]")
+            small = page.evaluate(
+                "[...document.querySelectorAll('button:not(:disabled), .target')]"
+                ".map((e) => [e.textContent, e.getBoundingClientRect()])"
+                ".filter(([, box]) => box.width && Math.min(box.width, box.height) < 43.5)"
+                ".map(([text]) => text)"
+            )
+            assert small == []
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        assert wide <= 1024, "nothing to scroll sideways"
