@@ -159,10 +159,11 @@ class Diagnosis:
         Raises:
           InputError: there is no such candidate.
         """
-        fits = {one.name: one.hypothesis.fit for one in self.found.candidates}
-        check_known("candidate", "candidate", effect, tuple(fits))
-        theta = self.problem.theta(fits[effect].z, fits[effect].free)
-        return motions_at(self.problem, [one.clip for one in self.measurements], theta)
+        hypotheses = {one.name: one.hypothesis for one in self.found.candidates}
+        check_known("candidate", "candidate", effect, tuple(hypotheses))
+        fit, trials = hypotheses[effect].fit, hypotheses[effect].of(self.problem)
+        theta = trials.theta(fit.z, fit.free)
+        return motions_at(trials, [one.clip for one in self.measurements], theta)
 
     @cached_property
     @in_float64

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
 from galileo_jax.studio.frames import Frames
@@ -197,9 +198,16 @@ class Session:
         """Tracks the chosen clips."""
         self._start("track", clips=self.trials.files)
 
-    def fit(self, effects: tuple[str, ...] = ()) -> None:
-        """Fits a model with these effects, then compares it with the data."""
+    def fit(self, effects: tuple[str, ...] = (), is_law: bool = False) -> None:
+        """Fits a model with these effects, then compares it with the data.
+
+        Args:
+          effects: names.
+          is_law: whether one is the formula that the diagnosis proposes, in a file of its own.
+        """
         trials, files = self.trials, self.files if effects else ()
+        if is_law:
+            files = (*files, f"{self._run}/diagnosis/{PROPOSED}")
         self._start(
             "fit",
             clips=trials.files,

@@ -15,6 +15,7 @@ from galileo_jax.studio.paths import below
 
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
+    from galileo_jax.studio.session import Session
 
 FORM_NAMES = frozenset(NAMES_OF_FORMS)  # they can be tried, not added
 MOST_SHOWN = 6
@@ -76,7 +77,8 @@ def _candidate(tab: "Tab", row: Mapping[str, Any], is_best: bool) -> None:
         pick.on(event, lambda: tab.preview(name))
     probability = float(row["probability"] or 0.0)
     with pick:
-        ui.label(name.replace("+", " + ")).classes("name")
+        law = row.get("law")
+        ui.label(law or name.replace("+", " + ")).classes("name")
         ui.label(f"{100 * probability:.3g} %" if probability > 5e-4 else "~0").classes("p")
         with ui.element("div").classes("bar2"):
             ui.element("i").style(f"width: {100 * probability:.1f}%")
@@ -86,12 +88,21 @@ def _candidate(tab: "Tab", row: Mapping[str, Any], is_best: bool) -> None:
         if FORM_NAMES & set(effects):
             ui.label("form").classes("small soft").props('title="a form without a name"')
             return
+        if law and not _is_verdict(session, law):
+            ui.label("law").classes("small soft").props('title="a formula that was also tried"')
+            return
         add = ui.button("Added" if is_in else "Add", color=None).props(
             f'unelevated no-caps data-add="{name}"'
         )
         add.classes("main" if is_best and not is_in else "plain")
         add.set_enabled(not is_in and session.job is None)
-        add.on("click.stop", lambda: session.fit(_joined(session.effects, effects)))
+        wanted = effects if law else _joined(session.effects, effects)
+        add.on("click.stop", lambda: session.fit(wanted, is_law=bool(law)))
+
+
+def _is_verdict(session: "Session", law: str) -> bool:
+    found = session.results.diagnosis
+    return found is not None and found.get("verdict", {}).get("law") == law
 
 
 def _joined(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ...]:
