@@ -27,7 +27,7 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.model.parameters import prior_deviations
-from galileo_jax.similarity.gaussian_likelihood import Whitening
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
 from galileo_jax.similarity.noise_scale import errors_at, fitted_mode_size, fitted_noise_scale
 
 NUM_REPLICATES = 200
@@ -36,6 +36,9 @@ ADEQUATE_P = 0.01
 # a camera that sees still objects better than it states still blurs moving ones.
 JUDGED_SCALE_RANGE = (1.0, NOISE_SCALE_RANGE[1])
 ANY_SCALE = (0.0, np.inf)
+# Where modes take up so much of a cell's values, as of how a falling body drifts aside, what they
+# leave is no noise, and tells nothing.
+ABSORBED = 0.99
 # Of the chance of a false alarm, how much is spent on the nuisances. They are far inside their
 # priors in most clips, so that an equal share would cost the residuals half of theirs.
 PULL_SHARE = 0.05
@@ -122,14 +125,12 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         label = phases(problem, trials.of_clip(theta, clip))
         observation = problem.observation
         labels.append(label)
+        num_axes = observation.position_m.shape[1]
+        absorbed = GaussianLikelihood.absorbed(scales[clip], problem.data)
         cells.extend(
-            find_cells(
-                clip,
-                observation.names,
-                observation.mask,
-                label,
-                observation.position_m.shape[1],
-            )
+            cell
+            for cell in find_cells(clip, observation.names, observation.mask, label, num_axes)
+            if absorbed[cell.index].mean() < ABSORBED
         )
     pulls = _pulls(trials, fit, theta)
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
-from scipy.stats import qmc
 
 from galileo_jax.experiment.belief import Belief
 from galileo_jax.experiment.proposal import Proposal, seen_as
@@ -95,6 +94,8 @@ def _draws(
     root = root_of(belief.covariance[np.ix_(shared, shared)])
     own = [i for i, s in enumerate(source) if s < 0 and own_free[i]]
     count = len(shared) + len(own)
+    from scipy.stats import qmc  # half a second
+
     sobol = qmc.MultivariateNormalQMC(np.zeros(count), rng=np.random.default_rng([seed, 67]))
     u = sobol.random(NUM_DRAWS + 1)[1:]
     u = np.vstack([np.zeros(count), np.clip(u, -FARTHEST_Z, FARTHEST_Z)])

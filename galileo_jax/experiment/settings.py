@@ -13,7 +13,6 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import did_you_mean
@@ -129,6 +128,8 @@ def grid(can: Can, seed: int = 0, most: int = MOST_SETTINGS) -> list[dict[str, A
     if choices * number ** len(ranges) <= most:
         columns = [kind.levels(number) for kind in can.values()]
         return [dict(zip(can, row, strict=True)) for row in itertools.product(*columns)]
+    from scipy.stats import qmc  # half a second
+
     sobol = qmc.Sobol(len(can), rng=np.random.default_rng([seed, 61]))
     points = sobol.random(2 ** int(math.log2(most)))
     return [

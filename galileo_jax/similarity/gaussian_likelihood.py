@@ -132,6 +132,12 @@ class GaussianLikelihood:
         return data.num_values - (data.gain**2 / (noise_scale**2 + data.gain**2)).sum()
 
     @staticmethod
+    def absorbed(noise_scale: float, data: Whitening) -> Float[np.ndarray, " value"]:
+        """The share, 0 to 1, of each value's tracking error that the modes take up."""
+        share = data.gain**2 / (noise_scale**2 + data.gain**2)
+        return share @ data.basis.reshape(len(share), -1) ** 2
+
+    @staticmethod
     def information(noise_scale: Any, data: Whitening) -> Any:
         """Fisher's, of the noise scale's logarithm."""
         share = noise_scale**2 / (noise_scale**2 + data.gain**2)

@@ -9,6 +9,7 @@ from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from tests.oracle_trials import NOISE_M, make_trials
+from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
 NUM, SEED = 32, 20261122
@@ -47,7 +48,8 @@ def _quantities(theta: np.ndarray, trials: JointProblem) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def errors():
-    return errors_in_sds()
+    with in_64_bit():
+        return errors_in_sds()
 
 
 @pytest.mark.parametrize("quantity", [0, 1, 2], ids=["k1", "k2", "mass_ratio"])

@@ -205,7 +205,9 @@ class Residuals:
                 low = rest[len(point) :] if is_central else base[point]
                 width = (2 * h if is_central else h)[:, None, None, None]
                 slope = np.zeros((*index.shape, *values.shape[1:]))
-                slope[point, slot] = (rest[: len(point)] - low) / width
+                # A proposal whose motion overflows costs too much to be taken, whatever its slopes.
+                with np.errstate(invalid="ignore"):
+                    slope[point, slot] = (rest[: len(point)] - low) / width
                 slopes.append(slope)
             motion = (out[0][: len(points.z)], out[1][: len(points.z)], *slopes)
             white, jacobian = in_chunks(
