@@ -1,6 +1,7 @@
 """Attacks on a running studio: each must be refused, and leave nothing behind."""
 
 import asyncio
+import contextlib
 import http.client
 import json
 import os
@@ -44,11 +45,10 @@ def ask(
 ) -> tuple[int, bytes, dict[str, str]]:
     connection = http.client.HTTPConnection("127.0.0.1", studio.port, timeout=20)
     named = {key.replace("_", "-"): value for key, value in headers.items()}
-    connection.request(method, path, body, named)
-    answer = connection.getresponse()
-    found = answer.status, answer.read(), {k.lower(): v for k, v in answer.getheaders()}
-    connection.close()
-    return found
+    with contextlib.closing(connection):
+        connection.request(method, path, body, named)
+        answer = connection.getresponse()
+        return answer.status, answer.read(), {k.lower(): v for k, v in answer.getheaders()}
 
 
 @pytest.fixture(scope="module")
