@@ -206,13 +206,12 @@ class Diagnosis:
             notes=notes,
         )
 
-    @property
-    def next_command(self) -> str:
-        """The command that comes next."""
+    def next_command(self, folder: str | Path = ".") -> str:
+        """The command that comes next; `folder`: where the diagnosis is saved."""
         from galileo_jax.report import diagnosis_text
 
         return diagnosis_text.next_command(
-            self.found, list(self.document["clips"]), list(self.effects_from)
+            self.found, list(self.document["clips"]), list(self.effects_from), Path(folder)
         )
 
     @in_float64
@@ -231,7 +230,7 @@ class Diagnosis:
         page = DiagnosisReport(
             self.found,
             self.document,
-            self.next_command,
+            self.next_command(Path(path).parent),
             hidden_effect(clips[0]),
             clips,
             self.command,

@@ -1,6 +1,7 @@
 """`galileo diagnose`: which effect is missing in the model of a clip?"""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
@@ -26,7 +27,7 @@ def main(argv: Sequence[str]) -> int | None:
 
     with progress_display() as display:
         found = diagnose(clips, **asked, on_progress=_RoundPrinter(display))
-        print("\n".join(_lines(found, hidden)))
+        print("\n".join(_lines(found, hidden, out)))
         display("writing the page", 1.0)
         found.save(out)
     warn(line for one in found.measurements for line in (*one.remarks, *one.doubts))
@@ -75,7 +76,7 @@ def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
+def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
     """Candidates, the verdict, and how to go on."""
     from galileo_jax.inference.fits.gradient import BEHIND, SETTLED
     from galileo_jax.report import diagnosis_text
@@ -111,7 +112,7 @@ def _lines(found: "Diagnosis", hidden: str | None) -> list[str]:
             f"added {row['rmse_after']:.4f}"
         )
     lines += [f"- {sentence}" for sentence in found.verdict.advice]
-    return [*lines, f"next: {found.next_command}"]
+    return [*lines, f"next: {found.next_command(out)}"]
 
 
 def _parser() -> command.Parser:

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from galileo_jax.comparison.compare import Comparison
@@ -102,9 +103,12 @@ def each_clip(record: Mapping[str, Any]) -> list[str]:
 
 
 def next_command(
-    diagnosis: Diagnosis, clips: Sequence[str], effects_from: Sequence[str] = ()
+    diagnosis: Diagnosis,
+    clips: Sequence[str],
+    effects_from: Sequence[str] = (),
+    folder: Path = Path(),
 ) -> str:
-    """The command to run next."""
+    """The command to run next; `folder`: where the diagnosis is saved."""
     files = shlex.join(clips)
     more = "".join(f" --effects-from {shlex.quote(path)}" for path in effects_from)
     found = diagnosis.verdict
@@ -113,7 +117,7 @@ def next_command(
     if found.status == "unknown":
         return f"galileo diagnose {files}{more} --effects-from my_effect.py"
     if found.status == "law":
-        more += f" --effects-from {PROPOSED}"
+        more += f" --effects-from {shlex.quote(str(folder / PROPOSED))}"
     chosen = found.status in ("named", "law")
     effects = found.effects if chosen else found.effects[0].split("+")
     return f"galileo fit {files}{more} --effects {','.join(effects)}"

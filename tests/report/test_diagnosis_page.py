@@ -1,5 +1,6 @@
 """The page of a diagnosis: every verdict is told, scripts run, nothing comes from outside."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import Place
 from galileo_jax.comparison.path_residuals import failing_interval, path_residuals
 from galileo_jax.comparison.phases import PHASES
+from galileo_jax.diagnosis.diagnosis import Verdict
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.comparison_page import ComparisonReport, write_comparison_page
@@ -157,3 +159,8 @@ def test_how_to_go_on(trials):
     }
     for status, expected in cases.items():
         assert diagnosis_text.next_command(diagnosis_of(trials, status), clips, mine) == expected
+    law = replace(diagnosis_of(trials, "named"), verdict=Verdict("law", ("law_drag",)))
+    found = diagnosis_text.next_command(law, clips, [], Path("runs/a b"))
+    assert found == (
+        "galileo fit 'a b.yaml' --effects-from 'runs/a b/proposed_effect.py' --effects law_drag"
+    )
