@@ -35,6 +35,7 @@ MIN_MASS_KG, MAX_MASS_KG = 1e-5, 100.0
 MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
 MIN_DENSITY, MAX_DENSITY = 100.0, 20_000.0  # kg/m^3, of a liquid
 MIN_FPS, MAX_FPS = 1.0, 1_000_000.0
+MAX_FLOOR_M = 1e6
 MAX_ANGLE_SD_DEG = 10.0
 MAX_SCALE_SD_SHARE = 0.2  # a scale known worse than this is a guess: leave it null
 MAX_ORIGIN_SD_PX = 50.0  # a foot known worse than this is null: found from the path
@@ -155,7 +156,8 @@ def _origin_sd_px(value: float) -> float:
 def _floor(value: Any) -> Any:
     if isinstance(value, bool) or value is None:
         return value
-    if isinstance(value, int | float) and math.isfinite(value):
+    # Integers of YAML may be larger than any float.
+    if isinstance(value, int | float) and abs(value) < MAX_FLOOR_M:
         return float(value)
     raise wrong(f"{short(value)} is no height; metres above the origin, or true, expected")
 

@@ -44,7 +44,7 @@ def test_a_job_streams_progress_and_ends_with_its_result(ear, tmp_path):
     *before, last = ear.until("done", "error", "cancelled")
     assert last.kind == "done", last.content
     shares = [message.content[1] for message in before if message.kind == "progress"]
-    assert shares == sorted(shares) and len(shares) > 1
+    assert shares and shares == sorted(shares)
     (view,) = last.content["tracks"]
     assert view["objects"] == ["object1", "object2"]
     assert (tmp_path / "slide_track" / "track_px.csv").is_file()
