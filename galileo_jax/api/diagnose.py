@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 DOCUMENT = "diagnosis.json"
-TRACKED = 0.2  # share of the work, for progress
+TRACKED, ADVISED = 0.2, 0.97  # share of the work, for progress
 STAGES = {  # how a stage begins, and how much is done by then
     "fitting the model": 0.02,
     "comparing it": 0.1,
@@ -403,7 +403,8 @@ def _diagnosed(
         on_round=on_round,
         on_candidate=on_candidate,
     )
-    found = with_next(found, clips[0], problem, seed)
+    with progress.part(max(share, ADVISED), 1.0):
+        found = with_next(found, clips[0], problem, seed)
     record = diagnosis_document(problem, found, seed)
     document = {
         "clips": [clip.source for clip in clips],

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 DIAGNOSIS = "diagnosis"  # folder of the last one
-LABS_SHARE = 0.1  # of the work of an experiment, for progress
+MEASURED, DIAGNOSED = 0.1, 0.8  # of the work of one experiment, for progress
+MOST_SHARE = 0.98  # before the pages are written
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,12 +200,14 @@ class _Loop:
             settings, reason = self._choose(found)
             self._journal.add({**settings, **journal.held}, reason)
 
-    def _share(self) -> float:
-        return min(max(len(self._journal.experiments) - 1, 0) / self._budget, 0.98)
+    def _share(self, part: float) -> float:
+        """Of all the work, where so much of the last experiment's is done."""
+        before = max(len(self._journal.experiments) - 1, 0)
+        return min((before + part) / self._budget, MOST_SHARE)
 
     def _measure(self, row: dict[str, Any]) -> None:
         journal = self._journal
-        progress.report(f"experiment {row['number']}", self._share())
+        progress.report(f"experiment {row['number']}", self._share(0.0))
         path = journal.folder / "clips" / f"e{row['number']:03}.csv"
         try:
             text = self._lab.measure(row["settings"])
@@ -220,7 +223,7 @@ class _Loop:
             journal.close(row, line=_line(error))
         else:
             journal.close(row, clip=str(path.relative_to(journal.folder)))
-        progress.report("measured", self._share(), {"experiment": row})
+        progress.report("measured", self._share(MEASURED), {"experiment": row})
 
     def _undiagnosed(self) -> dict[str, Any] | None:
         """The last track, where no verdict has it yet."""
@@ -230,10 +233,10 @@ class _Loop:
         return tracks[-1]
 
     def _diagnose(self, new: dict[str, Any]) -> Diagnosis | None:
-        journal, share = self._journal, self._share()
+        journal, share = self._journal, self._share(DIAGNOSED)
         clips = [one["clip"] for one in journal.tracks]
         try:
-            with progress.part(share + LABS_SHARE / self._budget, share + 1 / self._budget):
+            with progress.part(self._share(MEASURED), share):
                 found = self._diagnosed(clips)
         except Cancelled:
             raise
@@ -292,7 +295,8 @@ class _Loop:
         if found is None:  # begun again after the budget was spent
             found = self._diagnosed([one["clip"] for one in journal.tracks])
         try:
-            ahead = rehearsed(found, settings, journal.seed)
+            with progress.part(self._share(DIAGNOSED), self._share(1.0)):
+                ahead = rehearsed(found, settings, journal.seed)
         except InputError as error:  # of scenes that nobody can set up here
             said = f"not rehearsed ({_line(error)}): as different as can be from those so far"
             return farthest(self._can, settings, tried), said
