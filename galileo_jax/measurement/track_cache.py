@@ -25,7 +25,8 @@ ROOMS = ("clip", "tracking", "video")  # whose code decides what a track is
 LIBRARIES = ("numpy", "opencv-python-headless", "scipy")
 # Of the yaml: what is declared about the picture and the objects in it.
 KEYS = {"scenario", "fps", "ramp_angle_deg", "direction", "pixels_per_metre", "origin_px"}
-OBJECT_KEYS = {"name", "shape", "size_m", "point_px", "first_frame", "rolls"}
+OBJECT_KEYS = {"name", "shape", "size_m", "point_px", "rolls"}
+OBJECT_KEYS |= {"first_frame", "last_frame", "corrections"}
 
 
 def track_once(clip: Clip) -> Track:
