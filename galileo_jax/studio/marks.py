@@ -6,8 +6,14 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import ClipFile
 
 Point = tuple[float, float]
+Correction = tuple[int, float, float]  # frame, x, y
+Corners = tuple[Point, Point, Point, Point]
+
+CORNERS = ("corner1", "corner2", "corner3", "corner4")  # from the bottom left, counter-clockwise
+CAN_RECTANGLE = "rectangle" in ClipFile.model_fields
 
 STICKS_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 EDGE_PX = 10.0
@@ -16,12 +22,21 @@ STICK_SHARE = 0.3  # of the frame's width, that a stick is drawn over at first
 
 @dataclass(frozen=True)
 class ObjectMark:
-    """One object: its centre in the first frame (px), its shape, its size (m) if it is known."""
+    """One object.
+
+    Attributes:
+      name: its own.
+      point: its centre in the first frame, px.
+      shape: as in the yaml.
+      size_m: if it is known.
+      corrections: where it has been put right, by frame.
+    """
 
     name: str
     point: Point | None = None
     shape: str = "box"
     size_m: tuple[float, ...] | None = None
+    corrections: tuple[Correction, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -37,6 +52,10 @@ class Marks:
       stick: the two ends of something whose length is known.
       stick_m: that length, m; None: nobody has said yet.
       first_frame: the frame from which on the clip counts.
+      last_frame: the last one that counts; None: that of the clip.
+      rectangle: the corners of a rectangle of known sides, in place of the stick, from the bottom
+        left one counter-clockwise.
+      rectangle_m: its width and height, m, as far as somebody has said; 0: not yet.
     """
 
     scenario: str = "ramp"
@@ -47,11 +66,21 @@ class Marks:
     stick: tuple[Point, Point] | None = None
     stick_m: float | None = None
     first_frame: int = 0
+    last_frame: int | None = None
+    rectangle: Corners | None = None
+    rectangle_m: tuple[float, float] = (0.0, 0.0)
 
     @property
     def has_ramp(self) -> bool:
         """Whether the scenario has a slope."""
         return SCENARIOS[self.scenario].has_ramp
+
+    @property
+    def has_scale(self) -> bool:
+        """Whether lengths are known."""
+        if self.rectangle is not None:
+            return min(self.rectangle_m) > 0
+        return self.stick_m is not None
 
     @property
     def has_table(self) -> bool:
@@ -64,7 +93,9 @@ def handles(marks: Marks) -> dict[str, Point]:
     found = {one.name: one.point for one in marks.objects if one.point is not None}
     if marks.has_ramp:
         found |= {k: p for k in ("upper", "foot") if (p := getattr(marks, k)) is not None}
-    if marks.stick is not None:
+    if marks.rectangle is not None:
+        found |= dict(zip(CORNERS, marks.rectangle, strict=True))
+    elif marks.stick is not None:
         found |= {"stick1": marks.stick[0], "stick2": marks.stick[1]}
     return found
 
@@ -84,7 +115,34 @@ def moved(marks: Marks, handle: str, to: Point) -> Marks:
     if handle in ("stick1", "stick2") and marks.stick is not None:
         one, other = marks.stick
         return replace(marks, stick=(to, other) if handle == "stick1" else (one, to))
+    if handle in CORNERS and marks.rectangle is not None:
+        corners = list(marks.rectangle)
+        corners[CORNERS.index(handle)] = to
+        return replace(marks, rectangle=tuple(corners))  # pyright: ignore
     objects = tuple(replace(o, point=to) if o.name == handle else o for o in marks.objects)
+    return replace(marks, objects=objects)
+
+
+def with_rectangle(marks: Marks, size_px: tuple[int, int]) -> Marks:
+    """A rectangle to be laid on one of known sides, in place of the stick."""
+    (left, right), (top, bottom) = (
+        (round(a * side, 1), round(b * side, 1))
+        for a, b, side in ((0.3, 0.7, size_px[0]), (0.3, 0.7, size_px[1]))
+    )
+    corners = ((left, bottom), (right, bottom), (right, top), (left, top))
+    return replace(marks, rectangle=corners)
+
+
+def corrected(marks: Marks, name: str, frame: int, to: Point | None) -> Marks:
+    """The marks with an object put right in a frame; None: no more."""
+
+    def put(one: ObjectMark) -> ObjectMark:
+        kept = [c for c in one.corrections if c[0] != frame]
+        if to is not None:
+            kept.append((frame, round(to[0], 2), round(to[1], 2)))
+        return replace(one, corrections=tuple(sorted(kept)))
+
+    objects = tuple(put(one) if one.name == name else one for one in marks.objects)
     return replace(marks, objects=objects)
 
 
@@ -138,12 +196,18 @@ def declared(content: Mapping[str, Any], size_px: tuple[int, int], fps: float) -
             _pair(one.get("point_px")),
             str(one.get("shape", "box")),
             tuple(one["size_m"]) if one.get("size_m") else None,
+            _corrections(one.get("corrections")),
         )
         for one in listed
     )
     marks = Marks(str(content["scenario"]), float(content.get("fps", fps)), objects)
     first = listed[0].get("first_frame", 0) if listed else 0
-    marks = replace(marks, first_frame=int(first or 0))
+    last = listed[0].get("last_frame") if listed else None
+    marks = replace(marks, first_frame=int(first or 0), last_frame=last)
+    if (found := content.get("rectangle")) is not None:
+        corners = tuple(_point(corner) for corner in found["corners_px"])
+        width, height = found["sides_m"]
+        marks = replace(marks, rectangle=corners, rectangle_m=(float(width), float(height)))
     stick, metres = _stick(size_px, content.get("pixels_per_metre"))
     marks = replace(marks, stick=stick, stick_m=metres)
     if not marks.has_ramp:
@@ -178,9 +242,12 @@ def labels(before: Marks | None, after: Marks) -> dict[str, Any]:
             found["ramp"] = (*after.upper, *after.foot)
         if after.has_table and (before is None or before.foot != after.foot):
             found["origin"] = after.foot
-    is_laid = after.stick is not None and after.stick_m is not None
-    if is_laid and (before is None or _scale(before) != _scale(after)):
-        found["scale"] = (*after.stick[0], *after.stick[1], after.stick_m)  # pyright: ignore
+    if after.has_scale and (before is None or _scale(before) != _scale(after)):
+        if after.rectangle is not None:
+            corners = (number for corner in after.rectangle for number in corner)
+            found["rectangle"] = (*corners, *after.rectangle_m)
+        elif after.stick is not None:
+            found["scale"] = (*after.stick[0], *after.stick[1], after.stick_m)
     known = {one.name: one for one in old.objects}
     for one in after.objects:
         was = known.get(one.name, ObjectMark(one.name, shape=""))
@@ -192,6 +259,12 @@ def labels(before: Marks | None, after: Marks) -> dict[str, Any]:
             found.setdefault("size", {})[one.name] = one.size_m
         if after.first_frame != old.first_frame:
             found.setdefault("first_frame", {})[one.name] = after.first_frame
+        if after.last_frame != old.last_frame:
+            found.setdefault("last_frame", {})[one.name] = after.last_frame
+        new = [c for c in one.corrections if c not in was.corrections]
+        gone = {c[0] for c in was.corrections} - {c[0] for c in one.corrections}
+        if new or gone:
+            found.setdefault("correct", {})[one.name] = [*new, *((f,) for f in sorted(gone))]
     return found
 
 
@@ -212,6 +285,7 @@ def from_json(found: Mapping[str, Any]) -> Marks:
             _pair(one["point"]),
             str(one["shape"]),
             tuple(one["size_m"]) if one["size_m"] else None,
+            _corrections(one.get("corrections")),
         )
         for one in found["objects"]
     )
@@ -219,6 +293,10 @@ def from_json(found: Mapping[str, Any]) -> Marks:
     ends = (_point(stick[0]), _point(stick[1])) if stick else None
     points = {key: _pair(found[key]) for key in ("upper", "foot")}
     plain = {key: found[key] for key in ("scenario", "fps", "stick_m", "first_frame")}
+    corners = found.get("rectangle")
+    plain["rectangle"] = tuple(_point(corner) for corner in corners) if corners else None
+    plain["rectangle_m"] = _point(found.get("rectangle_m", (0.0, 0.0)))
+    plain["last_frame"] = found.get("last_frame")
     return Marks(objects=objects, stick=ends, **points, **plain)
 
 
@@ -230,7 +308,13 @@ def _line(marks: Marks) -> Point | None:
 
 
 def _scale(marks: Marks) -> tuple[Any, ...]:
+    if marks.rectangle is not None:
+        return marks.rectangle, marks.rectangle_m
     return marks.stick, marks.stick_m
+
+
+def _corrections(found: Any) -> tuple[Correction, ...]:
+    return tuple((int(frame), float(x), float(y)) for frame, x, y in found or ())
 
 
 def _point(value: Any) -> Point:
