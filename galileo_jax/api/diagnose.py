@@ -298,8 +298,9 @@ def diagnose(
       pixels_per_metre: overrides the clips' scale; None: the yaml's.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
         `{"round": row}` for the base model and for what is added, as in diagnosis.json's history,
-        and `{"candidate": row}` for each candidate as soon as it is fitted, and once more in the
-        end: until then its fit may get better, and probabilities change.
+        and `{"candidate": row, "motions": function}` for each candidate as soon as it is fitted,
+        and once more in the end: until then its fit may get better, and probabilities change. The
+        function gives every clip's `Motion` with it, as `Diagnosis.motions` does in the end.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Raises:
@@ -393,7 +394,15 @@ def _diagnosed(
             "probability": one.probability,
             **{key: one.error[key] for key in ("rmse", "chi2_per_dof")},
         }
-        progress.report(stage, share, {"candidate": row})
+        theta = trials_of(one).theta(one.hypothesis.fit.z, one.hypothesis.fit.free)
+        progress.report(
+            stage,
+            share,
+            {"candidate": row, "motions": lambda: motions_at(trials_of(one), clips, theta)},
+        )
+
+    def trials_of(one: Candidate) -> JointProblem:
+        return one.hypothesis.of(problem)
 
     found = run_loop(
         problem,

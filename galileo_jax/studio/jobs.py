@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Literal
 
-NICENESS = 5
+NICENESS = 15  # the page goes first
 PATIENCE_S = 20.0  # for work that was cancelled to stop by itself, before its process is ended
 
 Kind = Literal["progress", "partial", "done", "error", "cancelled"]
@@ -216,7 +216,7 @@ def _run(
     def on_progress(stage: str, share: float, partial: Any) -> None:
         send(Message(number, task, "progress", (stage, share)))
         if isinstance(partial, dict):
-            send(Message(number, task, "partial", partial))
+            send(Message(number, task, "partial", work.shown(partial)))
 
     def partial(content: Mapping[str, Any]) -> None:
         send(Message(number, task, "partial", content))

@@ -5,7 +5,7 @@ import itertools
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,7 @@ class Results:
     compare: Mapping[str, Any] | None = None
     diagnosis: Mapping[str, Any] | None = None  # diagnosis.json, with sentence and curves
     candidates: tuple[Mapping[str, Any], ...] = ()  # as they stream in
+    previews: Mapping[str, Any] = field(default_factory=dict)  # their curves, until all are there
     rounds: tuple[Mapping[str, Any], ...] = ()
     prediction: Mapping[str, Any] | None = None
 
@@ -226,7 +227,7 @@ class Session:
         """Which effect is missing?"""
         entry = self.store.get("runs", self.trials.name)
         self.store.put("runs", self.trials.name, entry | {"files": list(files)})
-        self._set_results(candidates=(), diagnosis=None)
+        self._set_results(candidates=(), diagnosis=None, previews={})
         self._start("diagnose", clips=self.trials.files, run=self._run, effects_from=list(files))
 
     def predict(self, seconds: float) -> None:
@@ -305,7 +306,14 @@ class Session:
     def _partial(self, content: Mapping[str, Any]) -> None:
         if self._context["trials"].name != self.trials.name:
             return
-        if "track" in content:
+        if "tracking" in content:
+            of = content["tracking"]
+            empty = {"objects": of["objects"], "times": [], "seen_px": [[] for _ in of["objects"]]}
+            own = {**empty, "clip": of["clip"], "fps": of["fps"], "sd_px": None, "warnings": []}
+            self._follow({**own, "is_running": True})
+        elif "frame" in content:
+            self._followed(**content["frame"])
+        elif "track" in content:
             view = content["track"]
             self._set_results(tracks={**self.results.tracks, view["clip"]: view})
         elif "fit" in content:
@@ -316,13 +324,30 @@ class Session:
             row = content["candidate"]
             others = [c for c in self.results.candidates if c["effect"] != row["effect"]]
             ranked = sorted([*others, row], key=lambda c: -float(c.get("score") or 0.0))
-            self._set_results(candidates=tuple(ranked))
+            previews = {**self.results.previews, row["effect"]: content.get("curves", ())}
+            self._set_results(candidates=tuple(ranked), previews=previews)
         elif "verdict" in content:
             found = content["verdict"]
             self._set_results(diagnosis={**found["document"], **_without(found, "document")})
 
+    def _follow(self, view: Mapping[str, Any]) -> None:
+        self.results = replace(self.results, tracks={**self.results.tracks, view["clip"]: view})
+        self._changed("live")
+
+    def _followed(self, index: int, places_px: Mapping[str, Any]) -> None:
+        """One frame more of the clip that is being tracked."""
+        for view in self.results.tracks.values():
+            if view.get("is_running") and index == len(view["times"]):
+                places = [list(places_px[name] or (None, None)) for name in view["objects"]]
+                seen = [[*was, new] for was, new in zip(view["seen_px"], places, strict=True)]
+                times = [*view["times"], index / view["fps"]]
+                self._follow({**view, "times": times, "seen_px": seen})
+                return
+
     def _ended(self, message: Message) -> None:
         follow, self._next, self.job = self._next, [], None
+        if message.task == "track" and message.kind != "done":
+            self._set_results(tracks=self._tracks())  # as they were
         if message.kind == "done":
             self._record(message.task, message.content)
             for action in follow:
@@ -353,7 +378,7 @@ class Session:
             return
         entry = self.store.get("runs", trials.name)
         mark = of["marks"] if task in ("fit", "diagnose") else of["model"]
-        path = trials.run / FILES[task]
+        path = trials.file(task)
         if path.is_file():
             entry[task] = made(path, mark)
         if task == "fit":
@@ -403,14 +428,18 @@ class Session:
 
     def _reopen(self) -> None:
         """Shows what lies in the folder for the clips that are chosen now."""
+        self.results = Results(self._tracks())
+        self._show_stored()
+        self._changed("clips", "marks", "results", "job")
+
+    def _tracks(self) -> dict[str, Any]:
+        """Those that lie in the folder, by clip."""
         tracks = {}
         for sheet in self.trials.sheets:
             view = results.pixel_track(track_files(sheet) / "track_px.csv")
             if view is not None:
                 tracks[sheet.name] = {**view, "clip": sheet.name}
-        self.results = Results(tracks)
-        self._show_stored()
-        self._changed("clips", "marks", "results", "job")
+        return tracks
 
     def _show_stored(self) -> None:
         run = self.trials.run
@@ -419,11 +448,16 @@ class Session:
         diagnosis = {"curves": {}, "sentence": "", **found, **entry.get("diagnose_view", {})}
         self._set_results(
             compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
-            prediction=entry.get("predict_view") if (run / FILES["predict"]).is_file() else None,
+            prediction=self._prediction(entry),
             diagnosis=diagnosis if found else None,
             candidates=tuple(found.get("candidates", ())),
             rounds=tuple(self._rounds(entry.get("rounds") or list(found.get("history", ())))),
         )
+
+    def _prediction(self, entry: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        found = entry.get("predict_view", {})
+        is_there = self.trials.file("predict").is_file() and "clips" in found
+        return found if is_there else None
 
     def _rounds(self, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """With that of the fit that lies there, whoever made it."""

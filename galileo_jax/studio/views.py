@@ -110,11 +110,24 @@ def diagnosis_view(found: gx.Diagnosis, curves: int = 8) -> dict[str, Any]:
     """What diagnosis.json does not hold: a sentence, and the curves of the best candidates."""
     drawn = {}
     for name in found.candidates["effect"][:curves]:
-        drawn[name] = [_thin(motion) for motion in found.motions(name)]
+        drawn[name] = [thin(motion) for motion in found.motions(name)]
     return {"sentence": found.sentence, "curves": drawn}
 
 
-def _thin(motion: gx.Motion) -> dict[str, Any]:
+def prediction_view(ahead: gx.Prediction) -> dict[str, Any]:
+    """Where a clip's objects go."""
+    step = thinned(ahead.motions.times_s)
+    keys = ("time_s", "x_m", "x_q025_m", "x_q975_m", "y_m")
+    objects = {
+        str(name): {key: numbers(part[key].to_numpy()[step], 4) for key in keys}
+        for name, part in ahead.to_dataframe().groupby("object", sort=False)
+    }
+    end = ahead.document["clip_end_s"]
+    return {"sentences": list(ahead.sentences), "objects": objects, "clip_end": end}
+
+
+def thin(motion: gx.Motion) -> dict[str, Any]:
+    """A candidate's curve and the residuals that it leaves."""
     step = max(1, -(-len(motion.times_s) // CANDIDATE_POINTS))
     return {
         "clip": motion.clip,
