@@ -35,6 +35,7 @@ from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report.diagnosis_text import PROPOSED
+from galileo_jax.report.diagnosis_text import verdict as sentence_of
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.results.truth import hidden_effect
 from galileo_jax.runtime import progress
@@ -418,6 +419,7 @@ def _diagnosed(
     document = {
         "clips": [clip.source for clip in clips],
         TRACKS: [digest(observation) for observation in observations],
+        "sentence": sentence_of(found),
         **record,
         **inferred(measured),
         **({"effects_from": [str(Path(path).resolve()) for path in files]} if files else {}),

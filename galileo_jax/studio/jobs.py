@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any, Literal
 
-NICENESS = 15  # the page goes first
+NICENESS = 5
 PATIENCE_S = 20.0  # for work that was cancelled to stop by itself, before its process is ended
 
 Kind = Literal["progress", "partial", "done", "error", "cancelled"]

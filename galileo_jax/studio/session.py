@@ -311,6 +311,7 @@ class Session:
             empty = {"objects": of["objects"], "times": [], "seen_px": [[] for _ in of["objects"]]}
             own = {**empty, "clip": of["clip"], "fps": of["fps"], "sd_px": None, "warnings": []}
             self._follow({**own, "is_running": True})
+            self._changed("results")
         elif "frame" in content:
             self._followed(**content["frame"])
         elif "track" in content:
@@ -383,7 +384,9 @@ class Session:
             entry[task] = made(path, mark)
         if task == "fit":
             new = results.round_of(results.document(trials.run / "result.json"))
-            entry["rounds"] = results.with_round(entry.get("rounds", []), new)
+            is_shown = trials.name == self.trials.name  # with rounds that commands have left
+            known = entry.get("rounds") or (list(self.results.rounds) if is_shown else [])
+            entry["rounds"] = results.with_round(known, new)
         if task in ("compare", "predict"):
             key = {"compare": "compare", "predict": "prediction"}[task]
             entry[f"{task}_view"] = content[key]
@@ -445,7 +448,10 @@ class Session:
         run = self.trials.run
         entry = self.store.get("runs", self.trials.name)
         found = results.document(run / FILES["diagnose"])
-        diagnosis = {"curves": {}, "sentence": "", **found, **entry.get("diagnose_view", {})}
+        last = entry.get("diagnose", {}).get("at") if found else None
+        is_own = found and last == (run / FILES["diagnose"]).stat().st_mtime_ns  # not a command's
+        curves = entry.get("diagnose_view", {}).get("curves", {}) if is_own else {}
+        diagnosis = {"sentence": "", **found, "curves": curves}
         self._set_results(
             compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
             prediction=self._prediction(entry),

@@ -53,7 +53,7 @@ export default {
               :transform="'rotate(' + tilt(place) + ')'"/>
             <circle class="target" :r="22 * k"/>
             <circle class="ring" :r="7 * k"/><circle class="dot" :r="1.6 * k"/>
-            <text class="label" :font-size="13 * k" :x="11 * k" :y="-9 * k">
+            <text class="label" :font-size="13 * k" :x="11 * k" :y="(kind(handle) === 'rampend' ? 20 : -9) * k">
               {{ kind(handle) === 'stickend' ? '' : words[handle] || handle }}</text>
           </g>
         </g>
@@ -213,9 +213,11 @@ export default {
         pen.fillStyle = "#000"; pen.fillRect(0, 0, 300, 300);
         pen.drawImage(img, this.loupe[0] * scale - side / 2, this.loupe[1] * scale - side / 2,
                       side, side, 0, 0, 300, 300);
-        pen.strokeStyle = "#fff"; pen.lineWidth = 1;
-        pen.beginPath(); pen.moveTo(150, 90); pen.lineTo(150, 210);
-        pen.moveTo(90, 150); pen.lineTo(210, 150); pen.stroke();
+        for (const [colour, width] of [["rgba(0,0,0,0.6)", 4], ["#fff", 1.5]]) {
+          pen.strokeStyle = colour; pen.lineWidth = width;
+          pen.beginPath(); pen.moveTo(150, 100); pen.lineTo(150, 200);
+          pen.moveTo(100, 150); pen.lineTo(200, 150); pen.stroke();
+        }
       });
     },
     trail(places) {

@@ -20,12 +20,13 @@ from tests.studio.test_page import opened, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.video]
 
-BOARD = "--scenario incline --size 320 180 --m1 0.15"
-CUBIC = "--effect cubic_drag --effects-from my_effect.py"
+BOARD = "--scenario incline --size 320x180 --m1 0.15"
+CUBIC = "--effects-from my_effect.py --effect cubic_drag:cubic_drag"
 CLIPS = {  # a drag with the cube of the speed is a law where it shows clearly, else unknown
-    "unknown": f"{BOARD} {CUBIC} --set cubic_drag=0.3 --seed 9 --angle 40 --k1 0.1 --fps 60",
-    "law": f"{BOARD} {CUBIC} --set cubic_drag=0.1 --seed 4 --angle 35 --k1 0.15",
-    "ambiguous": f"{BOARD} --effect air_drag --strength 0.1 --seed 7 --angle 25 --k1 0.2 --noise 10",
+    "unknown": f"{BOARD} {CUBIC}=0.3 --seed 9 --angle 40 --k1 0.1 --fps 60",
+    "law": f"{BOARD} {CUBIC}=0.1 --seed 4 --angle 35 --k1 0.15",
+    "ambiguous": f"{BOARD} --effect air_drag --strength 0.1 --seed 7 --angle 25 --k1 0.2"
+    " --noise 10",
 }
 SECONDS = {"unknown": 1.2, "law": 1.2, "ambiguous": 0.7}
 

@@ -25,8 +25,9 @@ def build(tab: "Tab") -> None:
             "Predict", lambda: session.predict(float(seconds.value or SECONDS)), tab, "predict"
         )
     if found is not None:
-        for line in found["sentences"]:
-            ui.label(line.strip()).style("margin-left: 14px" if line.startswith(" ") else "")
+        with ui.element("div").classes("answers"):
+            for line in found["sentences"]:
+                ui.label(line.strip()).classes("detail" if line.startswith(" ") else "")
         if session.states["predict"] == "done":
             version = session.versions["results"]
             ui.html(

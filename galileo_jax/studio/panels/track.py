@@ -23,6 +23,7 @@ def build(tab: "Tab") -> None:
         ui.label("The program follows every object through the video.").classes("soft")
     elif track.get("is_running"):
         ui.label("Following every object, frame by frame.").classes("soft")
+        return
     else:
         _found(track)
     if track is not None and session.sheet is not None:
@@ -58,7 +59,7 @@ def _found(track: Mapping[str, Any]) -> None:
             f"{name}: seen in {len(seen)} of {frames} frames, to {sds[len(sds) // 2]:.2f} px.",
         )
     for warning in track["warnings"]:
-        remark("odd", warning.split(": ", 1)[-1])
+        remark("odd", warning)
 
 
 def _put_right(tab: "Tab", marks: Marks) -> None:
@@ -67,11 +68,13 @@ def _put_right(tab: "Tab", marks: Marks) -> None:
         ui.label(f"Click on the middle of {tab.placing} in the video.").classes("say")
         plain_button("Never mind", lambda: _place(tab, ""), "place-none")
         return
-    ui.label("Where a path leaves its object, go to that frame and").classes("soft small")
+    ui.label("If a path leaves its object, go to the first frame that is wrong:").classes(
+        "soft small"
+    )
     with ui.element("div").classes("rowline"):
         for one in marks.objects:
             plain_button(
-                f"put {one.name} right", partial(_place, tab, one.name), f"right-{one.name}",
+                f"{one.name} is lost here", partial(_place, tab, one.name), f"right-{one.name}",
                 tab.session.job is None,
             )  # fmt: skip
     for one in marks.objects:

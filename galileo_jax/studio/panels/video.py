@@ -17,9 +17,9 @@ def build(tab: "Tab") -> None:
     session = tab.session
     title("Video")
     with ui.element("div").classes("drop").props("data-drop"):
-        ui.label("Drop a video here, or")
-        choose = ui.element("label").classes("rowline").style("justify-content: center")
-        with choose:
+        ui.label("Drop a video here").style("margin-bottom: 8px")
+        with ui.element("label").classes("choose"):
+            ui.label("or choose a file")
             ui.html(
                 '<input type="file" accept="video/*,.yaml,.yml" multiple aria-label="open a file" '
                 'onchange="galileoUpload(this.files)" style="min-height: 44px">',
