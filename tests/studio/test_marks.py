@@ -10,19 +10,14 @@ from galileo_jax.studio.marks import (
     CORNERS,
     Marks,
     ObjectMark,
-    blank,
     corrected,
-    declared,
-    from_json,
     handles,
-    labels,
     moved,
-    proposed,
-    to_json,
     with_object,
     with_rectangle,
     without_object,
 )
+from galileo_jax.studio.marks_yaml import blank, declared, from_json, labels, proposed, to_json
 from galileo_jax.studio.sheet import changed, opened, redone, undone
 from galileo_jax.studio.stages import Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import FILE, Store

@@ -85,7 +85,7 @@ def test_unknown_shows_the_missing_acceleration_and_takes_an_effect_of_ones_own(
         panels = page.locator(".right .js-plotly-plot .subplot").count()
         assert panels == 3, "against time, place and speed"
         titles = page.locator(".right .js-plotly-plot [class*=xtitle], .right .x2title, .x3title")
-        said = " ".join(titles.all_inner_texts())
+        said = " ".join(titles.all_text_contents())
         assert "time" in said and "path" in said and "speed" in said
         own = folder / "my_effect.py"
         hand.click("text=An effect of your own")
