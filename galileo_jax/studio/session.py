@@ -5,7 +5,7 @@ import itertools
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from galileo_jax.studio.marks import Marks
 from galileo_jax.studio.marks_yaml import proposed
 from galileo_jax.studio.paths import videos
 from galileo_jax.studio.sheet import Sheet, changed, opened, redone, undone
+from galileo_jax.studio.shown import Results, with_partial
 from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import Store
 
@@ -33,21 +34,6 @@ class Job:
     stage: str = "starting"
     share: float = 0.0
     is_cancelled: bool = False
-
-
-@dataclass(frozen=True)
-class Results:
-    """Views of what was computed for the chosen clips; None: not there."""
-
-    tracks: Mapping[str, Any]
-    fit: Mapping[str, Any] | None = None
-    live: Mapping[str, Any] | None = None  # the model at the sliders
-    compare: Mapping[str, Any] | None = None
-    diagnosis: Mapping[str, Any] | None = None  # diagnosis.json, with sentence and curves
-    candidates: tuple[Mapping[str, Any], ...] = ()  # as they stream in
-    previews: Mapping[str, Any] = field(default_factory=dict)  # their curves, until all are there
-    rounds: tuple[Mapping[str, Any], ...] = ()
-    prediction: Mapping[str, Any] | None = None
 
 
 class Session:
@@ -307,44 +293,8 @@ class Session:
     def _partial(self, content: Mapping[str, Any]) -> None:
         if self._context["trials"].name != self.trials.name:
             return
-        if "tracking" in content:
-            of = content["tracking"]
-            empty = {"objects": of["objects"], "times": [], "seen_px": [[] for _ in of["objects"]]}
-            own = {**empty, "clip": of["clip"], "fps": of["fps"], "sd_px": None, "warnings": []}
-            self._follow({**own, "is_running": True})
-            self._changed("results")
-        elif "frame" in content:
-            self._followed(**content["frame"])
-        elif "track" in content:
-            view = content["track"]
-            self._set_results(tracks={**self.results.tracks, view["clip"]: view})
-        elif "fit" in content:
-            self._set_results(fit=content["fit"], live=None)
-        elif "compare" in content:
-            self._set_results(compare=content["compare"])
-        elif "candidate" in content:
-            row = content["candidate"]
-            others = [c for c in self.results.candidates if c["effect"] != row["effect"]]
-            ranked = sorted([*others, row], key=lambda c: -float(c.get("score") or 0.0))
-            previews = {**self.results.previews, row["effect"]: content.get("curves", ())}
-            self._set_results(candidates=tuple(ranked), previews=previews)
-        elif "verdict" in content:
-            found = content["verdict"]
-            self._set_results(diagnosis={**found["document"], **_without(found, "document")})
-
-    def _follow(self, view: Mapping[str, Any]) -> None:
-        self.results = replace(self.results, tracks={**self.results.tracks, view["clip"]: view})
-        self._changed("live")
-
-    def _followed(self, index: int, places_px: Mapping[str, Any]) -> None:
-        """One frame more of the clip that is being tracked."""
-        for view in self.results.tracks.values():
-            if view.get("is_running") and index == len(view["times"]):
-                places = [list(places_px[name] or (None, None)) for name in view["objects"]]
-                seen = [[*was, new] for was, new in zip(view["seen_px"], places, strict=True)]
-                times = [*view["times"], index / view["fps"]]
-                self._follow({**view, "times": times, "seen_px": seen})
-                return
+        self.results = with_partial(self.results, content)
+        self._changed("live" if "frame" in content else "results")
 
     def _ended(self, message: Message) -> None:
         follow, self._next, self.job = self._next, [], None
@@ -499,7 +449,3 @@ class Session:
     def _changed(self, *parts: str) -> None:
         for part in parts:
             self.versions[part] += 1
-
-
-def _without(found: Mapping[str, Any], key: str) -> dict[str, Any]:
-    return {name: value for name, value in found.items() if name != key}
