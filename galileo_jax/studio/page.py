@@ -43,6 +43,7 @@ class Tab:
       placing: what a click into the video places: a new object, or one that is put right; "":
         nothing.
       frame: that is shown.
+      is_writing, draft: whether an effect is being written, and its text; None: as saved.
       dark: the colours.
       said: the job, the error and the note that are shown.
       drawn, lamps: what the panel and the row of stages were built of.
@@ -56,6 +57,8 @@ class Tab:
     candidate: str = ""
     placing: str = ""
     frame: int = 0
+    is_writing: bool = False
+    draft: str | None = None
     dark: bool = False
     said: tuple[str, str, str] = ("", "", "")
     drawn: Any = None

@@ -79,7 +79,8 @@ def _candidate(tab: "Tab", row: Mapping[str, Any], is_best: bool) -> None:
     probability = float(row["probability"] or 0.0)
     with pick:
         law = row.get("law")
-        ui.label(law or name.replace("+", " + ")).classes("name")
+        words = name.replace("+", " + ").replace("_", "_\u200b")  # where a line may break
+        ui.label(law or words).classes("name")
         ui.label(f"{100 * probability:.3g} %" if probability > 5e-4 else "~0").classes("p")
         with ui.element("div").classes("bar2"):
             ui.element("i").style(f"width: {100 * probability:.1f}%")
@@ -133,18 +134,28 @@ def _beyond(tab: "Tab", found: Mapping[str, Any]) -> None:
             if entry.get("formula"):
                 ui.label(f"{name}: {entry['formula']}").classes("code")
     if status in ("unknown", "ambiguous"):
-        with ui.expansion("An effect of your own").classes("w-full"):
+        place = ui.expansion("An effect of your own", value=tab.is_writing).classes("w-full")
+        place.on_value_change(lambda event: setattr(tab, "is_writing", bool(event.value)))
+        with place:
             _editor(tab)
 
 
 def _editor(tab: "Tab") -> None:
     path = below(tab.session.root, OWN_FILE)
     text = path.read_text(encoding="utf-8") if path.is_file() else TEMPLATE
-    area = ui.textarea(value=text).props("outlined autogrow data-effect").classes("w-full")
+    area = (
+        ui.textarea(value=text if tab.draft is None else tab.draft)
+        .props("outlined autogrow data-effect")
+        .classes("w-full")
+    )
     area.style("font: 13px ui-monospace, monospace; width: 100%")
+
+    # The panel is built anew when results come: what is being written stays.
+    area.on_value_change(lambda event: setattr(tab, "draft", event.value))
 
     def run() -> None:
         write_text(Path(path), area.value or "")
+        tab.draft = None
         tab.session.diagnose((OWN_FILE,))
 
     plain_button(f"Save {OWN_FILE} and run it", run, "run-effect", tab.session.job is None)
