@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 FORM_NAMES = frozenset(NAMES_OF_FORMS)  # they can be tried, not added
 MOST_SHOWN = 6
 OWN_FILE = "my_effect.py"
+OWN_EFFECT = "--effects-from"  # in advice: to write an effect
 TEMPLATE = '''from galileo_jax import Effect, LogNormal, Parameter, register_effect
 
 
@@ -62,10 +63,19 @@ def build(tab: "Tab") -> None:
     if session.states["diagnose"] != "done" and not is_asked:
         text = "Ask again" if found is not None else "What is missing?"
         main_button(text, session.diagnose, tab, "diagnose")
+    status = found.get("verdict", {}).get("status") if found is not None else ""
+    if found is not None and status == "unknown":
+        _missing(tab, found)
+        _own(tab)
+    for line in found.get("verdict", {}).get("advice", ()) if found is not None else ():
+        if OWN_EFFECT not in line:  # which stands here
+            remark("odd", line[:1].upper() + line[1:])
     for i, row in enumerate(session.results.candidates[:MOST_SHOWN]):
         _candidate(tab, row, is_best=i == 0)
-    if found is not None:
-        _beyond(tab, found)
+    if found is not None and status != "unknown":
+        _missing(tab, found)
+        if status == "ambiguous":
+            _own(tab)
     if session.effects:
         main_button("Predict", lambda: tab.go("predict"), tab, "to-predict")
 
@@ -121,23 +131,25 @@ def _strength(row: Mapping[str, Any]) -> str:
     return f"velocity error {row['rmse']:.4f} m/s"
 
 
-def _beyond(tab: "Tab", found: Mapping[str, Any]) -> None:
-    """What to do where no effect is named."""
-    status = found.get("verdict", {}).get("status")
-    for line in found.get("verdict", {}).get("advice", ()):
-        remark("odd", line)
+def _missing(tab: "Tab", found: Mapping[str, Any]) -> None:
+    """The acceleration that the model lacks, where there is one."""
     record = found.get("missing_force")
-    if record:
-        ui.label("The acceleration that the model lacks").classes("small soft")
-        ui.plotly(charts.missing_figure(record, tab.dark)).style("height: 230px; width: 100%")
-        for name, entry in record["objects"].items():
-            if entry.get("formula"):
-                ui.label(f"{name}: {entry['formula']}").classes("code")
-    if status in ("unknown", "ambiguous"):
-        place = ui.expansion("An effect of your own", value=tab.is_writing).classes("w-full")
-        place.on_value_change(lambda event: setattr(tab, "is_writing", bool(event.value)))
-        with place:
-            _editor(tab)
+    if not record:
+        return
+    ui.label("The acceleration that the model lacks").classes("small soft")
+    ui.plotly(charts.missing_figure(record, tab.dark)).style("height: 230px; width: 100%")
+    for name, entry in record["objects"].items():
+        if entry.get("formula"):
+            ui.label(f"{name}: {entry['formula']}").classes("code")
+
+
+def _own(tab: "Tab") -> None:
+    """To be unfolded."""
+    place = ui.expansion("An effect of your own", value=tab.is_writing).classes("w-full")
+    place.props("data-own header-class=own")
+    place.on_value_change(lambda event: setattr(tab, "is_writing", bool(event.value)))
+    with place:
+        _editor(tab)
 
 
 def _editor(tab: "Tab") -> None:
