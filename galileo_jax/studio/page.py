@@ -278,6 +278,9 @@ def _panel(tab: Tab) -> None:
                 ui.button(name, on_click=partial(session.look_at, name), color=None).props(
                     "flat no-caps"
                 ).classes(look)
+    is_left = (session.trials.run / "result.json").is_file() and session.results.fit is None
+    if is_left and not session.error and tab.stage in ("compare", "diagnose", "predict"):
+        ui.label("Opening the run …").classes("soft")
     PANELS[tab.stage](tab)
 
 
