@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
@@ -16,6 +17,7 @@ from galileo_jax.tracking.track import Track
 from galileo_jax.tracking.tracker import Start, track_video
 from galileo_jax.video import decode
 
+NEAR_M = 0.01  # a way so short shows a direction
 UNKNOWN_SPAN_PX = 40.0
 """Features of one object are within this of each other when its size is not known."""
 
@@ -114,4 +116,10 @@ def _ramp_angle_rad(clip: Clip) -> float:
     """How the ramp's surface is turned in the image, clockwise positive; 0 without a ramp."""
     if not SCENARIOS[clip.scenario].has_ramp or clip.ramp_angle_deg is None:
         return 0.0
-    return math.radians(clip.ramp_angle_deg) * (1 if clip.direction == "right" else -1)
+    angle = math.radians(clip.ramp_angle_deg)
+    if clip.rectangle is None:
+        return angle * (1 if clip.direction == "right" else -1)
+    middle = np.mean(clip.rectangle.corners_px, axis=0)
+    plane = picture_plane(clip, middle)
+    x, y = plane.to_pixels(np.array([math.cos(angle), -math.sin(angle)]) * NEAR_M) - middle
+    return math.atan(y / x)
