@@ -6,18 +6,17 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
 from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.square_view import square_view
 from galileo_jax.tracking.template import Outline, grey
 from galileo_jax.tracking.track import Track
 from galileo_jax.tracking.tracker import Start, track_video
 from galileo_jax.video import decode
 
-NEAR_M = 0.01  # a way so short shows a direction
 UNKNOWN_SPAN_PX = 40.0
 """Features of one object are within this of each other when its size is not known."""
 
@@ -37,17 +36,22 @@ def track_clip(clip: Clip) -> Track:
     def advance() -> None:
         report("tracking", next(done) / total)
 
+    view = None if clip.is_camera_plain else square_view(clip)
+    seen = clip if view is None else view.clip(clip)
+
     def open_frames() -> Iterator[np.ndarray]:
-        return decode.frames(video)
+        frames = decode.frames(video)
+        return frames if view is None else view.drawn(frames)
 
     if passes == 3:
-        clip = _with_points(clip, open_frames, advance)
+        seen = _with_points(seen, open_frames, advance)
     starts = [
-        Start(item.name, item.point_px, outline_of(clip, item), item.first_frame or 0)
-        for item in clip.objects
+        Start(item.name, item.point_px, outline_of(seen, item), item.first_frame or 0)
+        for item in seen.objects
         if item.point_px is not None
     ]
-    return track_video(open_frames, starts, clip.fps, advance=advance)
+    found = track_video(open_frames, starts, clip.fps, advance=advance)
+    return found if view is None else view.track(found, clip)
 
 
 def _with_points(
@@ -116,10 +120,4 @@ def _ramp_angle_rad(clip: Clip) -> float:
     """How the ramp's surface is turned in the image, clockwise positive; 0 without a ramp."""
     if not SCENARIOS[clip.scenario].has_ramp or clip.ramp_angle_deg is None:
         return 0.0
-    angle = math.radians(clip.ramp_angle_deg)
-    if clip.rectangle is None:
-        return angle * (1 if clip.direction == "right" else -1)
-    middle = np.mean(clip.rectangle.corners_px, axis=0)
-    plane = picture_plane(clip, middle)
-    x, y = plane.to_pixels(np.array([math.cos(angle), -math.sin(angle)]) * NEAR_M) - middle
-    return math.atan(y / x)
+    return math.radians(clip.ramp_angle_deg) * (1 if clip.direction == "right" else -1)

@@ -8,8 +8,10 @@ import pytest
 import yaml
 
 import galileo_jax as gx
+from galileo_jax.clip.picture_plane import nearby_planes
 from galileo_jax.measurement.measure import Measurement, measure
 from galileo_jax.video.decode import frames
+from tests.clip.test_picture_plane import filmed
 
 SEED = 41
 SIZE = (640, 360)
@@ -83,3 +85,11 @@ def test_modes_are_what_half_a_pixel_of_a_corner_does(tmp_path: Path) -> None:
     size = np.abs(difference).max()
     assert size > 1e-4
     assert np.abs(difference - modes[4, 0][:, seen]).max() < 0.05 * size
+
+
+def test_a_lens_that_is_not_known_well_is_a_mode(tmp_path: Path) -> None:
+    clip = filmed(tmp_path, lens="{k1: -0.05, k1_sd: 0.02}")
+    pairs = nearby_planes(clip, (160.0, 150.0))
+    assert len(pairs) == 9
+    more, less = pairs[-1]
+    assert (more.k1, less.k1) == pytest.approx((-0.03, -0.07))
