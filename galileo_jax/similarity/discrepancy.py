@@ -125,8 +125,10 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
 def _camera(
     position: np.ndarray, observation: Observation, scene: Surroundings
 ) -> list[np.ndarray]:
-    """Keystone about either axis, the lens and scale, common to all objects."""
-    found = []
+    """What is declared of it, or keystone about either axis, the lens and scale; of all objects."""
+    found = [] if observation.modes_m is None else list(observation.modes_m)
+    if observation.is_squared:
+        return found
     x, y = position[:, 0], position[:, 1]
     if scene.has_surface:
         found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))

@@ -11,6 +11,7 @@ from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
 from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.square_view import square_view
 from galileo_jax.tracking.template import Outline, grey
 from galileo_jax.tracking.track import Track
 from galileo_jax.tracking.tracker import Start, track_video
@@ -35,17 +36,22 @@ def track_clip(clip: Clip) -> Track:
     def advance() -> None:
         report("tracking", next(done) / total)
 
+    view = None if clip.is_camera_plain else square_view(clip)
+    seen = clip if view is None else view.clip(clip)
+
     def open_frames() -> Iterator[np.ndarray]:
-        return decode.frames(video)
+        frames = decode.frames(video)
+        return frames if view is None else view.drawn(frames)
 
     if passes == 3:
-        clip = _with_points(clip, open_frames, advance)
+        seen = _with_points(seen, open_frames, advance)
     starts = [
-        Start(item.name, item.point_px, outline_of(clip, item), item.first_frame or 0)
-        for item in clip.objects
+        Start(item.name, item.point_px, outline_of(seen, item), item.first_frame or 0)
+        for item in seen.objects
         if item.point_px is not None
     ]
-    return track_video(open_frames, starts, clip.fps, advance=advance)
+    found = track_video(open_frames, starts, clip.fps, advance=advance)
+    return found if view is None else view.track(found, clip)
 
 
 def _with_points(
