@@ -158,8 +158,10 @@ def _path(problem: Problem, index: int, centre_m: np.ndarray, tangent: np.ndarra
 
 
 def _worst(comparison: Comparison, clip: str, name: str) -> Place | None:
-    """The object's worst cell, where the model fails there."""
+    """The object's worst cell, where the model fails there; the worst of all always is marked."""
     if comparison.is_adequate:
         return None
-    own = [p for p in comparison.where if (p.clip, p.object) == (clip, name) and p.z > MARKED_Z]
+    first = comparison.where[:1]
+    marked = [p for p in comparison.where if p.z > MARKED_Z or p in first]
+    own = [p for p in marked if (p.clip, p.object) == (clip, name)]
     return own[0] if own else None
