@@ -96,7 +96,7 @@ class PicturePlane:
 
 def picture_plane(
     clip: Clip,
-    origin_px: Sequence[float],
+    origin_px: Sequence[float] | np.ndarray,
     *,
     corners_px: np.ndarray | None = None,
     k1: float | None = None,
@@ -133,7 +133,7 @@ def picture_plane(
 
 
 def nearby_planes(
-    clip: Clip, origin_px: Sequence[float]
+    clip: Clip, origin_px: Sequence[float] | np.ndarray
 ) -> list[tuple[PicturePlane, PicturePlane]]:
     """The map with each declared number one standard deviation larger, and smaller."""
     found = []

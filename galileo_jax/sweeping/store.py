@@ -14,6 +14,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -123,8 +124,10 @@ class Store:
             notes = json.loads(str(file["notes"]))
             picture = file["thumbnail"].tobytes()
             modes = file.get("modes_m")
-        seen = Observation(
-            names, **arrays, modes_m=modes, is_squared=notes.get("is_squared", False)
+        seen = replace(
+            Observation(names=names, **arrays),
+            modes_m=modes,
+            is_squared=bool(notes.get("is_squared", False)),
         )
         said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
         astray = tuple(Astray(**entry) for entry in notes.get("astray", []))

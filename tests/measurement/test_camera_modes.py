@@ -10,6 +10,7 @@ import yaml
 import galileo_jax as gx
 from galileo_jax.clip.picture_plane import nearby_planes
 from galileo_jax.measurement.measure import Measurement, measure
+from galileo_jax.tracking.to_metres import observe
 from galileo_jax.video.decode import frames
 from tests.clip.test_picture_plane import filmed
 
@@ -79,7 +80,7 @@ def test_modes_are_what_half_a_pixel_of_a_corner_does(tmp_path: Path) -> None:
     corners = np.array(rectangle.corners_px)
     corners[2, 0] += CLICK_SD_PX
     moved = rectangle.model_copy(update={"corners_px": tuple(map(tuple, corners.tolist()))})
-    other = measure(one.clip.model_copy(update={"rectangle": moved})).observation
+    other = observe(one.clip.model_copy(update={"rectangle": moved}), one.pixels)
     seen = one.observation.mask[0]
     difference = (other.position_m - one.observation.position_m)[0][:, seen]
     size = np.abs(difference).max()
