@@ -21,6 +21,8 @@ def label(
     pixels_per_metre: float | None = None,
     pixels_per_metre_sd: float | None = None,
     scale: Sequence[float] | None = None,
+    rectangle: Sequence[float] | None = None,
+    lens: Sequence[float] | None = None,
     ramp_angle: float | None = None,
     ramp_angle_sd: float | None = None,
     ramp: Sequence[float] | None = None,
@@ -56,6 +58,11 @@ def label(
       pixels_per_metre_sd: how well that is known (one standard deviation); None: of a `scale`,
         what half a pixel at either end makes of it.
       scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
+      rectangle: (x, y) of the four corners, px, of a rectangle in the plane of the motion, from the
+        bottom left one counter-clockwise, then its width and height, m: in place of a scale where
+        the camera is not square to the plane. Its bottom side is level.
+      lens: k1, or (k1, standard deviation): a point r half diagonals from the picture's middle is
+        drawn at r (1 + k1 r^2).
       ramp_angle: of the ramp, degrees.
       ramp_angle_sd: how well that is known, degrees; None: of a `ramp`, by half a pixel.
       ramp: (x1, y1, x2, y2): two pixels on the ramp: its angle and direction.
@@ -96,6 +103,8 @@ def label(
             pixels_per_metre=pixels_per_metre,
             pixels_per_metre_sd=pixels_per_metre_sd,
             scale=scale,
+            rectangle=rectangle,
+            lens=lens,
             ramp_angle=ramp_angle,
             ramp_angle_sd=ramp_angle_sd,
             ramp=ramp,

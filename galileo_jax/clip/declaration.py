@@ -45,6 +45,9 @@ class Declaration:
       pixels_per_metre: of the picture.
       pixels_per_metre_sd: how well that is known; None: of a `scale`, by its two pixels.
       scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
+      rectangle: (x, y) of four corners, from the bottom left one counter-clockwise, px, and its
+        width and height, m.
+      lens: k1, and how well it is known.
       ramp_angle: of the ramp, degrees.
       ramp_angle_sd: how well that is known; None: of a `ramp`, by its two pixels.
       ramp: (x1, y1, x2, y2): two pixels on the ramp.
@@ -69,6 +72,8 @@ class Declaration:
     pixels_per_metre: float | None = None
     pixels_per_metre_sd: float | None = None
     scale: Sequence[float] | None = None
+    rectangle: Sequence[float] | None = None
+    lens: Sequence[float] | None = None
     ramp_angle: float | None = None
     ramp_angle_sd: float | None = None
     ramp: Sequence[float] | None = None
@@ -87,7 +92,12 @@ class Declaration:
         Raises:
           InputError: a value is no number, two pixels are no line, or two options say the same.
         """
-        for one, other in (("pixels_per_metre", "scale"), ("ramp_angle", "ramp")):
+        for one, other in (
+            ("pixels_per_metre", "scale"),
+            ("pixels_per_metre", "rectangle"),
+            ("scale", "rectangle"),
+            ("ramp_angle", "ramp"),
+        ):
             if getattr(self, one) is not None and getattr(self, other) is not None:
                 raise InputError(f"{_option(one)}: not allowed with {_option(other)}")
         values: dict[str, Any] = {}
@@ -96,6 +106,15 @@ class Declaration:
         if self.scale is not None:
             numbers = _numbers("--scale", self.scale, 5)
             values |= _scale(*numbers)
+        if self.rectangle is not None:
+            numbers = _numbers("--rectangle", self.rectangle, 10)
+            corners = [numbers[i : i + 2] for i in range(0, 8, 2)]
+            values["rectangle"] = {"corners_px": corners, "sides_m": numbers[8:]}
+        if self.lens is not None:
+            numbers = _numbers("--lens", self.lens)
+            if not 1 <= len(numbers) <= 2:
+                raise InputError(f"--lens: {len(numbers)} values given; K1 or K1 SD expected")
+            values["lens"] = dict(zip(("k1", "k1_sd"), numbers, strict=False))
         if self.origin is not None:
             values["origin_sd_px"] = CLICK_SD_PX
         for name, key in POINTS.items():

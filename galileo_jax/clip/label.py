@@ -15,6 +15,7 @@ from galileo_jax.clip.load import (
     has_yaml,
     with_unused,
 )
+from galileo_jax.clip.ramp_in_plane import ramp_in_plane
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_files.read import is_track
@@ -38,11 +39,19 @@ KEY_ORDER = (
     "direction",
     "pixels_per_metre",
     "pixels_per_metre_sd",
+    "rectangle",
+    "lens",
     "origin_px",
     "origin_sd_px",
     "gravity",
     "objects",
 )
+
+# What says the same in another way goes.
+REPLACES = {
+    "rectangle": ("pixels_per_metre",),
+    "pixels_per_metre": ("rectangle",),
+}
 
 
 @dataclass(frozen=True)
@@ -86,9 +95,18 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     if not values and not objects:
         raise InputError(f"{path}: nothing to write; see galileo label --help")
     content |= values
+    for key, others in REPLACES.items():
+        if key in values:
+            content |= {other: None for other in others if content.get(other)}
     if objects:
         content["objects"] = _with_objects(yaml_path, content.get("objects"), objects)
-    clip = with_unused(check_clip(yaml_path, content))
+    clip = check_clip(yaml_path, content)
+    if declared.ramp is not None and not clip.is_camera_plain:
+        given = {} if declared.ramp_angle_sd is None else {"ramp_angle_sd_deg"}
+        found = ramp_in_plane(clip, declared.ramp)
+        content |= {key: value for key, value in found.items() if key not in given}
+        clip = check_clip(yaml_path, content)
+    clip = with_unused(clip)
     check_belongs(clip, path)
     if is_new:
         text = yaml_text({key: content[key] for key in KEY_ORDER if key in content})

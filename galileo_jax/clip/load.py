@@ -10,6 +10,7 @@ from pydantic_core import ErrorDetails
 
 from galileo_jax.clip import placement
 from galileo_jax.clip.declaration import Declaration
+from galileo_jax.clip.picture_plane import scale_of_rectangle
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import (
     MAX_SCALE_SD_SHARE,
@@ -34,6 +35,9 @@ EXAMPLES: dict[str, str] = {
     "objects": "objects: with one entry per object",
     "name": "name: object1",
     "shape": "shape: box",
+    "corners_px": "corners_px: [[20, 400], [600, 400], [600, 50], [20, 50]]",
+    "sides_m": "sides_m: [1.0, 0.6]",
+    "k1": "k1: -0.05",
 }
 """What to write for the keys that have no default."""
 
@@ -196,7 +200,10 @@ def check_clip(
         if is_timed:
             file = file.model_copy(update={"fps": read.fps})
     found = _observed(path, file, read) if read else _filmed(path, file)
+    _check_camera(file, fail)
     clip = Clip.model_validate({**dict(file), "path": path, **found})
+    if clip.rectangle is not None:
+        clip = clip.model_copy(update={"pixels_per_metre": scale_of_rectangle(clip)})
     _check_against_source(clip, read.observation if read else None, fail)
     return clip
 
@@ -411,6 +418,15 @@ def _check_against_source(clip: Clip, observation: Observation | None, fail: Any
     for problem in (placement.find_odd_size(clip), placement.find_misplacement(clip, centres_m)):
         if problem:
             fail(*problem)
+
+
+def _check_camera(file: ClipFile, fail: Any) -> None:
+    """Refuses two scales, and a camera's geometry where there is no picture."""
+    if file.rectangle is not None and file.pixels_per_metre is not None:
+        fail("rectangle", "given together with pixels_per_metre; leave one of them out")
+    for key in ("rectangle", "lens"):
+        if getattr(file, key) is not None and file.video is None:
+            fail(key, "means nothing beside a track, only beside a video; leave it out")
 
 
 def _check_frames(key: str, item: ClipObject, clip: Clip, fail: Any) -> None:

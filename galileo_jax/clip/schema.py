@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from galileo_jax.clip.camera_geometry import Lens, Rectangle
 from galileo_jax.clip.scenarios import SCENARIOS
 
 LengthUnit = Literal["m", "cm", "mm", "km", "in", "ft", "px"]
@@ -328,6 +329,8 @@ class ClipFile(BaseModel):
     direction: Annotated[Direction, _one_of(get_args(Direction))] = "right"
     pixels_per_metre: Annotated[Number, AfterValidator(_pixels_per_metre)] | None = None
     pixels_per_metre_sd: Annotated[Number, AfterValidator(_scale_sd)] = 0.0
+    rectangle: Rectangle | None = None
+    lens: Lens | None = None
     origin_px: Point | None = None
     origin_sd_px: Annotated[Number, AfterValidator(_origin_sd_px)] = 0.0
     gravity: Annotated[Number, AfterValidator(_gravity)] = 9.81
@@ -359,6 +362,9 @@ class Clip(ClipFile):
       direction: which way object 1 travels in the image.
       pixels_per_metre: None = unknown.
       pixels_per_metre_sd: how well it is known (one standard deviation); 0 = taken at its word.
+      rectangle: four corners in the plane of the motion, which tell the scale and how the camera
+        stands; `pixels_per_metre` is then that of its middle.
+      lens: how the lens bends straight lines; None = it does not.
       origin_px: foot of the ramp at table level, pixels, x right, y down; None = unknown.
       origin_sd_px: how well each of its coordinates is known (one standard deviation); 0 = as
         well as any start, some millimetres.
@@ -392,6 +398,11 @@ class Clip(ClipFile):
         """Whether lengths are in metres, not in pixels of unknown size."""
         is_in_metres = self.track is not None and self.track_units != "px"
         return self.pixels_per_metre is not None or is_in_metres
+
+    @property
+    def is_camera_plain(self) -> bool:
+        """Whether pixels become metres by a scale alone."""
+        return self.rectangle is None and self.lens is None
 
     @property
     def has_floor(self) -> bool:

@@ -138,6 +138,23 @@ def _add_scene_options(scene: Any) -> None:
         help="two pixels and the distance between them, in place of --pixels-per-metre "
         "(default: unchanged)",
     )
+    add(
+        "--rectangle",
+        nargs=10,
+        type=float,
+        metavar=("X1", "Y1", "X2", "Y2", "X3", "Y3", "X4", "Y4", "WIDTH", "HEIGHT"),
+        help="corners of a rectangle in the plane of the motion, from the bottom left one "
+        "counter-clockwise, pixels, and its sides, metres, in place of --scale where the camera is "
+        "not square to the plane (default: unchanged)",
+    )
+    add(
+        "--lens",
+        nargs="+",
+        type=float,
+        metavar=("K1", "SD"),
+        help="how it bends straight lines: r half diagonals from the middle are drawn at "
+        "r (1 + K1 r^2) (default: unchanged)",
+    )
     add("--ramp-angle", type=float, metavar="DEG", help="of the ramp, degrees (default: unchanged)")
     add(
         "--ramp-angle-sd",
