@@ -5,6 +5,7 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
 
     board without a table    from where the hand is off; to a stop or a blow
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
+    toss                     to the first impact
 """
 
 from collections.abc import Callable, Sequence
@@ -85,7 +86,7 @@ def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
     """What may end the motion of the scene."""
     if is_board(clip) or (clip.scenario == "fall" and not clip.has_floor):
         return [(arrest_frame, STOPPED), (blow_frame, STRUCK)]
-    if clip.scenario == "flight" and not clip.has_floor:
+    if clip.scenario in ("flight", "toss") and not clip.has_floor:
         return [(blow_frame, STRUCK)]
     return []
 

@@ -17,7 +17,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
-SWEEPS = 24
+SWEEPS = 40  # at most; a corner alone needs some ten
+CONVERGED_M_S = 1e-11
 TINY = 1e-30  # keeps the derivative of a length finite at 0
 
 
@@ -44,9 +45,8 @@ def after_impulses(
     count = levers_m.shape[0]
     normals, across = jax.vmap(_response, (0, None))(levers_m, mobility)
 
-    def corner(turn: int, carry):
+    def corner(i: jax.Array, carry):
         impulses, velocity, spin = carry
-        i = turn % count
         u = velocity + jnp.cross(spin, levers_m[i])
         push = jnp.maximum(impulses[i, 2] - (u[2] - least_m_s[i]) / normals[i], 0.0)
         wanted = impulses[i, :2] - u[:2] / across[i]
@@ -58,8 +58,19 @@ def after_impulses(
         spin = spin + mobility @ jnp.cross(levers_m[i], change)
         return impulses.at[i].set(new), velocity, spin
 
+    def sweep(carry):
+        done, _, state = carry
+        after = jax.lax.fori_loop(0, count, corner, state)
+        changed = jnp.max(jnp.abs(after[0] - state[0]))
+        return done + 1, changed, after
+
+    def goes_on(carry) -> jax.Array:
+        done, changed, _ = carry
+        return (done < SWEEPS) & (changed > CONVERGED_M_S)
+
+    asked = jnp.where(jnp.any(touches), 1.0, 0.0)  # in flight there is nothing to sweep
     start = (jnp.zeros_like(levers_m), velocity, spin)
-    impulses, _, _ = jax.lax.fori_loop(0, SWEEPS * count, corner, start)
+    _, _, (impulses, _, _) = jax.lax.while_loop(goes_on, sweep, (0, asked, start))
     return jnp.sum(impulses, axis=0), jnp.sum(jnp.cross(levers_m, impulses), axis=0)
 
 
