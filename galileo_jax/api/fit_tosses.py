@@ -114,9 +114,13 @@ def _edge_m(clip: Clip) -> float:
     key = f"{clip.path}: objects[0]"
     thing = clip.objects[0]
     if clip.scenario != "toss" or clip.track is None:
-        raise InputError(f"{clip.path}: scenario: {clip.scenario}; toss, with a csv track, expected")
+        raise InputError(
+            f"{clip.path}: scenario: {clip.scenario}; toss, with a csv track, expected"
+        )
     if thing.shape != "box" or thing.size_m is None:
-        raise InputError(f"{key}.size_m: a box of known size expected, [edge, edge, edge] in metres")
+        raise InputError(
+            f"{key}.size_m: a box of known size expected, [edge, edge, edge] in metres"
+        )
     if max(thing.size_m) > (1 + CUBE_WITHIN) * min(thing.size_m):
         raise InputError(f"{key}.size_m: {list(thing.size_m)}: three equal edges expected")
     return float(np.mean(thing.size_m))

@@ -1,8 +1,8 @@
 """Poses of one body as csv: `time_s, x_m, y_m, z_m, qw, qx, qy, qz`.
 
-Each title may begin with the object's name (`object1_x_m`, `object1_qw`). The quaternion's real part
-comes first; it turns the body's axes, which are along its edges, into the track's. Lengths are in
-metres, times in seconds.
+Each title may begin with the object's name (`object1_x_m`, `object1_qw`). The quaternion's real
+part comes first; it turns the body's axes, which are along its edges, into the track's. Lengths are
+in metres, times in seconds.
 """
 
 from pathlib import Path
@@ -70,9 +70,7 @@ def _column(path: Path, columns: dict[str, int], title: str) -> int:
     return columns[ending[0]]
 
 
-def _check_places(
-    path: Path, place: np.ndarray, lines: list[str], edge_m: float | None
-) -> None:
+def _check_places(path: Path, place: np.ndarray, lines: list[str], edge_m: float | None) -> None:
     if (empty := ~np.isfinite(place).all(axis=1)).any():
         raise InputError(f"{path}: {lines[int(empty.argmax())]}: a place is empty; metres expected")
     largest = float(np.abs(place).max())

@@ -65,7 +65,9 @@ def box(
     square = size_m**2
     inertia = (jnp.sum(square) - square) / 12
     numbers = (friction, restitution, gravity, floor_m, round_m)
-    return Solid(signs * (size_m - 2 * round_m), inertia, *(jnp.asarray(number, float) for number in numbers))
+    return Solid(
+        signs * (size_m - 2 * round_m), inertia, *(jnp.asarray(number, float) for number in numbers)
+    )
 
 
 def thrown(

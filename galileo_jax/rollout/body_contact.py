@@ -1,6 +1,6 @@
 """What a plane does to the corners of a body: impulses that only push, with Coulomb friction.
 
-For every corner that touches, with p its impulse over the mass and u its velocity after all of them:
+For every corner that touches, with p its impulse over the mass and u its velocity afterwards:
 
     0 <= p_n,  u_n >= least,  p_n (u_n - least) = 0
     |p_t| <= mu p_n, and where it slips  p_t = -mu p_n u_t / |u_t|

@@ -1,8 +1,8 @@
 """The rigid engine on a circle: a bob on a thread or a rod, at any angle.
 
 The angle's equation is integrated by Runge-Kutta steps of 1/1920 s (error below 1e-9 of the
-amplitude over 10 s). Dry friction in the bearing holds the bob where it turns back, if it can: these
-instants are met at their time, as in `engine_free`. A thread that gives way follows its load at
+amplitude over 10 s). Dry friction in the bearing holds the bob where it turns back, if it can;
+these instants are met at their time, as in `engine_free`. A thread that gives way follows its load at
 once, since it vibrates much faster than the bob swings (first order in the stretch s):
 
     r = L + s (cos a + L w^2 / g)
@@ -225,5 +225,7 @@ class EnginePendulum(EngineJax):
     def __init__(self, model: Model):
         """Raises `InputError` for a track in space."""
         if model.scene.surroundings.num_axes != 2:
-            raise InputError("scenario pendulum: a track in the plane (x, y) expected, not in space")
+            raise InputError(
+                "scenario pendulum: a track in the plane (x, y) expected, not in space"
+            )
         super().__init__(model)

@@ -34,8 +34,8 @@ def swung(
         def change(t: float, y: np.ndarray, slip: float = slip) -> np.ndarray:
             return np.hstack(rates(Swing(*y), np.asarray(t), slip, pendulum, scene)[0])
 
-        def turn(t: float, y: np.ndarray, way: float = way) -> float:
-            return float(y[1] * way) if pendulum.has_friction and t > time else 1.0
+        def turn(t: float, y: np.ndarray, way: float = way, began: float = time) -> float:
+            return float(y[1] * way) if pendulum.has_friction and t > began else 1.0
 
         turn.terminal, turn.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
         found = solve_ivp(
@@ -56,6 +56,7 @@ def swung(
         if found.status != 1:
             break
         now[1] = 0.0
-    seen = [place(Swing(*row), turn, pendulum, first, scene) for row, turn in zip(rows, turns)]
+    pairs = zip(rows, turns, strict=True)
+    seen = [place(Swing(*row), turn, pendulum, first, scene) for row, turn in pairs]
     position, velocity = (np.array(values).T[None] for values in zip(*seen, strict=True))
     return Motion(times, position, velocity, np.zeros((1, len(times))))

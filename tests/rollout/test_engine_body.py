@@ -66,9 +66,7 @@ def test_flight_keeps_energy_and_angular_momentum(size):
 
     first = np.asarray(pose.quaternion)
     own = Rotation.from_quat(first, scalar_first=True).inv().apply([3.0, -5.0, 4.0])
-    found = solve_ivp(
-        euler, (0, times[-1]), [*first, *own], t_eval=times, rtol=1e-12, atol=1e-13
-    )
+    found = solve_ivp(euler, (0, times[-1]), [*first, *own], t_eval=times, rtol=1e-12, atol=1e-13)
     assert np.asarray(poses.quaternion) == pytest.approx(found.y[:4].T, abs=1e-9)
 
 
@@ -181,7 +179,9 @@ def test_mujoco_says_the_same():
     model.geom_solref[0] = [0.0004, 1.5]
     data = mujoco.MjData(model)
     turned = np.array(pose.quaternion)
-    own = Rotation.from_quat(turned, scalar_first=True).inv().apply(np.array(spin_rad_s(solid, pose)))
+    own = (
+        Rotation.from_quat(turned, scalar_first=True).inv().apply(np.array(spin_rad_s(solid, pose)))
+    )
     data.qpos = [*np.asarray(pose.position_m), *turned]
     data.qvel = [*np.asarray(pose.velocity_m_s), *own]
     places = [np.array(data.qpos[:3])]

@@ -2,9 +2,9 @@
 
     residual = (place / PLACE_SD_M, turning / TURN_SD_RAD)
 
-The errors are not those of a camera (0.02 mm) but of the model: corners are no points, a plate gives
-way. Each impact multiplies what the start is off by, so that the fit goes out from the first impact
-in stages, each of which starts where the one before ended.
+The errors are not those of a camera (0.02 mm) but of the model: corners are no points, a plate
+gives way. Each impact multiplies what the start is off by, so that the fit goes out from the first
+impact in stages, each of which starts where the one before ended.
 """
 
 from collections.abc import Sequence
@@ -172,7 +172,9 @@ def padded(tosses: Sequence[Poses], length: int) -> Seen:
         short = max(0, length - len(values))
         return np.pad(values, ((0, short), *[(0, 0)] * (values.ndim - 1)), mode="edge")[:length]
 
-    steps = [rows(np.append(np.diff(poses.times_s), np.diff(poses.times_s)[-1])) for poses in tosses]
+    steps = [
+        rows(np.append(np.diff(poses.times_s), np.diff(poses.times_s)[-1])) for poses in tosses
+    ]
     return Seen(
         jnp.asarray(np.array(steps)[:, :-1]),
         jnp.asarray(np.array([rows(poses.position_m) for poses in tosses])),

@@ -61,7 +61,10 @@ def expected(
         return (value, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
 
     if PENDULUM in SCENARIOS[clip.scenario].laws:
-        return {**declared, **pendulum_expected(clip, times_s, place_m, _start_velocity(times_s, place_m))}
+        return {
+            **declared,
+            **pendulum_expected(clip, times_s, place_m, _start_velocity(times_s, place_m)),
+        }
     return {
         "start_velocity_x": start(velocity[0]),
         "start_velocity_y": start(velocity[1]),

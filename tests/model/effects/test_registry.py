@@ -17,7 +17,14 @@ from galileo_jax.model.effects import (
 from galileo_jax.model.effects.effect import State
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.runtime.errors import InputError
-from tests.model.effects.motion import LIBRARY, LONG_TABLE, OFF_THE_RAMP, PAIR, absent_theta, model_of
+from tests.model.effects.motion import (
+    LIBRARY,
+    LONG_TABLE,
+    OFF_THE_RAMP,
+    PAIR,
+    absent_theta,
+    model_of,
+)
 from tests.ramp_model import make_surroundings
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "my_effect.py"
