@@ -2,8 +2,8 @@
 
 The angle's equation is integrated by Runge-Kutta steps of 1/1920 s (error below 1e-9 of the
 amplitude over 10 s). Dry friction in the bearing holds the bob where it turns back, if it can;
-these instants are met at their time, as in `engine_free`. A thread that gives way follows its load at
-once, since it vibrates much faster than the bob swings (first order in the stretch s):
+these instants are met at their time, as in `engine_free`. A thread that gives way follows its load
+at once, since it vibrates much faster than the bob swings (first order in the stretch s):
 
     r = L + s (cos a + L w^2 / g)
     L a'' (1 + i + 2 (s / L) (cos a + 3 L w^2 / g)) = -g sin a (1 + (s / L) (cos a - L w^2 / g)) + f
