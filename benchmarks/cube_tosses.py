@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 import galileo_jax as gx
 from galileo_jax.clip.poses_csv import read_poses_csv
-from galileo_jax.inference.toss.flight import Flight, flight_of
+from galileo_jax.measurement.toss_flight import Flight, flight_of
 from galileo_jax.observation.poses import Poses
 
 EDGE_M, GRAVITY = 0.1048, 9.81  # as published

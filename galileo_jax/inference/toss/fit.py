@@ -15,7 +15,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.inference.toss.flight import Flight, flight_of
 from galileo_jax.inference.toss.least_squares import Solution, solve
 from galileo_jax.inference.toss.residuals import (
     COMMON,
@@ -25,6 +24,7 @@ from galileo_jax.inference.toss.residuals import (
     forward,
     left_over,
 )
+from galileo_jax.measurement.toss_flight import Flight, flight_of
 from galileo_jax.observation.poses import Poses
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError

@@ -1,5 +1,6 @@
 """What the poses say before the first impact: where it begins, and how the body is thrown."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,21 @@ class Flight:
     acceleration_m_s2: np.ndarray
 
 
+def last_free_frame(poses: Poses, size_m: Sequence[float] | None) -> int | None:
+    """The last frame before any corner is near the plane; None where none ever is.
+
+    Args:
+      poses: in the world's axes, the plane near z = 0.
+      size_m: the box's edges; None: what its lowest place says.
+    """
+    lowest = 2 * float(poses.position_m[:, 2].min())
+    size = np.full(3, lowest) if size_m is None else np.asarray(size_m)
+    turned = Rotation.from_quat(poses.quaternion, scalar_first=True).as_matrix()
+    reach = np.abs(turned[:, 2]) @ (size / 2)
+    near = poses.position_m[:, 2] - reach <= NEAR_SHARE * float(np.min(size))
+    return max(int(np.argmax(near)) - 1, 0) if near.any() else None
+
+
 def flight_of(poses: Poses, size_m: np.ndarray) -> Flight | None:
     """The flight, None where it has fewer than `FEWEST` frames.
 
@@ -41,9 +57,8 @@ def flight_of(poses: Poses, size_m: np.ndarray) -> Flight | None:
       size_m: `[3]`, the box's edges.
     """
     turned = Rotation.from_quat(poses.quaternion, scalar_first=True)
-    reach = np.abs(turned.as_matrix()[:, 2]) @ (size_m / 2)
-    free = poses.position_m[:, 2] - reach > NEAR_SHARE * float(np.min(size_m))
-    last = int(np.argmin(free)) - 1 if not free.all() else len(free) - 1
+    found = last_free_frame(poses, tuple(size_m))
+    last = len(poses.times_s) - 1 if found is None else found
     if last + 1 < FEWEST:
         return None
     time = poses.times_s[: last + 1] - poses.times_s[0]
