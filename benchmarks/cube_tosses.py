@@ -38,7 +38,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--fit", action="store_true", help="fit the tosses, too (minutes)")
     parser.add_argument("--every", type=int, default=3, help="of --fit: every so-manieth toss")
-    parser.add_argument("--window", type=float, default=0.2, help="of --fit: s after the impact")
+    parser.add_argument("--window", type=float, default=0.1, help="of --fit: s after the impact")
     call = parser.parse_args()
     tables = sorted(call.folder.glob("*.csv"))
     tosses = [read_poses_csv(table, "z", EDGE_M) for table in tables]

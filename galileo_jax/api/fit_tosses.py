@@ -62,7 +62,7 @@ class TossFit:
 def fit_tosses(
     clips: str | Path | Clip | Sequence[str | Path | Clip],
     *,
-    window: float = 0.2,
+    window: float = 0.1,
     ahead: bool = False,
     on_progress: OnProgress | None = None,
     cancel: CancelFlag | None = None,
@@ -71,14 +71,15 @@ def fit_tosses(
 
     friction, restitution: of corners on the table. edge, gravity: in the track's own metres and
     seconds; that they differ from what a ruler says is news of the track. floor: how high the table
-    is. rounding: radius of the cube's edges.
+    is. rounding: radius of the cube's edges. inertia: over mass times edge squared (solid 1/6, thin
+    shell 5/18).
 
     Each toss has a start of its own. Intervals come from how the tosses differ.
 
     Args:
       clips: each a csv of poses with its yaml, the yaml, or what `load` returned.
-      window: how long after its first impact a toss is looked at, s, 0.02 to 0.5. Errors grow
-        with every impact.
+      window: how long after its first impact a toss is looked at, s, 0.02 to 0.2. Errors grow
+        with every impact, and so does the time that a fit takes.
       ahead: predict the second half of each toss from its first, too.
       on_progress: called with the stage, the share done (0 to 1) and None.
       cancel: a flag with `is_set`, such as `threading.Event`.
@@ -88,8 +89,8 @@ def fit_tosses(
         back, or nothing flies.
       Cancelled: `cancel` was set.
     """
-    if not 0.02 <= window <= 0.5:
-        raise InputError(f"window: {window:g} s is outside [0.02, 0.5]")
+    if not 0.02 <= window <= 0.2:
+        raise InputError(f"window: {window:g} s is outside [0.02, 0.2]")
     given = [clips] if isinstance(clips, str | Path | Clip) else list(clips)
     loaded = [one if isinstance(one, Clip) else load_clip(one) for one in given]
     if not loaded:

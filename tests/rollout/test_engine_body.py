@@ -112,7 +112,7 @@ def test_a_face_slides_to_rest(round_m):
     """With a = mu g, to v^2 / (2 mu g), and stays there."""
     solid = cube(round_m=round_m)
     speed = 0.5
-    pose = start(solid, EDGE_M / 2, (1, 0, 0, 0), (speed, 0, 0), (0, 0, 0))
+    pose = start(solid, EDGE_M / 2, np.array([1.0, 0, 0, 0]), (speed, 0, 0), (0, 0, 0))
     poses = rolled(solid, pose)
     times = np.append(0.0, np.cumsum(STEPS_S))
     until = np.minimum(times, speed / (0.18 * G))
@@ -128,7 +128,7 @@ def test_it_rolls_over_an_edge():
     lean = 0.2  # from standing on the edge
     corner = EDGE_M / math.sqrt(2)
     turned = [math.cos((math.pi / 4 + lean) / 2), 0.0, math.sin((math.pi / 4 + lean) / 2), 0.0]
-    pose = start(solid, corner * math.cos(lean), turned, (0, 0, 0), (0, 0, 0))
+    pose = start(solid, corner * math.cos(lean), np.array(turned), (0, 0, 0), (0, 0, 0))
     share = EDGE_M**2 / 6 + corner**2  # of the moment of inertia about the edge
 
     def fall(_: float, y: np.ndarray) -> list[float]:

@@ -31,10 +31,10 @@ from galileo_jax.runtime.errors import InputError
 
 PLACE_SD_M, TURN_SD_RAD = 0.001, np.radians(1.0)
 OWN_SD = np.repeat([0.002, 0.02, 0.05, 0.5], 3)  # of a start about what its flight told
-STAGES_S = (0.02, 0.07, 0.14, 0.2)  # after the first impact
-PRIOR = {"friction": 0.2, "restitution": 0.2, "rounding": 0.002}  # the middles
+STAGES_S = (0.02, 0.06, 0.1)  # after the first impact
+PRIOR = {"friction": 0.2, "restitution": 0.2, "rounding": 0.002, "inertia": 0.2}  # the middles
 # Widths: of logarithms, of the restitution's log-odds, of the floor in metres.
-PRIOR_SD = np.array([1.0, 1.0, 0.1, 0.003, 0.05, 0.7])
+PRIOR_SD = np.array([1.0, 1.0, 0.1, 0.003, 0.05, 0.7, 0.3])
 FRAMES = 16  # the length of a window is rounded up to multiples, so that fits share programs
 
 _left = jax.jit(jax.vmap(left_over, (None, 0, 0, 0)))
@@ -84,8 +84,8 @@ def fit_poses(
     last_s = window_s or STAGES_S[-1]
     stages = [stage for stage in STAGES_S if stage < last_s] + [last_s]
     ends = [flight.last for _, flight in kept]
-    first = np.array([PRIOR["friction"], PRIOR["restitution"], edge_m, 0.0, gravity])
-    middle = np.asarray(backward(jnp.asarray(np.append(first, PRIOR["rounding"]))))
+    usual = {**PRIOR, "edge": edge_m, "floor": 0.0, "gravity": gravity}
+    middle = np.asarray(backward(jnp.asarray([usual[name] for name in COMMON])))
     common, own = middle, np.zeros((len(kept), len(OWN_SD)))
     poses = [one for one, _ in kept]
     windows = [_until(poses, ends, stage) for stage in stages]

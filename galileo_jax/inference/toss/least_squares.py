@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import pinvh
 
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.progress import check_cancelled
@@ -150,7 +151,7 @@ class _Arrow:
         """The covariance of what all share, from the scatter of the tosses' gradients."""
         solved = np.linalg.solve(self.bb, np.concatenate([self.ab.mT, self.gb[..., None]], axis=2))
         each = self.aa - self.ab @ solved[..., :-1]
-        bread = np.linalg.inv(each.sum(axis=0) + np.diag(self.prior))
+        bread = pinvh(each.sum(axis=0) + np.diag(self.prior))
         scores = self.ga - (self.ab @ solved[..., -1:])[..., 0]
         count = len(scores)
         meat = scores.T @ scores * count / max(count - 1, 1)

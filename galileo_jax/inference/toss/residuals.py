@@ -14,9 +14,10 @@ from jaxtyping import Float
 from galileo_jax.rollout.body import Pose, box, thrown
 from galileo_jax.rollout.engine_body import roll_out
 
-COMMON = ("friction", "restitution", "edge", "floor", "gravity", "rounding")
+# Inertia: principal moment over mass times edge squared; 1/6 of a solid cube, 5/18 of a thin shell.
+COMMON = ("friction", "restitution", "edge", "floor", "gravity", "rounding", "inertia")
 UNITS = {"edge": "m", "floor": "m", "gravity": "m/s^2", "rounding": "m"}
-NUM_START = 12
+RESTITUTION, FLOOR = COMMON.index("restitution"), COMMON.index("floor")
 SUBSTEPS = 2  # from frame to frame; what that leaves out is far below the model's own errors
 
 
@@ -39,24 +40,23 @@ class Seen(NamedTuple):
 
 def forward(z: Float[jax.Array, " common"]) -> Float[jax.Array, " common"]:
     """From unbounded numbers to the parameters, in their units."""
-    friction, restitution, edge, floor, gravity, rounding = z
-    share = jax.nn.sigmoid(restitution)
-    positive = jnp.exp(jnp.stack([friction, edge, gravity, rounding]))
-    return jnp.stack([positive[0], share, positive[1], floor, positive[2], positive[3]])
+    positive = jnp.exp(z)
+    share = jax.nn.sigmoid(z[RESTITUTION])
+    return positive.at[RESTITUTION].set(share).at[FLOOR].set(z[FLOOR])
 
 
 def backward(value: Float[jax.Array, " common"]) -> Float[jax.Array, " common"]:
     """The inverse."""
-    friction, restitution, edge, floor, gravity, rounding = value
-    logs = jnp.log(jnp.stack([friction, edge, gravity, rounding]))
-    odds = jnp.log(restitution / (1 - restitution))
-    return jnp.stack([logs[0], odds, logs[1], floor, logs[2], logs[3]])
+    share = value[RESTITUTION]
+    logs = jnp.log(value.at[FLOOR].set(1.0))
+    return logs.at[RESTITUTION].set(jnp.log(share / (1 - share))).at[FLOOR].set(value[FLOOR])
 
 
 def motion(z: jax.Array, change: jax.Array, start: Start, steps_s: jax.Array) -> Pose:
     """The poses at all frames of one toss."""
-    friction, restitution, edge, floor, gravity, rounding = forward(z)
+    friction, restitution, edge, floor, gravity, rounding, inertia = forward(z)
     solid = box(edge * jnp.ones(3), friction, restitution, gravity, floor, rounding)
+    solid = solid._replace(inertia_m2=inertia * edge**2 * jnp.ones(3))
     pose = thrown(
         solid,
         start.position_m + change[:3],
