@@ -84,10 +84,8 @@ def geometry(tosses: list[Poses]) -> None:
     turned = np.concatenate([_height(one) for one in tosses])
     rest = np.array([np.median(one.position_m[-5:, 2]) for one in tosses])
     print(f"at rest the centre is {1e3 * np.median(rest):.2f} mm high (sd {1e3 * rest.std():.2f})")
-    print(
-        f"  half of the published edge: {1e3 * EDGE_M / 2:.2f}; ratio {np.median(rest):.5f}", end=""
-    )
-    print(f" / {EDGE_M / 2:.5f} = {np.median(rest) / (EDGE_M / 2):.4f}")
+    share, sd = 2 * np.median(rest) / EDGE_M, 2 * rest.std() / EDGE_M / np.sqrt(len(rest))
+    print(f"  over half of the published edge: {share:.4f} +- {sd:.4f}")
     tipped = turned > FACE
     for share in (0.01, 0.02, 0.05):
         floor, half = _lower_line(turned[tipped], high[tipped], share)
