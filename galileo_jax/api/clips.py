@@ -58,6 +58,11 @@ def as_clip(clip: ClipLike, pixels_per_metre: float | None = None) -> Clip:
     if isinstance(clip, Clip):
         if pixels_per_metre is None:
             return clip
+        if clip.rectangle is not None:
+            raise InputError(
+                f"{clip.path}: pixels_per_metre (given in the call): its rectangle tells it; "
+                "leave one of them out"
+            )
         try:
             return Clip.model_validate({**dict(clip), "pixels_per_metre": pixels_per_metre})
         except ValidationError as error:

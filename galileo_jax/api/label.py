@@ -16,9 +16,13 @@ def label(
     size: Mapping[str, Sequence[float]] | None = None,
     shape: Mapping[str, str] | None = None,
     first_frame: Mapping[str, int | None] | None = None,
+    last_frame: Mapping[str, int | None] | None = None,
+    correct: Mapping[str, Sequence[Sequence[float]]] | None = None,
     pixels_per_metre: float | None = None,
     pixels_per_metre_sd: float | None = None,
     scale: Sequence[float] | None = None,
+    rectangle: Sequence[float] | None = None,
+    lens: Sequence[float] | None = None,
     ramp_angle: float | None = None,
     ramp_angle_sd: float | None = None,
     ramp: Sequence[float] | None = None,
@@ -47,10 +51,18 @@ def label(
       shape: object name to box (default of a new object), cylinder, torus or sphere.
       first_frame: object name to the first frame in which it moves by itself, from 0; None: to
         be found.
+      last_frame: object name to the last frame that is used; None: that of the clip.
+      correct: object name to (frame, x, y): where it is, px, in frames in which it was lost; it is
+        followed on from there. (frame,) takes that back.
       pixels_per_metre: of the picture.
       pixels_per_metre_sd: how well that is known (one standard deviation); None: of a `scale`,
         what half a pixel at either end makes of it.
       scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
+      rectangle: (x, y) of the four corners, px, of a rectangle in the plane of the motion, from the
+        bottom left one counter-clockwise, then its width and height, m: in place of a scale where
+        the camera is not square to the plane. Its bottom side is level.
+      lens: k1, or (k1, standard deviation): a point r half diagonals from the picture's middle is
+        drawn at r (1 + k1 r^2).
       ramp_angle: of the ramp, degrees.
       ramp_angle_sd: how well that is known, degrees; None: of a `ramp`, by half a pixel.
       ramp: (x1, y1, x2, y2): two pixels on the ramp: its angle and direction.
@@ -86,9 +98,13 @@ def label(
             size=size or {},
             shape=shape or {},
             first_frame=first_frame or {},
+            last_frame=last_frame or {},
+            correct=correct or {},
             pixels_per_metre=pixels_per_metre,
             pixels_per_metre_sd=pixels_per_metre_sd,
             scale=scale,
+            rectangle=rectangle,
+            lens=lens,
             ramp_angle=ramp_angle,
             ramp_angle_sd=ramp_angle_sd,
             ramp=ramp,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
@@ -119,16 +120,16 @@ def _motion(problem: Problem, clip: Clip, theta: np.ndarray, best: np.ndarray) -
         np.sqrt(variance),
         predicted + offset,
         np.where(shown, white, np.nan),
-        _in_pixels(clip, measured, scale, sign),
-        _in_pixels(clip, predicted + offset, scale, sign),
+        _in_pixels(clip, measured),
+        _in_pixels(clip, predicted + offset),
         -sign * turned,
         tuple(one * (sign, -1.0) * scale for one in corners),
     )
 
 
-def _in_pixels(clip: Clip, place_m: np.ndarray, scale: float, sign: float) -> np.ndarray | None:
+def _in_pixels(clip: Clip, place_m: np.ndarray) -> np.ndarray | None:
     """`[object, frame, 2]`: the way back from what `tracking.to_metres` does."""
     origin = clip.origin_px or clip.objects[0].point_px
     if clip.video is None or origin is None:
         return None
-    return np.moveaxis(place_m, 1, 2) * (sign * scale, -scale) + np.asarray(origin)
+    return picture_plane(clip, origin).to_pixels(np.moveaxis(place_m, 1, 2))

@@ -39,9 +39,15 @@ class Declaration:
       shape: object to its shape.
       first_frame: object to the first frame in which it moves by itself, from 0; None: to be
         found.
+      last_frame: object to the last frame that is used; None: that of the clip.
+      correct: object to (frame, x, y): where it is, px, in a frame in which it was lost; (frame,)
+        takes that back.
       pixels_per_metre: of the picture.
       pixels_per_metre_sd: how well that is known; None: of a `scale`, by its two pixels.
       scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
+      rectangle: (x, y) of four corners, from the bottom left one counter-clockwise, px, and its
+        width and height, m.
+      lens: k1, and how well it is known.
       ramp_angle: of the ramp, degrees.
       ramp_angle_sd: how well that is known; None: of a `ramp`, by its two pixels.
       ramp: (x1, y1, x2, y2): two pixels on the ramp.
@@ -61,9 +67,13 @@ class Declaration:
     size: Mapping[str, Sequence[float]] = field(default_factory=dict)
     shape: Mapping[str, str] = field(default_factory=dict)
     first_frame: Mapping[str, int | None] = field(default_factory=dict)
+    last_frame: Mapping[str, int | None] = field(default_factory=dict)
+    correct: Mapping[str, Sequence[Sequence[float]]] = field(default_factory=dict)
     pixels_per_metre: float | None = None
     pixels_per_metre_sd: float | None = None
     scale: Sequence[float] | None = None
+    rectangle: Sequence[float] | None = None
+    lens: Sequence[float] | None = None
     ramp_angle: float | None = None
     ramp_angle_sd: float | None = None
     ramp: Sequence[float] | None = None
@@ -82,7 +92,12 @@ class Declaration:
         Raises:
           InputError: a value is no number, two pixels are no line, or two options say the same.
         """
-        for one, other in (("pixels_per_metre", "scale"), ("ramp_angle", "ramp")):
+        for one, other in (
+            ("pixels_per_metre", "scale"),
+            ("pixels_per_metre", "rectangle"),
+            ("scale", "rectangle"),
+            ("ramp_angle", "ramp"),
+        ):
             if getattr(self, one) is not None and getattr(self, other) is not None:
                 raise InputError(f"{_option(one)}: not allowed with {_option(other)}")
         values: dict[str, Any] = {}
@@ -91,6 +106,15 @@ class Declaration:
         if self.scale is not None:
             numbers = _numbers("--scale", self.scale, 5)
             values |= _scale(*numbers)
+        if self.rectangle is not None:
+            numbers = _numbers("--rectangle", self.rectangle, 10)
+            corners = [numbers[i : i + 2] for i in range(0, 8, 2)]
+            values["rectangle"] = {"corners_px": corners, "sides_m": numbers[8:]}
+        if self.lens is not None:
+            numbers = _numbers("--lens", self.lens)
+            if not 1 <= len(numbers) <= 2:
+                raise InputError(f"--lens: {len(numbers)} values given; K1 or K1 SD expected")
+            values["lens"] = dict(zip(("k1", "k1_sd"), numbers, strict=False))
         if self.origin is not None:
             values["origin_sd_px"] = CLICK_SD_PX
         for name, key in POINTS.items():
@@ -117,14 +141,30 @@ class Declaration:
             objects.setdefault(name, {})["size_m"] = _numbers(f"--size {name}", size)
         for name, point in self.point.items():
             objects.setdefault(name, {})["point_px"] = _numbers(f"--point {name}", point, 2)
-        for name, frame in self.first_frame.items():
-            if not (frame is None or (isinstance(frame, int) and frame >= 0)):
-                text = str(frame)
-                raise InputError(
-                    f"--first-frame {name}: {text!r} is not a frame number from 0, or null"
-                )
-            objects.setdefault(name, {})["first_frame"] = frame
+        for key in ("first_frame", "last_frame"):
+            for name, frame in getattr(self, key).items():
+                if not (frame is None or (isinstance(frame, int) and frame >= 0)):
+                    raise InputError(
+                        f"{_option(key)} {name}: {str(frame)!r} is not a frame number from 0, or "
+                        "null"
+                    )
+                objects.setdefault(name, {})[key] = frame
         return objects
+
+    def corrections(self, name: str, listed: Any) -> list[list[float]]:
+        """An object's corrections, by frame, after this call.
+
+        Raises:
+          InputError: one is no frame with a place.
+        """
+        found = {one[0]: list(one) for one in listed or ()}
+        for one in self.correct.get(name, ()):
+            if len(one) not in (1, 3) or one[0] != int(one[0]):
+                raise InputError(f"--correct {name}: {list(one)} is no frame, x and y")
+            found.pop(int(one[0]), None)
+            if len(one) == 3:
+                found[int(one[0])] = [int(one[0]), *_numbers(f"--correct {name}", one[1:], 2)]
+        return [found[frame] for frame in sorted(found)]
 
 
 def _option(name: str) -> str:

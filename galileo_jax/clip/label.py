@@ -15,6 +15,7 @@ from galileo_jax.clip.load import (
     has_yaml,
     with_unused,
 )
+from galileo_jax.clip.ramp_in_plane import ramp_in_plane
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_files.read import is_track
@@ -38,11 +39,19 @@ KEY_ORDER = (
     "direction",
     "pixels_per_metre",
     "pixels_per_metre_sd",
+    "rectangle",
+    "lens",
     "origin_px",
     "origin_sd_px",
     "gravity",
     "objects",
 )
+
+# What says the same in another way goes.
+REPLACES = {
+    "rectangle": ("pixels_per_metre",),
+    "pixels_per_metre": ("rectangle",),
+}
 
 
 @dataclass(frozen=True)
@@ -80,12 +89,24 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     old = {} if is_new else read_mapping(yaml_path)
     content, notes = _defaults(path, declared) if is_new else (copy.deepcopy(old), ())
     values, objects = declared.clip_values(), declared.object_values()
+    for name in declared.correct:
+        was = _listed(yaml_path, content.get("objects"), name).get("corrections")
+        objects.setdefault(name, {})["corrections"] = declared.corrections(name, was)
     if not values and not objects:
         raise InputError(f"{path}: nothing to write; see galileo label --help")
     content |= values
+    for key, others in REPLACES.items():
+        if key in values:
+            content |= {other: None for other in others if content.get(other)}
     if objects:
         content["objects"] = _with_objects(yaml_path, content.get("objects"), objects)
-    clip = with_unused(check_clip(yaml_path, content))
+    clip = check_clip(yaml_path, content)
+    if declared.ramp is not None and not clip.is_camera_plain:
+        given = {} if declared.ramp_angle_sd is None else {"ramp_angle_sd_deg"}
+        found = ramp_in_plane(clip, declared.ramp)
+        content |= {key: value for key, value in found.items() if key not in given}
+        clip = check_clip(yaml_path, content)
+    clip = with_unused(clip)
     check_belongs(clip, path)
     if is_new:
         text = yaml_text({key: content[key] for key in KEY_ORDER if key in content})
@@ -120,6 +141,18 @@ def _defaults(clip_path: Path, declared: Declaration) -> tuple[dict[str, Any], t
     fps = round(probe(clip_path).fps, 4)
     note = f"fps: {fps:g} taken from the container; slow-motion clips often lie about it"
     return {"video": clip_path.name, "fps": fps}, (note,)
+
+
+def _listed(yaml_path: Path, listed: Any, name: str) -> Mapping[str, Any]:
+    """An object's entry in the yaml.
+
+    Raises:
+      InputError: there is none.
+    """
+    for item in listed if isinstance(listed, list) else ():
+        if isinstance(item, dict) and item.get("name") == name:
+            return item
+    raise InputError(f"{yaml_path}: objects: no {name!r} there to put right")
 
 
 def _with_objects(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 
@@ -76,11 +77,9 @@ def centres_from_pixels(clip: Clip) -> dict[str, np.ndarray]:
     """
     if clip.pixels_per_metre is None:
         return {}
-    origin = clip.origin_px or (0.0, 0.0)
-    along = 1.0 if clip.direction == "right" else -1.0
+    plane = picture_plane(clip, clip.origin_px or (0.0, 0.0))
     return {
-        item.name: np.array([along * (item.point_px[0] - origin[0]), origin[1] - item.point_px[1]])
-        / clip.pixels_per_metre
+        item.name: plane.to_metres(np.array(item.point_px))
         for item in clip.objects
         if item.point_px is not None
     }

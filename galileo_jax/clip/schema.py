@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
 
+from galileo_jax.clip.camera_geometry import Lens, Rectangle
 from galileo_jax.clip.scenarios import SCENARIOS
 
 LengthUnit = Literal["m", "cm", "mm", "km", "in", "ft", "px"]
@@ -209,6 +210,17 @@ def _name(value: str) -> str:
     return value
 
 
+def _corrections(value: Any) -> Any:
+    """A list of [frame, x, y]; pydantic sees to the numbers."""
+    is_list = isinstance(value, list | tuple)
+    if not is_list or not all(isinstance(one, list | tuple) and len(one) == 3 for one in value):
+        raise wrong(f"{short(value)} is no list of [frame, x, y], such as [[24, 312.0, 221.5]]")
+    frames = [one[0] for one in value]
+    if len({*map(str, frames)}) < len(frames):
+        raise wrong(f"{short(value)} has a frame twice; one place for each frame expected")
+    return tuple(map(tuple, value))
+
+
 def _path(value: Any) -> Any:
     if isinstance(value, str) and 0 < len(value) < 256 and value.isprintable():
         return Path(value)
@@ -247,6 +259,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Metres = Annotated[Number, AfterValidator(_metres)]
 Kilograms = Annotated[Number, AfterValidator(_kilograms)]
 Point = tuple[Number, Number]
+Correction = tuple[Annotated[int, Field(strict=True, ge=0)], Number, Number]
 File = Annotated[Path | None, BeforeValidator(_path)]
 OneLine = Annotated[str, Field(strict=True, min_length=1, max_length=80)]
 
@@ -265,6 +278,9 @@ class ClipObject(BaseModel):
         None = to be found.
       first_frame: the first frame in which the object moves by itself; frames before are
         not used for it. None = not known: the release is found from the motion.
+      last_frame: the last frame that is used for it; None = that of the clip.
+      corrections: (frame, x, y), px: where somebody has seen it in frames in which the program
+        had lost it; it is followed on from there.
       rolls: whether it may roll: a cylinder on its side, a torus on edge; a sphere always may.
         A number is its moment of inertia over m r^2, where it is not that of a solid.
       z_m: how far its centre is from the plane in which object 1 moves, m, positive towards the
@@ -281,6 +297,8 @@ class ClipObject(BaseModel):
     mass_kg: Kilograms | None = None
     point_px: Annotated[Point, AfterValidator(_point_px)] | None = None
     first_frame: Annotated[int, Field(strict=True, ge=0)] | None = 0
+    last_frame: Annotated[int, Field(strict=True, ge=0)] | None = None
+    corrections: Annotated[tuple[Correction, ...], BeforeValidator(_corrections)] = ()
     rolls: Annotated[bool | float | None, BeforeValidator(_rolls)] = None
     z_m: Annotated[Number, AfterValidator(_across)] = 0.0
     spin_rad_s: tuple[Number, Number, Number] | None = None
@@ -322,6 +340,8 @@ class ClipFile(BaseModel):
     direction: Annotated[Direction, _one_of(get_args(Direction))] = "right"
     pixels_per_metre: Annotated[Number, AfterValidator(_pixels_per_metre)] | None = None
     pixels_per_metre_sd: Annotated[Number, AfterValidator(_scale_sd)] = 0.0
+    rectangle: Rectangle | None = None
+    lens: Lens | None = None
     origin_px: Point | None = None
     origin_sd_px: Annotated[Number, AfterValidator(_origin_sd_px)] = 0.0
     gravity: Annotated[Number, AfterValidator(_gravity)] = 9.81
@@ -355,6 +375,9 @@ class Clip(ClipFile):
       direction: which way object 1 travels in the image.
       pixels_per_metre: None = unknown.
       pixels_per_metre_sd: how well it is known (one standard deviation); 0 = taken at its word.
+      rectangle: four corners in the plane of the motion, which tell the scale and how the camera
+        stands; `pixels_per_metre` is then that of its middle.
+      lens: how the lens bends straight lines; None = it does not.
       origin_px: foot of the ramp at table level, pixels, x right, y down; None = unknown.
       origin_sd_px: how well each of its coordinates is known (one standard deviation); 0 = as
         well as any start, some millimetres.
@@ -390,6 +413,11 @@ class Clip(ClipFile):
         """Whether lengths are in metres, not in pixels of unknown size."""
         is_in_metres = self.track is not None and self.track_units != "px"
         return self.pixels_per_metre is not None or is_in_metres
+
+    @property
+    def is_camera_plain(self) -> bool:
+        """Whether pixels become metres by a scale alone."""
+        return self.rectangle is None and self.lens is None
 
     @property
     def has_floor(self) -> bool:

@@ -10,6 +10,7 @@ from galileo_jax.clip.load import has_yaml
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.sources import source_of
 from galileo_jax.commands import command
+from galileo_jax.commands.clip_options import corrections
 
 LINE = ("X1", "Y1", "X2", "Y2")
 
@@ -23,7 +24,9 @@ def main(argv: Sequence[str]) -> int | None:
     for name in ("point", "size"):
         asked[name] = {thing: values for thing, *values in asked[name]}
     asked["shape"] = dict(asked["shape"])
-    asked["first_frame"] = {name: _frame(text) for name, text in asked["first_frame"]}
+    for key in ("first_frame", "last_frame"):
+        asked[key] = {name: _frame(text) for name, text in asked[key]}
+    asked["correct"] = corrections(asked["correct"])
     done = label(path, **asked)
     for line in [f"note: {note}" for note in done.notes]:
         command.console().print(line, soft_wrap=True, markup=False)
@@ -102,6 +105,19 @@ def _add_object_options(objects: Any) -> None:
         "first frame in which it moves by itself, from 0; null: to be found (default of a new "
         "object: 0)",
     )
+    add(
+        "--last-frame",
+        ("NAME", "FRAME"),
+        2,
+        "last frame that is used; null: that of the clip (default: unchanged)",
+    )
+    add(
+        "--correct",
+        ("NAME", "FRAME"),
+        "+",
+        "NAME FRAME X Y: where it is in a frame in which it was lost, pixels; it is followed on "
+        "from there. NAME FRAME takes that back (default: unchanged)",
+    )
 
 
 def _add_scene_options(scene: Any) -> None:
@@ -121,6 +137,23 @@ def _add_scene_options(scene: Any) -> None:
         metavar=(*LINE, "METRES"),
         help="two pixels and the distance between them, in place of --pixels-per-metre "
         "(default: unchanged)",
+    )
+    add(
+        "--rectangle",
+        nargs=10,
+        type=float,
+        metavar=("X1", "Y1", "X2", "Y2", "X3", "Y3", "X4", "Y4", "WIDTH", "HEIGHT"),
+        help="corners of a rectangle in the plane of the motion, from the bottom left one "
+        "counter-clockwise, pixels, and its sides, metres, in place of --scale where the camera is "
+        "not square to the plane (default: unchanged)",
+    )
+    add(
+        "--lens",
+        nargs="+",
+        type=float,
+        metavar=("K1", "SD"),
+        help="how it bends straight lines: r half diagonals from the middle are drawn at "
+        "r (1 + K1 r^2) (default: unchanged)",
     )
     add("--ramp-angle", type=float, metavar="DEG", help="of the ramp, degrees (default: unchanged)")
     add(

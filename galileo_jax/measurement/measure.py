@@ -7,9 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.measurement.astray import Astray, find_astray
+from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
@@ -117,19 +119,28 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
     """
     if clip.video is None:
         assert clip.track is not None  # load_clip requires one of the two
-        return read_track(clip.path, clip.track, clip, clip.fps).observation, None
+        return _to_last(clip, read_track(clip.path, clip.track, clip, clip.fps).observation), None
     pixels = track_once(clip)
-    return with_noise_at_rest(observe(clip, pixels)), pixels
+    observation = with_noise_at_rest(observe(clip, pixels))
+    return with_camera_modes(clip, observation, pixels), pixels
+
+
+def _to_last(clip: Clip, observation: Observation) -> Observation:
+    """Without what is after the last frames that are declared; tracking stops there by itself."""
+    mask = observation.mask.copy()
+    for i, item in enumerate(clip.objects):
+        if item.last_frame is not None:
+            mask[i, item.last_frame + 1 :] = False
+    return replace(observation, mask=mask)
 
 
 def _with_foot(clip: Clip, remarks: list[str]) -> Clip:
     """The clip with the foot of its ramp, from a first look at the path."""
     assert clip.pixels_per_metre is not None  # check_scale requires it of a ramp
-    first_look, _ = observed(_without_sizes(clip, origin_px=(0.0, 0.0)))
-    point = infer_foot(clip, first_look)
-    sign = 1.0 if clip.direction == "right" else -1.0
-    x, y = (float(value) * clip.pixels_per_metre for value in point)
-    origin = (round(sign * x, 1), round(-y, 1))
+    about = (0.0, 0.0) if clip.rectangle is None else clip.rectangle.corners_px[0]
+    first_look, _ = observed(_without_sizes(clip, origin_px=about))
+    x, y = picture_plane(clip, about).to_pixels(infer_foot(clip, first_look))
+    origin = (round(float(x), 1), round(float(y), 1))
     clip = clip.model_copy(update={"origin_px": origin})
     remarks.append(
         f"{clip.path}: origin_px: null; {list(origin)} +- {_foot_sd_px(clip):.1f} is taken, from "

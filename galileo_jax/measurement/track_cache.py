@@ -24,8 +24,12 @@ FOLDER = "tracks"
 ROOMS = ("clip", "tracking", "video")  # whose code decides what a track is
 LIBRARIES = ("numpy", "opencv-python-headless", "scipy")
 # Of the yaml: what is declared about the picture and the objects in it.
-KEYS = {"scenario", "fps", "ramp_angle_deg", "direction", "pixels_per_metre", "origin_px"}
-OBJECT_KEYS = {"name", "shape", "size_m", "point_px", "first_frame", "rolls"}
+KEYS = {
+    *("scenario", "fps", "ramp_angle_deg", "direction"),
+    *("pixels_per_metre", "rectangle", "lens", "origin_px"),
+}
+OBJECT_KEYS = {"name", "shape", "size_m", "point_px", "rolls"}
+OBJECT_KEYS |= {"first_frame", "last_frame", "corrections"}
 
 
 def track_once(clip: Clip) -> Track:

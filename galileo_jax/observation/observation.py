@@ -23,6 +23,10 @@ class Observation:
       covariance_m2: `[object, 2, 2, frame]`, m^2, tracking error of each frame (independent
         between frames).
       mask: `[object, frame]`, True where the point was measured.
+      modes_m: `[mode, object, 2, frame]`, m: errors that many frames share, each as one standard
+        deviation of it moves the track: a number declared about the camera (corners, lens), the
+        shift with which a coder holds what has come to rest; None where there are none.
+      is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """
 
     names: tuple[str, ...]
@@ -30,6 +34,8 @@ class Observation:
     position_m: Float[np.ndarray, "object 2 frame"]
     covariance_m2: Float[np.ndarray, "object 2 2 frame"]
     mask: Bool[np.ndarray, "object frame"]
+    modes_m: Float[np.ndarray, "mode object 2 frame"] | None = None
+    is_squared: bool = False
 
     @property
     def velocity_m_s(self) -> Float[np.ndarray, "object 2 frame-1"]:

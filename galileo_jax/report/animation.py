@@ -65,8 +65,11 @@ def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray
 
 
 def _frames(clip: Clip, num_frames: int) -> VideoFrames | None:
-    """None for a csv track, a clip without a place for its origin, a video that is gone."""
-    if clip.video is None or not clip.video.is_file():
+    """None for a csv track, a clip without a place for its origin, a video that is gone.
+
+    Nor where the picture is distorted, while the motion is drawn square.
+    """
+    if clip.video is None or not clip.video.is_file() or not clip.is_camera_plain:
         return None
     if clip.origin_px is None and clip.objects[0].point_px is None:
         return None

@@ -43,7 +43,7 @@ class View:
 def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
     """What the video shows; without a video all of `positions_m` `[..., 2, frame]`, but for NaN."""
     # As in `observe`: without a declared foot the first object's first place is the origin.
-    origin = clip.origin_px or clip.objects[0].point_px
+    origin = clip.origin_px or clip.objects[0].point_px if clip.is_camera_plain else None
     if clip.frame_size_px and origin:
         (width, height), (x, y) = clip.frame_size_px, origin
         scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M

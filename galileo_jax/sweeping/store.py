@@ -14,6 +14,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -122,7 +123,12 @@ class Store:
             clip = Clip.model_validate(json.loads(str(file["clip"])))
             notes = json.loads(str(file["notes"]))
             picture = file["thumbnail"].tobytes()
-        seen = Observation(names=names, **arrays)
+            modes = file.get("modes_m")
+        seen = replace(
+            Observation(names=names, **arrays),
+            modes_m=modes,
+            is_squared=bool(notes.get("is_squared", False)),
+        )
         said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
         astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
         cuts = tuple(Cut(**entry) for entry in notes.get("cuts", []))
@@ -136,6 +142,8 @@ class Store:
         notes = {name: getattr(one, name) for name in ("inferred", "doubts", "remarks")}
         notes["cuts"] = [vars(entry) for entry in one.cuts]
         notes["astray"] = [vars(entry) for entry in one.astray]
+        notes["is_squared"] = seen.is_squared
+        modes = {} if seen.modes_m is None else {"modes_m": seen.modes_m}
         with replacing(self._clip(key)) as path:
             np.savez_compressed(
                 path,
@@ -144,6 +152,7 @@ class Store:
                 notes=np.array(json.dumps(notes)),
                 thumbnail=np.frombuffer(measured.thumbnail or b"", np.uint8),
                 **{name: getattr(seen, name) for name in ARRAYS},
+                **modes,
             )
 
     def _cell(self, name: str, file: str) -> Path:

@@ -1,9 +1,12 @@
 """From pixels to metres: the last place that knows pixels."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.schema import Clip
-from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
+from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 
@@ -11,27 +14,23 @@ from galileo_jax.tracking.track import Track
 def observe(clip: Clip, track: Track) -> Observation:
     """Turns a track in pixels into an observation in metres.
 
-        x = +-(px - origin) / scale (plus for `direction: right`),   y = (origin - py) / scale
+    By the clip's `picture_plane`. Without `origin_px` the first seen point of the first object is
+    the origin. Without `pixels_per_metre` lengths are in units of `NOMINAL_SCALE` pixels, and the
+    model must carry the scale as an unknown.
 
-    Without `origin_px` the first seen point of the first object is the origin. Without
-    `pixels_per_metre` lengths are in units of `NOMINAL_SCALE` pixels, and the model must
-    carry the scale as an unknown.
+    Raises:
+      InputError: an object is not seen, or seen beyond the horizon of the declared rectangle.
     """
-    scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
-    sign = 1.0 if clip.direction == "right" else -1.0
-    mask = track.is_visible.copy()
-    for i, declared in enumerate(clip.objects):
-        mask[i, : declared.first_frame or 0] = False
-    if clip.origin_px is not None:
-        origin = np.asarray(clip.origin_px)
-    else:
-        seen = np.flatnonzero(mask[0])
-        if not seen.size:
-            raise InputError(f"{clip.path}: {track.names[0]} is not seen in any frame")
-        origin = track.position_px[0, seen[0]]
-    axes = np.array([sign, -1.0])
-    position = (track.position_px - origin) * axes / scale
-    covariance = track.covariance_px2 * np.outer(axes, axes) / scale**2
+    mask = _mask(clip, track)
+    plane = picture_plane(clip, origin_of(clip, track))
+    position = plane.to_metres(track.position_px)
+    if not np.isfinite(position[mask]).all():
+        raise InputError(
+            f"{clip.path}: rectangle: an object is seen where the plane of these "
+            "corners_px is not; mend them"
+        )
+    slope = plane.slope(track.position_px)
+    covariance = slope @ track.covariance_px2 @ np.swapaxes(slope, -1, -2)
     return Observation(
         names=track.names,
         times_s=track.times_s,
@@ -39,3 +38,20 @@ def observe(clip: Clip, track: Track) -> Observation:
         covariance_m2=np.moveaxis(covariance, 1, -1),
         mask=mask,
     )
+
+
+def origin_of(clip: Clip, track: Track) -> Sequence[float]:
+    """Where x and y are 0: declared, or the first seen point of the first object, px."""
+    if clip.origin_px is not None:
+        return clip.origin_px
+    seen = np.flatnonzero(_mask(clip, track)[0])
+    if not seen.size:
+        raise InputError(f"{clip.path}: {track.names[0]} is not seen in any frame")
+    return track.position_px[0, seen[0]]
+
+
+def _mask(clip: Clip, track: Track) -> np.ndarray:
+    mask = track.is_visible.copy()
+    for i, declared in enumerate(clip.objects):
+        mask[i, : declared.first_frame or 0] = False
+    return mask

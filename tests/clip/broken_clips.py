@@ -191,6 +191,25 @@ def _other_video(folder: Path) -> Path:
     return folder / "copy.mp4"
 
 
+_CORNERS = "[[20, 150], [300, 150], [300, 20], [20, 20]]"
+
+
+def _rectangle(
+    corners: str, *words: str, sides: str = "[1.0, 0.5]"
+) -> tuple[Callable[[Path], Path], tuple[str, ...]]:
+    text = f"rectangle: {{corners_px: {corners}, sides_m: {sides}}}"
+    return _edit("pixels_per_metre: 300.0", text, "rectangle", *words)
+
+
+def _beside_track(line: str, *words: str) -> tuple[Callable[[Path], Path], tuple[str, ...]]:
+    def build(folder: Path) -> Path:
+        path = build_good_track(folder)
+        path.write_text(TRACK_YAML + f"{line}\n")
+        return path
+
+    return build, ("clip.yaml", *words)
+
+
 _WIDTH, _HEIGHT = SIZE_PX
 _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     # keys
@@ -237,6 +256,30 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "name_with_space": _edit("object1", "object 1", "objects[0].name", "object 1"),
     "video_is_a_number": _edit("clip.mp4", "5", "video", "5", "file name"),
+    # the camera's geometry
+    "rectangle_of_three_corners": _rectangle("[[20, 150], [300, 150], [300, 20]]", "3 corners"),
+    "rectangle_whose_corners_cross": _rectangle(
+        "[[20, 150], [300, 150], [20, 20], [300, 20]]", "sides cross"
+    ),
+    "rectangle_clockwise": _rectangle(
+        "[[20, 20], [300, 20], [300, 150], [20, 150]]", "clockwise", "bottom left"
+    ),
+    "rectangle_with_three_corners_on_a_line": _rectangle(
+        "[[20, 150], [160, 150], [300, 150], [20, 20]]", "on a line"
+    ),
+    "rectangle_without_a_side": _rectangle(_CORNERS, "0 is not the length", sides="[0, 0.5]"),
+    "rectangle_with_one_side": _rectangle(_CORNERS, "[width, height]", sides="[0.5]"),
+    "rectangle_and_scale": _edit(
+        "gravity:",
+        f"rectangle: {{corners_px: {_CORNERS}, sides_m: [1, 0.5]}}\ngravity:",
+        "rectangle",
+        "together with pixels_per_metre",
+    ),
+    "rectangle_beside_a_track": _beside_track(
+        f"rectangle: {{corners_px: {_CORNERS}, sides_m: [1, 0.5]}}", "rectangle", "a track"
+    ),
+    "lens_too_strong": _edit("gravity:", "lens: {k1: -3}\ngravity:", "lens.k1", "-3", "half a"),
+    "lens_without_number": _edit("gravity:", "lens: {k1_sd: 0.1}\ngravity:", "lens.k1", "missing"),
     # values and units
     "unknown_scenario": _edit(
         "scenario: ramp", "scenario: slope", "slope", "fall, flight, incline"
@@ -330,6 +373,48 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "object_in_the_air": _edit("[205.0, 141.0]", "[205.0, 60.0]", "object2", "above the table"),
     "wrong_direction": _edit("direction: right", "direction: left", "objects[0]", "direction"),
+    "last_frame_beyond_the_end": _edit(
+        "    point_px",
+        "    last_frame: 24\n    point_px",
+        "objects[0].last_frame",
+        "24 is not after first_frame (0) and within the clip (to 23)",
+    ),
+    "last_frame_before_the_first": _edit(
+        "    point_px",
+        "    first_frame: 5\n    last_frame: 5\n    point_px",
+        "objects[0].last_frame",
+        "5 is not after first_frame (5)",
+    ),
+    "correction_is_a_point": _edit(
+        "    point_px",
+        "    corrections: [12, 70.0, 110.0]\n    point_px",
+        "objects[0].corrections",
+        "no list of [frame, x, y]",
+    ),
+    "correction_of_a_frame_that_is_not_used": _edit(
+        "    point_px",
+        "    last_frame: 9\n    corrections: [[10, 70.0, 110.0]]\n    point_px",
+        "objects[0].corrections[0]",
+        "frame 10 is not after the first that is used (0) and up to the last (9)",
+    ),
+    "correction_outside_the_frame": _edit(
+        "    point_px",
+        "    corrections: [[10, 70.0, 1100.0]]\n    point_px",
+        "objects[0].corrections[0]",
+        "outside the frame",
+    ),
+    "correction_given_twice": _edit(
+        "    point_px",
+        "    corrections: [[10, 70.0, 110.0], [10, 71.0, 110.0]]\n    point_px",
+        "objects[0].corrections",
+        "a frame twice",
+    ),
+    "correction_with_text": _edit(
+        "    point_px",
+        "    corrections: [[10, 70.0, left]]\n    point_px",
+        "objects[0].corrections[0][2]",
+        "'left' is not a number",
+    ),
     "first_frame_beyond_the_end": _edit(
         "    point_px",
         "    first_frame: 24\n    point_px",
