@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from galileo_jax.api.export import export
     from galileo_jax.api.fit import fit
     from galileo_jax.api.fit_result import Fit
+    from galileo_jax.api.fit_tosses import TossFit, fit_tosses
     from galileo_jax.api.label import label
     from galileo_jax.api.motion import Motion
     from galileo_jax.api.next_experiment import NextExperiment, next_experiment
@@ -61,6 +62,7 @@ _PLACES = {
     "galileo_jax.api.discover": ("Discovery", "discover"),
     "galileo_jax.api.fit": ("fit",),
     "galileo_jax.api.fit_result": ("Fit",),
+    "galileo_jax.api.fit_tosses": ("TossFit", "fit_tosses"),
     "galileo_jax.api.next_experiment": ("NextExperiment", "next_experiment"),
     "galileo_jax.api.predict": ("Prediction", "predict"),
     "galileo_jax.api.propose": ("Proposal", "propose"),
@@ -109,6 +111,7 @@ __all__ = [
     "Surroundings",
     "Sweep",
     "Theta",
+    "TossFit",
     "Track",
     "Uniform",
     "__version__",
@@ -118,6 +121,7 @@ __all__ = [
     "effects",
     "export",
     "fit",
+    "fit_tosses",
     "label",
     "load",
     "load_run",

@@ -19,6 +19,7 @@ VERBS = (
     ("label", "write points and scale into a clip's yaml"),
     ("simulate", "make a clip with known truth"),
     ("predict", "continue a fitted scene beyond its clip"),
+    ("toss", "estimate friction and bounce of a cube from tosses with measured poses"),
     ("next", "choose the experiment that would tell most"),
     ("discover", "let a lab measure until the verdict stands"),
     ("export", "write tracks and fits as csv, parquet or netCDF"),

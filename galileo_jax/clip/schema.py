@@ -31,6 +31,7 @@ SIZE_MEANING: dict[str, str] = {
 
 MIN_SIZE_M, MAX_SIZE_M = 0.001, 2.0
 MAX_ACROSS_M = 0.5
+MIN_THREAD_M, MAX_THREAD_M = 0.01, 30.0
 MIN_SCALE_PX_PER_M, MAX_SCALE_PX_PER_M = 5.0, 100_000.0
 MIN_MASS_KG, MAX_MASS_KG = 1e-5, 100.0
 MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
@@ -69,6 +70,16 @@ def _across(value: float) -> float:
     if abs(value) > MAX_ACROSS_M:
         hint = _suggestion(value, (0.01, "cm") if abs(value) < 20 else (0.001, "mm"))
         raise wrong(f"{value:g} m is too far from the plane of the motion; metres expected; {hint}")
+    return value
+
+
+def _thread(value: float) -> float:
+    if not MIN_THREAD_M <= value <= MAX_THREAD_M:
+        hint = "; " + _suggestion(value, (0.01, "cm")) if value > MAX_THREAD_M else ""
+        raise wrong(
+            f"{value:g} m is no length of a thread; {MIN_THREAD_M:g} to {MAX_THREAD_M:g} m "
+            f"expected{hint}"
+        )
     return value
 
 
@@ -339,6 +350,8 @@ class ClipFile(BaseModel):
     starts_moving: Annotated[bool, Field(strict=True)] = False
     floor: Annotated[bool | float | None, BeforeValidator(_floor)] = None
     liquid_density: Annotated[Number, AfterValidator(_liquid_density)] | None = None
+    thread_m: Annotated[Number, AfterValidator(_thread)] | None = None
+    pivot_m: Point | None = None
     objects: tuple[ClipObject, ...]
 
 
@@ -377,6 +390,8 @@ class Clip(ClipFile):
       floor: fall, flight: its height over the origin, m; true = there is one, at a height to be
         inferred; None or false = none is reached.
       liquid_density: liquid: kg/m^3; None = not known.
+      thread_m: pendulum: from the pivot to the bob's centre, m; None = not known.
+      pivot_m: pendulum: (x, y) of the pivot from the origin, m; None = not known.
       objects: at least one, names unique.
       is_own_track: the track is our own csv, in metres along our axes.
       frame_count: frames that decode, or rows of the csv track.

@@ -12,8 +12,8 @@ from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.effect import Surroundings
 
 PHASES = ("held", "ramp", "foot", "table", "collision", "after", "at rest", "fall")
-FREE = {"spring": "swing", "liquid": "liquid"}  # by the law that makes it
-PHASES += ("flight", *FREE.values())
+FREE = {"spring": "swing", "pendulum": "swing", "liquid": "liquid"}  # by the law that makes it
+PHASES += ("flight", "swing", "liquid")
 COLLISION_S = 0.05  # either side of the hit
 RESTS_M_S = 2e-3
 
@@ -87,9 +87,8 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
 
 def free_phase(scene: Surroundings) -> str:
     """What the motion of an object that slides on nothing is called."""
-    if scene.moves_in_plane:
-        return "flight"
-    return next((phase for law, phase in FREE.items() if law in scene.laws), "fall")
+    usual = "flight" if scene.moves_in_plane else "fall"
+    return next((phase for law, phase in FREE.items() if law in scene.laws), usual)
 
 
 def _hit_s(

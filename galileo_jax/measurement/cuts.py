@@ -5,21 +5,25 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
 
     board without a table    from where the hand is off; to a stop or a blow
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
+    toss                     to the first impact
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.find_blow import blow_frame, goes_on
 from galileo_jax.measurement.find_hand import hand_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
+from galileo_jax.measurement.toss_flight import last_free_frame
 from galileo_jax.observation.observation import Observation
 
 STOPPED = "is stopped by something that is not in the scene"
 STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
+LANDED = "comes down on the table"
 HELD = "is moved by a hand until then: it accelerates otherwise than on its way"
 
 
@@ -85,6 +89,9 @@ def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
     """What may end the motion of the scene."""
     if is_board(clip) or (clip.scenario == "fall" and not clip.has_floor):
         return [(arrest_frame, STOPPED), (blow_frame, STRUCK)]
+    if clip.scenario == "toss" and clip.track is not None:
+        poses = read_poses_csv(clip.track, clip.track_up)
+        return [(lambda _: last_free_frame(poses, clip.objects[0].size_m), LANDED)]
     if clip.scenario == "flight" and not clip.has_floor:
         return [(blow_frame, STRUCK)]
     return []

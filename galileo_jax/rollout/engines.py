@@ -1,6 +1,6 @@
 """The engines by name, and which one `auto` takes."""
 
-from galileo_jax.model.effects.effect import infers_gravity
+from galileo_jax.model.effects.effect import PENDULUM, infers_gravity
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.rollout.rollout import Engine
@@ -24,6 +24,10 @@ def make_engine(name: str, model: Model) -> Engine:
     if name == "auto":
         name = "rigid"
     is_free = not model.scene.surroundings.has_surface
+    if name == "rigid" and PENDULUM in model.scene.surroundings.laws:
+        from galileo_jax.rollout.engine_pendulum import EnginePendulum
+
+        return EnginePendulum(model)
     if name == "rigid" and is_free:
         from galileo_jax.rollout.engine_free import EngineFree
 

@@ -1,4 +1,4 @@
-"""What is not on a ramp: falls, flights, springs and liquids with known truth.
+"""What is not on a ramp: falls, flights, springs, liquids and pendulums with known truth.
 
 The laws are the effects' (`rollout/engine_free.rates`); integrator and bounces are SciPy's
 (Dormand and Prince, order 8, with events), so that a clip is no copy of the engine that fits it.
@@ -13,9 +13,10 @@ from scipy.integrate import solve_ivp
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipObject
-from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.effect import PENDULUM, Effect, Surroundings
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.laws.liquid import ADDED_MASS
+from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.effects.laws.start_velocity import PATH, PLANE
 from galileo_jax.model.parameters import Parameter
 from galileo_jax.model.scene.scene import extents
@@ -30,6 +31,7 @@ from galileo_jax.rollout.motion import dynamics
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.hidden import Hidden, prior_value
 from galileo_jax.simulation.motion import RECORD_S, Motion
+from galileo_jax.simulation.pendulum import swung
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
 
 WATER_KG_M3 = 998.0
@@ -87,7 +89,7 @@ class FreeTruth:
         )
 
 
-NAMES = (*PLANE, *PATH, "rest", "period", "density_ratio", "floor_height")
+NAMES = (*PLANE, *PATH, LENGTH, ANGLE, "rest", "period", "density_ratio", "floor_height")
 
 
 def draw_free(
@@ -100,7 +102,7 @@ def draw_free(
     """
     if has_floor and "floor" not in SCENARIOS[scenario].keys:
         raise InputError(f"--floor: there is none in scenario {scenario}")
-    draw = {"fall": _fall, "flight": _flight, "spring": _spring, "liquid": _liquid}[scenario]
+    draw = DRAWS[scenario]
     radius = round(float(rng.uniform(0.015, 0.04)), 3)
     drawn, top_m, seconds = draw(rng, radius, given)
     values = {"m1": float(np.exp(rng.uniform(np.log(0.05), np.log(0.3)))), **drawn}
@@ -160,6 +162,24 @@ def _liquid(rng: np.random.Generator, radius: float, given: Mapping[str, float])
     return drawn, 2.5, 4 * terminal * (1 + ADDED_MASS * ratio) / pull + 0.5
 
 
+def _pendulum(rng: np.random.Generator, radius: float, given: Mapping[str, float]) -> Drawn:
+    drawn = {
+        LENGTH: rng.uniform(0.3, 1.2),
+        ANGLE: rng.uniform(0.3, 1.2) * rng.choice([-1.0, 1.0]),
+        PATH[0]: rng.uniform(-0.2, 0.2),
+    }
+    return {name: float(value) for name, value in drawn.items()}, 1.0, 6.0
+
+
+DRAWS = {
+    "fall": _fall,
+    "flight": _flight,
+    "spring": _spring,
+    "liquid": _liquid,
+    "pendulum": _pendulum,
+}
+
+
 def hide_free(truth: FreeTruth, hidden: Hidden, rng: np.random.Generator) -> FreeTruth:
     """Puts an effect into a truth; what is not given is drawn from its prior.
 
@@ -196,6 +216,8 @@ def solve_free(truth: FreeTruth) -> tuple[Motion, tuple[float, ...]]:
     scene = truth.surroundings
     theta = {name: np.asarray(value) for name, value in truth.values.items()}
     effects = (*(e for e in truth.effects if e.name not in DECLARED_WRONGLY), *LAWS)
+    if PENDULUM in scene.laws:
+        return swung(effects, theta, scene, truth.seconds), ()
     law = dynamics(effects, scene, theta, np)
     floor = floor_of(effects, theta, scene)
     velocity = start_velocity(effects, theta, scene)

@@ -32,7 +32,7 @@ EXACT_M = 1e-9
 SMOOTH_M = 1e-7
 # A bounce lies between two records, which are joined by straight lines.
 BOUNCE_M = 5e-5
-FREE = ("fall", "flight", "spring", "liquid")
+FREE = ("fall", "flight", "spring", "liquid", "pendulum")
 
 
 @pytest.fixture(autouse=True)

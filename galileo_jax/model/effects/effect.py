@@ -61,6 +61,7 @@ class Bounce(NamedTuple):
 
 # In `Surroundings.expected`: of a high fall; how well the angle and the origin are known.
 FALL_LENGTH, ANGLE, ORIGIN = "fall_length", "declared_angle", "origin_m"
+PENDULUM = "pendulum"  # the law under which the path is a circle
 SPIN = "spin"  # its components by axis, "spin_x" and so on, where the spin is known
 
 Force = Callable[[State], PerObject]
@@ -149,6 +150,11 @@ class Surroundings:
     def starts_moving(self) -> bool:
         """Whether nothing is let go: the object moves when it is first seen."""
         return "start_velocity" in self.laws
+
+    @property
+    def is_thrown(self) -> bool:
+        """Whether the start's velocity may have any direction; on a thread it has the circle's."""
+        return self.moves_in_plane and PENDULUM not in self.laws
 
     @property
     def num_axes(self) -> int:
@@ -271,6 +277,10 @@ class Effect:
 
     def overlap(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Returns by how much less neighbours are apart at their first hit `[...]`, m, or None."""
+        return None
+
+    def stretch(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns by how much its weight stretches a pendulum's thread `[...]`, m, or None."""
         return None
 
     def bounce(self, theta: Theta, scene: Surroundings) -> Bounce | None:

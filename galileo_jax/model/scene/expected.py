@@ -14,17 +14,19 @@ import numpy as np
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.model.effects.air import expected_drags
-from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN, SPIN
+from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN, PENDULUM, SPIN
 from galileo_jax.model.effects.laws.start_velocity import LAUNCH
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
 from galileo_jax.model.scene.board_path import board_shape
+from galileo_jax.model.scene.pendulum_expected import pendulum_expected
+from galileo_jax.model.scene.period import period_s
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 
 START_FRAMES = 6  # the start's velocity is read off so many
 START_SD_M_S = 1.0
-PERIOD_SD, MANY_PERIODS = 0.3, 400  # of its logarithm; tried
+PERIOD_SD = 0.3  # of its logarithm
 FLOOR_SD_M = 0.005  # as a declared height is known
 UNKNOWN_RADIUS_M = 0.05  # half the height of an object whose size nobody declared
 DENSITY_RATIO = (0.5, 0.8)  # steel in water 0.13, a bubble 800
@@ -58,13 +60,18 @@ def expected(
     def start(value: float) -> tuple[float, float]:
         return (value, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
 
+    if PENDULUM in SCENARIOS[clip.scenario].laws:
+        return {
+            **declared,
+            **pendulum_expected(clip, times_s, place_m, _start_velocity(times_s, place_m)),
+        }
     return {
         "start_velocity_x": start(velocity[0]),
         "start_velocity_y": start(velocity[1]),
         **({"start_velocity_z": start(velocity[2])} if len(velocity) == 3 else {}),
         "start_speed": start(-velocity[1]),
         "rest": (middle, max(width, 0.01)) if known else (0.0, UNKNOWN_M),
-        "period": (_period_s(times_s, down_m), PERIOD_SD),
+        "period": (period_s(times_s, down_m), PERIOD_SD),
         "density_ratio": _density_ratio(clip),
         "floor_height": _floor_height(clip, place_m[1], half_height_m),
         **declared,
@@ -135,22 +142,6 @@ def _start_velocity(times_s: np.ndarray, place_m: np.ndarray) -> tuple[float, ..
         return (0.0,) * len(place_m)
     after = times_s[:count] - times_s[0]
     return tuple(float(np.polyfit(after, row[:count], min(2, count - 1))[-2]) for row in place_m)
-
-
-def _period_s(times_s: np.ndarray, down_m: np.ndarray) -> float:
-    """The period of the sine that leaves least over, s (a least-squares periodogram)."""
-    if len(times_s) < 5:
-        return 1.0
-    span = float(times_s[-1] - times_s[0])
-    step = float(np.median(np.diff(times_s)))
-    periods = np.geomspace(3 * step, 2 * span, MANY_PERIODS)
-    left = []
-    for period in periods:
-        turn = 2 * math.pi * (times_s - times_s[0]) / period
-        design = np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1)
-        solution = np.linalg.lstsq(design, down_m, rcond=None)[0]
-        left.append(np.sum((down_m - design @ solution) ** 2))
-    return float(periods[np.argmin(left)])
 
 
 def _density_ratio(clip: Clip) -> tuple[float, float]:

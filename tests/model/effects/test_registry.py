@@ -17,7 +17,14 @@ from galileo_jax.model.effects import (
 from galileo_jax.model.effects.effect import State
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.runtime.errors import InputError
-from tests.model.effects.motion import LIBRARY, LONG_TABLE, OF_FLIGHTS, PAIR, absent_theta, model_of
+from tests.model.effects.motion import (
+    LIBRARY,
+    LONG_TABLE,
+    OFF_THE_RAMP,
+    PAIR,
+    absent_theta,
+    model_of,
+)
 from tests.ramp_model import make_surroundings
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "my_effect.py"
@@ -57,7 +64,7 @@ def test_effects_are_made_by_name_in_one_order():
 
 
 def test_an_unknown_name_lists_the_known():
-    with pytest.raises(InputError, match="unknown effect 'drga'; known: air_drag, constant_force"):
+    with pytest.raises(InputError, match="unknown effect 'drga'; known: air_drag, bearing_friction"):
         make_effects(["drga"])
     with pytest.raises(InputError, match=r"table_tilt, viscous_drag; did you mean air_drag\?$"):
         make_effects(["airdrag"])
@@ -70,7 +77,7 @@ def test_a_name_given_twice():
 
 def test_the_example_is_an_effect_like_any_other():
     assert load_file(EXAMPLE) == ("cubic_drag",)
-    assert set(effect_names()) == {*LIBRARY, *OF_FLIGHTS, "cubic_drag"}
+    assert set(effect_names()) == {*LIBRARY, *OFF_THE_RAMP, "cubic_drag"}
     (effect,) = make_effects(["cubic_drag"])
     (parameter,) = effect.parameters(PAIR)
     assert (parameter.name, parameter.absent, parameter.role) == ("cubic_drag", 0.0, "effect")

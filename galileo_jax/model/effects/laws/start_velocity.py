@@ -2,7 +2,7 @@
 
     v(0) = (start_velocity_x, start_velocity_y)    in the plane, x along the travel, y up;
                                                    in space with start_velocity_z
-    v(0) = start_speed                             on a straight path, downward
+    v(0) = start_speed                             on a straight path, downward; on a thread forward
 
     launch_speed = start_velocity_x / cos(launch_angle)
 
@@ -35,29 +35,29 @@ class StartVelocity(Effect):
             return ()
         found = [
             Parameter(name, "m/s", Normal(*scene.expected[name]), 0.0, "main", 0.05, per_clip=True)
-            for name in (SPACE[: scene.num_axes] if scene.moves_in_plane else PATH)
+            for name in (SPACE[: scene.num_axes] if scene.is_thrown else PATH)
         ]
-        if scene.moves_in_plane and LAUNCH in scene.expected:
+        if scene.is_thrown and LAUNCH in scene.expected:
             prior = Normal(*scene.expected[LAUNCH])
             found.append(Parameter(LAUNCH, "rad", prior, prior.mean, "nuisance", step=None))
         return tuple(found)
 
     def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
         """In the plane."""
-        if self.name not in scene.laws or not scene.moves_in_plane:
+        if self.name not in scene.laws or not scene.is_thrown:
             return None
         components = [theta[name] for name in SPACE[: scene.num_axes]]
         return components[0].__array_namespace__().stack(components, axis=-1)[..., None, :]
 
     def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
         """Along the path."""
-        if self.name not in scene.laws or scene.moves_in_plane:
+        if self.name not in scene.laws or scene.is_thrown:
             return None
         return theta[PATH[0]][..., None]
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
         """The speed of a throw and its angle over the horizontal; the speed at a launcher."""
-        if self.name not in scene.laws or not scene.moves_in_plane:
+        if self.name not in scene.laws or not scene.is_thrown:
             return {}
         x, y, *z = (theta[name] for name in SPACE[: scene.num_axes])
         xp = x.__array_namespace__()

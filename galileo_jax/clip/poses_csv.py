@@ -1,0 +1,112 @@
+"""Poses of one body as csv: `time_s, x_m, y_m, z_m, qw, qx, qy, qz`.
+
+Each title may begin with the object's name (`object1_x_m`, `object1_qw`). The quaternion's real
+part comes first; it turns the body's axes, which are along its edges, into the track's. Lengths are
+in metres, times in seconds.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax.clip.track_csv import MAX_POSITION_M, MIN_ROWS, TIME, check_times
+from galileo_jax.clip.track_files.cells import parse_columns, read_cells
+from galileo_jax.observation.poses import Poses
+from galileo_jax.runtime.errors import InputError
+
+PLACE, TURN = ("x_m", "y_m", "z_m"), ("qw", "qx", "qy", "qz")
+UNIT_WITHIN = 0.01  # a quaternion's length; what a table rounds is much nearer
+MOST_TURN_RAD = 1.5  # from row to row: more cannot be told from less the other way round
+STILL_SIZES = 20.0  # a body that is further away than so many of its edges is in other units
+
+
+def read_poses_csv(path: Path, up: str = "z", edge_m: float | None = None) -> Poses:
+    """Reads poses; one line says what is wrong.
+
+    Args:
+      path: the csv.
+      up: the track's axis that points up, "z" or "y"; poses come back with z up.
+      edge_m: the body's largest edge where it is declared, to find units mixed up.
+
+    Raises:
+      InputError: a column is missing, times do not increase, a row is no pose, or lengths are
+        not metres.
+    """
+    path = Path(path)
+    (_, header), *rows = read_cells(path)
+    columns = {title: at for at, title in enumerate(header) if title}
+    named = {title: _column(path, columns, title) for title in (TIME, *PLACE, *TURN)}
+    if len(rows) < MIN_ROWS:
+        raise InputError(f"{path}: {len(rows)} rows; at least {MIN_ROWS} expected")
+    for line, row in rows:
+        if len(row) < max(named.values()) + 1:
+            raise InputError(
+                f"{path}: line {line}: {len(row)} cells; {len(header)} expected as in the header"
+            )
+    table = parse_columns(path, rows, named)
+    lines = [f"line {line}" for line, _ in rows]
+    check_times(path, table[TIME], lines)
+    place = np.stack([table[title] for title in PLACE], axis=1)
+    quaternion = np.stack([table[title] for title in TURN], axis=1)
+    _check_places(path, place, lines, edge_m)
+    quaternion = _checked_turns(path, quaternion, lines)
+    if up == "y":
+        place = place @ np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+        half = np.sqrt(0.5)  # a quarter turn about x
+        w, x, y, z = quaternion.T
+        quaternion = half * np.stack([w - x, w + x, y - z, y + z], axis=1)
+    return Poses(path.stem, table[TIME], place, quaternion)
+
+
+def _column(path: Path, columns: dict[str, int], title: str) -> int:
+    if title in columns:
+        return columns[title]
+    ending = [name for name in columns if name.endswith(f"_{title}") and title != TIME]
+    if len(ending) != 1:
+        what = "missing" if not ending else f"more than one body: {', '.join(ending)}"
+        raise InputError(
+            f"{path}: column {title!r}: {what}; poses have {', '.join((TIME, *PLACE, *TURN))}"
+        )
+    return columns[ending[0]]
+
+
+def _check_places(path: Path, place: np.ndarray, lines: list[str], edge_m: float | None) -> None:
+    if (empty := ~np.isfinite(place).all(axis=1)).any():
+        raise InputError(f"{path}: {lines[int(empty.argmax())]}: a place is empty; metres expected")
+    largest = float(np.abs(place).max())
+    moved = float(np.ptp(place, axis=0).max())
+    if largest > MAX_POSITION_M or (edge_m and moved > STILL_SIZES * edge_m):
+        raise InputError(
+            f"{path}: places up to {largest:g} m, and a way of {moved:g} m; metres expected; are "
+            "these millimetres (divide them by 1000)?"
+        )
+    if edge_m and moved < edge_m / 100:
+        raise InputError(
+            f"{path}: places within {moved:g} m; metres expected; are these kilometres, or does "
+            "it not move?"
+        )
+
+
+def _checked_turns(path: Path, quaternion: np.ndarray, lines: list[str]) -> np.ndarray:
+    """The quaternions `[row, 4]` at length 1, each of the sign that is nearer to the last."""
+    if (empty := ~np.isfinite(quaternion).all(axis=1)).any():
+        raise InputError(f"{path}: {lines[int(empty.argmax())]}: qw to qz: empty; numbers expected")
+    length = np.linalg.norm(quaternion, axis=1)
+    if (wrong := np.abs(length - 1) > UNIT_WITHIN).any():
+        at = int(wrong.argmax())
+        raise InputError(
+            f"{path}: {lines[at]}: qw, qx, qy, qz: no rotation, their squares' root is "
+            f"{length[at]:.4g}; 1 expected"
+        )
+    quaternion = quaternion / length[:, None]
+    signs = np.cumprod(np.sign(np.sum(quaternion[1:] * quaternion[:-1], axis=1)) + 0.0)
+    quaternion[1:] *= np.where(signs == 0, 1.0, signs)[:, None]
+    cosine = np.clip(np.sum(quaternion[1:] * quaternion[:-1], axis=1), -1, 1)
+    if (jumps := 2 * np.arccos(cosine) > MOST_TURN_RAD).any():
+        at = int(jumps.argmax()) + 1
+        turn = np.degrees(2 * np.arccos(cosine[at - 1]))
+        raise InputError(
+            f"{path}: {lines[at]}: turned by {turn:.0f} degrees since the row before; less than "
+            f"{np.degrees(MOST_TURN_RAD):.0f} expected; is the real part (qw) first?"
+        )
+    return quaternion

@@ -1,0 +1,23 @@
+"""Toss: a box is thrown onto a table, with poses from frame to frame (`clip/poses_csv.py`).
+
+`fit_tosses` takes all of it. To the other commands it is a flight in space of the centre, up to the
+first impact.
+"""
+
+from galileo_jax.clip.scenarios.scenario import Scenario, register
+
+register(
+    Scenario(
+        name="toss",
+        meaning="one box is thrown onto a table, and its turning was measured, too",
+        has_ramp=False,
+        moves_in_plane=True,
+        laws=("start_velocity",),
+        without=(
+            "constant_force",  # along the velocity: nothing pushes so
+            "initial_push",  # start_velocity
+            "release_delay",  # start_velocity: it flies when the clip begins
+            "spring_tether",  # along the velocity
+        ),
+    )
+)

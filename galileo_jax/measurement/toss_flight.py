@@ -1,0 +1,71 @@
+"""What the poses say before the first impact: where it begins, and how the body is thrown."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from galileo_jax.observation.poses import Poses
+
+NEAR_SHARE = 0.06  # of the edge: a lowest corner nearer to the plane may touch it in the next frame
+FEWEST = 6  # frames of a flight that tell velocity and spin
+
+
+@dataclass(frozen=True)
+class Flight:
+    """The flight of one toss.
+
+    Attributes:
+      last: index of the last frame that is surely free.
+      position_m, velocity_m_s: `[3]`, at the first frame.
+      quaternion: `[4]`, at the first frame.
+      spin_rad_s: `[3]`, along the world's axes.
+      acceleration_m_s2: `[3]`, constant, of a parabola through the flight.
+    """
+
+    last: int
+    position_m: np.ndarray
+    velocity_m_s: np.ndarray
+    quaternion: np.ndarray
+    spin_rad_s: np.ndarray
+    acceleration_m_s2: np.ndarray
+
+
+def last_free_frame(poses: Poses, size_m: Sequence[float] | None) -> int | None:
+    """The last frame before any corner is near the plane; None where none ever is.
+
+    Args:
+      poses: in the world's axes, the plane near z = 0.
+      size_m: the box's edges; None: what its lowest place says.
+    """
+    lowest = 2 * float(poses.position_m[:, 2].min())
+    size = np.full(3, lowest) if size_m is None else np.asarray(size_m)
+    turned = Rotation.from_quat(poses.quaternion, scalar_first=True).as_matrix()
+    reach = np.abs(turned[:, 2]) @ (size / 2)
+    near = poses.position_m[:, 2] - reach <= NEAR_SHARE * float(np.min(size))
+    return max(int(np.argmax(near)) - 1, 0) if near.any() else None
+
+
+def flight_of(poses: Poses, size_m: np.ndarray) -> Flight | None:
+    """The flight, None where it has fewer than `FEWEST` frames.
+
+    The spin is that of a body that turns evenly (a cube does; other boxes nearly, so briefly).
+
+    Args:
+      poses: in the world's axes, the plane near z = 0.
+      size_m: `[3]`, the box's edges.
+    """
+    turned = Rotation.from_quat(poses.quaternion, scalar_first=True)
+    found = last_free_frame(poses, tuple(size_m))
+    last = len(poses.times_s) - 1 if found is None else found
+    if last + 1 < FEWEST:
+        return None
+    time = poses.times_s[: last + 1] - poses.times_s[0]
+    design = np.stack([np.ones_like(time), time, time**2 / 2], axis=1)
+    place = np.linalg.lstsq(design, poses.position_m[: last + 1])[0]
+    since = (turned[: last + 1] * turned[0].inv()).as_rotvec()
+    turning = np.linalg.lstsq(design[:, :2], since)[0]
+    first = Rotation.from_rotvec(turning[0]) * turned[0]
+    quaternion = first.as_quat(scalar_first=True)
+    return Flight(last, place[0], place[1], quaternion, turning[1], place[2])
