@@ -13,8 +13,9 @@ from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import Parameter, joined
 from galileo_jax.observation.observation import Observation
+from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.rollout import Engine, at_times, in_jax
+from galileo_jax.rollout.rollout import Engine, Motion, at_times, in_jax
 from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.runtime.batching import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
 from galileo_jax.runtime.progress import check_cancelled
@@ -75,7 +76,7 @@ class Problem:
     ) -> Float[np.ndarray, "batch object 2 frame"]:
         """`simulate` of `[batch, parameter]`: `[batch, object, 2, frame]`."""
         check_cancelled()
-        motion = padded_motion(*self.engine.simulate(theta, self.last_seen_s(theta)))
+        motion = self.motion(theta)
         times = self.observation.times_s
         frames = np.pad(times, (0, rounded_up(len(times), FRAMES) - len(times)), mode="edge")
         model = self.model
@@ -85,6 +86,12 @@ class Problem:
             MOTIONS, lambda *rows: _seen_batch(kind, *rows, frames, scene), theta, *motion
         )
         return found[..., : len(times)]
+
+    def motion(self, theta: Float[np.ndarray, "batch parameter"]) -> Motion:
+        """Centres and velocities as long as programs are compiled for, if not as long as seen."""
+        if isinstance(self.engine, EngineJax):
+            return self.engine.rolled(theta, self.last_seen_s(theta))
+        return padded_motion(*self.engine.simulate(theta))
 
     def last_seen_s(
         self, theta: Float[np.ndarray, "batch parameter"]

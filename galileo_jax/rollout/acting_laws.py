@@ -3,6 +3,8 @@
 Most hypotheses have one effect of twenty; the others are pinned where they do nothing. Effects
 without a force or a friction law of their own cost little and are in every program. Those with a
 force, and those with a friction law, are left out where none of them acts: four programs in all.
+Where a law is none of the package's its programs cannot be kept (`trace_cache`), and are made anew
+in every process: then there is one for all.
 """
 
 import functools
@@ -14,6 +16,7 @@ from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.model import Model
 
 FORCES, FRICTIONS = 1, 2
+PACKAGE = f"{__name__.split('.')[0]}."
 FEW = 16  # rollouts: fewer are not worth a program of their own
 
 
@@ -37,20 +40,22 @@ class ActingLaws:
 
     def __init__(self, model: Model):
         self._model = model
+        self._share = functools.cache(self._share_of)
         self._table: list[tuple[int, np.ndarray, np.ndarray]] = []
+        if not all(type(effect).__module__.startswith(PACKAGE) for effect in model.effects):
+            return
         for effect in model.effects:
             columns = self._columns(effect)
             if _law(effect) and columns.size:
                 absent = np.array([model.parameters[i].absent for i in columns])
                 self._table.append((_law(effect), columns, absent))
-        self._share = functools.cache(self._share_of)
 
     def in_each(self, theta: np.ndarray) -> np.ndarray:
         """What acts in each of `theta` `[batch, parameter]`: the sum of `FORCES`, `FRICTIONS`.
 
         Where few rollouts have the same, they have what acts in any.
         """
-        found = np.zeros(len(theta), int)
+        found = np.full(len(theta), 0 if self._table else FORCES | FRICTIONS)
         for law, columns, absent in self._table:
             acts = (theta[:, columns] != absent).any(axis=1)
             found |= np.where(acts, law, 0)

@@ -40,20 +40,42 @@ class EngineJax:
         self._laws = ActingLaws(model)
 
     def simulate(
-        self, theta: Float[np.ndarray, "batch parameter"], until_s: np.ndarray | None = None
+        self, theta: Float[np.ndarray, "batch parameter"]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `Engine.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
-        theta, most = np.asarray(theta), self.model.num_records + 1
-        until_s = np.full(len(theta), np.inf) if until_s is None else until_s
+        """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
+        count = self.model.num_records + 1
+        position, velocity = self.rolled(theta, np.full(len(theta), np.inf))
+        return position[..., :count], velocity[..., :count]
+
+    def rolled(
+        self,
+        theta: Float[np.ndarray, "batch parameter"],
+        until_s: Float[np.ndarray, " batch"],
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As `simulate`, with as many records as programs are compiled for.
+
+        Args:
+          theta: as of `simulate`.
+          until_s: when somebody looks for the last time: later, objects may be anywhere.
+        """
+        theta = np.asarray(theta)
         acting = self._laws.in_each(theta)
-        rows, motions = [], []
-        for own in np.unique(acting):
-            rows.append(np.flatnonzero(acting == own))
-            roll = functools.partial(self._as_long_as_needed, self._laws.share(int(own)))
-            motions.append(in_chunks(MOTIONS, roll, theta[rows[-1]], until_s[rows[-1]]))
+        kinds = np.unique(acting)
+        rows = [np.flatnonzero(acting == own) for own in kinds]
+        motions = [
+            in_chunks(
+                MOTIONS,
+                functools.partial(self._as_long_as_needed, self._laws.share(int(own))),
+                theta[some],
+                until_s[some],
+            )
+            for own, some in zip(kinds, rows, strict=True)
+        ]
+        if len(motions) == 1:
+            return motions[0]
         back = np.argsort(np.concatenate(rows))
         position, velocity = (np.concatenate(own)[back] for own in zip(*motions, strict=True))
-        return position[..., :most], velocity[..., :most]
+        return position, velocity
 
     def _as_long_as_needed(self, share: Share, theta: np.ndarray, until_s: np.ndarray) -> Motion:
         """Rolled out until the last time of all that is asked for."""

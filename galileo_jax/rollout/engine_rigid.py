@@ -175,18 +175,18 @@ def _accelerations(
 
     def each(together: jax.Array) -> tuple[jax.Array, jax.Array]:
         """Accelerations, and the way those that should roll slip all the same."""
-        weight = together.astype(drive.dtype)
-        force, held = weight @ pull, weight @ rest
+        force, held = _sums(together, pull), _sums(together, rest)
         left = force - jnp.clip(force, -held, held)
-        inertia, slips = weight @ law.inertia, jnp.zeros_like(direction)
+        inertia, slips = _sums(together, law.inertia), jnp.zeros_like(direction)
         if not any(scene.rolls):
             return left / inertia, slips
-        a = left / (inertia + weight @ (rolls * turning))
+        a = left / (inertia + _sums(together, rolls * turning))
         for _ in range(sum(scene.rolls)):
             fails = rolls & (jnp.abs(a) * turning > brake)
             slips = jnp.where(fails, jnp.sign(left), slips)
             grips = rolls & (slips == 0)
-            a = (left - weight @ (slips * brake)) / (inertia + weight @ (grips * turning))
+            rubbed, turned = _sums(together, slips * brake), _sums(together, grips * turning)
+            a = (left - rubbed) / (inertia + turned)
         return a, slips
 
     together = jnp.eye(count, dtype=bool)
@@ -200,6 +200,11 @@ def _accelerations(
         return _Accelerations(a, None)
     turned = (direction + slips) * brake * law.rim
     return _Accelerations(a, jnp.where(rolls & (slips == 0), a, turned))
+
+
+def _sums(together: jax.Array, values: jax.Array) -> jax.Array:
+    """Of each group's values `[object]`; a matrix product would be a call for every rollout."""
+    return jnp.sum(jnp.where(together, values, 0.0), axis=-1)
 
 
 def _merged(together: jax.Array, i: int, when: jax.Array) -> jax.Array:
@@ -296,8 +301,8 @@ def _after_hits(bodies: Bodies, hits: jax.Array, law: Dynamics, scene: Surroundi
     for _ in range(count - 1):
         for i in range(count - 1):
             together = _merged(together, i, meets[i] & (common[i] > common[i + 1]))
-            weight = together.astype(v.dtype)
-            common = weight @ (law.inertia * (v - ahead)) / (weight @ law.inertia)
+            momentum = _sums(together, law.inertia * (v - ahead))
+            common = momentum / _sums(together, law.inertia)
     return jnp.where(jnp.any(hits), common + ahead, v)
 
 

@@ -43,17 +43,22 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
       row until it has one of the sizes. Parts run side by side, one per core.
     """
     count = len(jax.tree.leaves(batches[0])[0])
+    cuts = list(_cuts(count, sizes))
     is_64_bit = jax.config.read("jax_enable_x64")  # may be the calling thread's own
 
     def part(begin: int, end: int, size: int) -> Any:
-        index = np.concatenate([np.arange(begin, end), np.full(size - (end - begin), begin)])
+        rows: Any = slice(begin, end)
+        if size > end - begin:
+            rows = np.concatenate([np.arange(begin, end), np.full(size - (end - begin), begin)])
         with jax.enable_x64(is_64_bit):
-            out = function(*jax.tree.map(lambda leaf: np.asarray(leaf)[index], batches))
+            out = function(*jax.tree.map(lambda leaf: np.asarray(leaf)[rows], batches))
             return jax.tree.map(lambda leaf: np.asarray(leaf)[: end - begin], out)
 
+    if len(cuts) == 1:
+        return jax.tree.map(np.array, part(*cuts[0]))  # JAX's own cannot be written to
     # XLA runs small operations, one after the other, on a single core.
     with ThreadPoolExecutor(num_cores()) as pool:
-        parts = list(pool.map(lambda cut: part(*cut), _cuts(count, sizes)))
+        parts = list(pool.map(lambda cut: part(*cut), cuts))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)
 
 

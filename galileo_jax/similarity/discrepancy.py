@@ -37,7 +37,7 @@ HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # trackers are pulled along by what th
 # Boxes turn a little at a hit, however straight, and while they are close a corner of one pushes
 # the other on: they come apart, or together, otherwise than points do.
 PUSH_SD_M_S2, PUSH_S = 0.05, 0.2
-CLOSE_M = 0.005  # half of a box 60 mm deep, turned by some ten degrees
+CLOSE_M = 0.008  # half of a box 60 mm deep, against another, each turned by some eight degrees
 # Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
 # millimetre; how fast they go along it shows none of that.
 WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3

@@ -97,7 +97,7 @@ def missing_figure(record: Mapping[str, Any], dark: bool) -> Figure:
     """The acceleration that the model lacks, against time, place and speed."""
     colour = COLOURS[dark]
     traces = []
-    against = (("time, s", None), ("along the path, m", "path_m"), ("speed, m/s", "speed_m_s"))
+    against = (("time, s", None), ("path, m", "path_m"), ("speed, m/s", "speed_m_s"))
     for i, (name, entry) in enumerate(record["objects"].items()):
         step = slice(None, None, max(1, len(record["time_s"]) // MOST_MISSING))
         for panel, (_, key) in enumerate(against, 1):

@@ -3,14 +3,12 @@
 from dataclasses import dataclass, replace
 
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import ClipFile
 
 Point = tuple[float, float]
 Correction = tuple[int, float, float]  # frame, x, y
 Corners = tuple[Point, Point, Point, Point]
 
 CORNERS = ("corner1", "corner2", "corner3", "corner4")  # from the bottom left, counter-clockwise
-CAN_RECTANGLE = "rectangle" in ClipFile.model_fields
 
 
 @dataclass(frozen=True)

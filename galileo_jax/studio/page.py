@@ -43,6 +43,7 @@ class Tab:
       placing: what a click into the video places: a new object, or one that is put right; "":
         nothing.
       frame: that is shown.
+      is_writing, draft: whether an effect is being written, and its text; None: as saved.
       dark: the colours.
       said: the job, the error and the note that are shown.
       drawn, lamps: what the panel and the row of stages were built of.
@@ -56,6 +57,8 @@ class Tab:
     candidate: str = ""
     placing: str = ""
     frame: int = 0
+    is_writing: bool = False
+    draft: str | None = None
     dark: bool = False
     said: tuple[str, str, str] = ("", "", "")
     drawn: Any = None
@@ -275,6 +278,9 @@ def _panel(tab: Tab) -> None:
                 ui.button(name, on_click=partial(session.look_at, name), color=None).props(
                     "flat no-caps"
                 ).classes(look)
+    is_left = (session.trials.run / "result.json").is_file() and session.results.fit is None
+    if is_left and not session.error and tab.stage in ("compare", "diagnose", "predict"):
+        ui.label("Opening the run …").classes("soft")
     PANELS[tab.stage](tab)
 
 

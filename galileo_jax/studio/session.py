@@ -63,6 +63,7 @@ class Session:
         self._ids = itertools.count()
         self._context: dict[str, Any] = {}
         self.worker = Worker(str(self.root), self._from_worker)
+        self._effects_left: tuple[str, ...] = ()  # in the result that lies there
         self._unopened: dict[str, Path] = {}
         self.scan()
         self.show(clip if clip in self.names else next(iter(self.names), ""))
@@ -127,8 +128,10 @@ class Session:
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Of the fitted model."""
-        return tuple(self.results.fit["effects"]) if self.results.fit else ()
+        """Of the fitted model, be it opened already or not."""
+        if self.results.fit is not None:
+            return tuple(self.results.fit["effects"])
+        return self._effects_left
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -398,6 +401,8 @@ class Session:
     def _show_stored(self) -> None:
         run = self.trials.run
         entry = self.store.get("runs", self.trials.name)
+        fitted = results.document(run / FILES["fit"]).get("effects")
+        self._effects_left = tuple(map(str, fitted)) if isinstance(fitted, list) else ()
         found = results.document(run / FILES["diagnose"])
         last = entry.get("diagnose", {}).get("at") if found else None
         is_own = found and last == (run / FILES["diagnose"]).stat().st_mtime_ns  # not a command's

@@ -143,7 +143,9 @@ class Store:
         notes["cuts"] = [vars(entry) for entry in one.cuts]
         notes["astray"] = [vars(entry) for entry in one.astray]
         notes["is_squared"] = seen.is_squared
-        modes = {} if seen.modes_m is None else {"modes_m": seen.modes_m}
+        arrays = {name: getattr(seen, name) for name in ARRAYS}
+        if seen.modes_m is not None:
+            arrays["modes_m"] = seen.modes_m
         with replacing(self._clip(key)) as path:
             np.savez_compressed(
                 path,
@@ -151,8 +153,7 @@ class Store:
                 clip=np.array(one.clip.model_dump_json()),
                 notes=np.array(json.dumps(notes)),
                 thumbnail=np.frombuffer(measured.thumbnail or b"", np.uint8),
-                **{name: getattr(seen, name) for name in ARRAYS},
-                **modes,
+                **arrays,
             )
 
     def _cell(self, name: str, file: str) -> Path:

@@ -1,5 +1,6 @@
 """Decoding a video as a stream: one frame in memory at a time."""
 
+import functools
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -71,18 +72,9 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
     Raises `InputError` if the file is missing, empty, no video, a picture, or cut off; or if
     its frames are unevenly spaced, because then frame number / fps is not the time.
     """
-    times_ms: list[float] = []
-    with _opened(path) as capture:
-        announced = capture.get(cv2.CAP_PROP_FRAME_COUNT)
-        container_fps = max(capture.get(cv2.CAP_PROP_FPS), 0.0)
-        size_px = (0, 0)
-        while capture.grab():
-            if not times_ms:
-                is_decoded, frame = capture.retrieve()
-                if not is_decoded:
-                    break
-                size_px = (frame.shape[1], frame.shape[0])
-            times_ms.append(capture.get(cv2.CAP_PROP_POS_MSEC))
+    found = path.stat() if path.is_file() else None
+    stamp = (found.st_mtime_ns, found.st_size, found.st_ino) if found is not None else ()
+    announced, container_fps, size_px, times_ms = _scanned(path.resolve(), *stamp)
     count = len(times_ms)
     if count == 0:
         raise InputError(f"{path}: not one frame can be decoded; a video expected")
@@ -134,6 +126,27 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         yield capture
     finally:
         capture.release()
+
+
+@functools.lru_cache(64)
+def _scanned(path: Path, *stamp: int) -> tuple[float, float, tuple[int, int], tuple[float, ...]]:
+    """Frames announced, the container's rate, the frames' size and times, ms.
+
+    Once for each content: who draws marks has the clip checked at every step.
+    """
+    times_ms: list[float] = []
+    with _opened(path) as capture:
+        announced = capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        container_fps = max(capture.get(cv2.CAP_PROP_FPS), 0.0)
+        size_px = (0, 0)
+        while capture.grab():
+            if not times_ms:
+                is_decoded, frame = capture.retrieve()
+                if not is_decoded:
+                    break
+                size_px = (frame.shape[1], frame.shape[0])
+            times_ms.append(capture.get(cv2.CAP_PROP_POS_MSEC))
+    return announced, container_fps, size_px, tuple(times_ms)
 
 
 def _check_even_spacing(path: Path, times_ms: np.ndarray) -> None:

@@ -12,7 +12,6 @@ import pytest
 
 import galileo_jax as gx
 from galileo_jax.clip.yaml_file import read_mapping
-from galileo_jax.studio.marks import CAN_RECTANGLE
 from tests.missing import needed_module
 from tests.studio.clips import clip_in
 from tests.studio.server import Server, started
@@ -89,7 +88,6 @@ def test_marks_are_dragged_undone_and_found_again_after_a_reload(browser, folder
         wait_until(lambda: point(video) == after)
 
 
-@pytest.mark.skipif(not CAN_RECTANGLE, reason="clip files cannot say it yet")
 def test_a_rectangle_of_known_sides_is_laid_in_place_of_the_stick(browser, folder):
     yaml = folder / "slide.yaml"
     text = yaml.read_text()

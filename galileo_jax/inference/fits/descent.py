@@ -29,6 +29,7 @@ from galileo_jax.runtime.batching import in_chunks, one_at_a_time
 # below theirs; above the largest a step may leave a plateau (nothing moves) over its edge, and the
 # plateau would look steep.
 SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
+FEW = 4  # proposals: their rollouts, and those of their slopes, are best made in one batch
 CATCHES_UP = 0.1  # what the next step must promise of what one is behind
 SAME_VALLEY_NATS = 1.0  # by which points differ that are of one valley
 
@@ -169,7 +170,7 @@ class Descent:
     ) -> Quadratic:
         """The cost round proposals; of those that cost more than where they set off no slopes.
 
-        A proposal in three is refused, and of these the slopes would be most of the work.
+        A proposal in three is refused, and its slopes would be most of the work.
 
         Args:
           there: the proposals.
@@ -177,6 +178,10 @@ class Descent:
           widths: `[point, model parameter]`, of all points; those of `active` are changed.
           active: `[proposal]`, which points they are of.
         """
+        if len(there.z) <= FEW:
+            slopes = self.slopes(there, widths[active])
+            widths[active] = self.half_sd(slopes)
+            return quadratic(slopes, there.z)
         motions = self.residuals.motions(there)
         total = cost(self.residuals.whites_of(there, motions), there.z)
         better = np.flatnonzero(total < own.cost)
@@ -189,7 +194,7 @@ class Descent:
             new.gradient[better], new.normal[better] = found.gradient, found.normal
         return new
 
-    def slopes(self, points: Batch, widths: np.ndarray, motions: Motions) -> Slopes:
+    def slopes(self, points: Batch, widths: np.ndarray, motions: Motions | None = None) -> Slopes:
         """Over small steps where motion is smooth, else over `widths` `[point, parameter]`."""
         if self.is_smooth:
             widths = np.tile(SMALLEST_STEP * self.coarse_steps, (len(points.z), 1))

@@ -91,9 +91,11 @@ class GradientFitter:
 
     def compile(self) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
-        free = self.trials.free(self.trials.all_effects)[: self._count]
-        self._descent(self._batch(np.zeros((1, self._count)), free), np.inf, 1)
-        self._residuals.costs(self._batch(np.zeros((self.settings.num_starts, self._count)), free))
+        for effects in dict.fromkeys([(), self.trials.all_effects]):
+            free = self.trials.free(effects)[: self._count]
+            self._descent(self._batch(np.zeros((1, self._count)), free), np.inf, 1)
+            z = np.zeros((self.settings.num_starts, self._count))
+            self._residuals.costs(self._batch(z, free))
 
     def fit(
         self,

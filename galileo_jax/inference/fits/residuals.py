@@ -24,7 +24,6 @@ from galileo_jax.runtime.batching import (
     MOTIONS,
     SPARE_MODES,
     in_chunks,
-    padded_motion,
     rounded_up,
 )
 from galileo_jax.similarity.gaussian_likelihood import Whitening
@@ -240,9 +239,7 @@ class Residuals:
         """`[point, ...]`: parameters in their units, centres and velocities."""
         self.num_rollouts += len(z)
         theta = clip.theta(z, free)
-        problem = clip.problem
-        position, velocity = problem.engine.simulate(theta, problem.last_seen_s(theta))
-        return theta, *padded_motion(position, velocity)
+        return theta, *clip.problem.motion(theta)
 
 
 def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:

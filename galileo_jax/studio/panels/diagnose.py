@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 FORM_NAMES = frozenset(NAMES_OF_FORMS)  # they can be tried, not added
 MOST_SHOWN = 6
 OWN_FILE = "my_effect.py"
+OWN_EFFECT = "--effects-from"  # in advice: to write an effect
 TEMPLATE = '''from galileo_jax import Effect, LogNormal, Parameter, register_effect
 
 
@@ -62,10 +63,19 @@ def build(tab: "Tab") -> None:
     if session.states["diagnose"] != "done" and not is_asked:
         text = "Ask again" if found is not None else "What is missing?"
         main_button(text, session.diagnose, tab, "diagnose")
+    status = found.get("verdict", {}).get("status") if found is not None else ""
+    if found is not None and status == "unknown":
+        _missing(tab, found)
+        _own(tab)
+    for line in found.get("verdict", {}).get("advice", ()) if found is not None else ():
+        if OWN_EFFECT not in line:  # which stands here
+            remark("odd", line[:1].upper() + line[1:])
     for i, row in enumerate(session.results.candidates[:MOST_SHOWN]):
         _candidate(tab, row, is_best=i == 0)
-    if found is not None:
-        _beyond(tab, found)
+    if found is not None and status != "unknown":
+        _missing(tab, found)
+        if status == "ambiguous":
+            _own(tab)
     if session.effects:
         main_button("Predict", lambda: tab.go("predict"), tab, "to-predict")
 
@@ -79,7 +89,8 @@ def _candidate(tab: "Tab", row: Mapping[str, Any], is_best: bool) -> None:
     probability = float(row["probability"] or 0.0)
     with pick:
         law = row.get("law")
-        ui.label(law or name.replace("+", " + ")).classes("name")
+        words = name.replace("+", " + ").replace("_", "_\u200b")  # where a line may break
+        ui.label(law or words).classes("name")
         ui.label(f"{100 * probability:.3g} %" if probability > 5e-4 else "~0").classes("p")
         with ui.element("div").classes("bar2"):
             ui.element("i").style(f"width: {100 * probability:.1f}%")
@@ -120,31 +131,43 @@ def _strength(row: Mapping[str, Any]) -> str:
     return f"velocity error {row['rmse']:.4f} m/s"
 
 
-def _beyond(tab: "Tab", found: Mapping[str, Any]) -> None:
-    """What to do where no effect is named."""
-    status = found.get("verdict", {}).get("status")
-    for line in found.get("verdict", {}).get("advice", ()):
-        remark("odd", line)
+def _missing(tab: "Tab", found: Mapping[str, Any]) -> None:
+    """The acceleration that the model lacks, where there is one."""
     record = found.get("missing_force")
-    if record:
-        ui.label("The acceleration that the model lacks").classes("small soft")
-        ui.plotly(charts.missing_figure(record, tab.dark)).style("height: 230px; width: 100%")
-        for name, entry in record["objects"].items():
-            if entry.get("formula"):
-                ui.label(f"{name}: {entry['formula']}").classes("code")
-    if status in ("unknown", "ambiguous"):
-        with ui.expansion("An effect of your own").classes("w-full"):
-            _editor(tab)
+    if not record:
+        return
+    ui.label("The acceleration that the model lacks").classes("small soft")
+    ui.plotly(charts.missing_figure(record, tab.dark)).style("height: 230px; width: 100%")
+    for name, entry in record["objects"].items():
+        if entry.get("formula"):
+            ui.label(f"{name}: {entry['formula']}").classes("code")
+
+
+def _own(tab: "Tab") -> None:
+    """To be unfolded."""
+    place = ui.expansion("An effect of your own", value=tab.is_writing).classes("w-full")
+    place.props("data-own header-class=own")
+    place.on_value_change(lambda event: setattr(tab, "is_writing", bool(event.value)))
+    with place:
+        _editor(tab)
 
 
 def _editor(tab: "Tab") -> None:
     path = below(tab.session.root, OWN_FILE)
     text = path.read_text(encoding="utf-8") if path.is_file() else TEMPLATE
-    area = ui.textarea(value=text).props("outlined autogrow data-effect").classes("w-full")
+    area = (
+        ui.textarea(value=text if tab.draft is None else tab.draft)
+        .props("outlined autogrow data-effect")
+        .classes("w-full")
+    )
     area.style("font: 13px ui-monospace, monospace; width: 100%")
+
+    # The panel is built anew when results come: what is being written stays.
+    area.on_value_change(lambda event: setattr(tab, "draft", event.value))
 
     def run() -> None:
         write_text(Path(path), area.value or "")
+        tab.draft = None
         tab.session.diagnose((OWN_FILE,))
 
     plain_button(f"Save {OWN_FILE} and run it", run, "run-effect", tab.session.job is None)

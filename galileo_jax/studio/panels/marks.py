@@ -9,7 +9,6 @@ from nicegui import ui
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import SIZE_MEANING
 from galileo_jax.studio.marks import (
-    CAN_RECTANGLE,
     Marks,
     ObjectMark,
     with_rectangle,
@@ -45,15 +44,14 @@ def build(tab: "Tab") -> None:
         scene.props("outlined dense options-dense").style("min-width: 130px")
         scene.on_value_change(lambda event: _mark(tab, scenario=event.value))
         lengths = _lengths(tab, marks)
+        is_laid = marks.rectangle is not None
+        text = "Stick instead" if is_laid else "Rectangle instead"
+        plain_button(text, lambda: _turn(tab, not is_laid), "rectangle")
     for one in marks.objects:
         fields[one.name] = _object(tab, one)
     with ui.element("div").classes("rowline"):
         text = "Click on the object" if tab.placing else "Add object"
         plain_button(text, lambda: _place(tab), "add-object")
-        if CAN_RECTANGLE:
-            is_laid = marks.rectangle is not None
-            text = "Stick instead" if is_laid else "Rectangle instead of stick"
-            plain_button(text, lambda: _turn(tab, not is_laid), "rectangle")
         plain_button("Propose", session.propose, "propose", session.job is None)
     title("Check")
     place = ui.element("div").style("display: contents")
