@@ -24,7 +24,7 @@ from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import step_by_events
+from galileo_jax.rollout.event_loop import recorded, step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 from galileo_jax.runtime.errors import InputError
 
@@ -125,20 +125,26 @@ def roll_out(
     dt_s: float,
     theta: jax.Array,
     scene: Surroundings,
+    count: jax.Array | None = None,
 ) -> tuple[Float[jax.Array, "object 2 record"], Float[jax.Array, "object 2 record"]]:
-    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`."""
+    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
+
+    Of records beyond the first `count` the centres are as in the last of these.
+    """
     named = {name: theta[i] for i, name in enumerate(names)}
     pendulum = make_pendulum(effects, named, scene, jnp)
     first = start(named, pendulum)
 
-    def record(swing: Swing, index: jax.Array):
-        time_s = index * dt_s
-        way = jnp.sign(swing.turning_rad_s) if pendulum.has_friction else 0.0
-        turns = rates(swing, time_s, way, pendulum, scene)[0].turning_rad_s
-        seen = place(swing, turns, pendulum, first, scene)
-        return _step(swing, time_s, dt_s, pendulum, scene), seen
+    def step(swing: Swing, index: jax.Array) -> Swing:
+        return _step(swing, index * dt_s, dt_s, pendulum, scene)
 
-    _, (position, velocity) = jax.lax.scan(record, first, jnp.arange(num_records))
+    def seen(swing: Swing, index: jax.Array):
+        way = jnp.sign(swing.turning_rad_s) if pendulum.has_friction else 0.0
+        turns = rates(swing, index * dt_s, way, pendulum, scene)[0].turning_rad_s
+        return place(swing, turns, pendulum, first, scene)
+
+    swings = recorded(step, first, num_records, count)
+    position, velocity = jax.vmap(seen)(swings, jnp.arange(num_records))
     return position.T[None], velocity.T[None]
 
 
