@@ -25,6 +25,7 @@ class Observation:
       mask: `[object, frame]`, True where the point was measured.
       modes_m: `[mode, object, 2, frame]`, m: how one standard deviation of each number that is
         declared about the camera (corners, lens) moves the track; None where none is.
+      is_turning: the third axis is how far each object has turned, rad, not a place.
       is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """
 
@@ -35,6 +36,7 @@ class Observation:
     mask: Bool[np.ndarray, "object frame"]
     modes_m: Float[np.ndarray, "mode object 2 frame"] | None = None
     is_squared: bool = False
+    is_turning: bool = False
 
     @property
     def velocity_m_s(self) -> Float[np.ndarray, "object 2 frame-1"]:

@@ -89,7 +89,7 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
     count, _, frames = position.shape
     found = offsets(observation)
     if is_filmed:
-        found.extend(_camera(position, observation, scene))
+        found.extend(camera(position, observation, scene))
     # A ramp's angle known within so much was read off the picture or the path: the direction
     # there, used already, must not count again.
     lean = READ_OFF * scene.angle_sd_rad if scene.has_surface else 0.0
@@ -116,9 +116,7 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
     return np.stack(found)
 
 
-def _camera(
-    position: np.ndarray, observation: Observation, scene: Surroundings
-) -> list[np.ndarray]:
+def camera(position: np.ndarray, observation: Observation, scene: Surroundings) -> list[np.ndarray]:
     """What is declared of it, or keystone about either axis, the lens and scale; of all objects."""
     found = [] if observation.modes_m is None else list(observation.modes_m)
     if observation.is_squared:

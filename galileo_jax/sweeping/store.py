@@ -152,7 +152,7 @@ class Store:
                 notes=np.array(json.dumps(notes)),
                 thumbnail=np.frombuffer(measured.thumbnail or b"", np.uint8),
                 **{name: getattr(seen, name) for name in ARRAYS},
-                **modes,
+                **modes,  # pyright: ignore[reportArgumentType]
             )
 
     def _cell(self, name: str, file: str) -> Path:

@@ -7,7 +7,8 @@ for (role "main"). A law brings parameters only where `Surroundings.laws` names 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.laws.floor import Floor
 from galileo_jax.model.effects.laws.liquid import Liquid
+from galileo_jax.model.effects.laws.pucks import Pucks
 from galileo_jax.model.effects.laws.spring import Spring
 from galileo_jax.model.effects.laws.start_velocity import StartVelocity
 
-LAWS: tuple[Effect, ...] = (Spring(), Liquid(), StartVelocity(), Floor())
+LAWS: tuple[Effect, ...] = (Spring(), Liquid(), StartVelocity(), Floor(), Pucks())
