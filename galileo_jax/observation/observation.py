@@ -39,6 +39,12 @@ class Observation:
     is_turning: bool = False
 
     @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes."""
+        third = "turning" if self.is_turning else "z"
+        return ("x", "y", third)[: self.position_m.shape[1]]
+
+    @property
     def velocity_m_s(self) -> Float[np.ndarray, "object 2 frame-1"]:
         """The velocity profile `[object, 2, frame - 1]`, m/s (Galileo's comparison space)."""
         return np.diff(self.position_m, axis=-1) / np.diff(self.times_s)
