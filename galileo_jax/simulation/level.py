@@ -167,10 +167,10 @@ def _rubbed(
 
 def _meets_s(apart: np.ndarray, u: np.ndarray, reach: float) -> float:
     """When two pucks meet at constant speeds, s; inf if never."""
-    closing = apart[:2] @ u[:2]
+    closing = float(apart[:2] @ u[:2])
     if closing >= 0:
         return math.inf
-    square, gap = u[:2] @ u[:2], apart[:2] @ apart[:2] - reach**2
+    square, gap = float(u[:2] @ u[:2]), float(apart[:2] @ apart[:2]) - reach**2
     root2 = closing**2 - square * gap
     return max(gap, 0.0) / (math.sqrt(root2) - closing) if root2 > 0 else math.inf
 

@@ -143,7 +143,7 @@ class Store:
         notes["cuts"] = [vars(entry) for entry in one.cuts]
         notes["astray"] = [vars(entry) for entry in one.astray]
         notes["is_squared"] = seen.is_squared
-        modes = {} if seen.modes_m is None else {"modes_m": seen.modes_m}
+        modes: dict[str, Any] = {} if seen.modes_m is None else {"modes_m": seen.modes_m}
         with replacing(self._clip(key)) as path:
             np.savez_compressed(
                 path,
@@ -152,7 +152,7 @@ class Store:
                 notes=np.array(json.dumps(notes)),
                 thumbnail=np.frombuffer(measured.thumbnail or b"", np.uint8),
                 **{name: getattr(seen, name) for name in ARRAYS},
-                **modes,  # pyright: ignore[reportArgumentType]
+                **modes,
             )
 
     def _cell(self, name: str, file: str) -> Path:
