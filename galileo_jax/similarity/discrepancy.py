@@ -60,10 +60,12 @@ def offsets(observation: Observation) -> list[np.ndarray]:
     return found
 
 
-def wander(observation: Observation) -> list[np.ndarray]:
-    """For each object and axis of a track in space a slow wander (Ornstein-Uhlenbeck)."""
+def wander(
+    observation: Observation, sd_m: float = WANDER_SD_M, lasts_s: float = WANDER_S
+) -> list[np.ndarray]:
+    """For each object and axis of a track a slow wander (Ornstein-Uhlenbeck)."""
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    values, vectors = np.linalg.eigh(WANDER_SD_M**2 * np.exp(-apart / WANDER_S))
+    values, vectors = np.linalg.eigh(sd_m**2 * np.exp(-apart / lasts_s))
     kept = values > SMALLEST_MODE * values[-1]
     patterns = (np.sqrt(values[kept]) * vectors[:, kept]).T
     count, axes, _ = observation.position_m.shape

@@ -1,6 +1,7 @@
 """What is imperfect in measurements of pucks seen from above, as covariance (see `discrepancy`).
 
-Offsets of each puck and axis; what the camera does; a real hit's duration; and, where the turning
+Offsets of each puck and axis; what camera and tracker do, which wander by tenths of a pixel; a real
+hit's duration; and, where the turning
 is known, a followed point that is not the centre, which goes round it.
 """
 
@@ -10,7 +11,14 @@ import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import HIT_STEP_SD_M, camera, offsets
+from galileo_jax.similarity.discrepancy import (
+    HIT_STEP_SD_M,
+    WOBBLE_S,
+    WOBBLE_SD_M,
+    camera,
+    offsets,
+    wander,
+)
 
 NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other in some frame
 CENTRE_SHARE = 0.1  # of a radius: how far a followed point may be from the centre
@@ -25,6 +33,7 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
             own = np.zeros_like(position)
             own[:, :2] = pattern[:, :2]
             found.append(own)
+        found.extend(wander(observation, WOBBLE_SD_M, WOBBLE_S))
     for i, j in combinations(range(len(position)), 2):
         both = observation.mask[i] & observation.mask[j]
         apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
