@@ -58,9 +58,9 @@ def test_turning_is_read_and_only_from_above(tmp_path: Path) -> None:
     seen = measure(gx.load(path)).observation
     assert seen.axes == ("x", "y", "turning")
     content = yaml.safe_load(path.with_suffix(".yaml").read_text())
-    content |= {"scenario": "incline", "ramp_angle_deg": 20.0, "objects": content["objects"][:1]}
+    content |= {"scenario": "multi", "ramp_angle_deg": 20.0}
     path.with_suffix(".yaml").write_text(yaml.safe_dump(content))
-    with pytest.raises(InputError, match="angle_rad': means nothing in scenario incline"):
+    with pytest.raises(InputError, match="angle_rad': means nothing in scenario multi"):
         gx.load(path)
 
 
