@@ -4,18 +4,21 @@
 
 Draws tracks (ramp angle, objects, strength, noise and frame rate at random, the truth from an
 integrator of its own with the small faults of real clips): of four, two hide an effect that the
-library does not have, one hides one of the library's and one hides two. Every verdict that names
+library does not have, one hides one of the library's and one hides two. An effect that leaves no
+trace (static friction where a push starts the motion) is not counted. Every verdict that names
 effects (`named`, `ambiguous`) is a claim with a probability for each hypothesis; the reliability
 curve compares the probabilities with how often the hypothesis was the truth. What is finished stays
 in DIR/results.jsonl and is not done again. The last line is JSON.
 """
 
 import argparse
+import csv
 import json
 import multiprocessing
 import zlib
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +31,8 @@ import verdicts
 from galileo_jax.commands import command
 from galileo_jax.model.effects.registry import effect_names
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.simulation.like import truth_like
+from galileo_jax.simulation.motion import roll_out
 
 KINDS = ("outside", "one", "outside", "two")
 EDGES = np.linspace(0.0, 1.0, 11)
@@ -36,6 +41,7 @@ NOISE_M = (0.1e-3, 0.4e-3)
 ANGLES_DEG = (8.0, 30.0)
 STRENGTHS = (0.3, 1.0)
 TRIES = 8  # not every effect has a place in every scene
+NO_TRACE = 3.0  # of the noise, all the changes of a track that an effect makes together
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -101,10 +107,31 @@ def make_clip(folder: Path, name: str, kind: str, library: Sequence[str]) -> Non
             continue
 
 
+def seen_truth(yaml: Path, kind: str) -> str:
+    """The hidden effects that leave a trace in a track, joined by +; none: "none"."""
+    path = yaml.with_suffix(".truth.json")
+    record = json.loads(path.read_text())
+    if kind == "outside":
+        return record["effect"]
+    with yaml.with_suffix(".csv").open() as track:
+        noise_m = float(next(csv.DictReader(track))["object1_sd_m"])
+    truth = truth_like(path, record["ramp_angle_deg_declared"], record["scenario"])
+    times = np.arange(record["frames"]) / record["fps_true"]
+    whole = roll_out(truth, "fine").at(times).position_m
+    found = []
+    for effect in truth.effects:
+        others = tuple(each for each in truth.effects if each is not effect)
+        without = roll_out(replace(truth, effects=others), "fine").at(times).position_m
+        change = np.linalg.norm(whole - without) / noise_m
+        if change > NO_TRACE or effect not in truth.motion_effects:
+            found.append(effect.name)
+    return "+".join(found) or "none"
+
+
 def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
     entry: dict[str, Any] = {"case": name, "kind": kind, "diagnosis": None, "error": None}
     yaml = out / "clips" / f"{name}.yaml"
-    entry["truth"] = json.loads(yaml.with_suffix(".truth.json").read_text())["effect"]
+    entry["truth"] = seen_truth(yaml, kind)
     try:
         run = hidden_effects.run_diagnosis([yaml], out / "runs" / name, 0)
         keys = ("verdict", "probability_none", "history", "p_value")

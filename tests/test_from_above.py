@@ -44,12 +44,14 @@ def test_what_was_simulated_is_found(tmp_path: Path) -> None:
 
 def test_radii_come_from_the_hit(tmp_path: Path) -> None:
     path, _ = made(tmp_path, 52)
-    sizes = [item.size_m[0] for item in gx.load(path).objects]
+    sizes = [(item.size_m or (0.0,))[0] for item in gx.load(path).objects]
     hit = distance_at_hit(measure(gx.load(path)).observation)
     assert hit is not None
     assert hit[2] == pytest.approx(sum(sizes), abs=1e-3)
     one = measure(gx.load(edited(path, size_m=None)))
-    assert [item.size_m[0] for item in one.clip.objects] == pytest.approx([hit[2] / 2] * 2)
+    assert [(item.size_m or (0.0,))[0] for item in one.clip.objects] == pytest.approx(
+        [hit[2] / 2] * 2
+    )
     assert any("from the hit" in line for line in one.remarks)
 
 

@@ -35,6 +35,7 @@ from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report.diagnosis_text import PROPOSED
+from galileo_jax.report.diagnosis_text import verdict as sentence_of
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.results.truth import hidden_effect
 from galileo_jax.runtime import progress
@@ -298,8 +299,9 @@ def diagnose(
       pixels_per_metre: overrides the clips' scale; None: the yaml's.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
         `{"round": row}` for the base model and for what is added, as in diagnosis.json's history,
-        and `{"candidate": row}` for each candidate as soon as it is fitted, and once more in the
-        end: until then its fit may get better, and probabilities change.
+        and `{"candidate": row, "motions": function}` for each candidate as soon as it is fitted,
+        and once more in the end: until then its fit may get better, and probabilities change. The
+        function gives every clip's `Motion` with it, as `Diagnosis.motions` does in the end.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Raises:
@@ -393,7 +395,15 @@ def _diagnosed(
             "probability": one.probability,
             **{key: one.error[key] for key in ("rmse", "chi2_per_dof")},
         }
-        progress.report(stage, share, {"candidate": row})
+        theta = trials_of(one).theta(one.hypothesis.fit.z, one.hypothesis.fit.free)
+        progress.report(
+            stage,
+            share,
+            {"candidate": row, "motions": lambda: motions_at(trials_of(one), clips, theta)},
+        )
+
+    def trials_of(one: Candidate) -> JointProblem:
+        return one.hypothesis.of(problem)
 
     found = run_loop(
         problem,
@@ -409,6 +419,7 @@ def _diagnosed(
     document = {
         "clips": [clip.source for clip in clips],
         TRACKS: [digest(observation) for observation in observations],
+        "sentence": sentence_of(found),
         **record,
         **inferred(measured),
         **({"effects_from": [str(Path(path).resolve()) for path in files]} if files else {}),

@@ -16,6 +16,8 @@ def label(
     size: Mapping[str, Sequence[float]] | None = None,
     shape: Mapping[str, str] | None = None,
     first_frame: Mapping[str, int | None] | None = None,
+    last_frame: Mapping[str, int | None] | None = None,
+    correct: Mapping[str, Sequence[Sequence[float]]] | None = None,
     pixels_per_metre: float | None = None,
     pixels_per_metre_sd: float | None = None,
     scale: Sequence[float] | None = None,
@@ -49,6 +51,9 @@ def label(
       shape: object name to box (default of a new object), cylinder, torus or sphere.
       first_frame: object name to the first frame in which it moves by itself, from 0; None: to
         be found.
+      last_frame: object name to the last frame that is used; None: that of the clip.
+      correct: object name to (frame, x, y): where it is, px, in frames in which it was lost; it is
+        followed on from there. (frame,) takes that back.
       pixels_per_metre: of the picture.
       pixels_per_metre_sd: how well that is known (one standard deviation); None: of a `scale`,
         what half a pixel at either end makes of it.
@@ -93,6 +98,8 @@ def label(
             size=size or {},
             shape=shape or {},
             first_frame=first_frame or {},
+            last_frame=last_frame or {},
+            correct=correct or {},
             pixels_per_metre=pixels_per_metre,
             pixels_per_metre_sd=pixels_per_metre_sd,
             scale=scale,

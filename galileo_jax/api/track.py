@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from galileo_jax.api.clips import ClipLike, as_clip, as_list
+from galileo_jax.clip.load import with_corrections
 from galileo_jax.clip.same_objects import check_same_objects, check_scale
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
@@ -160,6 +161,7 @@ def track(
     clip: ClipLike,
     *,
     pixels_per_metre: float | None = None,
+    correct: Mapping[str, Sequence[Sequence[float]]] | None = None,
     on_progress: OnProgress | None = None,
     cancel: CancelFlag | None = None,
 ) -> Track:
@@ -171,7 +173,10 @@ def track(
     Args:
       clip: a clip, or what `load` takes.
       pixels_per_metre: overrides the clip's scale; None: the yaml's.
-      on_progress: called with the stage, the share done (0 to 1) and None.
+      correct: object name to (frame, x, y): where it is, px, in frames in which it was lost; it is
+        followed on from there. Besides the yaml's `corrections`; (frame,) leaves one out.
+      on_progress: called with the stage, the share done (0 to 1) and, while a video is followed,
+        `{"frame": {"index": i, "places_px": {name: (x, y) or None}}}`.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Raises:
@@ -185,7 +190,7 @@ def track(
       ['object', 'time_s', 'x_m', 'y_m', 'sd_x_m', 'sd_y_m', 'is_visible']
     """
     with progress.scope(on_progress, cancel):
-        found = _tracked(as_clip(clip, pixels_per_metre))
+        found = _tracked(with_corrections(as_clip(clip, pixels_per_metre), correct or {}))
         progress.report("tracked", 1.0)
         return found
 

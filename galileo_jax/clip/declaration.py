@@ -39,6 +39,9 @@ class Declaration:
       shape: object to its shape.
       first_frame: object to the first frame in which it moves by itself, from 0; None: to be
         found.
+      last_frame: object to the last frame that is used; None: that of the clip.
+      correct: object to (frame, x, y): where it is, px, in a frame in which it was lost; (frame,)
+        takes that back.
       pixels_per_metre: of the picture.
       pixels_per_metre_sd: how well that is known; None: of a `scale`, by its two pixels.
       scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
@@ -64,6 +67,8 @@ class Declaration:
     size: Mapping[str, Sequence[float]] = field(default_factory=dict)
     shape: Mapping[str, str] = field(default_factory=dict)
     first_frame: Mapping[str, int | None] = field(default_factory=dict)
+    last_frame: Mapping[str, int | None] = field(default_factory=dict)
+    correct: Mapping[str, Sequence[Sequence[float]]] = field(default_factory=dict)
     pixels_per_metre: float | None = None
     pixels_per_metre_sd: float | None = None
     scale: Sequence[float] | None = None
@@ -136,14 +141,30 @@ class Declaration:
             objects.setdefault(name, {})["size_m"] = _numbers(f"--size {name}", size)
         for name, point in self.point.items():
             objects.setdefault(name, {})["point_px"] = _numbers(f"--point {name}", point, 2)
-        for name, frame in self.first_frame.items():
-            if not (frame is None or (isinstance(frame, int) and frame >= 0)):
-                text = str(frame)
-                raise InputError(
-                    f"--first-frame {name}: {text!r} is not a frame number from 0, or null"
-                )
-            objects.setdefault(name, {})["first_frame"] = frame
+        for key in ("first_frame", "last_frame"):
+            for name, frame in getattr(self, key).items():
+                if not (frame is None or (isinstance(frame, int) and frame >= 0)):
+                    raise InputError(
+                        f"{_option(key)} {name}: {str(frame)!r} is not a frame number from 0, or "
+                        "null"
+                    )
+                objects.setdefault(name, {})[key] = frame
         return objects
+
+    def corrections(self, name: str, listed: Any) -> list[list[float]]:
+        """An object's corrections, by frame, after this call.
+
+        Raises:
+          InputError: one is no frame with a place.
+        """
+        found = {one[0]: list(one) for one in listed or ()}
+        for one in self.correct.get(name, ()):
+            if len(one) not in (1, 3) or one[0] != int(one[0]):
+                raise InputError(f"--correct {name}: {list(one)} is no frame, x and y")
+            found.pop(int(one[0]), None)
+            if len(one) == 3:
+                found[int(one[0])] = [int(one[0]), *_numbers(f"--correct {name}", one[1:], 2)]
+        return [found[frame] for frame in sorted(found)]
 
 
 def _option(name: str) -> str:

@@ -89,6 +89,9 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     old = {} if is_new else read_mapping(yaml_path)
     content, notes = _defaults(path, declared) if is_new else (copy.deepcopy(old), ())
     values, objects = declared.clip_values(), declared.object_values()
+    for name in declared.correct:
+        was = _listed(yaml_path, content.get("objects"), name).get("corrections")
+        objects.setdefault(name, {})["corrections"] = declared.corrections(name, was)
     if not values and not objects:
         raise InputError(f"{path}: nothing to write; see galileo label --help")
     content |= values
@@ -138,6 +141,18 @@ def _defaults(clip_path: Path, declared: Declaration) -> tuple[dict[str, Any], t
     fps = round(probe(clip_path).fps, 4)
     note = f"fps: {fps:g} taken from the container; slow-motion clips often lie about it"
     return {"video": clip_path.name, "fps": fps}, (note,)
+
+
+def _listed(yaml_path: Path, listed: Any, name: str) -> Mapping[str, Any]:
+    """An object's entry in the yaml.
+
+    Raises:
+      InputError: there is none.
+    """
+    for item in listed if isinstance(listed, list) else ():
+        if isinstance(item, dict) and item.get("name") == name:
+            return item
+    raise InputError(f"{yaml_path}: objects: no {name!r} there to put right")
 
 
 def _with_objects(

@@ -1,6 +1,6 @@
 """Loading a clip: every problem is one line that names the file, the key and the remedy."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -9,6 +9,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from galileo_jax.clip import placement
+from galileo_jax.clip.declaration import Declaration
 from galileo_jax.clip.picture_plane import scale_of_rectangle
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import (
@@ -24,7 +25,7 @@ from galileo_jax.clip.track_files.read import FileTrack, is_track, read_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.known_names import did_you_mean
+from galileo_jax.runtime.known_names import check_known, did_you_mean
 
 YAML_SUFFIXES = (".yaml", ".yml")
 
@@ -86,6 +87,11 @@ def with_unused(clip: Clip) -> Clip:
         for index, item in enumerate(clip.objects)
         if item.point_px is not None
     }
+    unused |= {
+        f"objects[{index}].corrections": "a track is not tracked again"
+        for index, item in enumerate(clip.objects)
+        if item.corrections
+    }
     if clip.origin_px is not None and clip.track_units != "px":
         unused["origin_px"] = "the track is in units of length" + (
             ", from the foot of the ramp on" if clip.is_own_track else "; track_origin is the foot"
@@ -94,6 +100,34 @@ def with_unused(clip: Clip) -> Clip:
         unused["track_origin"] = "the track is in pixels; origin_px is the foot"
     doubts = tuple(f"{clip.path}: {key}: not used; {why}" for key, why in unused.items())
     return clip.model_copy(update={"warnings": clip.warnings + doubts})
+
+
+def with_corrections(clip: Clip, correct: Mapping[str, Sequence[Sequence[float]]]) -> Clip:
+    """The clip with objects put right in further frames, or no more in some.
+
+    Raises:
+      InputError: no such object, or no such frame or place.
+    """
+    if not correct:
+        return clip
+    for name in correct:
+        check_known("--correct", "object", name, tuple(one.name for one in clip.objects))
+    given = Declaration(correct=correct)
+    objects = [
+        item.model_dump() | {"corrections": given.corrections(item.name, item.corrections)}
+        for item in clip.objects
+    ]
+
+    def fail(key: str, problem: str) -> NoReturn:
+        raise InputError(f"{clip.path}: {key} (given in the call): {problem}")
+
+    try:
+        found = Clip.model_validate({**dict(clip), "objects": objects})
+    except ValidationError as error:
+        fail(*_first_problem(error))
+    for index, item in enumerate(found.objects):
+        _check_frames(f"objects[{index}]", item, found, fail)
+    return found
 
 
 def has_yaml(path: Path) -> bool:
@@ -374,6 +408,7 @@ def _check_against_source(clip: Clip, observation: Observation | None, fail: Any
                 f"{item.first_frame} is beyond the end; the clip has "
                 f"{clip.frame_count} frames (0 to {clip.frame_count - 1})",
             )
+        _check_frames(key, item, clip, fail)
         if item.point_px is not None and clip.frame_size_px is not None:
             _check_in_frame(f"{key}.point_px", item.point_px, clip.frame_size_px, 0, fail)
     if clip.origin_px is not None and clip.frame_size_px is not None:
@@ -394,6 +429,26 @@ def _check_camera(file: ClipFile, fail: Any) -> None:
     for key in ("rectangle", "lens"):
         if getattr(file, key) is not None and file.video is None:
             fail(key, "means nothing beside a track, only beside a video; leave it out")
+
+
+def _check_frames(key: str, item: ClipObject, clip: Clip, fail: Any) -> None:
+    """Refuses a last frame or corrections outside of the frames in which the object is used."""
+    first, end = item.first_frame or 0, clip.frame_count - 1
+    last = end if item.last_frame is None else item.last_frame
+    if not first < last <= end:
+        fail(
+            f"{key}.last_frame",
+            f"{last} is not after first_frame ({first}) and within the clip (to {end})",
+        )
+    for n, (frame, x, y) in enumerate(item.corrections):
+        if not first < frame <= last:
+            fail(
+                f"{key}.corrections[{n}]",
+                f"frame {frame} is not after the first that is used ({first}) and up to the last "
+                f"({last})",
+            )
+        if clip.frame_size_px is not None:
+            _check_in_frame(f"{key}.corrections[{n}]", (x, y), clip.frame_size_px, 0, fail)
 
 
 def _check_uncertainties(clip: Clip, fail: Any) -> None:

@@ -199,6 +199,17 @@ def _name(value: str) -> str:
     return value
 
 
+def _corrections(value: Any) -> Any:
+    """A list of [frame, x, y]; pydantic sees to the numbers."""
+    is_list = isinstance(value, list | tuple)
+    if not is_list or not all(isinstance(one, list | tuple) and len(one) == 3 for one in value):
+        raise wrong(f"{short(value)} is no list of [frame, x, y], such as [[24, 312.0, 221.5]]")
+    frames = [one[0] for one in value]
+    if len({*map(str, frames)}) < len(frames):
+        raise wrong(f"{short(value)} has a frame twice; one place for each frame expected")
+    return tuple(map(tuple, value))
+
+
 def _path(value: Any) -> Any:
     if isinstance(value, str) and 0 < len(value) < 256 and value.isprintable():
         return Path(value)
@@ -237,6 +248,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Metres = Annotated[Number, AfterValidator(_metres)]
 Kilograms = Annotated[Number, AfterValidator(_kilograms)]
 Point = tuple[Number, Number]
+Correction = tuple[Annotated[int, Field(strict=True, ge=0)], Number, Number]
 File = Annotated[Path | None, BeforeValidator(_path)]
 OneLine = Annotated[str, Field(strict=True, min_length=1, max_length=80)]
 
@@ -255,6 +267,9 @@ class ClipObject(BaseModel):
         None = to be found.
       first_frame: the first frame in which the object moves by itself; frames before are
         not used for it. None = not known: the release is found from the motion.
+      last_frame: the last frame that is used for it; None = that of the clip.
+      corrections: (frame, x, y), px: where somebody has seen it in frames in which the program
+        had lost it; it is followed on from there.
       rolls: whether it may roll: a cylinder on its side, a torus on edge; a sphere always may.
         A number is its moment of inertia over m r^2, where it is not that of a solid.
       z_m: how far its centre is from the plane in which object 1 moves, m, positive towards the
@@ -271,6 +286,8 @@ class ClipObject(BaseModel):
     mass_kg: Kilograms | None = None
     point_px: Annotated[Point, AfterValidator(_point_px)] | None = None
     first_frame: Annotated[int, Field(strict=True, ge=0)] | None = 0
+    last_frame: Annotated[int, Field(strict=True, ge=0)] | None = None
+    corrections: Annotated[tuple[Correction, ...], BeforeValidator(_corrections)] = ()
     rolls: Annotated[bool | float | None, BeforeValidator(_rolls)] = None
     z_m: Annotated[Number, AfterValidator(_across)] = 0.0
     spin_rad_s: tuple[Number, Number, Number] | None = None

@@ -48,3 +48,19 @@ def out_folder(out: str | None, clips: "Sequence[Clip]", below: str = "") -> Pat
     if folder.exists() and not folder.is_dir():
         raise InputError(f"--out: {folder} is a file; a folder expected")
     return folder if out else folder / below
+
+
+def corrections(given: Sequence[Sequence[str]]) -> dict[str, list[list[float]]]:
+    """`--correct` as the functions take it.
+
+    Raises:
+      InputError: a number is none.
+    """
+    found: dict[str, list[list[float]]] = {}
+    for name, *values in given:
+        try:
+            found.setdefault(name, []).append([float(value) for value in values])
+        except ValueError:
+            text = " ".join(values)
+            raise InputError(f"--correct {name}: {text!r} is no frame, x and y") from None
+    return found

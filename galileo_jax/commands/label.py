@@ -10,6 +10,7 @@ from galileo_jax.clip.load import has_yaml
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.sources import source_of
 from galileo_jax.commands import command
+from galileo_jax.commands.clip_options import corrections
 
 LINE = ("X1", "Y1", "X2", "Y2")
 
@@ -23,7 +24,9 @@ def main(argv: Sequence[str]) -> int | None:
     for name in ("point", "size"):
         asked[name] = {thing: values for thing, *values in asked[name]}
     asked["shape"] = dict(asked["shape"])
-    asked["first_frame"] = {name: _frame(text) for name, text in asked["first_frame"]}
+    for key in ("first_frame", "last_frame"):
+        asked[key] = {name: _frame(text) for name, text in asked[key]}
+    asked["correct"] = corrections(asked["correct"])
     done = label(path, **asked)
     for line in [f"note: {note}" for note in done.notes]:
         command.console().print(line, soft_wrap=True, markup=False)
@@ -101,6 +104,19 @@ def _add_object_options(objects: Any) -> None:
         2,
         "first frame in which it moves by itself, from 0; null: to be found (default of a new "
         "object: 0)",
+    )
+    add(
+        "--last-frame",
+        ("NAME", "FRAME"),
+        2,
+        "last frame that is used; null: that of the clip (default: unchanged)",
+    )
+    add(
+        "--correct",
+        ("NAME", "FRAME"),
+        "+",
+        "NAME FRAME X Y: where it is in a frame in which it was lost, pixels; it is followed on "
+        "from there. NAME FRAME takes that back (default: unchanged)",
     )
 
 

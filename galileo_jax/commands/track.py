@@ -7,7 +7,7 @@ import numpy as np
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import warn
+from galileo_jax.commands.clip_options import corrections, warn
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
@@ -26,7 +26,7 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.api.track import track
 
     with progress_display() as display:
-        found = track(clip, on_progress=display)
+        found = track(clip, correct=corrections(call.correct), on_progress=display)
         assert found.pixels is not None  # of a video
         try:
             out.mkdir(parents=True, exist_ok=True)
@@ -79,6 +79,15 @@ def _parser() -> command.Parser:
         "--out", type=Path, metavar="DIR", help="where to write (default: NAME_track)"
     )
     adder(parser, "track")("pixels_per_metre", metavar="SCALE")
+    parser.add_argument(
+        "--correct",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar=("NAME", "FRAME"),
+        help="NAME FRAME X Y: where it is in a frame in which it was lost, pixels; it is followed "
+        "on from there, besides the yaml's corrections",
+    )
     parser.examples(
         "galileo track clip.mp4",
         "galileo track clip.mp4 --pixels-per-metre 640 --out tracked",

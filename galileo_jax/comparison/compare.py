@@ -135,12 +135,17 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         )
     pulls = _pulls(trials, fit, theta)
 
+    num_values = np.array([problem.data.num_values for problem in trials.problems], dtype=float)
+    used = fit.num_used * num_values / num_values.sum()
+
     def judged(bounds: tuple[float, float]) -> tuple[float, np.ndarray]:
         """The p-value and each cell's largest z, noise scales within bounds."""
         own, others = (
             [
-                _at_own_scale(white, scale, fit.num_used / len(scales), bounds, problem.data)
-                for white, scale, problem in zip(whites, scales, trials.problems, strict=True)
+                _at_own_scale(white, scale, own_used, bounds, problem.data)
+                for white, scale, own_used, problem in zip(
+                    whites, scales, used, trials.problems, strict=True
+                )
             ]
             for whites in (measured, drawn)
         )

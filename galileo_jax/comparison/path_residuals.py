@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, Place
+from galileo_jax.comparison.document import pulled
 from galileo_jax.comparison.local_tests import AXES, WHOLE
 from galileo_jax.comparison.phases import PHASES, Phase, phases_of
 from galileo_jax.comparison.worst_interval import worst_interval
@@ -158,8 +159,13 @@ def _path(problem: Problem, index: int, centre_m: np.ndarray, tangent: np.ndarra
 
 
 def _worst(comparison: Comparison, clip: str, name: str) -> Place | None:
-    """The object's worst cell, where the model fails there."""
+    """The object's worst cell, where the model fails there.
+
+    The worst of all is marked however bad it is, unless it is a nuisance that fails.
+    """
     if comparison.is_adequate:
         return None
-    own = [p for p in comparison.where if (p.clip, p.object) == (clip, name) and p.z > MARKED_Z]
+    first = () if pulled(comparison) else comparison.where[:1]
+    marked = [p for p in comparison.where if p.z > MARKED_Z or p in first]
+    own = [p for p in marked if (p.clip, p.object) == (clip, name)]
     return own[0] if own else None

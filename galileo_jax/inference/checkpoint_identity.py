@@ -38,7 +38,8 @@ def identity_of(
     digest = hashlib.sha256()
     for one in measured:
         seen = one.observation
-        for array in (seen.times_s, seen.position_m, seen.covariance_m2, seen.mask):
+        modes = () if seen.modes_m is None else (seen.modes_m,)
+        for array in (seen.times_s, seen.position_m, seen.covariance_m2, seen.mask, *modes):
             digest.update(np.ascontiguousarray(array).tobytes())
         where = {"path", "source", "video", "track"}
         digest.update(one.clip.model_dump_json(exclude=where).encode())

@@ -75,7 +75,7 @@ class Problem:
     ) -> Float[np.ndarray, "batch object 2 frame"]:
         """`simulate` of `[batch, parameter]`: `[batch, object, 2, frame]`."""
         check_cancelled()
-        motion = padded_motion(*self.engine.simulate(theta))
+        motion = padded_motion(*self.engine.simulate(theta, self.last_seen_s(theta)))
         times = self.observation.times_s
         frames = np.pad(times, (0, rounded_up(len(times), FRAMES) - len(times)), mode="edge")
         model = self.model
@@ -85,6 +85,16 @@ class Problem:
             MOTIONS, lambda *rows: _seen_batch(kind, *rows, frames, scene), theta, *motion
         )
         return found[..., : len(times)]
+
+    def last_seen_s(
+        self, theta: Float[np.ndarray, "batch parameter"]
+    ) -> Float[np.ndarray, " batch"]:
+        """When the objects are last seen, s since the release: no rollout need last longer."""
+        named, scene = self.model.by_name(theta), self.model.scene.surroundings
+        times = np.repeat(self.observation.times_s[:, None], len(theta), axis=1)
+        for effect in self.model.effects + self.model.nuisances:
+            times = np.asarray(effect.time(times, named, scene))
+        return times.max(axis=0, initial=0.0)
 
     def whiten(self, predicted_m: np.ndarray, noise_scale: float) -> np.ndarray:
         """Whitened residuals, unit normal if the model is right.

@@ -63,7 +63,7 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
         last = int(seen[-1])
         if (frame := _leapt(clip, observation, i, seen)) is not None:
             why = "what is tracked there moves as nothing can that hits nothing: something else"
-        elif _is_lost(track, i, last):
+        elif _is_lost(track, i, last, clip.objects[i].last_frame):
             frame, why = last + 1, "nothing there looks like it; what follows is left out"
         else:
             continue
@@ -133,9 +133,9 @@ def _size_m(declared: ClipObject) -> float:
     return max(declared.size_m) * (1 if declared.shape == "box" else 2)
 
 
-def _is_lost(track: Track, i: int, last: int) -> bool:
+def _is_lost(track: Track, i: int, last: int, last_used: int | None) -> bool:
     """Whether object `i`, last seen in frame `last`, should be in the picture after that."""
-    after = len(track.times_s) - 1 - last
+    after = (len(track.times_s) - 1 if last_used is None else last_used) - last
     if after < LOST_FRAMES or track.is_visible[i, last + 1 :].any():
         return False
     step = np.nan_to_num(track.position_px[i, last] - track.position_px[i, last - 1])

@@ -38,4 +38,6 @@ def with_camera_modes(clip: Clip, observation: Observation, track: Track) -> Obs
         ]
     )
     modes = np.where(observation.mask[:, None], np.swapaxes(found, -1, -2) / 2, 0.0)
+    if observation.modes_m is not None:
+        modes = np.concatenate([modes, observation.modes_m])
     return replace(observation, modes_m=modes, is_squared=clip.rectangle is not None)

@@ -121,10 +121,19 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
     """
     if clip.video is None:
         assert clip.track is not None  # load_clip requires one of the two
-        return read_track(clip.path, clip.track, clip, clip.fps).observation, None
+        return _to_last(clip, read_track(clip.path, clip.track, clip, clip.fps).observation), None
     pixels = track_once(clip)
     observation = with_noise_at_rest(observe(clip, pixels))
     return with_camera_modes(clip, observation, pixels), pixels
+
+
+def _to_last(clip: Clip, observation: Observation) -> Observation:
+    """Without what is after the last frames that are declared; tracking stops there by itself."""
+    mask = observation.mask.copy()
+    for i, item in enumerate(clip.objects):
+        if item.last_frame is not None:
+            mask[i, item.last_frame + 1 :] = False
+    return replace(observation, mask=mask)
 
 
 def _with_foot(clip: Clip, remarks: list[str]) -> Clip:

@@ -2,13 +2,14 @@
 
 Sampling and coding shift what moves from frame to frame; what stands still they shift once. The
 tracker states both alike, so that a fit of one noise scale would take the quiet frames for a reason
-to trust the moving ones too much.
+to trust the moving ones too much. The one shift of what has come to rest is stated as a pattern
+that all frames of the rest share: however many there are, they do not average it out.
 """
 
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 from scipy.special import chdtri
 
 from galileo_jax.observation.observation import Observation
@@ -20,7 +21,7 @@ LEAST_SCALE = 0.3  # a coder repeats what stands still: less scatter than that i
 
 
 def with_noise_at_rest(observation: Observation) -> Observation:
-    """The observation, its covariance lowered where objects are at rest.
+    """The observation, its covariance lowered where objects are at rest, with the rests' shifts.
 
     Args:
       observation: of a video that was tracked, with the tracker's stated covariance.
@@ -38,12 +39,45 @@ def with_noise_at_rest(observation: Observation) -> Observation:
         squares.append(np.sum(white[:, still] ** 2, axis=-1).reshape(-1))
     found = np.concatenate(squares)
     if len(found) < MIN_WINDOWS:
-        return observation
+        return replace(observation, modes_m=_with_shifts(observation, is_still))
     # The median: a window that holds the begin of a motion does not count.
     share = float(np.median(found) / chdtri(WINDOW - 1, 0.5))
     scale2 = np.where(is_still, np.clip(share, LEAST_SCALE**2, 1.0), 1.0)
     covariance = observation.covariance_m2 * scale2[:, None, None]
-    return replace(observation, covariance_m2=covariance)
+    lowered = replace(observation, covariance_m2=covariance)
+    return replace(lowered, modes_m=_with_shifts(lowered, is_still))
+
+
+def _with_shifts(
+    observation: Observation, is_still: Bool[np.ndarray, "object frame"]
+) -> Float[np.ndarray, "mode object 2 frame"] | None:
+    """The observation's modes and, of each rest that follows a motion, one along each axis.
+
+    A shift is as large as the errors of the same object while it moves, less what scatters at rest.
+    """
+    found = [] if observation.modes_m is None else list(observation.modes_m)
+    for i, still in enumerate(is_still):
+        variance = np.diagonal(observation.covariance_m2[i]).T
+        moving = observation.mask[i] & ~still
+        if not moving.any():
+            continue
+        usual = np.median(variance[:, moving], axis=1)
+        for rest in _stretches(still):
+            if not moving[: rest.start].any():
+                continue
+            shift2 = usual - np.median(variance[:, rest], axis=1)
+            for axis in np.flatnonzero(shift2 > 0):
+                mode = np.zeros_like(observation.position_m)
+                mode[i, axis, rest] = np.sqrt(shift2[axis])
+                found.append(mode)
+    return np.stack(found) if found else None
+
+
+def _stretches(is_there: Bool[np.ndarray, " frame"]) -> list[slice]:
+    """Where it is true without a gap."""
+    steps = np.diff(np.concatenate([[0], is_there.astype(int), [0]]))
+    ends = zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True)
+    return [slice(first, after) for first, after in ends]
 
 
 def _windows(values: np.ndarray) -> np.ndarray:

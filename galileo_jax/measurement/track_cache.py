@@ -28,7 +28,8 @@ KEYS = {
     *("scenario", "fps", "ramp_angle_deg", "direction"),
     *("pixels_per_metre", "rectangle", "lens", "origin_px"),
 }
-OBJECT_KEYS = {"name", "shape", "size_m", "point_px", "first_frame", "rolls"}
+OBJECT_KEYS = {"name", "shape", "size_m", "point_px", "rolls"}
+OBJECT_KEYS |= {"first_frame", "last_frame", "corrections"}
 
 
 def track_once(clip: Clip) -> Track:

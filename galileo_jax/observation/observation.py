@@ -23,8 +23,9 @@ class Observation:
       covariance_m2: `[object, 2, 2, frame]`, m^2, tracking error of each frame (independent
         between frames).
       mask: `[object, frame]`, True where the point was measured.
-      modes_m: `[mode, object, 2, frame]`, m: how one standard deviation of each number that is
-        declared about the camera (corners, lens) moves the track; None where none is.
+      modes_m: `[mode, object, 2, frame]`, m: errors that many frames share, each as one standard
+        deviation of it moves the track: a number declared about the camera (corners, lens), the
+        shift with which a coder holds what has come to rest; None where there are none.
       is_turning: the third axis is how far each object has turned, rad, not a place.
       is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """

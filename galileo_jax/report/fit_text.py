@@ -60,6 +60,8 @@ OUTSIDE = (  # what nuisances mean that are far from what is usual
 )
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
+# Residuals of the noise's size may still follow a pattern that noise does not have.
+PATTERNS = "galileo compare looks for a pattern in them"
 
 
 def meaning(name: str) -> str | None:
@@ -141,9 +143,9 @@ def fit_quality(result: dict[str, Any]) -> str:
         return "chi2 per degree of freedom cannot be computed."
     size = f"{math.sqrt(chi2):.2g} times the stated noise"
     if chi2 < CHI2_GOOD:
-        text = "The model fits, with less noise than the tracker states"
+        text = f"The residuals are smaller than the stated noise; {PATTERNS}"
     elif chi2 <= CHI2_HIGH:
-        text = "The model fits: the residuals have the size of the stated noise"
+        text = f"The residuals have the size of the stated noise; {PATTERNS}"
     elif chi2 <= CHI2_BAD:
         text = (
             f"The residuals are {size}: more noise than stated, or an effect that the model "

@@ -38,11 +38,14 @@ class EngineC:
         """Simulations of the scene, to be written and stepped."""
         return Batch(self.model.scene.model, nsim=size)
 
-    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def simulate(
+        self, theta: np.ndarray, until_s: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Rolls the scene out for each parameter vector.
 
         Args:
           theta: `[batch, parameter]`, in the model's units.
+          until_s: not heeded: all records are made.
 
         Returns:
           Centres (m) and their velocities (m/s), each `[batch, object, 2, record + 1]`,

@@ -77,7 +77,9 @@ class EngineCFree:
     def _new_batch(self, size: int) -> Batch:
         return Batch(self.compiled, nsim=size)
 
-    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def simulate(
+        self, theta: np.ndarray, until_s: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
         poses = self.poses(theta)
         return poses.position_m[:, :, :2], poses.velocity_m_s[:, :, :2]

@@ -18,7 +18,7 @@ from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import step_by_events
+from galileo_jax.rollout.event_loop import recorded, step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 
 MAX_BOUNCES = 8  # within one recorded step
@@ -54,8 +54,12 @@ def roll_out(
     dt_s: float,
     theta: jax.Array,
     scene: Surroundings,
+    count: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array]:
-    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`."""
+    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
+
+    Of records beyond the first `count` the centres are as in the last of these.
+    """
     named = {name: theta[i] for i, name in enumerate(names)}
     law = dynamics(effects, scene, named, jnp)
     start = jnp.asarray(scene.start_m)[0]
@@ -68,10 +72,10 @@ def roll_out(
         jnp.zeros(()),
     )
 
-    def record(body: Body, index: jax.Array):
-        return _step(body, index * dt_s, dt_s, law, scene, floor), body
+    def step(body: Body, index: jax.Array) -> Body:
+        return _step(body, index * dt_s, dt_s, law, scene, floor)
 
-    _, bodies = jax.lax.scan(record, body, jnp.arange(num_records))
+    bodies = recorded(step, body, num_records, count)
     return bodies.position_m.T[None], bodies.velocity_m_s.T[None]
 
 

@@ -10,11 +10,14 @@ from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.model import Model
+from galileo_jax.rollout.acting_laws import ActingLaws, Share
 from galileo_jax.rollout.devices import over_devices
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
+from galileo_jax.runtime.batching import RECORDS as LONG
 from galileo_jax.runtime.trace_cache import trace_cached
 
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
+SPARE = 3  # records beyond the last time: between two of them a place is interpolated
 
 Motion = tuple[
     Float[jax.Array, "*batch object 2 record"], Float[jax.Array, "*batch object 2 record"]
@@ -25,8 +28,8 @@ class EngineJax:
     """Simulates batches of parameter vectors; compiled once for all clips of a kind.
 
     Attributes:
-      roll_out: `(effects, names, num_records, dt_s, theta, scene)`, theta `[parameter]`, to
-        centres and velocities, each `[object, 2, record]`.
+      roll_out: `(effects, names, num_records, dt_s, theta, scene, count)`, theta `[parameter]`,
+        to centres and velocities, each `[object, 2, record]`.
     """
 
     name = "rigid"
@@ -34,14 +37,40 @@ class EngineJax:
 
     def __init__(self, model: Model):
         self.model = model
+        self._laws = ActingLaws(model)
 
     def simulate(
-        self, theta: Float[np.ndarray, "batch parameter"]
+        self, theta: Float[np.ndarray, "batch parameter"], until_s: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `EngineC.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
-        motion = in_chunks(MOTIONS, self._rolled_up, np.asarray(theta))
-        count = self.model.num_records + 1
-        return motion[0][..., :count], motion[1][..., :count]
+        """As `Engine.simulate`: centres and velocities `[batch, object, 2, record + 1]`."""
+        theta, most = np.asarray(theta), self.model.num_records + 1
+        until_s = np.full(len(theta), np.inf) if until_s is None else until_s
+        acting = self._laws.in_each(theta)
+        rows, motions = [], []
+        for own in np.unique(acting):
+            rows.append(np.flatnonzero(acting == own))
+            roll = functools.partial(self._as_long_as_needed, self._laws.share(int(own)))
+            motions.append(in_chunks(MOTIONS, roll, theta[rows[-1]], until_s[rows[-1]]))
+        back = np.argsort(np.concatenate(rows))
+        position, velocity = (np.concatenate(own)[back] for own in zip(*motions, strict=True))
+        return position[..., :most], velocity[..., :most]
+
+    def _as_long_as_needed(self, share: Share, theta: np.ndarray, until_s: np.ndarray) -> Motion:
+        """Rolled out until the last time of all that is asked for."""
+        model = self.model
+        most = model.num_records + 1
+        last = float(np.max(np.nan_to_num(until_s, nan=np.inf), initial=0.0))
+        count = int(min(last / model.record_dt_s + SPARE, most))
+        return _roll_out_batch(
+            self.roll_out,
+            share.effects,
+            share.names,
+            rounded_up(most, LONG),
+            model.record_dt_s,
+            theta[:, share.columns],
+            model.scene.surroundings,
+            np.asarray(count),
+        )
 
     def traceable(self, theta: Float[jax.Array, "batch parameter"]) -> Motion:
         """`simulate` in JAX: can be jitted, vmapped and differentiated."""
@@ -72,6 +101,9 @@ def _roll_out_batch(
     dt_s: float,
     theta: jax.Array,
     scene: Surroundings,
+    count: Any = None,
 ) -> Motion:
-    one = functools.partial(roll_out, effects, names, num_records, dt_s)
-    return over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, scene)
+    def one(theta: jax.Array, shared: tuple[Surroundings, Any]) -> Motion:
+        return roll_out(effects, names, num_records, dt_s, theta, *shared)
+
+    return over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, (scene, count))

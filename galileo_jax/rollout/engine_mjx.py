@@ -35,11 +35,14 @@ class EngineMJX:
         self.is_on_cpu = jax.default_backend() == "cpu"
         self.batch = BATCH_CPU if self.is_on_cpu else BATCH_GPU
 
-    def simulate(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def simulate(
+        self, theta: np.ndarray, until_s: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Rolls the scene out for each parameter vector; as `EngineC.simulate`.
 
         Args:
           theta: `[batch, parameter]`, in the model's units.
+          until_s: not heeded: all records are made.
 
         Returns:
           Centres (m) and velocities (m/s), each `[batch, object, 2, record + 1]`; NaN where

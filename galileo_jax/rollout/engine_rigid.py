@@ -22,7 +22,7 @@ from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import step_by_events
+from galileo_jax.rollout.event_loop import recorded, step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
 
 MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few bounces
@@ -71,17 +71,21 @@ def roll_out(
     dt_s: float,
     theta: jax.Array,
     scene: Surroundings,
+    count: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array]:
-    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`."""
+    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
+
+    Of records beyond the first `count` the centres are as in the last of these.
+    """
     law = dynamics(effects, scene, {name: theta[i] for i, name in enumerate(names)}, jnp)
 
-    def record(bodies: Bodies, index: jax.Array):
-        return _step(bodies, index * dt_s, dt_s, law, scene), bodies
+    def step(bodies: Bodies, index: jax.Array) -> Bodies:
+        return _step(bodies, index * dt_s, dt_s, law, scene)
 
     # What is pushed rolls from the hand.
     rim = law.start_speed_m_s * jnp.asarray(scene.rolls) if any(scene.rolls) else None
     start = Bodies(law.start_m, law.start_speed_m_s, rim)
-    _, (path, speed, _) = jax.lax.scan(record, start, jnp.arange(num_records))
+    path, speed, _ = recorded(step, start, num_records, count)
     position, velocity = to_plane(path, speed, law.ramp_rad, law.table_rad, scene)
     return jnp.moveaxis(position, 0, -1), jnp.moveaxis(velocity, 0, -1)
 

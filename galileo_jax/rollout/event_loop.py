@@ -1,5 +1,6 @@
-"""From event to event within one recorded step: what both halves of the rigid engine do."""
+"""From record to record, and from event to event between them: what both rigid engines do."""
 
+import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -7,6 +8,46 @@ import jax
 import jax.numpy as jnp
 
 Bodies = TypeVar("Bodies")  # a PyTree
+
+PART = 16  # records are made in parts of so many, as many parts as are asked for
+
+
+def recorded(
+    step: Callable[[Bodies, jax.Array], Bodies],
+    bodies: Bodies,
+    num_records: int,
+    count: jax.Array | None = None,
+) -> Bodies:
+    """The bodies at every record: leaves `[record, ...]`.
+
+    Args:
+      step: bodies at a record and its index to those at the next.
+      bodies: at the first.
+      num_records: which is compiled for.
+      count: of records that are wanted; beyond, bodies stay where they are then. None: all.
+    """
+
+    def record(bodies: Bodies, index: jax.Array) -> tuple[Bodies, Bodies]:
+        return step(bodies, index), bodies
+
+    if count is None or num_records % PART:
+        return jax.lax.scan(record, bodies, jnp.arange(num_records))[1]
+
+    def part(i: jax.Array, carry: tuple[Bodies, Bodies]) -> tuple[Bodies, Bodies]:
+        bodies, made = carry
+        bodies, own = jax.lax.scan(record, bodies, i * PART + jnp.arange(PART))
+        put = functools.partial(jax.lax.dynamic_update_slice_in_dim, start_index=i * PART, axis=0)
+        return bodies, jax.tree.map(put, made, own)
+
+    empty = jax.tree.map(lambda leaf: jnp.zeros((num_records, *leaf.shape), leaf.dtype), bodies)
+    made = jax.lax.fori_loop(0, -(-count // PART), part, (bodies, empty))[1]
+    is_over = jnp.arange(num_records) >= count
+
+    def held(leaf: jax.Array) -> jax.Array:
+        over = is_over.reshape(-1, *[1] * (leaf.ndim - 1))
+        return jnp.where(over, leaf[count - 1], leaf)
+
+    return jax.tree.map(held, made)
 
 
 def step_by_events(

@@ -29,8 +29,16 @@ class Engine(Protocol):
     name: str
     model: Model
 
-    def simulate(self, theta: Float[np.ndarray, "batch parameter"]) -> "Motion":
-        """Parameters, in their units, to centres (m) and velocities (m/s)."""
+    def simulate(
+        self, theta: Float[np.ndarray, "batch parameter"], until_s: np.ndarray | None = None
+    ) -> "Motion":
+        """Parameters, in their units, to centres (m) and velocities (m/s).
+
+        Args:
+          theta: parameters.
+          until_s: `[batch]`, time after which nobody looks: an engine may leave objects where
+            they are then. None: the model's duration.
+        """
         ...
 
 

@@ -15,8 +15,8 @@ MOST_MISSING = 160
 FONT = "system-ui, Segoe UI, Roboto, Arial, sans-serif"
 
 
-def track_figure(track: Mapping[str, Any], dark: bool) -> Figure:
-    """The speed of every object in the picture, px/s."""
+def track_figure(track: Mapping[str, Any], dark: bool, end_s: float) -> Figure:
+    """The speed of every object in the picture, px/s, up to the clip's end."""
     colour = COLOURS[dark]
     traces = []
     times = track["times"]
@@ -28,7 +28,9 @@ def track_figure(track: Mapping[str, Any], dark: bool) -> Figure:
                 None if gap else ((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2) ** 0.5 / (t - s)
             )
         traces.append(_points(times[1:], speeds, colour[f"object{i % 3}"], track["objects"][i]))
-    return _figure(traces, "time, s", "speed, px/s", dark)
+    figure = _figure(traces, "time, s", "speed, px/s", dark)
+    figure["layout"]["xaxis"]["range"] = [0.0, end_s]  # a track that grows does not shift
+    return figure
 
 
 def fit_figure(

@@ -33,13 +33,15 @@ def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple
         found.append(Remark("missing", "No object is marked. Add one and drag it to its centre."))
     if marks.has_ramp and not (marks.upper and marks.foot):
         found.append(Remark("missing", "The ramp is not marked. Draw its line."))
-    if marks.has_table and marks.stick_m is None:
+    if marks.rectangle is not None:
+        found.extend(_of_rectangle(marks))
+    elif marks.has_table and marks.stick_m is None:
         found.append(
             Remark("missing", "The scale is unknown. Lay the stick on a known length, and type it.")
         )
     if problem:
         found.append(Remark("missing", problem))
-    if not marks.has_table and marks.stick_m is None:
+    if not marks.has_table and marks.rectangle is None and marks.stick_m is None:
         found.append(
             Remark("odd", "The scale is unknown: friction and scale show only in combination.")
         )
@@ -64,3 +66,20 @@ def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple
                 )
             )
     return tuple(found)
+
+
+def _of_rectangle(marks: Marks) -> list[Remark]:
+    """Its sides, and whether its corners are in their order."""
+    assert marks.rectangle is not None
+    found = []
+    if not marks.has_scale:
+        text = "Type the rectangle's width and height, or turn back to the stick."
+        found.append(Remark("missing", text))
+    turns = []
+    for i in range(4):
+        (x1, y1), (x2, y2), (x3, y3) = (marks.rectangle[(i + k) % 4] for k in range(3))
+        turns.append((x2 - x1) * (y3 - y2) - (y2 - y1) * (x3 - x2))
+    if max(turns) >= 0:  # counter-clockwise as seen, y down
+        text = "The rectangle's corners are crossed: 1 is its bottom left, 2 its bottom right."
+        found.append(Remark("missing", text))
+    return found

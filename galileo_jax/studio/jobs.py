@@ -216,7 +216,7 @@ def _run(
     def on_progress(stage: str, share: float, partial: Any) -> None:
         send(Message(number, task, "progress", (stage, share)))
         if isinstance(partial, dict):
-            send(Message(number, task, "partial", partial))
+            send(Message(number, task, "partial", work.shown(partial)))
 
     def partial(content: Mapping[str, Any]) -> None:
         send(Message(number, task, "partial", content))

@@ -1,27 +1,35 @@
-"""What a person draws into a clip's first frame, and how it becomes keys of the clip's yaml."""
+"""What a person draws into a clip."""
 
-import math
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import ClipFile
 
 Point = tuple[float, float]
+Correction = tuple[int, float, float]  # frame, x, y
+Corners = tuple[Point, Point, Point, Point]
 
-STICKS_M = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-EDGE_PX = 10.0
-STICK_SHARE = 0.3  # of the frame's width, that a stick is drawn over at first
+CORNERS = ("corner1", "corner2", "corner3", "corner4")  # from the bottom left, counter-clockwise
+CAN_RECTANGLE = "rectangle" in ClipFile.model_fields
 
 
 @dataclass(frozen=True)
 class ObjectMark:
-    """One object: its centre in the first frame (px), its shape, its size (m) if it is known."""
+    """One object.
+
+    Attributes:
+      name: its own.
+      point: its centre in the first frame, px.
+      shape: as in the yaml.
+      size_m: if it is known.
+      corrections: where it has been put right, by frame.
+    """
 
     name: str
     point: Point | None = None
     shape: str = "box"
     size_m: tuple[float, ...] | None = None
+    corrections: tuple[Correction, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -37,6 +45,10 @@ class Marks:
       stick: the two ends of something whose length is known.
       stick_m: that length, m; None: nobody has said yet.
       first_frame: the frame from which on the clip counts.
+      last_frame: the last one that counts; None: that of the clip.
+      rectangle: the corners of a rectangle of known sides, in place of the stick, from the bottom
+        left one counter-clockwise.
+      rectangle_m: its width and height, m, as far as somebody has said; 0: not yet.
     """
 
     scenario: str = "ramp"
@@ -47,11 +59,21 @@ class Marks:
     stick: tuple[Point, Point] | None = None
     stick_m: float | None = None
     first_frame: int = 0
+    last_frame: int | None = None
+    rectangle: Corners | None = None
+    rectangle_m: tuple[float, float] = (0.0, 0.0)
 
     @property
     def has_ramp(self) -> bool:
         """Whether the scenario has a slope."""
         return SCENARIOS[self.scenario].has_ramp
+
+    @property
+    def has_scale(self) -> bool:
+        """Whether lengths are known."""
+        if self.rectangle is not None:
+            return min(self.rectangle_m) > 0
+        return self.stick_m is not None
 
     @property
     def has_table(self) -> bool:
@@ -64,7 +86,9 @@ def handles(marks: Marks) -> dict[str, Point]:
     found = {one.name: one.point for one in marks.objects if one.point is not None}
     if marks.has_ramp:
         found |= {k: p for k in ("upper", "foot") if (p := getattr(marks, k)) is not None}
-    if marks.stick is not None:
+    if marks.rectangle is not None:
+        found |= dict(zip(CORNERS, marks.rectangle, strict=True))
+    elif marks.stick is not None:
         found |= {"stick1": marks.stick[0], "stick2": marks.stick[1]}
     return found
 
@@ -84,7 +108,34 @@ def moved(marks: Marks, handle: str, to: Point) -> Marks:
     if handle in ("stick1", "stick2") and marks.stick is not None:
         one, other = marks.stick
         return replace(marks, stick=(to, other) if handle == "stick1" else (one, to))
+    if handle in CORNERS and marks.rectangle is not None:
+        corners = list(marks.rectangle)
+        corners[CORNERS.index(handle)] = to
+        return replace(marks, rectangle=tuple(corners))  # pyright: ignore
     objects = tuple(replace(o, point=to) if o.name == handle else o for o in marks.objects)
+    return replace(marks, objects=objects)
+
+
+def with_rectangle(marks: Marks, size_px: tuple[int, int]) -> Marks:
+    """A rectangle to be laid on one of known sides, in place of the stick."""
+    (left, right), (top, bottom) = (
+        (round(a * side, 1), round(b * side, 1))
+        for a, b, side in ((0.3, 0.7, size_px[0]), (0.3, 0.7, size_px[1]))
+    )
+    corners = ((left, bottom), (right, bottom), (right, top), (left, top))
+    return replace(marks, rectangle=corners)
+
+
+def corrected(marks: Marks, name: str, frame: int, to: Point | None) -> Marks:
+    """The marks with an object put right in a frame; None: no more."""
+
+    def put(one: ObjectMark) -> ObjectMark:
+        kept = [c for c in one.corrections if c[0] != frame]
+        if to is not None:
+            kept.append((frame, round(to[0], 2), round(to[1], 2)))
+        return replace(one, corrections=tuple(sorted(kept)))
+
+    objects = tuple(put(one) if one.name == name else one for one in marks.objects)
     return replace(marks, objects=objects)
 
 
@@ -98,157 +149,3 @@ def with_object(marks: Marks, at: Point) -> Marks:
 def without_object(marks: Marks, name: str) -> Marks:
     """The marks without one of the objects."""
     return replace(marks, objects=tuple(one for one in marks.objects if one.name != name))
-
-
-def proposed(found: Mapping[str, Any], size_px: tuple[int, int]) -> Marks:
-    """What the program found in a video, as marks; a stick to be laid on a known length.
-
-    Args:
-      found: the fields of a `Proposal`.
-      size_px: of the video.
-    """
-    ramp = found["ramp"]
-    upper, foot = ((ramp[0], ramp[1]), (ramp[2], ramp[3])) if ramp is not None else (None, None)
-    objects = tuple(
-        ObjectMark(name, (round(x, 1), round(y, 1))) for name, (x, y) in found["objects"].items()
-    )
-    stick = _stick(size_px, None)[0]
-    return Marks(found["scenario"], found["fps"], objects, upper, foot, stick)
-
-
-def blank(fps: float, size_px: tuple[int, int]) -> Marks:
-    """Marks of a video in which nothing was found: a line and a stick to be dragged."""
-    width, height = size_px
-    upper, foot = (0.2 * width, 0.4 * height), (0.5 * width, 0.7 * height)
-    return Marks(fps=fps, upper=upper, foot=foot, stick=_stick(size_px, None)[0])
-
-
-def declared(content: Mapping[str, Any], size_px: tuple[int, int], fps: float) -> Marks:
-    """The marks that a clip's yaml stands for.
-
-    Args:
-      content: the yaml's keys, valid.
-      size_px: of the video.
-      fps: of the container, where the yaml says nothing.
-    """
-    listed = [one for one in content.get("objects") or () if isinstance(one, Mapping)]
-    objects = tuple(
-        ObjectMark(
-            str(one["name"]),
-            _pair(one.get("point_px")),
-            str(one.get("shape", "box")),
-            tuple(one["size_m"]) if one.get("size_m") else None,
-        )
-        for one in listed
-    )
-    marks = Marks(str(content["scenario"]), float(content.get("fps", fps)), objects)
-    first = listed[0].get("first_frame", 0) if listed else 0
-    marks = replace(marks, first_frame=int(first or 0))
-    stick, metres = _stick(size_px, content.get("pixels_per_metre"))
-    marks = replace(marks, stick=stick, stick_m=metres)
-    if not marks.has_ramp:
-        return marks
-    foot = _pair(content.get("origin_px"))
-    start = objects[0].point if objects else None
-    if foot is None or not marks.has_table:
-        foot = start or (0.5 * size_px[0], 0.6 * size_px[1])
-    angle = math.radians(float(content.get("ramp_angle_deg") or 20.0))
-    along = -1.0 if content.get("direction") == "left" else 1.0
-    # As high as object 1 stands, so that the line ends beside it.
-    rise = max(foot[1] - start[1], 0.1 * size_px[1]) if start else 0.3 * size_px[1]
-    room = (foot[0] if along > 0 else size_px[0] - foot[0]) - EDGE_PX
-    rise = min(rise, max(room, EDGE_PX) * math.tan(angle))  # an end that can be grabbed
-    upper = (round(foot[0] - along * rise / math.tan(angle), 3), round(foot[1] - rise, 3))
-    return replace(marks, foot=foot, upper=upper)
-
-
-def labels(before: Marks | None, after: Marks) -> dict[str, Any]:
-    """What `label` is to write so that the yaml says what was drawn; empty if nothing changed.
-
-    Only what was changed: a measured angle is not replaced because the foot was moved.
-    """
-    old = before or Marks(scenario="", fps=math.nan)
-    found: dict[str, Any] = {}
-    if after.scenario != old.scenario:
-        found["scenario"] = after.scenario
-    if after.fps != old.fps:
-        found["fps"] = after.fps
-    if after.has_ramp and after.upper and after.foot:
-        if before is None or _line(before) != _line(after) or after.scenario != old.scenario:
-            found["ramp"] = (*after.upper, *after.foot)
-        if after.has_table and (before is None or before.foot != after.foot):
-            found["origin"] = after.foot
-    is_laid = after.stick is not None and after.stick_m is not None
-    if is_laid and (before is None or _scale(before) != _scale(after)):
-        found["scale"] = (*after.stick[0], *after.stick[1], after.stick_m)  # pyright: ignore
-    known = {one.name: one for one in old.objects}
-    for one in after.objects:
-        was = known.get(one.name, ObjectMark(one.name, shape=""))
-        if one.point != was.point and one.point is not None:
-            found.setdefault("point", {})[one.name] = one.point
-        if one.shape != was.shape:
-            found.setdefault("shape", {})[one.name] = one.shape
-        if one.size_m != was.size_m and one.size_m is not None:
-            found.setdefault("size", {})[one.name] = one.size_m
-        if after.first_frame != old.first_frame:
-            found.setdefault("first_frame", {})[one.name] = after.first_frame
-    return found
-
-
-def to_json(marks: Marks) -> dict[str, Any]:
-    """Plain data."""
-    return asdict(marks)
-
-
-def from_json(found: Mapping[str, Any]) -> Marks:
-    """What `to_json` made.
-
-    Raises:
-      KeyError, TypeError, ValueError: it is something else.
-    """
-    objects = tuple(
-        ObjectMark(
-            str(one["name"]),
-            _pair(one["point"]),
-            str(one["shape"]),
-            tuple(one["size_m"]) if one["size_m"] else None,
-        )
-        for one in found["objects"]
-    )
-    stick = found["stick"]
-    ends = (_point(stick[0]), _point(stick[1])) if stick else None
-    points = {key: _pair(found[key]) for key in ("upper", "foot")}
-    plain = {key: found[key] for key in ("scenario", "fps", "stick_m", "first_frame")}
-    return Marks(objects=objects, stick=ends, **points, **plain)
-
-
-def _line(marks: Marks) -> Point | None:
-    """The direction of the ramp; moving it along with its foot changes nothing."""
-    if marks.upper is None or marks.foot is None:
-        return None
-    return round(marks.foot[0] - marks.upper[0], 2), round(marks.foot[1] - marks.upper[1], 2)
-
-
-def _scale(marks: Marks) -> tuple[Any, ...]:
-    return marks.stick, marks.stick_m
-
-
-def _point(value: Any) -> Point:
-    return float(value[0]), float(value[1])
-
-
-def _pair(value: Any) -> Point | None:
-    return None if value is None else _point(value)
-
-
-def _stick(
-    size_px: tuple[int, int], scale: float | None
-) -> tuple[tuple[Point, Point], float | None]:
-    """A stick near the lower edge; of a known scale as long as a round number of metres."""
-    width, height = size_px
-    length, metres = STICK_SHARE * width, None
-    if scale:
-        metres = min(STICKS_M, key=lambda one: abs(one * scale - length))
-        length = metres * scale
-    left, y = round(0.06 * width, 1), round(0.94 * height, 1)
-    return ((left, y), (round(left + length, 3), y)), metres

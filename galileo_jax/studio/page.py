@@ -1,5 +1,6 @@
 """The page of one tab: the stages above, the video and its curves left, the stage's panel right."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -9,7 +10,7 @@ from typing import Any
 from nicegui import ui
 
 from galileo_jax.studio import charts
-from galileo_jax.studio.marks import Marks, moved, with_object
+from galileo_jax.studio.marks import Marks, corrected, moved, with_object
 from galileo_jax.studio.panels import compare, diagnose, fit, marks, predict, track, video
 from galileo_jax.studio.session import Session
 from galileo_jax.studio.stages import STAGES
@@ -26,6 +27,7 @@ PANELS = {
     "predict": predict.build,
 }
 POLL_S = 0.1
+CURVES_AFTER_S = 0.03
 PARTS = {"video": {"clips", "marks"}, "marks": {"clips", "marks"}}  # that their panels show
 RUNNING = {"propose": "marks", "open_run": "fit", "export": "predict"}  # else its own stage
 
@@ -38,7 +40,9 @@ class Tab:
       session: the clips and results.
       stage: the panel.
       candidate: whose curve is looked at.
-      placing: a click into the video adds an object.
+      placing: what a click into the video places: a new object, or one that is put right; "":
+        nothing.
+      frame: that is shown.
       dark: the colours.
       said: the job, the error and the note that are shown.
       drawn, lamps: what the panel and the row of stages were built of.
@@ -50,7 +54,8 @@ class Tab:
     session: Session
     stage: str = "video"
     candidate: str = ""
-    placing: bool = False
+    placing: str = ""
+    frame: int = 0
     dark: bool = False
     said: tuple[str, str, str] = ("", "", "")
     drawn: Any = None
@@ -63,7 +68,7 @@ class Tab:
         """Turns to a stage."""
         if self.stage == "fit" != stage and self.session.results.live is not None:
             self.session.put_back()
-        self.stage, self.candidate, self.placing = stage, "", False
+        self.stage, self.candidate, self.placing = stage, "", ""
         if stage in ("fit", "compare", "diagnose", "predict"):
             self.session.open_run()
         self.redraw()
@@ -88,6 +93,7 @@ def build_page(session: Session) -> None:
     ui.colors(primary="#b34d25")
     dark = ui.dark_mode(None)
     seen: dict[str, int] = {}
+    drawn: dict[str, Any] = {}
 
     with ui.element("header").classes("bar"):
         ui.label("galileo studio").classes("brand")
@@ -111,16 +117,26 @@ def build_page(session: Session) -> None:
             tab.mark(moved(sheet.marks, given["handle"], (given["x"], given["y"])))
 
     def on_place(event: Any) -> None:
-        if session.sheet is not None and tab.placing:
-            tab.placing = False
-            tab.mark(with_object(session.sheet.marks, tuple(event.args)))
+        if session.sheet is None or not tab.placing:
+            return
+        (x, y, frame), name, tab.placing = event.args, tab.placing, ""
+        if name == marks.NEW:
+            tab.mark(with_object(session.sheet.marks, (x, y)))
+        else:
+            tab.mark(corrected(session.sheet.marks, name, int(frame), (x, y)))
+            session.track()
+
+    def on_frame(event: Any) -> None:
+        tab.frame = int(event.args)
 
     viewer.on("moved", on_moved)
     viewer.on("place", on_place)
+    viewer.on("frame", on_frame)
 
     def show() -> None:
         seen.update(session.versions)
         lamps()
+        viewer.show(session, tab.stage, bool(tab.placing))
         if tab.drawn == (now := _shown(tab)):
             tab.refresh()
         else:
@@ -129,8 +145,9 @@ def build_page(session: Session) -> None:
             with panel:
                 _panel(tab)
             tab.drawn = now
-        curves()
         bar()
+        # A browser that draws curves shows nothing else meanwhile: the click's answer goes first.
+        asyncio.get_running_loop().call_later(CURVES_AFTER_S, curves)
 
     def lamps() -> None:
         task = session.job.task if session.job is not None else ""
@@ -143,11 +160,12 @@ def build_page(session: Session) -> None:
             _stage_buttons(tab)
 
     def curves() -> None:
-        viewer.show(session, tab.stage, tab.placing)
+        viewer.show(session, tab.stage, bool(tab.placing))
         figure = _figure(tab)
         strip.classes(add="" if figure else "none", remove="none" if figure else "")
-        if figure is not None:
+        if figure is not None and figure != drawn.get("figure"):
             chart.update_figure(figure)
+            drawn["figure"] = figure
 
     def bar() -> None:
         job.clear()
@@ -189,11 +207,11 @@ def _shown(tab: Tab) -> Any:
         return now
     session = tab.session
     found = session.results
-    views = (found.tracks, found.fit, found.compare, found.diagnosis, found.prediction)
+    views = (*found.tracks.values(), found.fit, found.compare, found.diagnosis, found.prediction)
     return (
-        tab.stage, tab.dark, session.active, session.chosen, session.names, session.error,
-        session.note, session.job is None, tuple(session.states.values()), tuple(map(id, views)),
-        found.candidates, found.rounds, tuple(session.broken), session.sheet,
+        tab.stage, tab.dark, tab.placing, session.active, session.chosen, session.names,
+        session.error, session.note, session.job is None, tuple(session.states.values()),
+        tuple(map(id, views)), found.candidates, found.rounds, tuple(session.broken), session.sheet,
     )  # fmt: skip
 
 
@@ -267,7 +285,10 @@ def _figure(tab: Tab) -> Any:
     if tab.stage == "track" or motion is None:
         track = found.tracks.get(tab.session.active)
         is_wanted = tab.stage not in ("video", "marks")
-        return charts.track_figure(track, dark) if track is not None and is_wanted else None
+        if track is None or not is_wanted or tab.session.sheet is None:
+            return None
+        count = tab.session.sheet.info.frame_count
+        return charts.track_figure(track, dark, count / tab.session.sheet.marks.fps)
     if tab.stage == "fit":
         return charts.fit_figure(motion, None, dark)
     is_of_this_model = found.compare is not None and tab.session.states["compare"] == "done"
@@ -277,14 +298,17 @@ def _figure(tab: Tab) -> Any:
         return charts.residual_figure(motion, own, dark)
     if tab.stage == "diagnose":
         return charts.residual_figure(motion, own, dark, _candidate(tab))
-    if tab.stage == "predict" and found.prediction is not None:
-        return charts.prediction_figure(found.prediction, dark)
+    ahead = (found.prediction or {"clips": {}})["clips"].get(tab.session.active)
+    if tab.stage == "predict" and ahead is not None:
+        return charts.prediction_figure(ahead, dark)
     return charts.fit_figure(motion, None, dark) if tab.stage == "predict" else None
 
 
 def _candidate(tab: Tab) -> tuple[str, Any] | None:
-    found = tab.session.results.diagnosis
-    curves = found["curves"].get(tab.candidate, ()) if found is not None else ()
+    results = tab.session.results
+    found = results.diagnosis
+    known = found["curves"] if found is not None else results.previews
+    curves = known.get(tab.candidate, ())
     own = [one for one in curves if one["clip"] == tab.session.active]
     is_in = set(tab.candidate.split("+")) <= set(tab.session.effects)
     return (tab.candidate, own[0]) if own and not is_in else None

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -85,10 +85,10 @@ def round_of(result: Mapping[str, Any]) -> dict[str, Any]:
     return {"effects": list(result["effects"]), **{k: error[k] for k in keys}, **frictions}
 
 
-def with_round(rounds: list[dict[str, Any]], new: dict[str, Any]) -> list[dict[str, Any]]:
+def with_round(rounds: Sequence[Mapping[str, Any]], new: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The rounds with one more; those whose model is not a part of the new one's are over."""
     own = set(new["effects"])
-    return [one for one in rounds if set(one["effects"]) < own] + [new]
+    return [dict(one) for one in (*(r for r in rounds if set(r["effects"]) < own), new)]
 
 
 def _number(text: str) -> float | None:

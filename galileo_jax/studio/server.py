@@ -104,10 +104,12 @@ def make_app(
 
     @app.get("/still/{name}")
     def still(name: str) -> Response:
-        """The first and the last frame of a prediction."""
-        path = session.trials.run / "first_and_last.png"
+        """The first and the last frame of a clip's prediction."""
+        path = (
+            session.trials.run / ("" if len(session.chosen) == 1 else name) / "first_and_last.png"
+        )
         is_inside = path.is_file() and path.resolve().is_relative_to(session.root)
-        if name != session.trials.name or not is_inside:
+        if name not in session.chosen or not is_inside:
             return PlainTextResponse("no such picture", 404)
         caching = {"cache-control": "no-store"}
         return Response(path.read_bytes(), media_type="image/png", headers=caching)

@@ -14,9 +14,11 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
 from galileo_jax.studio.frames import Frames
 from galileo_jax.studio.jobs import Message, Worker
-from galileo_jax.studio.marks import Marks, proposed
+from galileo_jax.studio.marks import Marks
+from galileo_jax.studio.marks_yaml import proposed
 from galileo_jax.studio.paths import videos
 from galileo_jax.studio.sheet import Sheet, changed, opened, redone, undone
+from galileo_jax.studio.shown import Results, with_partial
 from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import Store
 
@@ -32,20 +34,6 @@ class Job:
     stage: str = "starting"
     share: float = 0.0
     is_cancelled: bool = False
-
-
-@dataclass(frozen=True)
-class Results:
-    """Views of what was computed for the chosen clips; None: not there."""
-
-    tracks: Mapping[str, Any]
-    fit: Mapping[str, Any] | None = None
-    live: Mapping[str, Any] | None = None  # the model at the sliders
-    compare: Mapping[str, Any] | None = None
-    diagnosis: Mapping[str, Any] | None = None  # diagnosis.json, with sentence and curves
-    candidates: tuple[Mapping[str, Any], ...] = ()  # as they stream in
-    rounds: tuple[Mapping[str, Any], ...] = ()
-    prediction: Mapping[str, Any] | None = None
 
 
 class Session:
@@ -226,7 +214,7 @@ class Session:
         """Which effect is missing?"""
         entry = self.store.get("runs", self.trials.name)
         self.store.put("runs", self.trials.name, entry | {"files": list(files)})
-        self._set_results(candidates=(), diagnosis=None)
+        self._set_results(candidates=(), diagnosis=None, previews={})
         self._start("diagnose", clips=self.trials.files, run=self._run, effects_from=list(files))
 
     def predict(self, seconds: float) -> None:
@@ -305,24 +293,13 @@ class Session:
     def _partial(self, content: Mapping[str, Any]) -> None:
         if self._context["trials"].name != self.trials.name:
             return
-        if "track" in content:
-            view = content["track"]
-            self._set_results(tracks={**self.results.tracks, view["clip"]: view})
-        elif "fit" in content:
-            self._set_results(fit=content["fit"], live=None)
-        elif "compare" in content:
-            self._set_results(compare=content["compare"])
-        elif "candidate" in content:
-            row = content["candidate"]
-            others = [c for c in self.results.candidates if c["effect"] != row["effect"]]
-            ranked = sorted([*others, row], key=lambda c: -float(c.get("score") or 0.0))
-            self._set_results(candidates=tuple(ranked))
-        elif "verdict" in content:
-            found = content["verdict"]
-            self._set_results(diagnosis={**found["document"], **_without(found, "document")})
+        self.results = with_partial(self.results, content)
+        self._changed("live" if "frame" in content else "results")
 
     def _ended(self, message: Message) -> None:
         follow, self._next, self.job = self._next, [], None
+        if message.task == "track" and message.kind != "done":
+            self._set_results(tracks=self._tracks())  # as they were
         if message.kind == "done":
             self._record(message.task, message.content)
             for action in follow:
@@ -353,12 +330,14 @@ class Session:
             return
         entry = self.store.get("runs", trials.name)
         mark = of["marks"] if task in ("fit", "diagnose") else of["model"]
-        path = trials.run / FILES[task]
+        path = trials.file(task)
         if path.is_file():
             entry[task] = made(path, mark)
         if task == "fit":
             new = results.round_of(results.document(trials.run / "result.json"))
-            entry["rounds"] = results.with_round(entry.get("rounds", []), new)
+            is_shown = trials.name == self.trials.name  # with rounds that commands have left
+            known = entry.get("rounds") or (list(self.results.rounds) if is_shown else [])
+            entry["rounds"] = results.with_round(known, new)
         if task in ("compare", "predict"):
             key = {"compare": "compare", "predict": "prediction"}[task]
             entry[f"{task}_view"] = content[key]
@@ -403,27 +382,39 @@ class Session:
 
     def _reopen(self) -> None:
         """Shows what lies in the folder for the clips that are chosen now."""
+        self.results = Results(self._tracks())
+        self._show_stored()
+        self._changed("clips", "marks", "results", "job")
+
+    def _tracks(self) -> dict[str, Any]:
+        """Those that lie in the folder, by clip."""
         tracks = {}
         for sheet in self.trials.sheets:
             view = results.pixel_track(track_files(sheet) / "track_px.csv")
             if view is not None:
                 tracks[sheet.name] = {**view, "clip": sheet.name}
-        self.results = Results(tracks)
-        self._show_stored()
-        self._changed("clips", "marks", "results", "job")
+        return tracks
 
     def _show_stored(self) -> None:
         run = self.trials.run
         entry = self.store.get("runs", self.trials.name)
         found = results.document(run / FILES["diagnose"])
-        diagnosis = {"curves": {}, "sentence": "", **found, **entry.get("diagnose_view", {})}
+        last = entry.get("diagnose", {}).get("at") if found else None
+        is_own = found and last == (run / FILES["diagnose"]).stat().st_mtime_ns  # not a command's
+        curves = entry.get("diagnose_view", {}).get("curves", {}) if is_own else {}
+        diagnosis = {"sentence": "", **found, "curves": curves}
         self._set_results(
             compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
-            prediction=entry.get("predict_view") if (run / FILES["predict"]).is_file() else None,
+            prediction=self._prediction(entry),
             diagnosis=diagnosis if found else None,
             candidates=tuple(found.get("candidates", ())),
             rounds=tuple(self._rounds(entry.get("rounds") or list(found.get("history", ())))),
         )
+
+    def _prediction(self, entry: Mapping[str, Any]) -> Mapping[str, Any] | None:
+        found = entry.get("predict_view", {})
+        is_there = self.trials.file("predict").is_file() and "clips" in found
+        return found if is_there else None
 
     def _rounds(self, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """With that of the fit that lies there, whoever made it."""
@@ -458,7 +449,3 @@ class Session:
     def _changed(self, *parts: str) -> None:
         for part in parts:
             self.versions[part] += 1
-
-
-def _without(found: Mapping[str, Any], key: str) -> dict[str, Any]:
-    return {name: value for name, value in found.items() if name != key}

@@ -11,7 +11,8 @@ from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.check import Remark, remarks_on
-from galileo_jax.studio.marks import Marks, blank, declared, from_json, labels, to_json
+from galileo_jax.studio.marks import Marks
+from galileo_jax.studio.marks_yaml import blank, declared, from_json, labels, to_json
 from galileo_jax.studio.paths import check_declared
 from galileo_jax.studio.store import Store, yaml_content
 from galileo_jax.video.decode import VideoInfo, probe

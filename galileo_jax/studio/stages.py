@@ -48,6 +48,13 @@ class Trials:
         """The folder of the run."""
         return self.root / "runs" / self.name
 
+    def file(self, stage: str) -> Path:
+        """What a stage leaves; of several clips each has its own prediction."""
+        folder = self.run
+        if stage == "predict" and len(self.sheets) > 1:
+            folder = self.run / next(iter(self.sheets)).name
+        return folder / FILES[stage]
+
     @property
     def files(self) -> list[str]:
         """The clips as a command is given them, in the folder."""
@@ -111,7 +118,7 @@ def _track_state(sheet: Sheet, store: Store) -> State:
 
 
 def _state(trials: Trials, stage: str, entry: dict[str, Any], now: str) -> State:
-    path = trials.run / FILES[stage]
+    path = trials.file(stage)
     if not path.is_file():
         return "open"
     fit = trials.run / FILES["fit"]

@@ -16,6 +16,7 @@
   setInterval(() => document.querySelectorAll(".timed .js-plotly-plot").forEach((graph) => {
     if (!graph.on || graph.galileo) return;
     graph.galileo = true;
+    new ResizeObserver(() => dispatchEvent(new Event("resize"))).observe(graph.parentElement);
     graph.on("plotly_click", (event) =>
       window.dispatchEvent(new CustomEvent("galileo-go", { detail: event.points[0].x })));
     graph.on("plotly_afterplot", () => line(graph));

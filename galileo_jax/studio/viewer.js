@@ -7,7 +7,7 @@ export default {
   <div class="viewer" tabindex="0" ref="root" @keydown="key" :aria-label="'video ' + name">
     <div class="screen"><div class="stage" ref="stage" :style="{ '--ratio': width / height }">
       <img ref="img" class="frame" :src="url(shown)" draggable="false" alt="" @load="loaded" @error="loaded">
-      <svg ref="svg" :viewBox="'0 0 ' + width + ' ' + height" @pointerdown="background"
+      <svg ref="svg" :data-follow="follow === null ? '' : follow" :viewBox="'0 0 ' + width + ' ' + height" @pointerdown="background"
            @pointermove="drag" @pointerup="drop" @pointercancel="drop" :class="{ placing: placing }">
         <g v-if="track">
           <g v-for="(places, i) in track.seen_px" :key="'t' + i" :class="'object' + (i % 3)">
@@ -20,6 +20,11 @@ export default {
             </g>
           </g>
         </g>
+        <g v-if="track && !editable">
+          <g v-for="([i, at, x, y], n) in told" :key="'c' + n" :class="'object' + (i % 3)">
+            <rect v-if="at === frame" class="told" :x="x - 6 * k" :y="y - 6 * k" :width="12 * k" :height="12 * k"/>
+          </g>
+        </g>
         <g v-if="model && model.model_px">
           <g v-for="(outline, i) in model.outlines" :key="'m' + i" :class="'object' + (i % 3)">
             <polygon v-if="body(i)" class="body" :points="corners(outline)" :transform="body(i)"/>
@@ -29,6 +34,11 @@ export default {
           <line v-if="at.upper && at.foot" class="ramp" v-bind="ends('upper', 'foot')"/>
           <line v-if="at.upper && at.foot && table" class="ramp table" :x1="at.foot[0]"
             :y1="at.foot[1]" :x2="at.upper[0] < at.foot[0] ? width : 0" :y2="at.foot[1]"/>
+          <polygon v-if="at.corner1" class="stick side" :points="corners([at.corner1, at.corner2, at.corner3, at.corner4])"/>
+          <text v-if="at.corner1" class="label" :font-size="13 * k" text-anchor="middle"
+            :x="(at.corner1[0] + at.corner2[0]) / 2" :y="(at.corner1[1] + at.corner2[1]) / 2 - 8 * k">{{ sides[0] }}</text>
+          <text v-if="at.corner1" class="label" :font-size="13 * k"
+            :x="(at.corner2[0] + at.corner3[0]) / 2 + 8 * k" :y="(at.corner2[1] + at.corner3[1]) / 2">{{ sides[1] }}</text>
           <line v-if="at.stick1 && at.stick2" class="stick" v-bind="ends('stick1', 'stick2')"/>
           <text v-if="at.stick1 && at.stick2" class="label" :font-size="13 * k" text-anchor="middle"
             :x="(at.stick1[0] + at.stick2[0]) / 2" :y="(at.stick1[1] + at.stick2[1]) / 2 - 8 * k">
@@ -43,7 +53,7 @@ export default {
               :transform="'rotate(' + tilt(place) + ')'"/>
             <circle class="target" :r="22 * k"/>
             <circle class="ring" :r="7 * k"/><circle class="dot" :r="1.6 * k"/>
-            <text class="label" :font-size="13 * k" :x="11 * k" :y="-9 * k">
+            <text class="label" :font-size="13 * k" :x="11 * k" :y="(kind(handle) === 'rampend' ? 20 : -9) * k">
               {{ kind(handle) === 'stickend' ? '' : words[handle] || handle }}</text>
           </g>
         </g>
@@ -56,6 +66,9 @@ export default {
         {{ timer ? '❚❚' : '▶' }}</button>
       <button type="button" class="round" @click="step(-1)" aria-label="One frame back">‹</button>
       <div class="slide"><i v-for="(one, n) in stretches" :key="n" :style="where(one)"></i>
+      <b v-if="first > 0" :style="unused(0, first)"></b>
+      <b v-if="last < count - 1" :style="unused(last, count - 1)"></b>
+      <u v-for="(one, n) in told" :key="'u' + n" :style="{ left: share(one[1]) }"></u>
       <input type="range" min="0" :max="Math.max(count - 1, 0)" :value="frame" aria-label="Frame"
         @input="go(+$event.target.value)"></div>
       <button type="button" class="round" @click="step(1)" aria-label="One frame forward">›</button>
@@ -65,12 +78,14 @@ export default {
   props: {
     name: String, count: Number, fps: Number, width: Number, height: Number,
     marks: Object, words: Object, boxes: Object, stick: String, editable: Boolean, table: Boolean,
-    placing: Boolean, track: Object, model: Object, stretches: Array,
+    placing: Boolean, track: Object, model: Object, stretches: Array, sides: Array,
+    told: Array, follow: Number, first: Number, last: Number,
   },
   data: () => ({ frame: 0, shown: 0, k: 1, at: {}, held: null, moved: false, loupe: null,
                  timer: null, cache: new Map() }),
   watch: {
     marks: { handler(now) { if (!this.held) this.at = { ...now }; }, immediate: true, deep: true },
+    follow(now) { if (now !== null && now >= 0 && !this.timer) this.go(now); },
     name() { this.cache.clear(); this.waiting = false; this.go(0); this.fetchAhead(); },
   },
   mounted() {
@@ -144,7 +159,7 @@ export default {
     },
     background(event) {
       this.$refs.root.focus();
-      if (this.placing) this.$emit("place", this.point(event).map((v) => +v.toFixed(2)));
+      if (this.placing) this.$emit("place", [...this.point(event).map((v) => +v.toFixed(2)), this.frame]);
     },
     grab(event, handle) {
       const [x, y] = this.point(event);
@@ -198,9 +213,11 @@ export default {
         pen.fillStyle = "#000"; pen.fillRect(0, 0, 300, 300);
         pen.drawImage(img, this.loupe[0] * scale - side / 2, this.loupe[1] * scale - side / 2,
                       side, side, 0, 0, 300, 300);
-        pen.strokeStyle = "#fff"; pen.lineWidth = 1;
-        pen.beginPath(); pen.moveTo(150, 90); pen.lineTo(150, 210);
-        pen.moveTo(90, 150); pen.lineTo(210, 150); pen.stroke();
+        for (const [colour, width] of [["rgba(0,0,0,0.6)", 4], ["#fff", 1.5]]) {
+          pen.strokeStyle = colour; pen.lineWidth = width;
+          pen.beginPath(); pen.moveTo(150, 100); pen.lineTo(150, 200);
+          pen.moveTo(100, 150); pen.lineTo(200, 150); pen.stroke();
+        }
       });
     },
     trail(places) {
@@ -227,6 +244,7 @@ export default {
     },
     kind(handle) {
       if (handle.startsWith("stick")) return "stickend";
+      if (handle.startsWith("corner")) return "corner";
       return handle === "upper" || handle === "foot" ? "rampend" : "thing";
     },
     body(i) {
@@ -235,6 +253,8 @@ export default {
       return `translate(${place[0]} ${place[1]}) rotate(${this.model.turned[i][this.frame]})`;
     },
     corners(outline) { return outline.map((corner) => corner.join(",")).join(" "); },
+    share(frame) { return `${100 * frame / Math.max(this.count - 1, 1)}%`; },
+    unused(from, to) { return { left: this.share(from), width: this.share(to - from) }; },
     where(one) {
       const end = Math.max(this.count - 1, 1) / this.fps;
       return { left: `${100 * one.start / end}%`, width: `${100 * (one.end - one.start) / end}%` };

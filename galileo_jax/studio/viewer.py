@@ -5,11 +5,12 @@ from typing import Any
 
 from nicegui.element import Element
 
-from galileo_jax.studio.marks import handles
+from galileo_jax.studio.marks import CORNERS, handles
 from galileo_jax.studio.session import Session
 from galileo_jax.studio.sheet import Sheet
 
 WORDS = {"upper": "ramp", "foot": "foot", "stick1": "stick", "stick2": "stick"}
+WORDS |= {name: name[-1] for name in CORNERS}
 
 
 class Viewer(Element, component="viewer.js"):
@@ -22,7 +23,7 @@ class Viewer(Element, component="viewer.js"):
             self._put({"count": 0, "name": "", "width": 16, "height": 9, "fps": 30.0})
             return
         marks, found = sheet.marks, session.results
-        motion = self.motion(session)
+        motion, track = self.motion(session), found.tracks.get(sheet.name)
         is_measured = stage not in ("video", "marks")
         stretches: Sequence[Any] = ()
         is_shown = stage in ("compare", "diagnose") and session.states["compare"] == "done"
@@ -38,11 +39,18 @@ class Viewer(Element, component="viewer.js"):
                 "marks": {key: list(place) for key, place in handles(marks).items()},
                 "words": {**WORDS, **({} if marks.has_table else {"foot": "ramp"})},
                 "boxes": _boxes(sheet),
-                "stick": "? m" if marks.stick_m is None else f"{marks.stick_m:g} m",
+                "stick": _length(marks.stick_m),
+                "sides": [_length(side) for side in marks.rectangle_m],
                 "editable": stage == "marks",
                 "table": marks.has_table,
                 "placing": placing,
-                "track": found.tracks.get(sheet.name) or motion if is_measured else None,
+                "first": marks.first_frame,
+                "last": sheet.info.frame_count - 1
+                if marks.last_frame is None
+                else marks.last_frame,
+                "told": [[i, *c] for i, one in enumerate(marks.objects) for c in one.corrections],
+                "follow": len(track["times"]) - 1 if track and track.get("is_running") else None,
+                "track": track or motion if is_measured else None,
                 "model": motion if is_measured and stage != "track" else None,
                 "stretches": list(stretches),
             }
@@ -67,10 +75,14 @@ class Viewer(Element, component="viewer.js"):
             self.update()
 
 
+def _length(metres: float | None) -> str:
+    return f"{metres:g} m" if metres else "? m"
+
+
 def _boxes(sheet: Sheet) -> dict[str, list[float]]:
     """How large the marked objects are in the picture, px, where size and scale are known."""
     marks = sheet.marks
-    if marks.stick is None or not marks.stick_m:
+    if marks.rectangle is not None or marks.stick is None or not marks.stick_m:
         return {}
     (x1, y1), (x2, y2) = marks.stick
     scale = ((x2 - x1) ** 2 + (y2 - y1) ** 2) ** 0.5 / marks.stick_m

@@ -1,6 +1,7 @@
 """Results as plain data for the page: lists of numbers, words, and nothing else."""
 
 import math
+import re
 from collections.abc import Mapping, Sized
 from typing import Any
 
@@ -12,6 +13,19 @@ MOST_POINTS = 400  # of a curve on the page
 CANDIDATE_POINTS = 90
 SIGMAS, SHARE = 8.0, 0.6  # how far a slider reaches to either side
 STEPS = 100  # at least, on either side
+WHERE = {  # phases of the motion
+    "whole": "over the whole motion",
+    "held": "while it is held",
+    "ramp": "on the ramp",
+    "foot": "at the foot",
+    "table": "on the table",
+    "collision": "at the hit",
+    "after": "after the hit",
+    "fall": "as it falls",
+    "flight": "as it flies",
+    "swing": "as it swings",
+    "liquid": "in the liquid",
+}
 
 
 def motion_view(motion: gx.Motion) -> dict[str, Any]:
@@ -72,8 +86,18 @@ def track_view(track: gx.Track) -> dict[str, Any]:
         "times": numbers(pixels.times_s, 5),
         "seen_px": numbers(seen, 2),
         "sd_px": numbers(np.sqrt(variance), 3),
-        "warnings": list(track.warnings),
+        "warnings": [in_words(line) for line in track.warnings],
     }
+
+
+def in_words(line: str) -> str:
+    """A remark without the names of files and keys, which the page does not show."""
+    text = line.split(": ", 1)[-1]
+    size = re.fullmatch(r"(.+): size_m: null; \[(.+)\] is taken, (.+)", text)
+    if size:
+        name, sides, source = size.groups()
+        return f"{name}: no size given; {sides.replace(', ', ' x ')} m is taken, {source}."
+    return text
 
 
 def comparison_view(check: gx.Comparison) -> dict[str, Any]:
@@ -84,7 +108,7 @@ def comparison_view(check: gx.Comparison) -> dict[str, Any]:
     for one in check.paths:
         if one.failing_s is None or one.worst is None:
             continue
-        where = "the whole motion" if one.worst.phase == "whole" else f"phase {one.worst.phase}"
+        where = WHERE.get(one.worst.phase, one.worst.phase)
         stretches.append(
             {
                 "clip": one.clip,
@@ -93,8 +117,8 @@ def comparison_view(check: gx.Comparison) -> dict[str, Any]:
                 "end": one.failing_s[1],
                 "sentence": (
                     f"{one.title} misses the model most from {one.failing_s[0]:.2f} to "
-                    f"{one.failing_s[1]:.2f} s, along {one.worst.axis} ({where}; "
-                    f"z = {one.worst.z:.0f})."
+                    f"{one.failing_s[1]:.2f} s, in {one.worst.axis} {where}, by "
+                    f"{one.worst.z:.0f} standard deviations."
                 ),
             }
         )
@@ -107,14 +131,27 @@ def comparison_view(check: gx.Comparison) -> dict[str, Any]:
 
 
 def diagnosis_view(found: gx.Diagnosis, curves: int = 8) -> dict[str, Any]:
-    """What diagnosis.json does not hold: a sentence, and the curves of the best candidates."""
+    """What diagnosis.json does not hold: the curves of the best candidates."""
     drawn = {}
     for name in found.candidates["effect"][:curves]:
-        drawn[name] = [_thin(motion) for motion in found.motions(name)]
-    return {"sentence": found.sentence, "curves": drawn}
+        drawn[name] = [thin(motion) for motion in found.motions(name)]
+    return {"curves": drawn}
 
 
-def _thin(motion: gx.Motion) -> dict[str, Any]:
+def prediction_view(ahead: gx.Prediction) -> dict[str, Any]:
+    """Where a clip's objects go."""
+    step = thinned(ahead.motions.times_s)
+    keys = ("time_s", "x_m", "x_q025_m", "x_q975_m", "y_m")
+    objects = {
+        str(name): {key: numbers(part[key].to_numpy()[step], 4) for key in keys}
+        for name, part in ahead.to_dataframe().groupby("object", sort=False)
+    }
+    end = ahead.document["clip_end_s"]
+    return {"sentences": list(ahead.sentences), "objects": objects, "clip_end": end}
+
+
+def thin(motion: gx.Motion) -> dict[str, Any]:
+    """A candidate's curve and the residuals that it leaves."""
     step = max(1, -(-len(motion.times_s) // CANDIDATE_POINTS))
     return {
         "clip": motion.clip,

@@ -25,12 +25,24 @@ def propose(*, video: str, partial: Partial) -> dict[str, Any]:
     return {"proposal": asdict(gx.propose(video))}
 
 
+def shown(content: Mapping[str, Any]) -> dict[str, Any]:
+    """A partial result of the API as the page shows it."""
+    given = dict(content)
+    motions = given.pop("motions", None)
+    if motions is not None:
+        given["curves"] = [views.thin(one) for one in motions()]
+    return given
+
+
 def track(*, clips: Sequence[str], partial: Partial) -> dict[str, Any]:
     """Tracks clips; NAME_track/track_px.csv, and track_m.csv where the scale is known."""
     shown = []
     for i, clip in enumerate(clips):
         with progress.part(i / len(clips), (i + 1) / len(clips)):
-            found = gx.track(clip)
+            loaded = gx.load(clip)
+            names = [item.name for item in loaded.objects]
+            partial({"tracking": {"clip": loaded.path.stem, "objects": names, "fps": loaded.fps}})
+            found = gx.track(loaded)
         folder = Path(f"{Path(clip).stem}_track")
         folder.mkdir(exist_ok=True)
         assert found.pixels is not None  # of a video
@@ -88,29 +100,16 @@ def diagnose(
 
 
 def predict(*, run: str, seconds: float, partial: Partial) -> dict[str, Any]:
-    """Continues a run beyond its clip; a joint fit's first clip."""
+    """Continues a run beyond its clips, each of them."""
     fit = _fit_of(run)
-    folder = Path(run) if len(fit.names) == 1 else Path(run) / fit.names[0]
-    ahead = gx.predict(fit if len(fit.names) == 1 else folder, seconds=seconds)
-    ahead.save(folder)
-    table = ahead.to_dataframe()
-    rows = {name: part for name, part in table.groupby("object", sort=False)}
-    step = views.thinned(ahead.motions.times_s)
-    shown = {
-        name: {
-            key: views.numbers(part[key].to_numpy()[step], 4)
-            for key in ("time_s", "x_m", "x_q025_m", "x_q975_m", "y_m")
-        }
-        for name, part in rows.items()
-    }
-    return {
-        "prediction": {
-            "sentences": list(ahead.sentences),
-            "objects": shown,
-            "clip_end": ahead.document["clip_end_s"],
-            "picture": str(folder / "first_and_last.png"),
-        }
-    }
+    clips = {}
+    for i, name in enumerate(fit.names):
+        with progress.part(i / len(fit.names), (i + 1) / len(fit.names)):
+            folder = Path(run) if len(fit.names) == 1 else Path(run) / name
+            ahead = gx.predict(fit if len(fit.names) == 1 else folder, seconds=seconds)
+            ahead.save(folder)
+            clips[name] = views.prediction_view(ahead)
+    return {"prediction": {"clips": clips}}
 
 
 def export(*, run: str, to: str, partial: Partial) -> dict[str, Any]:

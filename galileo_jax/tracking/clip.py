@@ -11,10 +11,11 @@ from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
 from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.pieces import Start
 from galileo_jax.tracking.square_view import square_view
 from galileo_jax.tracking.template import Outline, grey
 from galileo_jax.tracking.track import Track
-from galileo_jax.tracking.tracker import Start, track_video
+from galileo_jax.tracking.tracker import Seen, track_video
 from galileo_jax.video import decode
 
 UNKNOWN_SPAN_PX = 40.0
@@ -33,25 +34,42 @@ def track_clip(clip: Clip) -> Track:
     passes = 2 if all(item.point_px is not None for item in clip.objects) else 3
     total, done = passes * max(clip.frame_count, 1), itertools.count(1)
 
-    def advance() -> None:
-        report("tracking", next(done) / total)
+    names = [item.name for item in clip.objects]
 
     view = None if clip.is_camera_plain else square_view(clip)
-    seen = clip if view is None else view.clip(clip)
+    square = clip if view is None else view.clip(clip)
+
+    def advance(seen: Seen | None = None) -> None:
+        partial = None
+        if seen is not None:
+            places = dict(zip(names, seen.places_px, strict=True))
+            if view is not None:
+                places = {name: view.shown(place) for name, place in places.items()}
+            partial = {"frame": {"index": seen.frame, "places_px": places}}
+        report("tracking", next(done) / total, partial)
 
     def open_frames() -> Iterator[np.ndarray]:
         frames = decode.frames(video)
         return frames if view is None else view.drawn(frames)
 
     if passes == 3:
-        seen = _with_points(seen, open_frames, advance)
-    starts = [
-        Start(item.name, item.point_px, outline_of(seen, item), item.first_frame or 0)
-        for item in seen.objects
-        if item.point_px is not None
-    ]
+        square = _with_points(square, open_frames, advance)
+    starts = [_start(square, item) for item in square.objects if item.point_px is not None]
     found = track_video(open_frames, starts, clip.fps, advance=advance)
     return found if view is None else view.track(found, clip)
+
+
+def _start(clip: Clip, item: ClipObject) -> Start:
+    """Where an object is first seen, and where somebody has put it right."""
+    assert item.point_px is not None
+    later = []
+    for frame, *point in sorted(item.corrections):
+        there = item.model_copy(update={"point_px": tuple(point)})
+        later.append(Start(item.name, (point[0], point[1]), outline_of(clip, there), frame))
+    return Start(
+        item.name, item.point_px, outline_of(clip, item), item.first_frame or 0, item.last_frame,
+        tuple(later),
+    )  # fmt: skip
 
 
 def _with_points(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from galileo_jax.clip.declaration import CLICK_SD_PX
 from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
     MEMORY_FRAMES,
@@ -13,8 +14,9 @@ from galileo_jax.tracking.noise import (
     is_in_motion,
     motion_variance,
 )
+from galileo_jax.tracking.pieces import Piece
 from galileo_jax.tracking.pose import rotation
-from galileo_jax.tracking.refiner import Refined, velocities_at
+from galileo_jax.tracking.refiner import Refined
 
 MIN_CORRELATION = 0.7
 MAX_COVERED, MAX_OUTSIDE = 0.25, 0.1
@@ -37,49 +39,58 @@ class Finished:
 
 
 def finished(
-    fits: Sequence[list[Refined | None]],
-    points_px: Sequence[tuple[float, float]],
-    first_frames: Sequence[int],
-    exposure_share: float,
+    fits: Sequence[list[Refined | None]], pieces: Sequence[Piece], exposure_share: float
 ) -> list[Finished]:
-    """The objects' tracks from their fits of every frame (None: not found).
+    """The pieces' tracks from their fits of every frame (None: not found).
 
     Args:
-      fits: per object, per frame.
-      points_px: the points to follow, each in its object's first frame.
-      first_frames: per object.
+      fits: per piece, per frame.
+      pieces: with the points to follow, each in its piece's first frame.
       exposure_share: open share of a frame's time.
     """
-    seen = [_seen(found) for found in fits]
-    seen = [_at_mid_exposure(poses, noise, exposure_share) for poses, noise in seen]
+    seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
+    seen = [
+        _at_mid_exposure(poses, noise, exposure_share, piece)
+        for (poses, noise), piece in zip(seen, pieces, strict=True)
+    ]
     excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
     return [
-        _anchored(poses, noise, found[first], np.array(point), first, excess)
-        for (poses, noise), found, point, first in zip(
-            seen, fits, points_px, first_frames, strict=True
-        )
+        _anchored(poses, noise, found, piece, excess)
+        for (poses, noise), found, piece in zip(seen, fits, pieces, strict=True)
     ]
 
 
-def _seen(fits: list[Refined | None]) -> tuple[np.ndarray, np.ndarray]:
+def joined(pieces: Sequence[Finished], count: int) -> Finished:
+    """One object's pieces, which follow each other, as one track of so many frames."""
+    whole = Finished(
+        np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan), np.full(count, np.nan)
+    )
+    for piece in pieces:
+        is_seen = np.isfinite(piece.angle_rad)
+        for into, part in zip(vars(whole).values(), vars(piece).values(), strict=True):
+            into[is_seen] = part[is_seen]
+    return whole
+
+
+def _seen(fits: list[Refined | None], corrected: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Poses `[frame, 3]` and their image noise `[frame, 2, 2]`; NaN: not visible."""
     poses = np.full((len(fits), 3), np.nan)
     noise = np.full((len(fits), 2, 2), np.nan)
     for index, fit in enumerate(fits):
         if fit is not None and _is_visible(fit):
             poses[index], noise[index] = fit.pose, fit.covariance
-    is_doubtful = ~_without_glimpses(poses)
+    is_doubtful = ~_without_glimpses(poses, corrected)
     poses[is_doubtful], noise[is_doubtful] = np.nan, np.nan
     return poses, noise
 
 
 def _at_mid_exposure(
-    poses: np.ndarray, noise: np.ndarray, exposure_share: float
+    poses: np.ndarray, noise: np.ndarray, exposure_share: float, piece: Piece
 ) -> tuple[np.ndarray, np.ndarray]:
     """The poses without what blows within an exposure shift them, and the noise with the rest."""
     jumps = np.zeros((len(poses), 2))
     for index in np.flatnonzero(np.isfinite(poses[:, 0])):
-        jumps[index] = velocities_at(poses, int(index)).jump[:2]
+        jumps[index] = piece.velocities(poses, int(index)).jump[:2]
     shift = blow_shift(jumps, exposure_share)
     unknown = BLOW_KNOWN_TO**2 * (shift**2).sum(axis=1)
     corrected = poses - np.pad(shift, ((0, 0), (0, 1)))
@@ -89,9 +100,8 @@ def _at_mid_exposure(
 def _anchored(
     poses: np.ndarray,
     noise: np.ndarray,
-    first_fit: Refined | None,
-    point_px: np.ndarray,
-    first_frame: int,
+    fits: list[Refined | None],
+    piece: Piece,
     excess: np.ndarray,
 ) -> Finished:
     """The followed point's places: rigid with the poses, `point_px` where the object began.
@@ -104,6 +114,8 @@ def _anchored(
     moves = is_in_motion(poses[frames, :2], noise[frames])
     covariance[frames] += np.einsum("fi,ij->fij", moves * excess, np.eye(2))
 
+    first_frame, point_px = piece.first_frame, np.array(piece.point_px)
+    first_fit = fits[first_frame] if first_frame < len(fits) else None
     anchor = np.array([*point_px, 0.0])
     if first_fit is not None:
         anchor, anchor_noise = first_fit.pose, first_fit.covariance
@@ -115,18 +127,20 @@ def _anchored(
             anchor_noise = noise[began].mean(axis=0) / max(1.0, len(began) / MEMORY_FRAMES)
         covariance += anchor_noise
     covariance += SAMPLING_SD_PX**2 * np.eye(2)
+    if piece.is_clicked:
+        covariance += CLICK_SD_PX**2 * np.eye(2)
 
     angle = poses[:, 2] - anchor[2]
     arm = point_px - anchor[:2]
     position = poses[:, :2] + np.stack([rotation(a) @ arm for a in angle])
-    return Finished(position, covariance, angle)
+    return Finished(position, covariance, angle + piece.turned_rad)
 
 
-def _without_glimpses(poses: np.ndarray) -> np.ndarray:
+def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray:
     """`[frame]`: where `poses` `[frame, 3]` are to be believed.
 
     What comes back for a few frames after a longer absence is more likely something like it,
-    unless it is where it was.
+    unless it is where it was, or somebody has seen it there.
     """
     is_seen = np.isfinite(poses[:, 0])
     result = np.zeros_like(is_seen)
@@ -136,7 +150,8 @@ def _without_glimpses(poses: np.ndarray) -> np.ndarray:
         is_same = last_end is not None and (
             np.hypot(*(poses[begin] - poses[last_end - 1])[:2]) < SAME_PLACE_PX
         )
-        if last_end is None or is_same or end - begin >= min(begin - last_end, LONG_RUN):
+        is_known = is_same or any(begin <= frame < end for frame in corrected)
+        if last_end is None or is_known or end - begin >= min(begin - last_end, LONG_RUN):
             result[begin:end] = True
             last_end = end
     return result

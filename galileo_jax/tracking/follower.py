@@ -10,7 +10,7 @@ from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.refine import FINE_PX, Fit, align
 from galileo_jax.tracking.rigid import rigid_motion
-from galileo_jax.tracking.search import SURE, best_fit, candidate_poses, is_alike
+from galileo_jax.tracking.search import SURE, TURNS_RAD, best_fit, candidate_poses, is_alike
 from galileo_jax.tracking.template import Template, median_template
 
 FOUND, FOUND_AGAIN = 0.75, 0.85
@@ -40,6 +40,8 @@ AS_BEFORE = 0.3
 """Share of its path since by which what goes on after a repeated frame is off a steady motion."""
 SHARP_PX = 1.0
 """An object that moves less than this during the exposure gives a patch for the template."""
+CLICKED_PX, CLICKED_SHARE = 4.0, 0.5
+"""How far from its centre, or at which share of its template's radius, one may click on it."""
 MAX_PATCHES = 32
 RENEWALS = frozenset(8 * 2**i for i in range(32))
 """Numbers of sharp frames after which the template becomes the median of the patches so far:
@@ -72,6 +74,7 @@ class Follower:
     frames_held: int = 0
     stride: int = 1
     frames_sharp: int = 0
+    frames_before: int = 0  # that somebody has put it right in
 
     def __post_init__(self) -> None:
         self.first_pose = self.pose
@@ -105,6 +108,31 @@ class Follower:
         self.poses.append(fit.pose)
         self.exposure.add(picture, self.template, self.pose, self.velocity)
         self._keep(picture)
+
+    def put_right(self, picture: Picture, point_px: tuple[float, float]) -> bool:
+        """Looks for the object around a point where somebody has seen it; False: it looks other.
+
+        Where it is found it is followed on from there, as if it were new: how fast it goes is
+        seen in the next frames.
+        """
+        turns = TURNS_RAD if self.template.shows_turns else (0.0,)
+        upright = {float(self.pose[2]), float(self.first_pose[2])}
+        still = np.zeros(3)
+        guesses = [
+            (np.array([*point_px, angle + turn]), still) for angle in upright for turn in turns
+        ]
+        fit = best_fit(picture, self.template, guesses)
+        is_there = np.hypot(*(fit.pose[:2] - point_px)) < max(
+            CLICKED_SHARE * self.template.radius, CLICKED_PX
+        )
+        if not (is_there and is_alike(fit) and fit.correlation >= FOUND):
+            return False
+        self.poses.append(fit.pose)
+        self.pose, self.correlation = fit.pose, fit.correlation
+        self.velocity = self.mean_velocity = np.zeros(3)
+        self.frames_missed = self.frames_held = 0
+        self.frames_before = len(self.poses)
+        return True
 
     @property
     def _frames_since(self) -> int:
@@ -192,7 +220,7 @@ class Follower:
 
     def _leap_px(self) -> float:
         """How far from the expected place the object can be; any distance while it is new."""
-        if len(self.poses) - self.frames_missed < SETTLED_FRAMES:
+        if len(self.poses) - self.frames_before - self.frames_missed < SETTLED_FRAMES:
             return np.inf
         speed = float(np.hypot(*self.velocity[:2]))
         return max(1.5 * speed, self.template.radius) * min(self._frames_since, MAX_LEAP_FRAMES)

@@ -42,6 +42,13 @@ class SquareView:
         """The way back; NaN where the picture does not show the plane."""
         return self.plane.to_pixels(self.view.to_metres(points_px))
 
+    def shown(self, place_px: tuple[float, float] | None) -> tuple[float, float] | None:
+        """Where the picture shows a place of the view; None for None."""
+        if place_px is None:
+            return None
+        x, y = self.to_picture(np.array(place_px))
+        return float(x), float(y)
+
     def drawn(self, frames: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
         """Frames of the picture as the view shows them."""
         width, height = self.size_px
@@ -59,8 +66,18 @@ class SquareView:
             x, y = self.from_picture(np.array(point))
             return float(x), float(y)
 
+        def corrected(frame: int, x: float, y: float) -> tuple[int, float, float]:
+            there = self.from_picture(np.array([x, y]))
+            return frame, float(there[0]), float(there[1])
+
         objects = tuple(
-            item.model_copy(update={"point_px": moved(item.point_px)}) for item in clip.objects
+            item.model_copy(
+                update={
+                    "point_px": moved(item.point_px),
+                    "corrections": tuple(corrected(*each) for each in item.corrections),
+                }
+            )
+            for item in clip.objects
         )
         square = {"rectangle": None, "lens": None, "frame_size_px": self.size_px}
         return clip.model_copy(

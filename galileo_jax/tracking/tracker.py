@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.tracking.exposure import Exposure
-from galileo_jax.tracking.finish import finished
+from galileo_jax.tracking.finish import finished, joined
 from galileo_jax.tracking.follower import Follower
 from galileo_jax.tracking.picture import Picture
-from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
-from galileo_jax.tracking.template import Outline, grey, median_template, template_at
+from galileo_jax.tracking.pieces import Piece, Start, follow_on
+from galileo_jax.tracking.refiner import Refined, refine_pose
+from galileo_jax.tracking.template import grey, median_template
 from galileo_jax.tracking.track import Track
 
 MAX_KEPT_BYTES = 256 << 20
@@ -19,20 +20,16 @@ MAX_KEPT_BYTES = 256 << 20
 
 
 @dataclass(frozen=True)
-class Start:
-    """Where an object is first seen.
+class Seen:
+    """What the first pass has found in a frame.
 
     Attributes:
-      name: the object's.
-      point_px: `(x, y)` of the point to follow, in frame `first_frame`.
-      outline: what the object fills around the point.
-      first_frame: frames before are not looked at.
+      frame: its number.
+      places_px: by object `(x, y)`; None: not found.
     """
 
-    name: str
-    point_px: tuple[float, float]
-    outline: Outline
-    first_frame: int = 0
+    frame: int
+    places_px: tuple[tuple[float, float] | None, ...]
 
 
 def track_video(
@@ -40,7 +37,7 @@ def track_video(
     starts: Sequence[Start],
     fps: float,
     *,
-    advance: Callable[[], None] = lambda: None,
+    advance: Callable[[Seen | None], None] = lambda _: None,
 ) -> Track:
     """Follows the point of each start through a video.
 
@@ -49,52 +46,53 @@ def track_video(
     median of its sharp patches. Second pass: every pose again, by alignment with that template,
     smeared by the motion; the first frame's pose fixes where on the object the point lies.
 
+    Where somebody has put an object right it is looked for around that point. If it looks as it
+    did, it is followed on as the same; if not, from a new first frame, whose point is then known
+    as well as a click is.
+
     Args:
       open_frames: gives the frames from the beginning, `[height, width, 3]` uint8, BGR (or
         grey); called again if the video is long.
       starts: at least one.
       fps: frames per second.
-      advance: called after every frame of both passes (a progress bar).
+      advance: called after every frame of both passes (a progress bar), of the first one with
+        what it has found.
     """
     exposure, kept = Exposure(), _Kept(len(starts))
-    followers: list[Follower | None] = [None] * len(starts)
+    pieces: list[list[Piece]] = [[] for _ in starts]
     before: Picture | None = None
     count, size_px = 0, (0, 0)
     for index, frame in enumerate(open_frames()):
         picture = Picture(grey(frame))
         for k, start in enumerate(starts):
-            if index == start.first_frame:
-                point = np.array(start.point_px, dtype=float)
-                template = template_at(picture.grey, point, start.outline)
-                followers[k] = Follower(template, np.array([*point, 0.0]), exposure, picture)
-            follower = followers[k]
-            if follower is not None:
-                follower.step(before if index > start.first_frame else None, picture)
-                kept.add(k, index, picture, follower)
+            if start.uses(index):
+                follow_on(pieces[k], start, index, before, picture, exposure)
+                kept.add(k, index, picture, pieces[k][-1].follower)
         before = picture
         count, size_px = index + 1, picture.size_px
-        advance()
+        advance(Seen(index, tuple(_place(own, index) for own in pieces)))
 
-    coarse = [_coarse_poses(follower, count) for follower in followers]
+    flat = [(k, piece) for k, own in enumerate(pieces) for piece in own]
+    coarse = [piece.poses(count) for _, piece in flat]
     templates = [
-        median_template(f.patches, f.template.region) if f is not None else None for f in followers
+        median_template(piece.follower.patches, piece.follower.template.region) for _, piece in flat
     ]
-    fits: list[list[Refined | None]] = [[] for _ in starts]
+    fits: list[list[Refined | None]] = [[] for _ in flat]
     for index, pictures in enumerate(kept.pictures(open_frames, count)):
-        for poses, template, found, picture in zip(coarse, templates, fits, pictures, strict=True):
-            if template is None or picture is None or not np.isfinite(poses[index, 0]):
+        for (k, piece), poses, template, found in zip(flat, coarse, templates, fits, strict=True):
+            picture = pictures[k]
+            if picture is None or not np.isfinite(poses[index, 0]):
                 found.append(None)
                 continue
-            velocities = velocities_at(poses, index)
+            velocities = piece.velocities(poses, index)
             found.append(refine_pose(picture, template, poses[index], velocities, exposure.share))
-        advance()
+        advance(None)
 
-    objects = finished(
-        fits,
-        [start.point_px for start in starts],
-        [start.first_frame for start in starts],
-        exposure.share,
-    )
+    done = finished(fits, [piece for _, piece in flat], exposure.share)
+    objects = [
+        joined([one for (of, _), one in zip(flat, done, strict=True) if of == k], count)
+        for k in range(len(starts))
+    ]
     return Track(
         names=tuple(start.name for start in starts),
         times_s=np.arange(count) / fps,
@@ -136,9 +134,8 @@ class _Kept:
             yield [Picture(grey(frame))] * self._num_objects
 
 
-def _coarse_poses(follower: Follower | None, count: int) -> np.ndarray:
-    """The first pass's poses `[frame, 3]`, NaN before the first frame and where not found."""
-    poses = np.full((count, 3), np.nan)
-    if follower is not None:
-        poses[count - len(follower.poses) :] = follower.poses
-    return poses
+def _place(pieces: list[Piece], index: int) -> tuple[float, float] | None:
+    """Where an object was found in a frame; None: nowhere."""
+    if not pieces or not np.isfinite(pose := pieces[-1].poses(index + 1)[-1])[0]:
+        return None
+    return float(pose[0]), float(pose[1])

@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from galileo_jax.api.label import label
+from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.yaml_update import updated_text
 from galileo_jax.commands import command
 from galileo_jax.commands import label as label_command
@@ -27,12 +28,17 @@ NEW_GIVEN = {
     "size": {"object1": (0.06, 0.05, 0.06)},
     "first_frame": {"object2": 3},
 }
-UPDATE = "--gravity 10 --direction right --first-frame object1 null --shape object2 box"
+UPDATE = (
+    "--gravity 10 --direction right --first-frame object1 null --shape object2 box "
+    "--last-frame object2 20 --correct object1 12 80 112.5 --correct object1 9 77 111"
+)
 UPDATE_GIVEN = {
     "gravity": 10,
     "direction": "right",
     "first_frame": {"object1": None},
     "shape": {"object2": "box"},
+    "last_frame": {"object2": 20},
+    "correct": {"object1": [(12, 80, 112.5), (9, 77, 111)]},
 }
 
 
@@ -68,7 +74,24 @@ def test_an_update_is_the_commands(tmp_path: Path) -> None:
         texts.append(path.read_text())
     assert texts[0] == texts[1]
     assert "gravity: 10.0\n" in texts[0]
+    clip = load_clip(path)
+    assert clip.objects[1].last_frame == 20
+    assert clip.objects[0].corrections == ((9, 77, 111), (12, 80, 112.5))
     assert "# guessed" in texts[0]
+
+
+def test_a_correction_is_replaced_and_taken_back(tmp_path: Path) -> None:
+    path = build_good(tmp_path)
+    label(path, correct={"object1": [(9, 77, 111), (12, 80, 112)]})
+    found = label(path, correct={"object1": [(12, 81, 113), (9,)]}).clip
+    assert found.objects[0].corrections == ((12, 81, 113),)
+    for wrong, words in (
+        ({"object1": [(3, 1)]}, "no frame, x and y"),
+        ({"object1": [(2.5, 1, 1)]}, "no frame, x and y"),
+        ({"object7": [(2, 1, 1)]}, "no 'object7' there"),
+    ):
+        with pytest.raises(InputError, match=words):
+            label(path, correct=wrong)
 
 
 def test_options_have_keywords_of_the_same_name() -> None:

@@ -373,6 +373,48 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     ),
     "object_in_the_air": _edit("[205.0, 141.0]", "[205.0, 60.0]", "object2", "above the table"),
     "wrong_direction": _edit("direction: right", "direction: left", "objects[0]", "direction"),
+    "last_frame_beyond_the_end": _edit(
+        "    point_px",
+        "    last_frame: 24\n    point_px",
+        "objects[0].last_frame",
+        "24 is not after first_frame (0) and within the clip (to 23)",
+    ),
+    "last_frame_before_the_first": _edit(
+        "    point_px",
+        "    first_frame: 5\n    last_frame: 5\n    point_px",
+        "objects[0].last_frame",
+        "5 is not after first_frame (5)",
+    ),
+    "correction_is_a_point": _edit(
+        "    point_px",
+        "    corrections: [12, 70.0, 110.0]\n    point_px",
+        "objects[0].corrections",
+        "no list of [frame, x, y]",
+    ),
+    "correction_of_a_frame_that_is_not_used": _edit(
+        "    point_px",
+        "    last_frame: 9\n    corrections: [[10, 70.0, 110.0]]\n    point_px",
+        "objects[0].corrections[0]",
+        "frame 10 is not after the first that is used (0) and up to the last (9)",
+    ),
+    "correction_outside_the_frame": _edit(
+        "    point_px",
+        "    corrections: [[10, 70.0, 1100.0]]\n    point_px",
+        "objects[0].corrections[0]",
+        "outside the frame",
+    ),
+    "correction_given_twice": _edit(
+        "    point_px",
+        "    corrections: [[10, 70.0, 110.0], [10, 71.0, 110.0]]\n    point_px",
+        "objects[0].corrections",
+        "a frame twice",
+    ),
+    "correction_with_text": _edit(
+        "    point_px",
+        "    corrections: [[10, 70.0, left]]\n    point_px",
+        "objects[0].corrections[0][2]",
+        "'left' is not a number",
+    ),
     "first_frame_beyond_the_end": _edit(
         "    point_px",
         "    first_frame: 24\n    point_px",

@@ -54,6 +54,7 @@ def check_contract(document):
     scores = [candidate["score"] for candidate in document["candidates"]]
     assert scores == sorted(scores, reverse=True), "best first"
     shares = [candidate["probability"] for candidate in document["candidates"]]
+    assert document["sentence"].endswith(".")
     assert sum(shares) + document["probability_none"] == pytest.approx(1.0)
     assert all({"rule", "sentence"} <= set(why) for why in document["reasons"])
     status, effects = document["verdict"]["status"], document["verdict"]["effects"]

@@ -24,9 +24,16 @@ def precision():
 class Banana:
     """Rosenbrock's valley in z1 and z2, and a third parameter of no effect; no rollouts."""
 
-    def slopes(self, points: Batch, steps: np.ndarray, is_central: bool) -> Slopes:
+    def motions(self, points: Batch):
+        return [(points.z, points.z, points.z)]
+
+    def whites_of(self, points: Batch, motions):
+        z = motions[0][0]
+        return [np.stack([10 * (z[:, 1] - z[:, 0] ** 2), 3 - z[:, 0]], axis=1)]
+
+    def slopes(self, points: Batch, steps: np.ndarray, is_central: bool, motions=None) -> Slopes:
         z = points.z
-        white = np.stack([10 * (z[:, 1] - z[:, 0] ** 2), 3 - z[:, 0]], axis=1)
+        [white] = self.whites_of(points, motions or self.motions(points))
         jacobian = np.zeros((len(z), 2, 3))
         jacobian[:, 0, 0], jacobian[:, 0, 1], jacobian[:, 1, 0] = -20 * z[:, 0], 10, -1
         index = np.tile(np.arange(3), (len(white), 1))
@@ -64,6 +71,20 @@ def test_every_start_of_a_batch_arrives_at_the_end_of_a_curved_valley():
 def test_costs_never_rise_with_more_steps():
     costs = [descend(batch([-1.2, 1.0, 0.0]), max_steps=n).best.cost[0] for n in range(1, 20)]
     assert all(np.diff(costs) <= 0) and costs[-1] < costs[0]
+
+
+def test_slopes_are_taken_only_where_a_step_has_got_somewhere(monkeypatch):
+    costs, residuals = [], Banana()
+    slopes = residuals.slopes
+
+    def watched(points, *rest):
+        costs.append(cost(residuals.whites_of(points, residuals.motions(points)), points.z)[0])
+        return slopes(points, *rest)
+
+    monkeypatch.setattr(residuals, "slopes", watched)
+    descent = Descent(residuals, np.ones(3), is_smooth=True)  # pyright: ignore
+    found = descent(batch([-1.2, 1.0, 0.0]), 1e-9, 200)
+    assert all(np.diff(costs) < 0) and len(costs) < found.num_steps
 
 
 def test_steps_that_run_out_are_told():

@@ -49,3 +49,27 @@ def test_a_short_track_is_left_as_it_is():
         whole.mask[:, :8],
     )
     assert with_noise_at_rest(short) is short
+
+
+def test_the_shift_of_what_came_to_rest_is_one_error():
+    """Of a coder: as large as the errors in motion, however many frames of the rest there are."""
+    seen = filmed(0.4)
+    back = Observation(
+        seen.names,
+        seen.times_s,
+        seen.position_m[..., ::-1],
+        seen.covariance_m2[..., ::-1],
+        seen.mask,
+    )
+    found = with_noise_at_rest(back)
+    assert found.modes_m is not None and found.modes_m.shape == (2, 1, 2, FRAMES)
+    assert not found.modes_m[..., :55].any(), "nothing is shared by what moves"
+    for axis, mode in enumerate(found.modes_m):
+        assert not mode[0, 1 - axis].any()
+        at_rest = mode[0, axis, 75:]
+        assert (at_rest == at_rest[0]).all()
+        moving, resting = (
+            found.covariance_m2[0, axis, axis, part] for part in (slice(55), slice(75, None))
+        )
+        assert at_rest[0] ** 2 + np.median(resting) == pytest.approx(np.median(moving), rel=0.1)
+    assert with_noise_at_rest(seen).modes_m is None, "the first picture is coded by itself"

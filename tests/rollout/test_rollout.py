@@ -24,9 +24,9 @@ class CountingEngine:
     def __init__(self, model):
         self.model, self.engine, self.calls = model, EngineC(model), []
 
-    def simulate(self, theta):
+    def simulate(self, theta, until_s=None):
         self.calls.append(len(theta))
-        return self.engine.simulate(theta)
+        return self.engine.simulate(theta, until_s)
 
 
 @pytest.fixture(scope="module")

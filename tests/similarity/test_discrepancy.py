@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import HIT_END_S, LENS_SD, WOBBLE_SD_M, modes
+from galileo_jax.similarity.discrepancy import (
+    CLOSE_M,
+    HIT_END_S,
+    LENS_SD,
+    PUSH_SD_M_S2,
+    WOBBLE_SD_M,
+    _pushes,
+    _speeds_at,
+    modes,
+)
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
@@ -144,3 +153,42 @@ def test_a_hit_that_ends_late_parts_bodies_slower(monkeypatch):
 def test_bodies_that_friction_presses_together_do_not_part(monkeypatch):
     _, found = soft_ends(replace(HIT, friction=(0.1, 0.2)), monkeypatch)
     assert found == []
+
+
+def pushes(experiment):
+    """The modes of a push between bodies that are close, and when they come apart."""
+    seen = observe(experiment, 0, noise_m=0.0)
+    after = int(np.argmax(seen.times_s > solve(experiment, seen.times_s).hit_s)) + 1
+    hit = _speeds_at(after - 2, 1, seen.position_m, seen)
+    assert hit is not None
+    return seen.times_s, hit, np.array(_pushes(hit, seen.position_m, seen))
+
+
+@pytest.mark.parametrize("friction", [(0.2, 0.1), (0.1, 0.2)])
+def test_a_push_between_close_bodies_conserves_momentum(friction):
+    experiment = replace(HIT, friction=friction)
+    times, hit, found = pushes(experiment)
+    before = times < times[hit.frame]
+    assert found.any() and not found[..., before].any() and not found[:, :, 1].any()
+    m1, m2 = experiment.mass_kg
+    both = hit.both[:-1]
+    moved = m1 * found[:, 0, 0][:, both] + m2 * found[:, 1, 0][:, both]
+    assert np.abs(moved).max() < 0.1 * m1 * np.abs(found[:, 0, 0]).max()
+    # Their squares sum to what a random push of that size does: sd t^2 / 2 while it lasts.
+    apart = found[:, 1, 0] - found[:, 0, 0]
+    soon = times[both[3]] - (times[both[0]] + times[both[0] - 1]) / 2
+    expected = PUSH_SD_M_S2 * soon**2 / 2
+    assert np.sqrt((apart[:, both[3]] ** 2).sum()) == pytest.approx(expected, rel=0.1)
+
+
+def test_bodies_that_are_far_apart_no_longer_push():
+    """Friction pulls these apart: when they are, nothing but the speed then gained goes on."""
+    parts = replace(HIT, friction=(0.15, 0.01))
+    times, hit, found = pushes(parts)
+    apart = np.diff(solve(parts, times).position_m[:, 0], axis=0)[0]
+    far = hit.both[apart[hit.both] - apart[hit.both[0]] > 2 * CLOSE_M][:-1]
+    assert len(far) >= 4
+    gained = (found[:, 1, 0] - found[:, 0, 0])[:, far]
+    speed = np.diff(gained, axis=1) / np.diff(times[far])
+    assert np.abs(speed).max() > 1e-4
+    assert np.abs(np.diff(speed, axis=1)).max() < 1e-6

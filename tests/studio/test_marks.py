@@ -7,18 +7,17 @@ import galileo_jax as gx
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.check import remarks_on
 from galileo_jax.studio.marks import (
+    CORNERS,
     Marks,
     ObjectMark,
-    blank,
-    from_json,
+    corrected,
     handles,
-    labels,
     moved,
-    proposed,
-    to_json,
     with_object,
+    with_rectangle,
     without_object,
 )
+from galileo_jax.studio.marks_yaml import blank, declared, from_json, labels, proposed, to_json
 from galileo_jax.studio.sheet import changed, opened, redone, undone
 from galileo_jax.studio.stages import Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import FILE, Store
@@ -53,6 +52,46 @@ def test_only_what_was_changed_is_declared():
     assert labels(MARKS, replace(MARKS, first_frame=3))["first_frame"] == {
         "object1": 3, "object2": 3,
     }  # fmt: skip
+
+
+def test_the_frames_that_count_and_corrections_are_declared():
+    ends = labels(MARKS, replace(MARKS, last_frame=30))
+    assert ends == {"last_frame": {"object1": 30, "object2": 30}}
+    right = corrected(MARKS, "object2", 12, (201.0, 91.004))
+    assert labels(MARKS, right) == {"correct": {"object2": [(12, 201.0, 91.0)]}}
+    again = corrected(right, "object2", 12, (203.0, 91.0))
+    assert labels(right, again) == {"correct": {"object2": [(12, 203.0, 91.0)]}}
+    assert corrected(again, "object2", 12, None) == MARKS
+    assert labels(again, MARKS) == {"correct": {"object2": [(12,)]}}
+    assert from_json(to_json(again)) == again
+
+
+def test_a_rectangle_of_known_sides_takes_the_sticks_place():
+    laid = with_rectangle(MARKS, (320, 180))
+    assert [name for name in handles(laid) if name not in handles(MARKS)] == list(CORNERS)
+    assert not {"stick1", "stick2"} & set(handles(laid))
+    assert labels(MARKS, laid) == {}, "without lengths it says nothing"
+    assert [one.kind for one in remarks_on(laid, 240.0, None)].count("missing") == 1
+    typed = replace(laid, rectangle_m=(0.5, 0.25))
+    assert not [one for one in remarks_on(typed, 240.0, None) if one.kind == "missing"]
+    corners = (96.0, 126.0, 224.0, 126.0, 224.0, 54.0, 96.0, 54.0)
+    assert labels(MARKS, typed) == {"rectangle": (*corners, 0.5, 0.25)}
+    dragged = moved(typed, "corner3", (230.0, 50.0))
+    assert labels(typed, dragged)["rectangle"][4:6] == (230.0, 50.0)
+    assert from_json(to_json(dragged)) == dragged
+    crossed = moved(typed, "corner3", (90.0, 150.0))
+    assert any("crossed" in one.sentence for one in remarks_on(crossed, 240.0, None))
+    assert "scale" in labels(typed, replace(typed, rectangle=None)), "and back to the stick"
+
+
+def test_a_rectangle_in_a_yaml_is_drawn():
+    content = {
+        "scenario": "ramp", "objects": [], "ramp_angle_deg": 20.0,
+        "rectangle": {"corners_px": [[1, 9], [8, 9], [8, 2], [1, 2]], "sides_m": [0.4, 0.4]},
+    }  # fmt: skip
+    found = declared(content, (320, 180), 30.0)
+    assert found.rectangle == ((1, 9), (8, 9), (8, 2), (1, 2)) and found.rectangle_m == (0.4, 0.4)
+    assert found.has_scale
 
 
 def test_marks_survive_json_and_everything_in_them_can_be_grabbed():

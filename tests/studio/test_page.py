@@ -11,6 +11,8 @@ from typing import Any
 import pytest
 
 import galileo_jax as gx
+from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.studio.marks import CAN_RECTANGLE
 from tests.missing import needed_module
 from tests.studio.clips import clip_in
 from tests.studio.server import Server, started
@@ -85,6 +87,35 @@ def test_marks_are_dragged_undone_and_found_again_after_a_reload(browser, folder
         assert video.with_suffix(".yaml").read_text() == text
         page.click("[aria-label=Redo]")
         wait_until(lambda: point(video) == after)
+
+
+@pytest.mark.skipif(not CAN_RECTANGLE, reason="clip files cannot say it yet")
+def test_a_rectangle_of_known_sides_is_laid_in_place_of_the_stick(browser, folder):
+    yaml = folder / "slide.yaml"
+    text = yaml.read_text()
+    scale = read_mapping(yaml)["pixels_per_metre"]
+    with started(folder) as studio, opened(browser, studio) as page:
+        page.click("[data-stage=marks]")
+        page.click("[data-do=rectangle]")
+        page.wait_for_selector("[data-handle=corner4]")
+        assert page.locator("[data-handle=stick1]").count() == 0
+        page.wait_for_selector("[data-remark=missing]")
+        assert "rectangle's width and height" in page.inner_text("[data-remark=missing]")
+        drag(page, "corner3", 6, 2)
+        for side, pixels in enumerate((128, 72)):
+            page.locator(f"[data-side='{side}']").fill(f"{pixels / scale:.4f}")
+            page.keyboard.press("Tab")
+        wait_until(lambda: read_mapping(yaml).get("rectangle") is not None)
+        said = read_mapping(yaml)["rectangle"]
+        assert said["sides_m"] == pytest.approx([128 / scale, 72 / scale], rel=1e-3)
+        assert said["corners_px"][:2] == [[96.0, 126.0], [224.0, 126.0]]
+        assert said["corners_px"][2][0] > 224.0, "dragged"
+        page.wait_for_selector("[data-remark=fine]")
+        page.wait_for_selector("polygon.side")
+        for _ in range(4):
+            page.click("[aria-label=Undo]")
+        wait_until(lambda: yaml.read_text() == text)
+        page.wait_for_selector("[data-handle=stick1]")
 
 
 def test_the_keyboard_steps_through_frames_and_moves_marks(browser, folder):

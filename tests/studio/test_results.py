@@ -8,6 +8,7 @@ from galileo_jax.studio import charts
 from galileo_jax.studio.panels.stairs import friction_moves, stairs
 from galileo_jax.studio.results import pixel_track, round_of, with_round
 from galileo_jax.studio.session import Session
+from galileo_jax.studio.shown import Results, with_partial
 from tests.studio.clips import clip_in
 
 MOTION = {
@@ -39,6 +40,28 @@ def test_a_round_is_a_step_and_removing_it_goes_back():
     assert [one["effects"] for one in with_round(rounds, row("air_drag"))] == [[], ["air_drag"]]
     assert [one["effects"] for one in with_round(rounds, row("stribeck"))] == [[], ["stribeck"]]
     assert with_round(rounds, row()) == [row()]
+
+
+def test_a_track_grows_frame_by_frame_and_is_replaced_when_it_is_done():
+    shown = with_partial(Results({}), {"tracking": {"clip": "a", "objects": ["b"], "fps": 10.0}})
+    for index, place in enumerate(((1.0, 2.0), None, (3.0, 4.0))):
+        frame = {"index": index, "places_px": {"b": place}}
+        shown = with_partial(shown, {"frame": frame})
+    assert with_partial(shown, {"frame": frame}) == shown, "no frame counts twice"
+    track = shown.tracks["a"]
+    assert track["seen_px"] == [[[1.0, 2.0], [None, None], [3.0, 4.0]]]
+    assert track["times"] == [0.0, 0.1, 0.2] and track["is_running"]
+    done = {"clip": "a", "times": [0.0]}
+    assert with_partial(shown, {"track": done}).tracks == {"a": done}
+
+
+def test_candidates_come_with_their_curves_and_stand_in_their_order():
+    shown = Results({})
+    for name, score in (("a", 1.0), ("b", 3.0), ("a", 4.0)):
+        row = {"effect": name, "score": score}
+        shown = with_partial(shown, {"candidate": row, "curves": [score]})
+    assert [(one["effect"], one["score"]) for one in shown.candidates] == [("a", 4.0), ("b", 3.0)]
+    assert shown.previews == {"a": [4.0], "b": [3.0]}
 
 
 def test_the_staircase_has_a_step_for_each_round_and_says_how_k1_moved():

@@ -14,7 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from galileo_jax.inference.fits.programs import Quadratic, propose
-from galileo_jax.inference.fits.residuals import POINTS, Batch, Residuals, Slopes, quadratic
+from galileo_jax.inference.fits.residuals import (
+    POINTS,
+    Batch,
+    Motions,
+    Residuals,
+    Slopes,
+    cost,
+    quadratic,
+)
 from galileo_jax.runtime.batching import in_chunks, one_at_a_time
 
 # Of a parameter's coarse step. The rigid engine rounds below its own; MuJoCo's contacts are rough
@@ -136,10 +144,8 @@ class Descent:
         active, num_steps, joined = np.arange(count), 0, np.arange(count)
         while active.size and num_steps < max_steps:
             there = points.take(active)._replace(z=proposed[active])
-            slopes = self.slopes(there, widths[active])
-            widths[active] = self.half_sd(slopes)
-            new = quadratic(slopes, there.z)
             own = Quadratic(*(leaf[active] for leaf in best))
+            new = self._quadratic(there, own, widths, active)
             is_first = np.full(len(active), num_steps == 0)
             region[active], accepts, proposed[active], promised[active] = in_chunks(
                 POINTS, one_at_a_time(propose), region[active], is_first, own, new
@@ -158,11 +164,36 @@ class Descent:
         is_settled = promised < enough
         return Descended(best, first_cost, widths, is_settled, num_steps, joined)
 
-    def slopes(self, points: Batch, widths: np.ndarray) -> Slopes:
+    def _quadratic(
+        self, there: Batch, own: Quadratic, widths: np.ndarray, active: np.ndarray
+    ) -> Quadratic:
+        """The cost round proposals; of those that cost more than where they set off no slopes.
+
+        A proposal in three is refused, and of these the slopes would be most of the work.
+
+        Args:
+          there: the proposals.
+          own: where they set off.
+          widths: `[point, model parameter]`, of all points; those of `active` are changed.
+          active: `[proposal]`, which points they are of.
+        """
+        motions = self.residuals.motions(there)
+        total = cost(self.residuals.whites_of(there, motions), there.z)
+        better = np.flatnonzero(total < own.cost)
+        new = Quadratic(there.z, total, np.zeros_like(own.gradient), own.normal.copy())
+        if better.size:
+            some = [tuple(values[better] for values in own) for own in motions]
+            slopes = self.slopes(there.take(better), widths[active[better]], some)
+            widths[active[better]] = self.half_sd(slopes)
+            found = quadratic(slopes, there.z[better])
+            new.gradient[better], new.normal[better] = found.gradient, found.normal
+        return new
+
+    def slopes(self, points: Batch, widths: np.ndarray, motions: Motions) -> Slopes:
         """Over small steps where motion is smooth, else over `widths` `[point, parameter]`."""
         if self.is_smooth:
             widths = np.tile(SMALLEST_STEP * self.coarse_steps, (len(points.z), 1))
-        return self.residuals.slopes(points, widths, is_central=not self.is_smooth)
+        return self.residuals.slopes(points, widths, not self.is_smooth, motions)
 
     def half_sd(self, slopes: Slopes) -> np.ndarray:
         """Difference steps in z: half a conditional sd, within what slopes are good for.

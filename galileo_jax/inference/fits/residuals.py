@@ -29,6 +29,9 @@ from galileo_jax.runtime.batching import (
 )
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
+Motions = list[tuple[np.ndarray, ...]]
+"""For each clip parameters in their units, and centres and velocities `[point, ...]`."""
+
 POINTS = (4, 16)  # sizes of compiled batches of hypotheses
 FREE = 4  # numbers of free parameters are rounded up to multiples
 
@@ -164,25 +167,37 @@ class Residuals:
 
     def whites(self, points: Batch) -> list[Float[np.ndarray, "point value"]]:
         """Whitened residuals, `[point, value]`, clip by clip."""
-        white = []
-        for c, clip in enumerate(self.clips):
-            theta, position, velocity = self._simulate(clip, *points)
-            white.append(
-                in_chunks(
-                    MOTIONS,
-                    lambda *rows, clip=clip: white_batch(clip.kind, *rows, clip.data, clip.scene),
-                    *(theta, position, velocity, points.noise[:, c]),
-                )
-            )
-        return white
+        return self.whites_of(points, self.motions(points))
 
-    def slopes(self, points: Batch, steps: np.ndarray, is_central: bool) -> Slopes:
+    def motions(self, points: Batch) -> Motions:
+        """By rollouts, clip by clip."""
+        return [self._simulate(clip, points.z, points.free) for clip in self.clips]
+
+    def whites_of(self, points: Batch, motions: Motions) -> list[Float[np.ndarray, "point value"]]:
+        """Whitened residuals, `[point, value]`, clip by clip, of points that were rolled out."""
+        return [
+            in_chunks(
+                MOTIONS,
+                lambda *rows, clip=clip: white_batch(clip.kind, *rows, clip.data, clip.scene),
+                *(*motion, points.noise[:, c]),
+            )
+            for c, (clip, motion) in enumerate(zip(self.clips, motions, strict=True))
+        ]
+
+    def slopes(
+        self,
+        points: Batch,
+        steps: np.ndarray,
+        is_central: bool,
+        motions: Motions | None = None,
+    ) -> Slopes:
         """By differences: of motions by rollouts, of clock and camera by JAX.
 
         Args:
           points: where.
           steps: `[point, model parameter]`, in z.
           is_central: differences to both sides, not forward ones.
+          motions: of the points, where they are known.
         """
         index = _free_index(points.free)
         padded = np.pad(self._is_simulated, (0, 1))
@@ -195,21 +210,23 @@ class Residuals:
             h = steps[point, which]
             offsets = np.zeros((len(point), self._count))
             offsets[np.arange(len(point)), which] = h
-            owner = np.concatenate([np.arange(len(points.z)), *([point] * len(signs))])
+            first = 0 if motions else len(points.z)  # of the points themselves
+            owner = np.concatenate([np.arange(first), *([point] * len(signs))])
             moved = points.z[owner]
-            moved[len(points.z) :] += np.concatenate([s * offsets for s in signs])
-            _, *out = self._simulate(clip, moved, points.free[owner], points.noise[owner])
+            moved[first:] += np.concatenate([s * offsets for s in signs])
+            _, *out = self._simulate(clip, moved, points.free[owner])
+            bases = motions[c][1:] if motions else [values[:first] for values in out]
             slopes = []
-            for values in out:
-                base, rest = values[: len(points.z)], values[len(points.z) :]
+            for values, base in zip(out, bases, strict=True):
+                rest = values[first:]
                 low = rest[len(point) :] if is_central else base[point]
                 width = (2 * h if is_central else h)[:, None, None, None]
-                slope = np.zeros((*index.shape, *values.shape[1:]))
+                slope = np.zeros((*index.shape, *base.shape[1:]))
                 # A proposal whose motion overflows costs too much to be taken, whatever its slopes.
                 with np.errstate(invalid="ignore"):
                     slope[point, slot] = (rest[: len(point)] - low) / width
                 slopes.append(slope)
-            motion = (out[0][: len(points.z)], out[1][: len(points.z)], *slopes)
+            motion = (*bases, *slopes)
             white, jacobian = in_chunks(
                 POINTS,
                 lambda *rows, clip=clip: jacobian_batch(clip.kind, *rows, clip.arrays),
@@ -219,11 +236,12 @@ class Residuals:
             jacobians.append(jacobian)
         return Slopes(jacobians, whites, index, self._count)
 
-    def _simulate(self, clip: FittedClip, z: np.ndarray, free: np.ndarray, noise: np.ndarray):
+    def _simulate(self, clip: FittedClip, z: np.ndarray, free: np.ndarray):
         """`[point, ...]`: parameters in their units, centres and velocities."""
         self.num_rollouts += len(z)
         theta = clip.theta(z, free)
-        position, velocity = clip.problem.engine.simulate(theta)
+        problem = clip.problem
+        position, velocity = problem.engine.simulate(theta, problem.last_seen_s(theta))
         return theta, *padded_motion(position, velocity)
 
 

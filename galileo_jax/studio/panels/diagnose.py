@@ -58,7 +58,8 @@ def build(tab: "Tab") -> None:
                     f"Remove {effect}", lambda kept=kept: session.fit(kept), "remove",
                     session.job is None,
                 )  # fmt: skip
-    if session.states["diagnose"] != "done":
+    is_asked = session.job is not None and session.job.task == "diagnose"
+    if session.states["diagnose"] != "done" and not is_asked:
         text = "Ask again" if found is not None else "What is missing?"
         main_button(text, session.diagnose, tab, "diagnose")
     for i, row in enumerate(session.results.candidates[:MOST_SHOWN]):

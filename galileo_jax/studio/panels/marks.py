@@ -1,13 +1,20 @@
 """Marks: everything in the first frame that the program must know, to be dragged; and `Check`."""
 
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import SIZE_MEANING
-from galileo_jax.studio.marks import ObjectMark, without_object
+from galileo_jax.studio.marks import (
+    CAN_RECTANGLE,
+    Marks,
+    ObjectMark,
+    with_rectangle,
+    without_object,
+)
 from galileo_jax.studio.panels.parts import (
     main_button,
     on_entered,
@@ -16,6 +23,8 @@ from galileo_jax.studio.panels.parts import (
     remark,
     title,
 )
+
+NEW = "a new object"  # what a click into the video places
 
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
@@ -35,14 +44,16 @@ def build(tab: "Tab") -> None:
         scene = ui.select(sorted(SCENARIOS), value=marks.scenario, label="scenario")
         scene.props("outlined dense options-dense").style("min-width: 130px")
         scene.on_value_change(lambda event: _mark(tab, scenario=event.value))
-        stick = ui.number("stick, m", value=marks.stick_m, min=0)
-        stick.props("outlined dense data-stick step=any").style("width: 120px")
-        on_number(stick, lambda value: _mark(tab, stick_m=value or None))
+        lengths = _lengths(tab, marks)
     for one in marks.objects:
         fields[one.name] = _object(tab, one)
     with ui.element("div").classes("rowline"):
         text = "Click on the object" if tab.placing else "Add object"
         plain_button(text, lambda: _place(tab), "add-object")
+        if CAN_RECTANGLE:
+            is_laid = marks.rectangle is not None
+            text = "Stick instead" if is_laid else "Rectangle instead of stick"
+            plain_button(text, lambda: _turn(tab, not is_laid), "rectangle")
         plain_button("Propose", session.propose, "propose", session.job is None)
     title("Check")
     place = ui.element("div").style("display: contents")
@@ -52,7 +63,8 @@ def build(tab: "Tab") -> None:
         sheet = session.sheet
         if sheet is None:
             return
-        stick.set_value(sheet.marks.stick_m)
+        for field, value in zip(lengths, _known(sheet.marks), strict=True):
+            field.set_value(value)
         for one in sheet.marks.objects:
             fields[one.name].set_value(_text(one.size_m))
         now = (sheet.remarks, sheet.is_complete, session.job is None)
@@ -67,6 +79,46 @@ def build(tab: "Tab") -> None:
     refresh()
 
 
+def _lengths(tab: "Tab", marks: Marks) -> list[Any]:
+    """The fields of what tells the scale."""
+
+    def field(label: str, value: float | None, name: str, write: Any) -> Any:
+        made = ui.number(label, value=value, min=0)
+        made.props(f"outlined dense {name} step=any").style("width: 118px")
+        on_number(made, write)
+        return made
+
+    if marks.rectangle is None:
+        write = lambda value: _mark(tab, stick_m=value or None)  # noqa: E731
+        return [field("stick, m", marks.stick_m, "data-stick", write)]
+    return [
+        field(label, value, f"data-side={i}", partial(_side, tab, i))
+        for i, (label, value) in enumerate(
+            zip(("width, m", "height, m"), _known(marks), strict=True)
+        )
+    ]
+
+
+def _known(marks: Marks) -> list[float | None]:
+    if marks.rectangle is None:
+        return [marks.stick_m]
+    return [side or None for side in marks.rectangle_m]
+
+
+def _side(tab: "Tab", which: int, value: float | None) -> None:
+    if tab.session.sheet is not None:
+        sides = list(tab.session.sheet.marks.rectangle_m)
+        sides[which] = value or 0.0
+        _mark(tab, rectangle_m=tuple(sides))
+
+
+def _turn(tab: "Tab", to_rectangle: bool) -> None:
+    sheet = tab.session.sheet
+    if sheet is not None:
+        marks = replace(sheet.marks, rectangle=None)
+        tab.mark(with_rectangle(marks, sheet.info.size_px) if to_rectangle else marks)
+
+
 def drawn(tab: "Tab") -> Any:
     """While this is the same, `Tab.refresh` is enough to show what has changed."""
     session, sheet = tab.session, tab.session.sheet
@@ -74,7 +126,7 @@ def drawn(tab: "Tab") -> Any:
         return None
     objects = tuple((one.name, one.shape) for one in sheet.marks.objects)
     said = (session.error, session.note, session.job is None, session.chosen, session.active)
-    return (sheet.marks.scenario, objects, tab.placing, said)
+    return (sheet.marks.scenario, objects, sheet.marks.rectangle is None, tab.placing, said)
 
 
 def _check(tab: "Tab") -> None:
@@ -136,7 +188,7 @@ def _mark(tab: "Tab", **given: Any) -> None:
 
 
 def _place(tab: "Tab") -> None:
-    tab.placing = not tab.placing
+    tab.placing = "" if tab.placing else NEW
     tab.redraw()
 
 

@@ -16,7 +16,7 @@ SECONDS = 2.0
 def build(tab: "Tab") -> None:
     """The panel."""
     session = tab.session
-    found = session.results.prediction
+    found = (session.results.prediction or {"clips": {}})["clips"].get(session.active)
     title("Predict")
     with ui.element("div").classes("rowline"):
         seconds = ui.number("seconds beyond the clip", value=SECONDS, min=0.1, max=60)
@@ -25,12 +25,13 @@ def build(tab: "Tab") -> None:
             "Predict", lambda: session.predict(float(seconds.value or SECONDS)), tab, "predict"
         )
     if found is not None:
-        for line in found["sentences"]:
-            ui.label(line.strip()).style("margin-left: 14px" if line.startswith(" ") else "")
-        if session.states["predict"] == "done" and len(session.chosen) == 1:
+        with ui.element("div").classes("answers"):
+            for line in found["sentences"]:
+                ui.label(line.strip()).classes("detail" if line.startswith(" ") else "")
+        if session.states["predict"] == "done":
             version = session.versions["results"]
             ui.html(
-                f'<img class="still" src="/still/{session.trials.name}?{version}" '
+                f'<img class="still" src="/still/{session.active}?{version}" '
                 'alt="the last frame, and where the objects come to rest">',
                 sanitize=False,
             )
@@ -58,6 +59,9 @@ def _commands(tab: "Tab") -> str:
     lines += [f"galileo fit {clips}{added}", f"galileo compare {run}"]
     if len(session.chosen) == 1:
         lines.append(f"galileo predict {run} --seconds {SECONDS:g}")
+    else:
+        each = (shlex.quote(f"runs/{session.trials.name}/{name}") for name in session.chosen)
+        lines += [f"galileo predict {one} --seconds {SECONDS:g}" for one in each]
     return "\n".join(lines)
 
 
@@ -76,4 +80,7 @@ def _lines(tab: "Tab") -> str:
     ]
     if len(files) == 1:
         lines.append(f"ahead = gx.predict(fit, seconds={SECONDS:g})")
+    else:
+        folders = [f"{run}/{name}" for name in session.chosen]
+        lines.append(f"ahead = [gx.predict(one, seconds={SECONDS:g}) for one in {folders!r}]")
     return "\n".join(lines)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from galileo_jax.studio.panels.parts import main_button, on_number, remark, title
+from galileo_jax.studio.panels.parts import main_button, on_number, plain_button, remark, title
 
 if TYPE_CHECKING:
     from galileo_jax.studio.page import Tab
@@ -17,9 +17,9 @@ def build(tab: "Tab") -> None:
     session = tab.session
     title("Video")
     with ui.element("div").classes("drop").props("data-drop"):
-        ui.label("Drop a video here, or")
-        choose = ui.element("label").classes("rowline").style("justify-content: center")
-        with choose:
+        ui.label("Drop a video here").style("margin-bottom: 8px")
+        with ui.element("label").classes("choose"):
+            ui.label("or choose a file")
             ui.html(
                 '<input type="file" accept="video/*,.yaml,.yml" multiple aria-label="open a file" '
                 'onchange="galileoUpload(this.files)" style="min-height: 44px">',
@@ -43,11 +43,20 @@ def build(tab: "Tab") -> None:
         rate = ui.number("true frames per second", value=sheet.marks.fps, min=1)
         rate.props("outlined dense data-fps step=any")
         on_number(rate, lambda value: _mark(tab, fps=value))
+    with ui.element("div").classes("rowline"):
         first = ui.number("counts from frame", value=sheet.marks.first_frame, min=0, precision=0)
-        first.props("outlined dense")
+        first.props("outlined dense data-first").style("width: 150px")
         on_number(first, lambda value: _mark(tab, first_frame=int(value or 0)))
+        plain_button("this frame", lambda: _mark(tab, first_frame=tab.frame), "from-here")
+    with ui.element("div").classes("rowline"):
+        end = info.frame_count - 1
+        shown = end if sheet.marks.last_frame is None else sheet.marks.last_frame
+        last = ui.number("counts to frame", value=shown, min=0, precision=0)
+        last.props("outlined dense data-last").style("width: 150px")
+        on_number(last, lambda value: _to(tab, value))
+        plain_button("this frame", lambda: _to(tab, tab.frame), "to-here")
     for one in sheet.remarks:
-        if "frames per second" in one.sentence:
+        if "frame" in one.sentence:
             remark(one.kind, one.sentence)
     for warning in info.warnings:
         remark("odd", warning.split(": ", 1)[-1])
@@ -75,6 +84,14 @@ def _tick(tab: "Tab", name: str, is_on: bool) -> None:
     session = tab.session
     names = {*session.chosen, name} if is_on else {one for one in session.chosen if one != name}
     session.choose(tuple(names))
+
+
+def _to(tab: "Tab", frame: float | None) -> None:
+    """The last frame that counts; the clip's own where none is given."""
+    sheet = tab.session.sheet
+    if sheet is not None:
+        is_last = frame is None or int(frame) == sheet.info.frame_count - 1
+        tab.mark(replace(sheet.marks, last_frame=None if is_last else int(frame or 0)))
 
 
 def _mark(tab: "Tab", **given: Any) -> None:

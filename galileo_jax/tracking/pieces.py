@@ -1,0 +1,115 @@
+"""The pieces of an object's path: a new one begins where it is put right and looks otherwise."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from galileo_jax.tracking.exposure import Exposure
+from galileo_jax.tracking.follower import Follower
+from galileo_jax.tracking.picture import Picture
+from galileo_jax.tracking.refiner import Velocities, velocities_at
+from galileo_jax.tracking.template import Outline, template_at
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where an object is first seen.
+
+    Attributes:
+      name: the object's.
+      point_px: `(x, y)` of the point to follow, in frame `first_frame`.
+      outline: what the object fills around the point.
+      first_frame: frames before are not looked at.
+      last_frame: nor are frames after; None: to the end.
+      corrections: where somebody has seen it in later frames, in time's order: it is followed on
+        from there.
+    """
+
+    name: str
+    point_px: tuple[float, float]
+    outline: Outline
+    first_frame: int = 0
+    last_frame: int | None = None
+    corrections: "tuple[Start, ...]" = ()
+
+    def uses(self, index: int) -> bool:
+        """Whether a frame is looked at."""
+        return self.first_frame <= index <= (index if self.last_frame is None else self.last_frame)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One look of an object.
+
+    Attributes:
+      first_frame: in which it begins.
+      point_px: the followed point there.
+      follower: with its poses from that frame on.
+      corrected: frames in which somebody has put it right.
+      turned_rad: how far the object had turned when the piece began.
+    """
+
+    first_frame: int
+    point_px: tuple[float, float]
+    follower: Follower
+    corrected: tuple[int, ...] = ()
+    turned_rad: float = 0.0
+
+    @property
+    def is_clicked(self) -> bool:
+        """Whether its point is only as good as a click in the middle of the motion."""
+        return self.first_frame in self.corrected
+
+    def poses(self, count: int) -> np.ndarray:
+        """The first pass's `[frame, 3]`; NaN outside of the piece and where not found."""
+        found = np.full((count, 3), np.nan)
+        own = self.follower.poses[: count - self.first_frame]
+        if own:
+            found[self.first_frame : self.first_frame + len(own)] = own
+        return found
+
+    def velocities(self, poses: np.ndarray, frame: int) -> Velocities:
+        """Around a frame; it is not known how the object came to where somebody put it right."""
+        ends = [at for at in self.corrected if at > frame]
+        begins = [at for at in self.corrected if at <= frame]
+        first = max(begins, default=0)
+        return velocities_at(poses[first : min(ends, default=len(poses))], frame - first)
+
+
+def follow_on(
+    pieces: list[Piece],
+    start: Start,
+    index: int,
+    before: Picture | None,
+    picture: Picture,
+    exposure: Exposure,
+) -> None:
+    """One frame further; `pieces` grows where a new one begins.
+
+    Args:
+      pieces: the object's so far.
+      start: the object.
+      index: of the frame.
+      before: the frame before it.
+      picture: the frame.
+      exposure: of the video, shared by all objects.
+    """
+    if not pieces:
+        pieces.append(_begun(start, picture, exposure))
+    elif (told := next((c for c in start.corrections if c.first_frame == index), None)) is not None:
+        last = pieces[-1]
+        if last.follower.put_right(picture, told.point_px):
+            pieces[-1] = replace(last, corrected=(*last.corrected, index))
+            return
+        turned = last.turned_rad + float(last.follower.pose[2])
+        pieces.append(replace(_begun(told, picture, exposure), corrected=(index,)))
+        pieces[-1] = replace(pieces[-1], turned_rad=turned)
+    own = pieces[-1]
+    own.follower.step(before if index > own.first_frame else None, picture)
+
+
+def _begun(start: Start, picture: Picture, exposure: Exposure) -> Piece:
+    point = np.array(start.point_px, dtype=float)
+    template = template_at(picture.grey, point, start.outline)
+    follower = Follower(template, np.array([*point, 0.0]), exposure, picture)
+    return Piece(start.first_frame, start.point_px, follower)
