@@ -21,7 +21,7 @@ from jaxtyping import Float
 from galileo_jax.model.effects.effect import Effect, Rims, Surroundings
 from galileo_jax.rollout.engine_free import start_velocity
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import step_by_events
+from galileo_jax.rollout.event_loop import recorded, step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 
 MAX_EVENTS = 16  # within one recorded step
@@ -74,10 +74,12 @@ def roll_out(
     dt_s: float,
     theta: jax.Array,
     scene: Surroundings,
+    count: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array]:
     """One rollout: `[parameter]` to centres and velocities, each `[object, axis, record]`.
 
-    The third axis, where the track has one, is the turning, rad.
+    The third axis, where the track has one, is the turning, rad. Of records beyond the first
+    `count` places are as in the last of these.
     """
     named = {name: theta[i] for i, name in enumerate(names)}
     law = dynamics(effects, scene, named, jnp)
@@ -96,10 +98,10 @@ def roll_out(
         jnp.zeros(len(scene.names)),
     )
 
-    def record(discs: Discs, index: jax.Array):
-        return _step(discs, index * dt_s, dt_s, table, scene), discs
+    def step(discs: Discs, index: jax.Array) -> Discs:
+        return _step(discs, index * dt_s, dt_s, table, scene)
 
-    _, found = jax.lax.scan(record, discs, jnp.arange(num_records))
+    found = recorded(step, discs, num_records, count)
     place, speed = (jnp.moveaxis(each, 0, -1) for each in (found.place_m, found.speed_m_s))
     if scene.num_axes == 2:
         return place[:, :2], speed[:, :2]

@@ -33,7 +33,7 @@ def rolled(one: LevelTruth, seconds: float, names=None, theta=None):
 
 def alone(**values: float) -> LevelTruth:
     """The first puck, and another that it passes far away."""
-    far = truth(start_velocity_x1=1.0, start_velocity_y1=0.0, **values)
+    far = truth(start_velocity_x1=1.0, start_velocity_y1=0.0, **values)  # pyright: ignore[reportArgumentType]
     return LevelTruth(far.things, far.values, ((0.0, 0.0), (0.0, -1.0)))
 
 
