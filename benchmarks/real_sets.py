@@ -40,6 +40,17 @@ objects:
 """
 
 
+PUCKS = """video: {video}
+scenario: from_above
+fps: 240.0
+pixels_per_metre: null
+objects:
+  - {{name: object1, shape: cylinder, size_m: null, point_px: [79.8, 72.0], first_frame: 168}}
+  - {{name: object2, shape: cylinder, size_m: null, point_px: [150.3, 86.1], first_frame: 168}}
+"""
+BESIDE_HIT = 14  # frames on either side of a hit through which velocities are laid
+
+
 def main() -> None:
     """Prints the rows."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
@@ -131,6 +142,56 @@ def cube_tosses(folder: Path, out: Path, _: int) -> str:
     return "see the lines above"
 
 
+def puck_head_on(folder: Path, out: Path, _: int) -> str:
+    """Restitution, friction in radii and mass ratio; momentum before and after, by the track."""
+    video = out / "puck_head_on.mp4"
+    video.write_bytes((folder / video.name).read_bytes())
+    path = video.with_suffix(".yaml")
+    path.write_text(PUCKS.format(video=video.name))
+    found = gx.fit(path)
+    names = ("restitution", "mass_ratio", "deceleration1", "deceleration2")
+    share, sd = _momentum_after(found)
+    return (
+        f"{'; '.join(_estimate(found, name) for name in names)}; {_error(found)}; momentum after "
+        f"the hit over that before, of equal masses: along {share[0]:.3f} +- {sd[0]:.3f}, across "
+        f"{share[1]:.3f} +- {sd[1]:.3f}"
+    )
+
+
+def _momentum_after(found: gx.Fit) -> tuple[np.ndarray, np.ndarray]:
+    """Along the first puck's way and across it, as a share of its momentum, and the sd of both.
+
+    From velocities at the hit by parabolas through the frames before and after it, errors from
+    what these leave: no part of the model's.
+    """
+    seen = found.problem.problems[0].observation
+    times, place = seen.times_s, seen.position_m[:, :2]
+    both = seen.mask.all(axis=0)
+    apart = np.where(both, np.linalg.norm(place[1] - place[0], axis=0), np.inf)
+    hit = int(np.argmin(apart))
+    before = np.arange(hit - BESIDE_HIT - 1, hit - 1)
+    after = np.arange(hit + 2, hit + 2 + BESIDE_HIT)
+    first, var = _velocity(times, place[0], before, times[hit])
+    ahead, var1 = _velocity(times, place[0], after, times[hit])
+    struck, var2 = _velocity(times, place[1], after, times[hit])
+    along = first / np.linalg.norm(first)
+    axes = np.stack([along, [-along[1], along[0]]])
+    size = float(np.linalg.norm(first))
+    return axes @ (ahead + struck) / size, np.full(2, math.sqrt(var + var1 + var2) / size)
+
+
+def _velocity(
+    times: np.ndarray, place: np.ndarray, frames: np.ndarray, at_s: float
+) -> tuple[np.ndarray, float]:
+    """At a time, m/s, and the variance of either component."""
+    since = times[frames] - at_s
+    design = np.vander(since, 3)
+    solution = np.linalg.lstsq(design, place[:, frames].T, rcond=None)[0]
+    left = place[:, frames].T - design @ solution
+    variance = float(np.sum(left**2)) / (2 * (len(frames) - 3))
+    return solution[1], variance * float(np.linalg.inv(design.T @ design)[1, 1])
+
+
 def no_scenario(folder: Path, out: Path, _: int) -> str:
     """Nothing yet."""
     return "skipped; the program has no scenario for it yet"
@@ -143,7 +204,7 @@ SETS: dict[str, tuple[tuple[str, ...], Row]] = {
     "slides": (("slide_r1.yaml", "slide_r2.yaml"), slides),
     "projectile": (("projectile_45.mp4",), projectile),
     "spin_flights": (("spin_flights/index.csv",), spin_flights),
-    "puck_head_on": (("puck_head_on.mp4",), no_scenario),
+    "puck_head_on": (("puck_head_on.mp4",), puck_head_on),
     "cube_tosses": (("cube_tosses",), cube_tosses),
 }
 

@@ -95,8 +95,8 @@ def simulate(
     Args:
       out: DIR/NAME.mp4, or DIR/NAME.csv for a track.
       seed: of everything that is drawn, 0 or more.
-      scenario: "ramp", "multi" or "incline"; "fall", "flight", "spring", "liquid" or
-        "pendulum".
+      scenario: "ramp", "multi" or "incline"; "fall", "flight", "spring", "liquid",
+        "pendulum" or "from_above" (tracks only).
       shapes: of the objects on a ramp, in the order of the travel (box, cylinder, torus,
         sphere); round ones roll. None: as many boxes as the scenario has.
       angle: of the ramp, degrees, 1 to 60.

@@ -332,6 +332,8 @@ def _check_objects(file: ClipFile, fail: Any) -> None:
         names[item.name] = index
         if item.rolls is not None:
             _check_rolls(f"objects[{index}].rolls", item, file.scenario, fail)
+        if scenario.is_level and item.shape != "cylinder":
+            fail(f"objects[{index}].shape", f"{item.shape}; a puck is a cylinder, seen from above")
         if item.size_m is None:
             continue
         meaning = SIZE_MEANING[item.shape]

@@ -393,6 +393,8 @@ class Clip(ClipFile):
       thread_m: pendulum: from the pivot to the bob's centre, m; None = not known.
       pivot_m: pendulum: (x, y) of the pivot from the origin, m; None = not known.
       objects: at least one, names unique.
+      is_scale_assumed: lengths are in units of something in the picture, which a
+        `pixels_per_metre` that means nothing else gives a size.
       is_own_track: the track is our own csv, in metres along our axes.
       frame_count: frames that decode, or rows of the csv track.
       frame_size_px: (width, height); None for a csv track.
@@ -402,6 +404,7 @@ class Clip(ClipFile):
 
     path: Path
     source: str = ""
+    is_scale_assumed: bool = False
     is_own_track: bool = False
     frame_count: int
     frame_size_px: tuple[int, int] | None = None
@@ -411,6 +414,8 @@ class Clip(ClipFile):
     @property
     def is_scale_known(self) -> bool:
         """Whether lengths are in metres, not in pixels of unknown size."""
+        if self.is_scale_assumed:
+            return False
         is_in_metres = self.track is not None and self.track_units != "px"
         return self.pixels_per_metre is not None or is_in_metres
 

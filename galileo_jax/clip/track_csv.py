@@ -9,6 +9,9 @@ A flight in space has `object1_z_m` as well, towards the viewer, and one standar
 axes (`object1_sd_m`); where times are uncertain, another one along the velocity
 (`object1_sd_along_m`). Of a single object the titles may lack its name: `time_s, x_m, y_m, z_m`.
 
+What is seen from above may have `object1_angle_rad` of every object: how far it has turned,
+counter-clockwise (with `object1_sd_angle_rad`).
+
 A track that a spreadsheet has saved again is read as well (`track_files/cells.py`).
 """
 
@@ -39,6 +42,7 @@ MIN_SD_M = 1e-5
 
 MAX_POSITION_M = 100.0
 MAX_SD_M = 1.0
+MAX_SD_RAD = 1.0
 MAX_STEP_S = 1.0
 """No motion is seen in frames a second apart; a step of just 1 is a count of frames."""
 
@@ -47,7 +51,9 @@ ONLY = "object1"
 
 _ISOTROPIC = ("sd_along_m", "sd_m")
 _COVARIANCE = ("sd_x_m", "sd_y_m", "correlation")
+_TURNING = ("sd_angle_rad", "angle_rad")
 _FIELDS = (
+    *_TURNING,
     *_COVARIANCE,
     *_ISOTROPIC,
     "x_m",
@@ -73,17 +79,24 @@ def read_observation_csv(path: Path) -> Observation:
     lines = [f"line {line}" for line, _ in rows]
     check_times(path, times, lines)
 
-    axes = 3 if "z_m" in columns[names[0]] else 2
+    is_turning = "angle_rad" in columns[names[0]]
+    third = "angle_rad" if is_turning else "z_m"
+    axes = 3 if third in columns[names[0]] else 2
     position = np.empty((len(names), axes, len(times)))
     covariance = np.empty((len(names), axes, axes, len(times)))
     for index, name in enumerate(names):
         column = {field: table[title] for field, title in columns[name].items()}
-        places = [column[field] for field in ("x_m", "y_m", "z_m")[:axes]]
+        places = [column[field] for field in ("x_m", "y_m", third)[:axes]]
         position[index] = _positions(path, name, places, lines)
+        if is_turning:
+            covariance[index] = _with_turning(path, name, column, times, position[index], lines)
+            continue
         is_visible = np.isfinite(position[index, 0])
         covariance[index] = _covariance(path, name, column, times, position[index], lines)
         covariance[index][:, :, ~is_visible] = np.nan
-    return Observation(names, times, position, covariance, np.isfinite(position[:, 0]))
+    mask = np.isfinite(position[:, 0])
+    covariance[np.broadcast_to(~mask[:, None, None], covariance.shape)] = np.nan
+    return Observation(names, times, position, covariance, mask, is_turning=is_turning)
 
 
 def write_observation_csv(path: Path, observation: Observation) -> None:
@@ -104,7 +117,10 @@ def write_observation_csv(path: Path, observation: Observation) -> None:
         )
         places = zip(("x_m", "y_m", "z_m"), observation.position_m[index], strict=False)
         fields: dict[str, np.ndarray] = dict(places)
-        if axes == 3:
+        if observation.is_turning:
+            fields["angle_rad"] = fields.pop("z_m")
+            fields["sd_m"], fields["sd_angle_rad"] = sd[index, 0], sd[index, 2]
+        elif axes == 3:
             fields["sd_m"], fields["sd_along_m"] = space_sds_m(covariance[index])
         elif is_isotropic:
             fields["sd_m"] = sd[index, 0]
@@ -247,10 +263,17 @@ def _find_columns(
                 f"{path}: column '{name}_z_m': in space write '{name}_sd_m', for all axes"
             )
         in_space = any("z_m" in other for other in columns.values())
+        turns = any("angle_rad" in other for other in columns.values())
+        if turns and (in_space or has_covariance):
+            raise InputError(
+                f"{path}: column '{name}_angle_rad': of what is seen from above, without z_m and "
+                f"with '{name}_sd_m' for x and y"
+            )
         required = (
             "x_m",
             "y_m",
             *(("z_m",) if in_space else ()),
+            *(("angle_rad",) if turns else ()),
             *(_COVARIANCE if has_covariance else ()),
         )
         missing = next((field for field in required if field not in fields), None)
@@ -301,6 +324,31 @@ def _positions(
             "are these pixels or millimetres?"
         )
     return position
+
+
+def _with_turning(
+    path: Path,
+    name: str,
+    column: dict[str, np.ndarray],
+    times: np.ndarray,
+    position: np.ndarray,
+    lines: Sequence[str],
+) -> np.ndarray:
+    """`[3, 3, row]` of x, y (m^2) and the turning (rad^2), which is made continuous in place."""
+    seen = np.isfinite(position[2])
+    position[2, seen] = np.unwrap(position[2, seen])
+    plane = {field: values for field, values in column.items() if "angle" not in field}
+    found = np.zeros((3, 3, len(times)))
+    found[:2, :2] = _covariance(path, name, plane, times, position[:2], lines)
+    given = column.get("sd_angle_rad")
+    sd = np.full(len(times), position_noise_m(times, position[2])) if given is None else given
+    if not ((sd > 0) & (sd <= MAX_SD_RAD))[seen].all():
+        raise InputError(
+            f"{path}: {name}: standard deviation {sd[seen].max():g} rad of its turning; more than "
+            f"0 and at most {MAX_SD_RAD:g} expected; are these degrees?"
+        )
+    found[2, 2] = sd**2
+    return found
 
 
 def _covariance(

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from galileo_jax.comparison.bootstrap import replicates, whitened
-from galileo_jax.comparison.local_tests import AXES, Cell, find_cells, statistics
+from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
@@ -125,11 +125,12 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         label = phases(problem, trials.of_clip(theta, clip))
         observation = problem.observation
         labels.append(label)
-        num_axes = observation.position_m.shape[1]
         absorbed = GaussianLikelihood.absorbed(scales[clip], problem.data)
         cells.extend(
             cell
-            for cell in find_cells(clip, observation.names, observation.mask, label, num_axes)
+            for cell in find_cells(
+                clip, observation.names, observation.mask, label, observation.axes
+            )
             if absorbed[cell.index].mean() < ABSORBED
         )
     pulls = _pulls(trials, fit, theta)
@@ -256,7 +257,7 @@ def _place(
 ) -> Place:
     problem = trials.problems[cell.clip]
     observation = problem.observation
-    i, a = observation.names.index(cell.object), AXES.index(cell.axis)
+    i, a = observation.names.index(cell.object), observation.axes.index(cell.axis)
     frames = len(observation.times_s)
     index = cell.index % frames
     predicted = problem.simulate(trials.of_clip(theta, cell.clip))[i, a]

@@ -14,7 +14,7 @@ from scipy.fft import dct
 
 from galileo_jax.comparison.phases import PHASES
 
-AXES = ("x", "y", "z")
+AXES = ("x", "y")  # of a picture; others have a third
 MIN_FRAMES = 5
 SLOW_SHARE, MAX_SLOW = 0.25, 6  # cosines that count as slow
 WHOLE = "whole"
@@ -40,7 +40,11 @@ class Cell:
 
 
 def find_cells(
-    clip: int, names: Sequence[str], mask: np.ndarray, labels: np.ndarray, num_axes: int = 2
+    clip: int,
+    names: Sequence[str],
+    mask: np.ndarray,
+    labels: np.ndarray,
+    axes: Sequence[str] = AXES,
 ) -> list[Cell]:
     """The cells of one clip with enough frames.
 
@@ -49,13 +53,13 @@ def find_cells(
       names: of the objects.
       mask: `[object, frame]`, where the object was seen.
       labels: `[object, frame]`, indices into `PHASES`.
-      num_axes: of the track, 2 or 3.
+      axes: of the track.
     """
     frames = mask.shape[1]
     found = []
     for i, name in enumerate(names):
-        for a, axis in enumerate(AXES[:num_axes]):
-            first = (i * num_axes + a) * frames
+        for a, axis in enumerate(axes):
+            first = (i * len(axes) + a) * frames
             for phase in (*PHASES, WHOLE):
                 chosen = mask[i] & (
                     np.ones(frames, bool) if phase == WHOLE else labels[i] == PHASES.index(phase)

@@ -134,7 +134,7 @@ def failing_interval(
       times_s: `[frame]`.
       worst: the cell.
     """
-    values = white[AXES.index(worst.axis)]
+    values = white[AXES.index(worst.axis) if worst.axis in AXES else 2]
     if worst.phase != WHOLE:
         values = np.where(labels == PHASES.index(worst.phase), values, np.nan)
     found = worst_interval(values, times_s)

@@ -4,7 +4,7 @@ In which phase a model fails is a strong hint at what it lacks.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -65,7 +65,8 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     position, velocity = (a[0] for a in problem.engine.simulate(theta[None]))
     recorded = np.arange(position.shape[-1]) * model.record_dt_s
     label = np.empty((len(scene.names), len(times)), int)
-    hit_s = _hit_s(position, recorded, scene.half_length_m)
+    find_hits = _level_hit_s if scene.is_level else _hit_s
+    hit_s = find_hits(position, recorded, scene.half_length_m)
     for i in range(len(scene.names)):
         x = np.interp(times, recorded, position[i, 0])
         speed = np.interp(times, recorded, np.linalg.norm(velocity[i], axis=0))
@@ -77,6 +78,8 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
             label[i][beyond < -half] = PHASES.index("ramp")
         if not scene.has_surface:
             label[i] = PHASES.index(free_phase(scene))
+        if scene.is_level:
+            label[i] = PHASES.index("table")
         label[i][speed < RESTS_M_S] = PHASES.index("at rest")
         if (hit := hit_s[i]) is not None:
             label[i][times > hit] = PHASES.index("after")
@@ -103,4 +106,21 @@ def _hit_s(
             hit_s = float(times_s[touching[0]])
             for j in (i, i + 1):
                 found[j] = min(hit_s, found[j] or hit_s)
+    return found
+
+
+def _level_hit_s(
+    position: np.ndarray, times_s: np.ndarray, radius_m: tuple[float, ...]
+) -> list[float | None]:
+    """As `_hit_s`, of discs seen from above: any two may touch."""
+    found: list[float | None] = [None] * len(position)
+    for i, j in combinations(range(len(position)), 2):
+        apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
+        # Between two records they come nearer than in either.
+        step = np.abs(np.diff(apart, append=apart[-1:]))
+        touching = np.flatnonzero(apart - radius_m[i] - radius_m[j] < 1e-4 + step)
+        if touching.size:
+            hit_s = float(times_s[touching[0]])
+            for k in (i, j):
+                found[k] = min(hit_s, found[k] or hit_s)
     return found

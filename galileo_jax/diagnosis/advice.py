@@ -8,6 +8,7 @@ from galileo_jax.model.effects.forms import FORM_MEANINGS
 # How another run gets other speeds and places, by how the objects move.
 ANOTHER_RUN = {
     "slide": "release object 1 from another height",
+    "level": "push the pucks faster, slower and in another direction",
     "fall": "drop the object from another height",
     "flight": "throw the object at another speed and angle",
     "swing": "let the object swing much further, or much less",
@@ -68,6 +69,7 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
     if verdict.status != "ambiguous":
         return ()
     motion = "slide" if scene.has_surface else free_phase(scene)
+    motion = "level" if scene.is_level else motion
     again = ANOTHER_RUN[motion]
     groups = [(group, how.format(again=again)) for group, how in SEPARATES]
     if motion in GRAVITY:
@@ -85,7 +87,7 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
             "stays there, and what belongs to a speed comes with it"
         )
     if not said:
-        said = [f"{again}, or use another angle of the ramp" if scene.has_surface else again]
+        said = [f"{again}, or use another angle of the ramp" if motion == "slide" else again]
     if num_clips == 1:
         said.append("give several clips of the same objects together: they share their parameters")
     return tuple(said)

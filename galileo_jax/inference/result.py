@@ -76,6 +76,8 @@ def velocity_error(
         both = np.broadcast_to(both[:, None], residual.shape)
         variance = np.diagonal(observation.covariance_m2, axis1=1, axis2=2)
         variance = np.moveaxis(variance, -1, 1)
+        if observation.is_turning:  # radians are no metres
+            residual, variance, both = residual[:, :2], variance[:, :2], both[:, :2]
         residuals.append(residual[both])
         noises.append(((variance[..., 1:] + variance[..., :-1]) / dt**2)[both])
     values, noise = np.concatenate(residuals), np.concatenate(noises)

@@ -15,6 +15,7 @@ from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
+from galileo_jax.measurement.infer_radii import from_first_common_frame, is_level, told_by_hit
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
@@ -87,6 +88,7 @@ def measure(clip: Clip) -> Measurement:
     else:
         whole, pixels = observed(clip)
         measured = Measurement(clip, whole, whole, pixels)
+    measured = _with_pucks(measured, remarks) if is_level(clip) else measured
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
     pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
     observation, cuts = cut(measured.clip, measured.observation)
@@ -192,6 +194,14 @@ def _with_sizes(measured: Measurement, remarks: list[str]) -> Measurement:
         entries[f"{name}.size_m"] = {"mean": list(size), "sd": SIZE_SD_M}
     clip = clip.model_copy(update={"objects": objects})
     return replace(measured, clip=clip, inferred=entries)
+
+
+def _with_pucks(measured: Measurement, remarks: list[str]) -> Measurement:
+    """The measurement from where all pucks are seen on, with the scale or radii from a hit."""
+    observation = from_first_common_frame(measured.clip, measured.observation)
+    clip, observation, found, said = told_by_hit(measured.clip, observation)
+    remarks.extend(f"{clip.path}: {line}" for line in said)
+    return replace(measured, clip=clip, observation=observation, whole=observation, inferred=found)
 
 
 def _inclined(clip: Clip, slope: Slope) -> Clip:

@@ -26,6 +26,7 @@ class Observation:
       modes_m: `[mode, object, 2, frame]`, m: errors that many frames share, each as one standard
         deviation of it moves the track: a number declared about the camera (corners, lens), the
         shift with which a coder holds what has come to rest; None where there are none.
+      is_turning: the third axis is how far each object has turned, rad, not a place.
       is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """
 
@@ -36,6 +37,13 @@ class Observation:
     mask: Bool[np.ndarray, "object frame"]
     modes_m: Float[np.ndarray, "mode object 2 frame"] | None = None
     is_squared: bool = False
+    is_turning: bool = False
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes."""
+        third = "turning" if self.is_turning else "z"
+        return ("x", "y", third)[: self.position_m.shape[1]]
 
     @property
     def velocity_m_s(self) -> Float[np.ndarray, "object 2 frame-1"]:

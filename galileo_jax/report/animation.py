@@ -55,7 +55,7 @@ def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray
     name = escape(problem.name, quote=True)
     return (
         f'<figure class="motion" data-clip="{name}">'
-        f"<figcaption>{escape(_caption(video))}</figcaption>"
+        f"<figcaption>{escape(_caption(video, problem))}</figcaption>"
         f"{_stage(clip, problem, motions, models, view, video)}"
         f'<div class="controls"><button type="button">Play</button>'
         f'<input type="range" min="0" max="{len(data["times"]) - 1}" value="0" '
@@ -91,9 +91,10 @@ def _offset(problem: Problem, predicted_m: np.ndarray) -> np.ndarray:
     return found
 
 
-def _caption(video: VideoFrames | None) -> str:
+def _caption(video: VideoFrames | None, problem: Problem) -> str:
     if video is None:
-        return "The scene from the side. Arrow keys move the slider frame by frame."
+        side = "above" if problem.model.scene.surroundings.is_level else "the side"
+        return f"The scene from {side}. Arrow keys move the slider frame by frame."
     step = video.frames[1] - video.frames[0] if len(video.frames) > 1 else 1
     every = "" if step == 1 else f" One frame in {step} is shown."
     return (
@@ -111,7 +112,8 @@ def _legend(problem: Problem, models: list[str], video: VideoFrames | None) -> s
         entries.append(("dashed", "soft", ", ".join(models[:-1])))
     if video:
         entries.append(("cross", "ink", "measured"))
-        if problem.model.scene.surroundings.has_surface:
+        scene = problem.model.scene.surroundings
+        if scene.has_surface and not scene.is_level:
             entries.append(("line", "soft", "ramp and table as declared"))
     else:
         entries.append(("line", "ink", "measured (outline; its path dotted)"))
@@ -191,7 +193,7 @@ def _places(problem: Problem, motion_m: np.ndarray) -> list[list[list[float] | N
 
 
 def _body(clip: Clip, problem: Problem, index: int) -> str:
-    if clip.objects[index].shape == "sphere":
+    if clip.objects[index].shape == "sphere" or problem.model.scene.surroundings.is_level:
         return f'<circle r="{MM * problem.model.scene.surroundings.half_length_m[index]:.1f}"/>'
     return f'<polygon points="{_points(outline(clip, problem.model.scene, index))}"/>'
 

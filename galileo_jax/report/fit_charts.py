@@ -21,8 +21,7 @@ from galileo_jax.report.chart import (
 from galileo_jax.report.style import object_colour
 
 Quantity = Literal["velocity", "position"]
-UNITS = {"velocity": "m/s", "position": "m"}
-AXES = ("x", "y", "z")  # the last of a track in space
+PER = {"velocity": "/s", "position": ""}
 FAILS_Z = 5.0  # of white noise, the largest of four tracks of 120 frames is over 4.6 in 1 of 100
 SMALLEST_RANGE = 3.3  # of the residuals' axis, in units of the noise
 
@@ -32,7 +31,7 @@ def failing_interval_of(fitted: PosteriorPredictive) -> tuple[str, str, Interval
     found = [
         (name, axis, interval)
         for name, both in zip(fitted.observation.names, fitted.residuals, strict=True)
-        for axis, values in zip(AXES, both, strict=False)
+        for axis, values in zip(fitted.observation.axes, both, strict=True)
         if (interval := worst_interval(values, fitted.observation.times_s)) is not None
     ]
     worst = max(found, key=lambda one: one[2].z, default=None)
@@ -40,7 +39,7 @@ def failing_interval_of(fitted: PosteriorPredictive) -> tuple[str, str, Interval
 
 
 def axes_of(fitted: PosteriorPredictive) -> range:
-    """The axes that were measured, as indices into `AXES`."""
+    """The axes that were measured, as indices into `Observation.axes`."""
     return range(fitted.observation.position_m.shape[1])
 
 
@@ -48,10 +47,10 @@ def profile_chart(
     fitted: PosteriorPredictive, quantity: Quantity, index: int, axis: int, clip: str
 ) -> Chart:
     """The velocity profile or the position of one object along one axis."""
-    name = fitted.observation.names[index]
-    label = f"{quantity} of {name} along {AXES[axis]} against time, measured and fitted"
+    name, along = fitted.observation.names[index], fitted.observation.axes[axis]
+    label = f"{quantity} of {name} along {along} against time, measured and fitted"
     panel = profile_panel(fitted, quantity, index, axis)
-    return Chart(f"{quantity}_{name}_{AXES[axis]}", label, (panel,), clip)
+    return Chart(f"{quantity}_{name}_{along}", label, (panel,), clip)
 
 
 def residual_chart(fitted: PosteriorPredictive, index: int, clip: str) -> Chart:
@@ -81,10 +80,18 @@ def track_chart(observation: Observation, axis: int) -> Chart:
         )
         for i, name in enumerate(observation.names)
     )
+    along = observation.axes[axis]
     panel = Panel(
-        f"{AXES[axis]}, m", marks, xlabel="time, s", xlim=time_limits(observation.times_s)
+        f"{along}, {_unit(observation, axis)}",
+        marks,
+        xlabel="time, s",
+        xlim=time_limits(observation.times_s),
     )
-    return Chart(f"track_{AXES[axis]}", f"measured {AXES[axis]} against time", (panel,))
+    return Chart(f"track_{along}", f"measured {along} against time", (panel,))
+
+
+def _unit(observation: Observation, axis: int) -> str:
+    return "rad" if observation.axes[axis] == "turning" else "m"
 
 
 def fit_residual_panel(fitted: PosteriorPredictive, index: int) -> Panel:
@@ -166,14 +173,14 @@ def profile_panel(fitted: PosteriorPredictive, quantity: Quantity, index: int, a
     spread = 1.96 * np.sqrt(drawn.var(axis=0) + np.where(np.isfinite(noise), noise, 0.0) ** 2)
     mean = drawn.mean(axis=0)
     return Panel(
-        ylabel=f"{quantity}, {UNITS[quantity]}",
+        ylabel=f"{quantity}, {_unit(fitted.observation, axis)}{PER[quantity]}",
         marks=(
             Band(times_s, mean - spread, mean + spread, colour, "95 % of measurements", 0.16),
             Band(times_s, low, high, colour, "95 % of the model", 0.4),
             Line(times_s, median, colour, "fitted"),
             Points(times_s, measured, "ink", "measured"),
         ),
-        title=f"{fitted.observation.names[index]}, {AXES[axis]}",
+        title=f"{fitted.observation.names[index]}, {fitted.observation.axes[axis]}",
         xlabel="time, s",
         xlim=time_limits(fitted.observation.times_s),
         ylim=with_room(*_limits(measured, noise)) if np.isfinite(measured).any() else None,

@@ -38,7 +38,7 @@ def prediction_lines(run: Run, found: Mapping[str, Any]) -> list[str]:
 def _answers(run: Run, entry: Mapping[str, Any]) -> dict[str, str]:
     """What the posterior predicts of one object, by question."""
     surroundings = run.problem.model.scene.surroundings
-    is_free = not surroundings.has_surface
+    is_free = not surroundings.has_surface or surroundings.is_level
     verb = "move" if any(surroundings.rolls) or is_free else "slide"
     slides, stops = entry["slides_probability"], entry["stops_probability"]
     answers = {f"will it {verb}?": _chance(slides)}

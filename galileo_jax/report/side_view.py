@@ -69,11 +69,13 @@ def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
 def surfaces(scene: Scene, view: View) -> list[np.ndarray]:
     """Ramp and table as slabs, corners `[4, 2]`, m; none where nothing carries the objects.
 
+    Nor where the table is seen from above.
+
     The first two corners are the ends of the surface; slabs reach to the edges of the view.
     """
     surroundings = scene.surroundings
     angle = surroundings.angle_rad
-    if not surroundings.has_surface:
+    if not surroundings.has_surface or surroundings.is_level:
         return []
     if scene.has_table:
         start_x = surroundings.start_m[0][0]
@@ -100,7 +102,7 @@ def outline(clip: Clip, scene: Scene, index: int) -> np.ndarray:
     length, height = (
         size[index] for size in (scene.surroundings.half_length_m, scene.surroundings.half_height_m)
     )
-    if clip.objects[index].shape == "sphere":
+    if clip.objects[index].shape == "sphere" or scene.surroundings.is_level:
         angle = np.linspace(0.0, 2 * np.pi, CIRCLE_CORNERS, endpoint=False)
         return length * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (length, height)

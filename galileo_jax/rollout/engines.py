@@ -24,6 +24,10 @@ def make_engine(name: str, model: Model) -> Engine:
     if name == "auto":
         name = "rigid"
     is_free = not model.scene.surroundings.has_surface
+    if name == "rigid" and model.scene.surroundings.is_level:
+        from galileo_jax.rollout.engine_level import EngineLevel
+
+        return EngineLevel(model)
     if name == "rigid" and PENDULUM in model.scene.surroundings.laws:
         from galileo_jax.rollout.engine_pendulum import EnginePendulum
 
@@ -36,7 +40,7 @@ def make_engine(name: str, model: Model) -> Engine:
         from galileo_jax.rollout.engine_rigid import EngineRigid
 
         return EngineRigid(model)
-    if is_free:
+    if is_free or model.scene.surroundings.is_level:
         raise InputError(f"engine: {name!r} has no scene without a ramp; rigid or auto expected")
     if any(model.scene.surroundings.rolls):
         raise InputError(f"engine: {name!r} has nothing that rolls; rigid or auto expected")

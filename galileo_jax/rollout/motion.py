@@ -191,7 +191,7 @@ def pitch(position: OfCentres, scene: Surroundings) -> PerObject:
         sliding = pitch(position, dataclasses.replace(scene, rolls=()))
         turned = far / xp.asarray(scene.half_height_m)
         return sliding - xp.where(xp.asarray(scene.rolls), turned, 0.0)
-    if not scene.has_surface:
+    if not scene.has_surface or scene.is_level:
         return xp.zeros(position.shape[:-1])
     if not scene.has_table:
         return xp.zeros(position.shape[:-1]) - scene.angle_rad

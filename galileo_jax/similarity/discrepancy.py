@@ -66,10 +66,12 @@ def offsets(observation: Observation) -> list[np.ndarray]:
     return found
 
 
-def wander(observation: Observation) -> list[np.ndarray]:
-    """For each object and axis of a track in space a slow wander (Ornstein-Uhlenbeck)."""
+def wander(
+    observation: Observation, sd_m: float = WANDER_SD_M, lasts_s: float = WANDER_S
+) -> list[np.ndarray]:
+    """For each object and axis of a track a slow wander (Ornstein-Uhlenbeck)."""
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    values, vectors = np.linalg.eigh(WANDER_SD_M**2 * np.exp(-apart / WANDER_S))
+    values, vectors = np.linalg.eigh(sd_m**2 * np.exp(-apart / lasts_s))
     kept = values > SMALLEST_MODE * values[-1]
     patterns = (np.sqrt(values[kept]) * vectors[:, kept]).T
     count, axes, _ = observation.position_m.shape
@@ -95,7 +97,7 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
     count, _, frames = position.shape
     found = offsets(observation)
     if is_filmed:
-        found.extend(_camera(position, observation, scene))
+        found.extend(camera(position, observation, scene))
     # A ramp's angle known within so much was read off the picture or the path: the direction
     # there, used already, must not count again.
     lean = READ_OFF * scene.angle_sd_rad if scene.has_surface else 0.0
@@ -122,9 +124,7 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
     return np.stack(found)
 
 
-def _camera(
-    position: np.ndarray, observation: Observation, scene: Surroundings
-) -> list[np.ndarray]:
+def camera(position: np.ndarray, observation: Observation, scene: Surroundings) -> list[np.ndarray]:
     """What is declared of it, or keystone about either axis, the lens and scale; of all objects."""
     found = [] if observation.modes_m is None else list(observation.modes_m)
     if observation.is_squared:

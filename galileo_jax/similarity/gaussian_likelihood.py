@@ -18,6 +18,7 @@ from jaxtyping import Float
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import crossings, modes, offsets, wander
+from galileo_jax.similarity.level_discrepancy import level_modes
 
 NoiseModel = Literal["camera", "bodies", "tracker"]
 Places = Float[jax.Array, "object 2 frame"]
@@ -68,6 +69,8 @@ class GaussianLikelihood:
         covariance[~mask] = np.eye(axes)
         if noise == "tracker":
             patterns = np.stack(offsets(observation))
+        elif scene.is_level:
+            patterns = level_modes(observation, scene, is_filmed=noise == "camera")
         elif axes == 3:
             patterns = np.stack([*offsets(observation), *wander(observation)])
         else:

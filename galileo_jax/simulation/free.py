@@ -7,6 +7,7 @@ The laws are the effects' (`rollout/engine_free.rates`); integrator and bounces 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -30,6 +31,7 @@ from galileo_jax.rollout.engine_free import (
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.hidden import Hidden, prior_value
+from galileo_jax.simulation.level import LevelTruth
 from galileo_jax.simulation.motion import RECORD_S, Motion
 from galileo_jax.simulation.pendulum import swung
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
@@ -122,6 +124,7 @@ def draw_free(
     return FreeTruth(scenario, thing, values, (0.0, top_m), seconds + release, release)
 
 
+Truth = TypeVar("Truth", FreeTruth, LevelTruth)
 Drawn = tuple[dict[str, float], float, float]  # parameters, height of the start, seconds
 
 
@@ -180,7 +183,7 @@ DRAWS = {
 }
 
 
-def hide_free(truth: FreeTruth, hidden: Hidden, rng: np.random.Generator) -> FreeTruth:
+def hide_free(truth: Truth, hidden: Hidden, rng: np.random.Generator) -> Truth:
     """Puts an effect into a truth; what is not given is drawn from its prior.
 
     A strength from 0 (weak) to 1 (strong) says where in the prior the first parameter is.

@@ -15,7 +15,7 @@ SHAPES: dict[str, tuple[Shape, ...]] = {
 }
 """Scenarios on a ramp, and the shapes of their objects where none are given."""
 
-FREE_SCENARIOS = ("fall", "flight", "spring", "liquid", "pendulum")
+FREE_SCENARIOS = ("fall", "flight", "spring", "liquid", "pendulum", "from_above")
 SCENARIO_NAMES = (*SHAPES, *FREE_SCENARIOS)
 CAMERA_FAULTS = ("keystone", "roll", "origin", "points")
 DIRECTIONS = ("right", "left")

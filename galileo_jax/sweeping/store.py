@@ -128,6 +128,7 @@ class Store:
             Observation(names=names, **arrays),
             modes_m=modes,
             is_squared=bool(notes.get("is_squared", False)),
+            is_turning=bool(notes.get("is_turning", False)),
         )
         said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
         astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
@@ -142,7 +143,7 @@ class Store:
         notes = {name: getattr(one, name) for name in ("inferred", "doubts", "remarks")}
         notes["cuts"] = [vars(entry) for entry in one.cuts]
         notes["astray"] = [vars(entry) for entry in one.astray]
-        notes["is_squared"] = seen.is_squared
+        notes |= {"is_squared": seen.is_squared, "is_turning": seen.is_turning}
         arrays = {name: getattr(seen, name) for name in ARRAYS}
         if seen.modes_m is not None:
             arrays["modes_m"] = seen.modes_m

@@ -64,8 +64,9 @@ def test_nothing_contradicts_anything_else(tmp_path, scenario, case):
     shown = np.concatenate([[path.along, path.across] for path in check.paths], axis=1)
     assert np.nansum(shown**2) == pytest.approx(np.nansum(white**2), rel=SAME)
 
-    chi2, said = error["chi2_per_dof"], fit_quality(fit.result)
-    assert float(re.search(r"freedom ([\d.]+)\)", said)[1]) == pytest.approx(chi2, abs=0.006)
+    chi2, said = error["chi2_per_dof"], fit_quality(dict(fit.result))
+    (stated,) = re.findall(r"freedom ([\d.]+)\)", said)
+    assert float(stated) == pytest.approx(chi2, abs=0.006)
     lead = adequacy(check.found, check.fit.effects)
     fails = [path for path in check.paths if path.failing_s is not None]
     assert ("not adequate" in lead) == (not check.is_adequate)

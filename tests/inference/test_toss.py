@@ -52,10 +52,10 @@ def tosses(tmp_path_factory) -> list[Path]:
         starts = [
             thrown(
                 solid,
-                np.array([0.2, 0.1, 0.17]),
-                rng.normal(size=4),
-                np.array([*rng.normal(0, 0.7, 2), 0.2]),
-                rng.normal(0, 4, 3),
+                jnp.array([0.2, 0.1, 0.17]),
+                jnp.asarray(rng.normal(size=4)),
+                jnp.array([*rng.normal(0, 0.7, 2), 0.2]),
+                jnp.asarray(rng.normal(0, 4, 3)),
             )
             for _ in range(count)
         ]

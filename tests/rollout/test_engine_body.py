@@ -28,7 +28,8 @@ def precision():
 
 
 def cube(friction=0.18, restitution=0.125, gravity=G, size=(EDGE_M,) * 3, round_m=0.0) -> Solid:
-    return box(jnp.array(size), friction, restitution, gravity, 0.0, round_m)
+    numbers = (jnp.asarray(value) for value in (friction, restitution, gravity, 0.0))
+    return box(jnp.array(size), *numbers, round_m)  # pyright: ignore[reportCallIssue]
 
 
 def start(solid, height=0.15, quaternion=TURNED, velocity=(1.0, 0.2, 0.5), spin=(3.0, -5.0, 4.0)):

@@ -15,6 +15,7 @@ class Scenario:
       has_ramp: it needs `ramp_angle_deg`, and its objects slide on the ramp or the table.
       has_table: the ramp ends on a table.
       num_objects: (fewest, most) objects; None means no upper limit.
+      is_level: objects slide on a level table that is seen from above.
       moves_in_plane: the path bends freely; False: it is straight, or a ramp and a table.
       laws: names of the laws of motion that are always there (`effects/laws/`).
       without: effects that have no place, because the laws do the same or the picture cannot
@@ -27,6 +28,7 @@ class Scenario:
     has_ramp: bool
     num_objects: tuple[int, int | None] = (1, 1)
     has_table: bool = False
+    is_level: bool = False
     moves_in_plane: bool = False
     laws: tuple[str, ...] = ()
     without: tuple[str, ...] = ()

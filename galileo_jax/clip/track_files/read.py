@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, ClipFile, short
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
@@ -93,6 +94,13 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
         if file.track_up == "z":
             observation = _turned_up(yaml_path, path, observation)
         _check_names(yaml_path, path, file, observation.names)
+        is_level, third = SCENARIOS[file.scenario].is_level, observation.position_m.shape[1] == 3
+        if third and is_level != observation.is_turning:
+            column = "angle_rad" if observation.is_turning else "z_m"
+            raise InputError(
+                f"{path}: column '{column}': means nothing in scenario {file.scenario}; "
+                "leave it out"
+            )
         return FileTrack(observation, "m", _frame_rate(observation.times_s), is_own=True)
     table = _reader(path, head).read(path)
     table, warnings = _in_declared_order(yaml_path, path, file, table)

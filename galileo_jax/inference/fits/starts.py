@@ -55,7 +55,7 @@ def _in_range(trials: JointProblem, index: int, share: np.ndarray) -> np.ndarray
     if parameter.role != "main" or not parameter.name.startswith("k"):
         return share
     scene = trials.problems[0].model.scene.surroundings
-    if parameter.name != "k1":
+    if parameter.name != "k1" or scene.is_level:
         return 0.5 * share**2 + 0.01  # as many between 0.01 and 0.13 as above
     # Above tan(angle) nothing slides and every start looks alike.
     steepest = min(float(np.tan(scene.angle_rad)), 0.98)

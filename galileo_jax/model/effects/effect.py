@@ -59,6 +59,20 @@ class Bounce(NamedTuple):
     grip: Array
 
 
+class Rims(NamedTuple):
+    """What happens where the rims of discs meet.
+
+    Attributes:
+      restitution: `[...]`, of the speed along the centres.
+      grip: `[...]`, the most that the impulse across them is, as a share of that along them.
+      offset_m: `[..., object, 2]`, where each disc is beside where it was seen.
+    """
+
+    restitution: Array
+    grip: Array
+    offset_m: Float[AnyArray, "... object 2"]
+
+
 # In `Surroundings.expected`: of a high fall; how well the angle and the origin are known.
 FALL_LENGTH, ANGLE, ORIGIN = "fall_length", "declared_angle", "origin_m"
 PENDULUM = "pendulum"  # the law under which the path is a circle
@@ -147,9 +161,14 @@ class Surroundings:
     expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
+    def is_level(self) -> bool:
+        """Whether objects slide on a level table that is seen from above."""
+        return self.has_surface and self.moves_in_plane
+
+    @property
     def starts_moving(self) -> bool:
         """Whether nothing is let go: the object moves when it is first seen."""
-        return "start_velocity" in self.laws
+        return "start_velocity" in self.laws or self.is_level
 
     @property
     def is_thrown(self) -> bool:
@@ -158,7 +177,7 @@ class Surroundings:
 
     @property
     def num_axes(self) -> int:
-        """2, or 3 of what was measured in space: x, y (up), z."""
+        """2, or 3 of what was measured in space: x, y (up), z; from above x, y, turning (rad)."""
         return len(self.start_m[0])
 
     @property
@@ -226,7 +245,10 @@ class Effect:
     def start_velocity(
         self, theta: Theta, scene: Surroundings
     ) -> Float[AnyArray, "... object 2"] | None:
-        """Returns the velocity in the plane at the start `[..., object, 2]`, m/s, or None."""
+        """Returns the velocity in the plane at the start `[..., object, 2]`, m/s, or None.
+
+        In space `[..., object, 3]`; from above the third is the turning, rad/s.
+        """
         return None
 
     def force(self, theta: Theta, scene: Surroundings) -> Force | None:
@@ -259,7 +281,8 @@ class Effect:
     def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
         """Returns how much steeper ramp and table are than declared, rad, each `[...]`, or None.
 
-        In the plane: how far gravity points forward of the picture's vertical, and 0.
+        In the plane: how far gravity points forward of the picture's vertical, and 0. From above:
+        how much the table falls towards x, and towards y.
         """
         return None
 
@@ -285,6 +308,10 @@ class Effect:
 
     def bounce(self, theta: Theta, scene: Surroundings) -> Bounce | None:
         """Returns the floor, or None where there is none to bounce on."""
+        return None
+
+    def rims(self, theta: Theta, scene: Surroundings) -> Rims | None:
+        """Returns what hits of discs do that are seen from above, or None."""
         return None
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:

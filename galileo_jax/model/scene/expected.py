@@ -20,6 +20,7 @@ from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
 from galileo_jax.model.scene.board_path import board_shape
+from galileo_jax.model.scene.level_starts import level_starts
 from galileo_jax.model.scene.pendulum_expected import pendulum_expected
 from galileo_jax.model.scene.period import period_s
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
@@ -52,6 +53,8 @@ def expected(
             declared["start_speed"] = (speed, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
         is_board = not SCENARIOS[clip.scenario].has_table
         return declared | (board_shape(clip, observation) if is_board else {})
+    if SCENARIOS[clip.scenario].is_level:
+        return declared | level_starts(observation, half_height_m)
     down_m = place_m[1, 0] - place_m[1]
     velocity = _start_velocity(times_s, place_m)
     middle = (float(down_m.min()) + float(down_m.max())) / 2

@@ -125,14 +125,14 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
     Object 1 starts on the ramp where it is first seen (projected onto the surface), every
     other object on the table, in the order of the travel. `incline` is the same scene without
     the table; `fall` (and a spring, a liquid) is an incline straight down, without a board; in
-    the plane of a `flight` there is no path to begin with.
+    the plane of a `flight`, and on a table seen from above, there is no path to begin with.
 
     Raises:
       InputError: an object is never seen, or one stands before the one declared before it.
     """
     scenario = SCENARIOS[clip.scenario]
-    has_surface, has_table = scenario.has_ramp, scenario.has_table
-    if has_surface:
+    has_surface, has_table = scenario.has_ramp or scenario.is_level, scenario.has_table
+    if scenario.has_ramp:
         assert clip.ramp_angle_deg is not None  # the clip's own validation
         angle = math.radians(clip.ramp_angle_deg)
     else:
@@ -172,10 +172,10 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         is_scale_known=clip.is_scale_known,
         has_surface=has_surface,
         mass_kg=tuple(declared.mass_kg for declared in clip.objects),
-        **(rolling(clip.objects) if has_surface else {}),
+        **(rolling(clip.objects) if scenario.has_ramp else {}),
         moves_in_plane=scenario.moves_in_plane,
         laws=laws_of(clip),
-        expected=expected(clip, observation, half[0][1]),
+        expected=expected(clip, observation, half[0][int(not scenario.is_level)]),
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
 
@@ -206,7 +206,7 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
     """
     frame_s = 1.0 / clip.fps
     declared = clip.objects[0].first_frame
-    if StartVelocity.name in laws_of(clip):
+    if StartVelocity.name in laws_of(clip) or SCENARIOS[clip.scenario].is_level:
         return float(observation.times_s[np.argmax(observation.mask[0])]), frame_s
     if clip.scenario == "ramp" and declared is not None:
         return declared * frame_s, frame_s / 3

@@ -8,7 +8,8 @@ from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.laws.floor import Floor
 from galileo_jax.model.effects.laws.liquid import Liquid
 from galileo_jax.model.effects.laws.pendulum import Pendulum
+from galileo_jax.model.effects.laws.pucks import Pucks
 from galileo_jax.model.effects.laws.spring import Spring
 from galileo_jax.model.effects.laws.start_velocity import StartVelocity
 
-LAWS: tuple[Effect, ...] = (Spring(), Liquid(), Pendulum(), StartVelocity(), Floor())
+LAWS: tuple[Effect, ...] = (Spring(), Liquid(), Pendulum(), StartVelocity(), Floor(), Pucks())

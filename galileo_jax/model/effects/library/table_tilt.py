@@ -2,7 +2,8 @@
 
     q'' = g (sin b - k cos b)  on the table,    b = table_tilt
 
-positive where it falls away from the ramp.
+positive where it falls away from the ramp. Of a table seen from above: towards x, and as
+`table_tilt_y` towards y.
 
 Source: Galileo, Discorsi, third day (1638).
 Confused with: surface_friction (k1 on the table) where object 2 is not moved; both
@@ -10,6 +11,7 @@ frictions on the table, where both objects move: only the direction in the pictu
 """
 
 import math
+from dataclasses import replace
 from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
@@ -26,14 +28,17 @@ class TableTilt(Effect):
     name: ClassVar[str] = "table_tilt"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The table's slope; none without a table."""
-        if not scene.has_table:
-            return ()
-        return (Parameter("table_tilt", "rad", PRIOR, 0.0, "effect", 0.05),)
+        """The table's slope, from above both; none without a table."""
+        tilt = Parameter("table_tilt", "rad", PRIOR, 0.0, "effect", 0.05)
+        if scene.is_level:
+            return (tilt, replace(tilt, name="table_tilt_y"))
+        return (tilt,) if scene.has_table else ()
 
     def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
         """Of the table alone."""
         if not self.parameters(scene):
             return None
         slope = theta["table_tilt"]
+        if scene.is_level:
+            return slope, theta["table_tilt_y"]
         return 0.0 * slope, slope

@@ -23,7 +23,7 @@ class ContactGap(Effect):
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How much further, m; none where there is nothing to hit."""
-        if len(scene.names) < 2:
+        if len(scene.names) < 2 or scene.is_level:
             return ()
         return (Parameter("contact_gap", "m", PRIOR, 0.0, "nuisance", 0.2),)
 

@@ -21,7 +21,7 @@ class ImpactRestitution(Effect):
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The coefficient; none where there is nothing to hit."""
-        if len(scene.names) < 2:
+        if len(scene.names) < 2 or scene.is_level:
             return ()
         return (Parameter("impact_restitution", "1", PRIOR, 0.0, "nuisance", 0.2),)
 

@@ -17,8 +17,8 @@ class PixelScale(Effect):
     name: ClassVar[str] = "pixel_scale"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The scale, px/m; none where it is declared."""
-        if scene.is_scale_known:
+        """The scale, px/m; none where it is declared, or lengths are in radii of a puck."""
+        if scene.is_scale_known or scene.is_level:
             return ()
         prior = LogNormal(NOMINAL_SCALE_PX_PER_M, 1.0)
         nominal = NOMINAL_SCALE_PX_PER_M
@@ -26,7 +26,7 @@ class PixelScale(Effect):
 
     def measure(self, position_m: Array, theta: Theta, scene: Surroundings) -> Array:
         """The centres in nominal metres, about object 1's start (the picture's origin)."""
-        if scene.is_scale_known:
+        if scene.is_scale_known or scene.is_level:
             return position_m
         xp = position_m.__array_namespace__()
         origin = xp.asarray(scene.start_m[0])[:, None]

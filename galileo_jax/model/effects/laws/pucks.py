@@ -1,0 +1,104 @@
+"""Pucks: discs on a level table, seen from above.
+
+    w = (v_x, v_y, r turning / sqrt(2)),    w' = -k g w / |w|
+
+A puck's friction is opposed to its sliding and its turning together: it slides straight and turns
+evenly less, both come to rest at once, and friction takes k m g of its energy m w^2 / 2 for each
+metre of |w|. This is the ellipsoidal limit surface with a torque of m k g r / sqrt(2) about the
+centre of a puck that turns on the spot (evenly pressed discs: 2/3 in place of 0.71; rings: 1).
+
+At a hit, n along the centres and t across them,
+
+    v_n+ = -e v_n-,    |J_t| <= grip J_n    or as much as stops the rims' slip
+
+Closed form: without another force a puck stops after v^2 / (2 k g); discs of the same mass that
+meet head-on at e = 1 exchange their velocities.
+
+Source: Goyal, Ruina and Papadopoulos (1991), Planar sliding with dry friction, Wear 143, 307; Howe
+and Cutkosky (1996), Practical force-motion models for sliding manipulation, Int. J. Robotics Res.
+15, 557; Farkas et al. (2003), Frictional coupling between sliding and spinning motion, Phys. Rev.
+Lett. 90, 248302 (both stop at once); Walton (1993), in: Particulate two-phase flow (impact).
+"""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Rims, Surroundings, Theta
+from galileo_jax.model.parameters import Normal, Parameter, Uniform
+
+OFFSET = (
+    "hit_offset"  # in `Surroundings.expected`: how well places relative to each other are known
+)
+START = ("start_velocity_x", "start_velocity_y", "start_turning")
+
+
+class Pucks(Effect):
+    """Start velocities, the rims' restitution and grip, and where exactly they meet."""
+
+    name: ClassVar[str] = "pucks"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Of what moves when it is first seen its velocities; of several pucks what a hit does."""
+        if self.name not in scene.laws:
+            return ()
+        units = ("m/s", "m/s", "rad/s")[: scene.num_axes]
+        found = [
+            Parameter(name, unit, Normal(*scene.expected[name]), 0.0, "main", 0.05, per_clip=True)
+            for i in range(len(scene.names))
+            for name, unit in zip(_starts(scene, i), units, strict=True)
+            if name in scene.expected
+        ]
+        if len(scene.names) > 1:
+            found += [
+                Parameter("restitution", "1", Uniform(0.0, 1.0), 0.0, "main", 0.05),
+                Parameter("grip", "1", Uniform(0.0, 1.0), 0.0, "main", 0.1),
+            ]
+            place = Normal(*scene.expected[OFFSET])
+            found += [
+                Parameter(f"{OFFSET}_{axis}{i + 1}", "m", place, 0.0, "nuisance", 0.1)
+                for i in range(1, len(scene.names))
+                for axis in "xy"
+            ]
+        return tuple(found)
+
+    def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Of every puck; 0 of those that rest."""
+        if self.name not in scene.laws:
+            return None
+        zero = 0.0 * theta["m1"]
+        rows = [
+            [theta[name] if name in scene.expected else zero for name in _starts(scene, i)]
+            for i in range(len(scene.names))
+        ]
+        xp = zero.__array_namespace__()
+        return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+
+    def rims(self, theta: Theta, scene: Surroundings) -> Rims | None:
+        """What a hit does, and where the pucks are beside where they were seen."""
+        if self.name not in scene.laws:
+            return None
+        zero = 0.0 * theta["m1"]
+        xp = zero.__array_namespace__()
+        places = [xp.stack([zero, zero], axis=-1)]
+        for i in range(1, len(scene.names)):
+            places.append(xp.stack([theta[f"{OFFSET}_{axis}{i + 1}"] for axis in "xy"], axis=-1))
+        if len(scene.names) == 1:
+            return Rims(zero, zero, xp.stack(places, axis=-2))
+        return Rims(theta["restitution"], theta["grip"], xp.stack(places, axis=-2))
+
+    def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
+        """Where nobody knows how long a metre is: decelerations in radii of the puck."""
+        if self.name not in scene.laws or scene.is_scale_known:
+            return {}
+        return {
+            f"deceleration{i + 1}": (
+                theta[f"k{i + 1}"] * scene.gravity / scene.half_length_m[i],
+                "radii/s^2",
+            )
+            for i in range(len(scene.names))
+        }
+
+
+def _starts(scene: Surroundings, i: int) -> tuple[str, ...]:
+    """Names of a puck's start velocity, as many as the track has axes."""
+    return tuple(f"{name}{i + 1}" for name in START[: scene.num_axes])

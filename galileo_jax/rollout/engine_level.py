@@ -1,0 +1,249 @@
+"""The rigid engine seen from above: discs that slide and turn on a level table.
+
+Each disc is a point (x, y, s) with s = r turning / sqrt(2), whose friction has one size and points
+against its velocity (`effects/laws/pucks.py`). Between events a midpoint step of 1/240 s is exact
+for constant friction on a level table, and second order for every other law; a stop or a hit is
+met at its time, by Newton's method on the step itself, so that the motion is a continuous function
+of the parameters with the right derivatives, as in `engine_rigid`.
+
+Discs that touch and press are held apart by small plastic impacts.
+"""
+
+import math
+from itertools import combinations
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from galileo_jax.model.effects.effect import Effect, Rims, Surroundings
+from galileo_jax.rollout.engine_free import start_velocity
+from galileo_jax.rollout.engine_jax import EngineJax
+from galileo_jax.rollout.event_loop import recorded, step_by_events
+from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
+
+MAX_EVENTS = 16  # within one recorded step
+PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
+TOUCH_M_S = 1e-9
+NEWTON_STEPS = 3
+ROOT2 = math.sqrt(2.0)
+
+
+class Discs(NamedTuple):
+    """All discs of one rollout, or their rates of change.
+
+    Attributes:
+      place_m, speed_m_s: `[object, 3]`, x, y and r turning / sqrt(2).
+      way_m: `[object]`, how far each has come along its curve.
+    """
+
+    place_m: Float[jax.Array, "object 3"]
+    speed_m_s: Float[jax.Array, "object 3"]
+    way_m: Float[jax.Array, " object"]
+
+    def after(self, a: jax.Array, t: jax.Array) -> "Discs":
+        """At a constant acceleration `[object, 3]`."""
+        along = _length(self.speed_m_s[:, :2])
+        return Discs(
+            self.place_m + self.speed_m_s * t + 0.5 * a * t**2,
+            self.speed_m_s + a * t,
+            self.way_m + along * t,
+        )
+
+
+class Table(NamedTuple):
+    """What does not change in a rollout.
+
+    Attributes:
+      law: the equations of motion.
+      rims: what a hit does.
+      radius_m: `[object]`, true.
+    """
+
+    law: Dynamics
+    rims: Rims
+    radius_m: jax.Array
+
+
+def roll_out(
+    effects: tuple[Effect, ...],
+    names: tuple[str, ...],
+    num_records: int,
+    dt_s: float,
+    theta: jax.Array,
+    scene: Surroundings,
+    count: jax.Array | None = None,
+) -> tuple[jax.Array, jax.Array]:
+    """One rollout: `[parameter]` to centres and velocities, each `[object, axis, record]`.
+
+    The third axis, where the track has one, is the turning, rad. Of records beyond the first
+    `count` places are as in the last of these.
+    """
+    named = {name: theta[i] for i, name in enumerate(names)}
+    law = dynamics(effects, scene, named, jnp)
+    rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
+    velocity = start_velocity(effects, named, scene)
+    assert velocity is not None  # the pucks' law gives one
+    seen = jnp.asarray(scene.start_m)
+    shown = _magnified(effects, named, scene)
+    table = Table(law, rims, jnp.asarray(scene.half_length_m))
+    # Starts and turning as the camera's scale will show them.
+    start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
+    turning = velocity[:, 2] if scene.num_axes == 3 else jnp.zeros(len(scene.names))
+    discs = Discs(
+        jnp.concatenate([start, jnp.zeros((len(start), 1))], axis=1),
+        jnp.concatenate([velocity[:, :2], (table.radius_m * turning / ROOT2)[:, None]], axis=1),
+        jnp.zeros(len(scene.names)),
+    )
+
+    def step(discs: Discs, index: jax.Array) -> Discs:
+        return _step(discs, index * dt_s, dt_s, table, scene)
+
+    found = recorded(step, discs, num_records, count)
+    place, speed = (jnp.moveaxis(each, 0, -1) for each in (found.place_m, found.speed_m_s))
+    if scene.num_axes == 2:
+        return place[:, :2], speed[:, :2]
+    per_turn = ROOT2 / table.radius_m[:, None, None] / shown
+    turned = seen[0, 2] + (seen[:, 2:, None] - seen[0, 2]) / shown + per_turn * place[:, 2:]
+    return (
+        jnp.concatenate([place[:, :2], turned], axis=1),
+        jnp.concatenate([speed[:, :2], per_turn * speed[:, 2:]], axis=1),
+    )
+
+
+def _magnified(effects: tuple[Effect, ...], named: dict[str, Any], scene: Surroundings) -> Any:
+    """How many times as large as they are the camera shows lengths (about object 1's start)."""
+    origin = jnp.asarray(scene.start_m)[:, :, None]
+    ends = jnp.concatenate([origin, origin + 1.0], axis=-1)
+    for effect in effects:
+        ends = effect.measure(ends, named, scene)
+    return ends[0, 0, 1] - ends[0, 0, 0]
+
+
+def _step(discs: Discs, time_s: jax.Array, dt_s: float, table: Table, scene: Surroundings) -> Discs:
+    """One recorded step, event by event."""
+
+    def advance(discs: Discs, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
+        return _to_next_event(discs, time_s, left_s, is_last, table, scene)
+
+    return step_by_events(advance, discs, time_s, dt_s, MAX_EVENTS)
+
+
+def _to_next_event(
+    discs: Discs,
+    time_s: jax.Array,
+    left_s: jax.Array,
+    is_last: jax.Array,
+    table: Table,
+    scene: Surroundings,
+) -> tuple[Discs, jax.Array]:
+    """Moves on to the next event, or by `left_s`; returns the discs and the time it took."""
+    pairs = np.array(list(combinations(range(len(scene.names)), 2)), int).reshape(-1, 2)
+    a = _acceleration(discs, time_s, table.law, scene)
+    half = 0.5 * jnp.minimum(left_s, jnp.min(_stops(discs, a)))
+    middle = discs.after(a, half)
+    a = _acceleration(middle, time_s + half, table.law, scene)
+    # What rests stays, whatever the half step before it rounds to.
+    rests = (_length(discs.speed_m_s) == 0) & (_length(a) == 0)
+    a = jnp.where(rests[:, None], 0.0, a)
+    stops, hits = _stops(discs, a), _hits(discs, a, pairs, left_s, table)
+    soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([stops, hits])))
+    t = jnp.where(is_last, left_s, soonest)
+    moved = discs.after(a, t)
+    speed = jnp.where((stops <= t)[:, None], 0.0, moved.speed_m_s)
+    for k, pair in enumerate(pairs):
+        struck = _struck(moved.place_m, speed, pair, table)
+        speed = jnp.where(hits[k] <= t, struck, speed)
+    return moved._replace(speed_m_s=speed), t
+
+
+def _acceleration(discs: Discs, time_s: jax.Array, law: Dynamics, scene: Surroundings) -> jax.Array:
+    """Of every disc, `[object, 3]`."""
+    speed = discs.speed_m_s
+    size, along = _length(speed), _length(speed[:, :2])
+    forward = speed[:, :2] / jnp.where(along > 0, along, 1.0)[:, None]
+    drive = law.drive(state_at(discs.way_m, along, time_s, scene)) / law.inertia
+    brake = law.brake(state_at(discs.way_m, size, time_s, scene)) / law.inertia
+    downhill = law.gravity * jnp.stack([jnp.sin(law.ramp_rad), jnp.sin(law.table_rad)])
+    pull = jnp.concatenate(
+        [drive[:, None] * forward + downhill, jnp.zeros((len(scene.names), 1))], axis=1
+    )
+    strength = _length(pull)
+    against = jnp.where(
+        (size > 0)[:, None],
+        speed / jnp.where(size > 0, size, 1.0)[:, None],
+        pull / jnp.where(strength > 0, strength, 1.0)[:, None],
+    )
+    held = (size == 0) & (strength <= brake)
+    return jnp.where(held[:, None], 0.0, pull - brake[:, None] * against)
+
+
+def _stops(discs: Discs, a: jax.Array) -> jax.Array:
+    """When each disc comes to rest at constant acceleration, s; inf where it does not."""
+    size = _length(discs.speed_m_s)
+    moves = size > 0
+    slows = -jnp.sum(discs.speed_m_s * a, axis=1) / jnp.where(moves, size, 1.0)
+    ends = moves & (slows > 0)
+    return jnp.where(ends, size / jnp.where(ends, slows, 1.0), jnp.inf)
+
+
+def _hits(
+    discs: Discs, a: jax.Array, pairs: np.ndarray, left_s: jax.Array, table: Table
+) -> jax.Array:
+    """When the rims of each pair meet, s `[pair]`; inf where they do not within `left_s`."""
+    one, other = pairs.T
+    apart = (discs.place_m[other] - discs.place_m[one])[:, :2]
+    u, du = (discs.speed_m_s[other] - discs.speed_m_s[one])[:, :2], (a[other] - a[one])[:, :2]
+    reach = table.radius_m[one] + table.radius_m[other]
+    closing, square = jnp.sum(apart * u, axis=1), jnp.sum(u**2, axis=1)
+    gap = jnp.sum(apart**2, axis=1) - reach**2
+    root2 = closing**2 - square * gap
+    # Pairs that press against each other without a speed close within the step all the same.
+    meets = (closing < -TOUCH_M_S * reach) & (root2 > 0)
+    root = jnp.sqrt(jnp.where(meets, root2, 1.0))
+    at = jnp.where(meets, gap / jnp.where(meets, root - closing, 1.0), jnp.inf)
+    at = jax.lax.stop_gradient(jnp.where(meets, jnp.clip(at, 0.0, left_s), 0.0))
+    for _ in range(NEWTON_STEPS):
+        # The last of the steps carries the derivative of the instant.
+        at = jax.lax.stop_gradient(at)[:, None]
+        there, speed = apart + u * at + 0.5 * du * at**2, u + du * at
+        distance = _length(there)
+        way = jax.lax.stop_gradient(jnp.sum(there * speed, axis=1) / distance)
+        at = at[:, 0] - (distance - reach) / jnp.where(way < 0, way, -jnp.inf)
+    return jnp.where(meets & (at <= left_s), jnp.maximum(at, 0.0), jnp.inf)
+
+
+def _struck(place_m: jax.Array, speed_m_s: jax.Array, pair: np.ndarray, table: Table) -> jax.Array:
+    """Speeds `[object, 3]` after a hit of two discs, one from object `pair[0]` to `pair[1]`."""
+    one, other = (int(i) for i in pair)
+    apart = (place_m[other] - place_m[one])[:2]
+    normal = apart / _length(apart)
+    across = jnp.stack([-normal[1], normal[0]])
+    u = (speed_m_s[other] - speed_m_s[one])[:2]
+    mass = table.law.mass[jnp.array([one, other])]
+    reduced = 1.0 / jnp.sum(1.0 / mass)
+    approach = -jnp.sum(u * normal)
+    e = jnp.where(approach > PLASTIC_M_S, table.rims.restitution, 0.0)
+    push = jnp.maximum((1.0 + e) * approach, 0.0) * reduced
+    slip = jnp.sum(u * across) - ROOT2 * (speed_m_s[one, 2] + speed_m_s[other, 2])
+    # J = m r^2 / 2: turning adds twice the inverse mass.
+    most = table.rims.grip * push
+    rub = jnp.clip(-slip * reduced / 3.0, -most, most)
+    impulse = push * normal + rub * across
+    change = jnp.concatenate([impulse, -ROOT2 * rub[None]])
+    back = jnp.concatenate([-impulse, -ROOT2 * rub[None]])
+    return speed_m_s.at[other].add(change / mass[1]).at[one].add(back / mass[0])
+
+
+def _length(vectors: jax.Array) -> jax.Array:
+    """Over the last axis, with a finite derivative at 0."""
+    square = jnp.sum(vectors**2, axis=-1)
+    return jnp.where(square > 0, jnp.sqrt(jnp.where(square > 0, square, 1.0)), 0.0)
+
+
+class EngineLevel(EngineJax):
+    """Discs on a level table, see the module."""
+
+    roll_out = staticmethod(roll_out)

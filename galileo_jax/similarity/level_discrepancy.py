@@ -1,0 +1,63 @@
+"""What is imperfect in measurements of pucks seen from above, as covariance (see `discrepancy`).
+
+Offsets of each puck and axis; what camera and tracker do, which wander by tenths of a pixel; a real
+hit's duration; and, where the turning
+is known, a followed point that is not the centre, which goes round it.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.observation.observation import Observation
+from galileo_jax.similarity.discrepancy import (
+    HIT_STEP_SD_M,
+    WOBBLE_S,
+    WOBBLE_SD_M,
+    camera,
+    offsets,
+    wander,
+)
+
+NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other in some frame
+CENTRE_SHARE = 0.1  # of a radius: how far a followed point may be from the centre
+
+
+def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) -> np.ndarray:
+    """The patterns times their standard deviations, `[mode, object, axis, frame]`, m (and rad)."""
+    position = np.nan_to_num(observation.position_m)
+    found = offsets(observation)
+    if is_filmed:
+        for pattern in camera(position[:, :2], observation, scene):
+            own = np.zeros_like(position)
+            own[:, :2] = pattern[:, :2]
+            found.append(own)
+        found.extend(wander(observation, WOBBLE_SD_M, WOBBLE_S))
+    for i, j in combinations(range(len(position)), 2):
+        both = observation.mask[i] & observation.mask[j]
+        apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
+        apart = np.where(both, apart, np.inf)
+        if apart.min() > NEAR * (scene.half_length_m[i] + scene.half_length_m[j]):
+            continue
+        hit = int(np.argmin(apart))
+        for k in (i, j):
+            for axis in range(2):
+                step = np.zeros_like(position)
+                step[k, axis, hit + 1 :] = HIT_STEP_SD_M
+                found.append(step)
+    if observation.is_turning:
+        found.extend(_off_centre(position, scene))
+    return np.stack(found)
+
+
+def _off_centre(position: np.ndarray, scene: Surroundings) -> list[np.ndarray]:
+    """A point that is off its puck's centre, along x and along y when it is first seen."""
+    found = []
+    for i, turned in enumerate(position[:, 2] - position[:, 2, :1]):
+        size = CENTRE_SHARE * scene.half_length_m[i]
+        for x, y in ((np.cos(turned), np.sin(turned)), (-np.sin(turned), np.cos(turned))):
+            own = np.zeros_like(position)
+            own[i, 0], own[i, 1] = size * x, size * y
+            found.append(own)
+    return found

@@ -1,0 +1,201 @@
+"""Pucks on a table seen from above, with known truth.
+
+The laws are the effects'; the motion is stepped finely (`STEP_S`), hits are met within a step, so
+that a clip is no copy of the engine that fits it.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.clip.schema import ClipObject
+from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.laws import LAWS
+from galileo_jax.model.effects.laws.pucks import OFFSET, START
+from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.simulation.motion import Motion
+from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
+
+STEP_S, STEPS_PER_RECORD = 1e-4, 10
+PLASTIC_M_S = 0.02  # slower impacts are plastic, as in every engine
+LONGEST_S = 4.0
+REST_S = 0.2  # looked at so long after everything has come to rest
+SCENARIO = "from_above"
+
+
+@dataclass(frozen=True)
+class LevelTruth:
+    """Pucks, the first of which is pushed.
+
+    Attributes:
+      things: names, shapes and sizes.
+      values: every parameter by name, those of `effects` too.
+      start_m: `[object]`, (x, y) of the centres at the start.
+      effects: what is hidden in the clip.
+    """
+
+    things: tuple[ClipObject, ...]
+    values: Mapping[str, float]
+    start_m: tuple[tuple[float, float], ...]
+    effects: tuple[Effect, ...] = field(default=())
+    scenario: str = SCENARIO
+    gravity: float = GRAVITY_M_S2
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """The scene as the laws see it."""
+        count = len(self.things)
+        radii = tuple((item.size_m or (math.nan,))[0] for item in self.things)
+        moving = [f"{name}1" for name in START]
+        return Surroundings(
+            names=tuple(item.name for item in self.things),
+            angle_rad=0.0,
+            gravity=self.gravity,
+            half_length_m=radii,
+            half_height_m=radii,
+            corner_m=(math.inf,) * count,
+            start_m=tuple((x, y, 0.0) for x, y in self.start_m),
+            start_path_m=(0.0,) * count,
+            has_table=False,
+            comes_down=(False,) * count,
+            moves_in_plane=True,
+            laws=("pucks",),
+            expected=dict.fromkeys([*moving, OFFSET], (0.0, 1.0)),
+        )
+
+
+def draw_level(rng: np.random.Generator, given: Mapping[str, float]) -> LevelTruth:
+    """Draws two pucks, the first on its way to the second, with what `given` leaves open.
+
+    Raises:
+      InputError: a given name is no parameter of the scenario.
+    """
+    radii = np.round(rng.uniform(0.015, 0.03, 2), 3)
+    masses = np.exp(rng.uniform(math.log(0.02), math.log(0.08), 2))
+    frictions = rng.uniform(0.08, 0.3, 2)
+    away, heading = rng.uniform(0.2, 0.4), rng.uniform(-0.5, 0.5)
+    # Past the middle by so much of the reach: from head-on to a glancing hit.
+    aside = rng.uniform(-0.7, 0.7) * radii.sum()
+    speed = math.sqrt(2 * frictions[0] * GRAVITY_M_S2 * away) * rng.uniform(1.4, 2.2)
+    values = {
+        "m1": masses[0],
+        "k1": frictions[0],
+        "m2": masses[1],
+        "k2": frictions[1],
+        "start_velocity_x1": speed * math.cos(heading),
+        "start_velocity_y1": speed * math.sin(heading),
+        "start_turning1": rng.uniform(-15.0, 15.0),
+        "restitution": rng.uniform(0.4, 0.95),
+        "grip": rng.uniform(0.05, 0.35),
+    }
+    for name in given:
+        if name not in values:
+            known = ", ".join(values)
+            raise InputError(f"--set: {SCENARIO} has no parameter {name!r}; known: {known}")
+    values = {name: float(given.get(name, value)) for name, value in values.items()}
+    values |= {f"{OFFSET}_{axis}2": 0.0 for axis in "xy"}
+    x, y = (
+        away * math.cos(heading) - aside * math.sin(heading),
+        away * math.sin(heading) + aside * math.cos(heading),
+    )
+    things = tuple(
+        ClipObject(name=f"object{i + 1}", shape="cylinder", size_m=(float(r), 0.01))
+        for i, r in enumerate(radii)
+    )
+    return LevelTruth(things, values, ((0.0, 0.0), (round(x, 4), round(y, 4))))
+
+
+def solve_level(truth: LevelTruth) -> tuple[Motion, tuple[float, ...]]:
+    """The motion, the turning as `pitch_rad`, and when pucks hit each other, s."""
+    scene = truth.surroundings
+    theta: dict[str, Any] = {name: np.asarray(value) for name, value in truth.values.items()}
+    effects = (*(e for e in truth.effects if e.name not in DECLARED_WRONGLY), *LAWS)
+    law = dynamics(effects, scene, theta, np)
+    radii = np.array(scene.half_length_m)
+    count = len(radii)
+    place, speed = np.zeros((count, 3)), np.zeros((count, 3))
+    place[:, :2] = truth.start_m
+    speed[0] = [truth.values[f"{name}1"] for name in START]
+    speed[:, 2] *= radii / math.sqrt(2)
+    way, hits, rows = np.zeros(count), [], []
+    last = round(LONGEST_S / STEP_S)
+    for index in range(last + 1):
+        if index % STEPS_PER_RECORD == 0:
+            rows.append((place.copy(), speed.copy()))
+        if not speed.any():
+            last = min(last, index + round(REST_S / STEP_S))
+        if index == last:
+            break
+        speed = _rubbed(speed, way, index * STEP_S, law, scene)
+        left = STEP_S
+        for i, j in combinations(range(count), 2):
+            meets = _meets_s(place[j] - place[i], speed[j] - speed[i], radii[i] + radii[j])
+            if meets <= left:
+                place, left = place + meets * speed, left - meets
+                _strike(place, speed, i, j, law, truth.values)
+                hits.append(index * STEP_S + meets)
+        place = place + left * speed
+        way = way + STEP_S * np.hypot(*speed[:, :2].T)
+    places, speeds = (np.moveaxis(np.array(each), 0, -1) for each in zip(*rows, strict=True))
+    times = STEP_S * STEPS_PER_RECORD * np.arange(len(rows))
+    turned = places[:, 2] * math.sqrt(2) / radii[:, None]
+    return Motion(times, places[:, :2], speeds[:, :2], turned), tuple(hits)
+
+
+def _rubbed(
+    speed: np.ndarray, way: np.ndarray, time_s: float, law: Dynamics, scene: Surroundings
+) -> np.ndarray:
+    """Speeds after a step's forces; friction ends a motion, and does not turn it round."""
+    along, size = np.hypot(*speed[:, :2].T), np.linalg.norm(speed, axis=1)
+    drive = law.drive(state_at(way, along, np.asarray(time_s), scene)) / law.inertia
+    brake = law.brake(state_at(way, size, np.asarray(time_s), scene)) / law.inertia
+    pushed = speed.copy()
+    pushed[:, :2] += (
+        STEP_S * drive[:, None] * speed[:, :2] / np.where(along > 0, along, 1.0)[:, None]
+    )
+    pushed[:, 0] += STEP_S * law.gravity * np.sin(law.ramp_rad)
+    pushed[:, 1] += STEP_S * law.gravity * np.sin(law.table_rad)
+    size = np.linalg.norm(pushed, axis=1)
+    left = np.maximum(size - STEP_S * brake, 0.0)
+    return pushed * (left / np.where(size > 0, size, 1.0))[:, None]
+
+
+def _meets_s(apart: np.ndarray, u: np.ndarray, reach: float) -> float:
+    """When two pucks meet at constant speeds, s; inf if never."""
+    closing = float(apart[:2] @ u[:2])
+    if closing >= 0:
+        return math.inf
+    square, gap = float(u[:2] @ u[:2]), float(apart[:2] @ apart[:2]) - reach**2
+    root2 = closing**2 - square * gap
+    return max(gap, 0.0) / (math.sqrt(root2) - closing) if root2 > 0 else math.inf
+
+
+def _strike(
+    place: np.ndarray,
+    speed: np.ndarray,
+    i: int,
+    j: int,
+    law: Dynamics,
+    values: Mapping[str, float],
+) -> None:
+    """Changes the speeds by the impulses of a hit: Newton's along, Coulomb's across."""
+    normal = (place[j] - place[i])[:2]
+    normal /= np.linalg.norm(normal)
+    across = np.array([-normal[1], normal[0]])
+    u, inverse = (speed[j] - speed[i])[:2], 1 / law.mass
+    approach = -u @ normal
+    e = values["restitution"] if approach > PLASTIC_M_S else 0.0
+    push = (1 + e) * approach / (inverse[i] + inverse[j])
+    rims = math.sqrt(2) * (speed[i, 2] + speed[j, 2])
+    stopping = -(u @ across - rims) / (3 * (inverse[i] + inverse[j]))
+    rub = float(np.clip(stopping, -values["grip"] * push, values["grip"] * push))
+    impulse = push * normal + rub * across
+    speed[i, :2] -= impulse * inverse[i]
+    speed[j, :2] += impulse * inverse[j]
+    for k in (i, j):
+        speed[k, 2] -= math.sqrt(2) * rub * inverse[k]

@@ -1,0 +1,148 @@
+"""Discs on a level table: closed forms, conservation, slopes, and the finely stepped solver."""
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from galileo_jax.model.effects.laws import LAWS
+from galileo_jax.model.effects.laws.pucks import OFFSET, START
+from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.rollout.engine_level import roll_out
+from galileo_jax.simulation.level import LevelTruth, draw_level, solve_level
+
+DT_S = 1 / 240
+G = 9.81
+EXACT = 1e-9  # m and m/s, in 64 bit
+ROLL_OUT = jax.jit(roll_out, static_argnums=(0, 1, 2, 3))
+FINE_M = 2e-4  # of the solver's steps of 0.1 ms
+
+
+def truth(seed: int = 0, **values: float) -> LevelTruth:
+    return draw_level(np.random.default_rng(seed), values)
+
+
+def rolled(one: LevelTruth, seconds: float, names=None, theta=None):
+    names = tuple(one.values) if names is None else names
+    theta = jnp.asarray([one.values[name] for name in names]) if theta is None else theta
+    records = round(seconds / DT_S) + 1
+    return ROLL_OUT((*one.effects, *LAWS), names, records, DT_S, theta, one.surroundings)
+
+
+def alone(**values: float) -> LevelTruth:
+    """The first puck, and another that it passes far away."""
+    far = truth(start_velocity_x1=1.0, start_velocity_y1=0.0, **values)  # pyright: ignore[reportArgumentType]
+    return LevelTruth(far.things, far.values, ((0.0, 0.0), (0.0, -1.0)))
+
+
+@pytest.mark.usefixtures("x64")
+def test_a_puck_stops_where_and_when_it_should() -> None:
+    one = alone(k1=0.4, start_turning1=20.0)
+    radius = (one.things[0].size_m or (0.0,))[0]
+    spin = radius * 20.0 / math.sqrt(2)
+    size = math.hypot(1.0, spin)
+    position, velocity = rolled(one, 1.0)
+    stop_s = size / (0.4 * G)
+    # It slides and turns evenly less, to an end at once.
+    assert position[0, 0, -1] == pytest.approx(stop_s / 2, abs=EXACT)
+    assert position[0, 2, -1] == pytest.approx(20.0 * stop_s / 2, abs=1e-7)
+    moves = np.abs(np.asarray(velocity[0, 0])) > 0
+    assert DT_S * np.flatnonzero(moves)[-1] == pytest.approx(stop_s, abs=DT_S)
+    assert not np.asarray(velocity[1]).any()
+    plain, _ = rolled(alone(k1=0.4, start_turning1=0.0), 1.0)
+    assert plain[0, 0, -1] == pytest.approx(1.0 / (2 * 0.4 * G), abs=EXACT)
+
+
+@pytest.mark.usefixtures("x64")
+def test_equal_pucks_head_on_exchange_their_speeds() -> None:
+    drawn = truth(
+        m1=0.05,
+        m2=0.05,
+        k1=1e-5,
+        k2=1e-5,
+        restitution=1.0,
+        start_velocity_x1=1.0,
+        start_velocity_y1=0.0,
+        start_turning1=0.0,
+    )
+    one = LevelTruth(drawn.things, drawn.values, ((0.0, 0.0), (0.3, 0.0)))
+    _, velocity = rolled(one, 1.0)
+    assert velocity[0, :, -1] == pytest.approx([0, 0, 0], abs=1e-3)
+    assert velocity[1, :, -1] == pytest.approx([1, 0, 0], abs=1e-3)
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("seed", range(4))
+def test_a_hit_off_centre_conserves_momenta(seed: int) -> None:
+    one = truth(seed, k1=1e-5, k2=1e-5)
+    masses = np.array([one.values["m1"], one.values["m2"]])
+    radii = np.array([(item.size_m or (0.0,))[0] for item in one.things])
+    position, velocity = (np.asarray(each) for each in rolled(one, 1.0))
+    assert np.abs(velocity[1, :2, -1]).max() > 0.05  # it was hit
+
+    def momenta(k: int) -> np.ndarray:
+        linear = masses @ velocity[:, :2, k]
+        (x, y), (u, v) = position[:, :2, k].T, velocity[:, :2, k].T
+        orbit = x * v - y * u
+        spin = radii**2 / 2 * velocity[:, 2, k]
+        return np.array([*linear, masses @ (orbit + spin)])
+
+    # The table's own friction of 1e-5 is all that takes any.
+    assert momenta(-1) == pytest.approx(momenta(0), abs=1e-4 * masses.sum())
+    rims = (radii[:, None] * velocity[:, 2]) ** 2 / 2
+    energy = masses @ ((velocity[:, :2] ** 2).sum(axis=1) + rims)
+    assert energy[-1] < energy[0]
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("seed", range(6))
+def test_agrees_with_the_fine_solver(seed: int) -> None:
+    one = truth(seed)
+    motion, hits = solve_level(one)
+    position, _ = rolled(one, 1.0)
+    fine = motion.at(DT_S * np.arange(position.shape[-1]))
+    assert len(hits) == 1
+    assert np.abs(np.asarray(position[:, :2]) - fine.position_m).max() < FINE_M
+    assert np.abs(np.asarray(position[:, 2]) - fine.pitch_rad).max() < 0.05
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("name", ["table_tilt", "air_drag", "viscous_drag", "stribeck"])
+def test_effects_agree_with_the_fine_solver(name: str) -> None:
+    one = truth(3)
+    effects = make_effects([name])
+    scene = one.surroundings
+    given = {"table_tilt": 0.02, "table_tilt_y": -0.01, "stribeck": 0.5, "stribeck_speed": 0.3}
+    values = {p.name: given.get(p.name, 0.05) for e in effects for p in e.parameters(scene)}
+    changed = LevelTruth(one.things, {**one.values, **values}, one.start_m, effects)
+    motion, _ = solve_level(changed)
+    position, _ = rolled(changed, 1.0)
+    fine = motion.at(DT_S * np.arange(position.shape[-1]))
+    assert np.abs(np.asarray(position[:, :2]) - fine.position_m).max() < 2 * FINE_M
+    plain, _ = rolled(one, 1.0)
+    assert np.abs(np.asarray(position - plain)).max() > 10 * FINE_M
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("seed", [0, 5])
+def test_slopes_agree_with_differences(seed: int) -> None:
+    one = truth(seed)
+    names = tuple(one.values)
+    theta = np.array([one.values[name] for name in names])
+
+    def at_end(values: jax.Array) -> jax.Array:
+        return rolled(one, 1.0, names, values)[0][..., ::12]
+
+    slopes = np.asarray(jax.jacfwd(at_end)(jnp.asarray(theta)))
+    steps = np.array(1e-6 * np.maximum(np.abs(theta), 0.01))
+    for k, name in enumerate(names):
+        step = steps[k] * np.eye(len(theta))[k]
+        difference = np.asarray(
+            at_end(jnp.asarray(theta + step)) - at_end(jnp.asarray(theta - step))
+        )
+        difference = difference / (2 * steps[k])
+        scale = np.abs(difference).max() + 1e-6
+        assert np.abs(slopes[..., k] - difference).max() < 1e-3 * scale, name
+    assert START[0] + "1" in names and f"{OFFSET}_x2" in names

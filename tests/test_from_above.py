@@ -1,0 +1,107 @@
+"""Pucks seen from above, from a simulated track to what a fit and a diagnosis say of it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+import galileo_jax as gx
+from galileo_jax.measurement.infer_radii import distance_at_hit
+from galileo_jax.measurement.measure import measure
+from galileo_jax.runtime.errors import InputError
+
+FPS = 120.0
+
+
+def made(folder: Path, seed: int, **options) -> tuple[Path, dict[str, float]]:
+    path = folder / f"pucks_{seed}.csv"
+    done = gx.simulate(path, scenario="from_above", seed=seed, track_only=True, fps=FPS, **options)
+    return path, done.truths[0]["parameters"]
+
+
+def edited(path: Path, **keys) -> Path:
+    """The clip with other values for keys of every object (or of the clip)."""
+    at = path.with_suffix(".yaml")
+    content = yaml.safe_load(at.read_text())
+    for item in content["objects"]:
+        item.update({key: value for key, value in keys.items() if key in item})
+    at.write_text(yaml.safe_dump(content))
+    return path
+
+
+def test_what_was_simulated_is_found(tmp_path: Path) -> None:
+    path, true = made(tmp_path, 51)
+    result = gx.fit(path).result
+    assert result["converged"]
+    told = {**result["parameters"], **result["derived"]}
+    true["mass_ratio"] = true["m1"] / true["m2"]
+    for name in ("k1", "k2", "restitution", "mass_ratio", "start_turning1"):
+        assert abs(told[name]["mean"] - true[name]) < 3.5 * told[name]["sd"], name
+        assert told[name]["identified"], name
+    assert told["k2"]["sd"] < 0.01
+
+
+def test_radii_come_from_the_hit(tmp_path: Path) -> None:
+    path, _ = made(tmp_path, 52)
+    sizes = [(item.size_m or (0.0,))[0] for item in gx.load(path).objects]
+    hit = distance_at_hit(measure(gx.load(path)).observation)
+    assert hit is not None
+    assert hit[2] == pytest.approx(sum(sizes), abs=1e-3)
+    one = measure(gx.load(edited(path, size_m=None)))
+    assert [(item.size_m or (0.0,))[0] for item in one.clip.objects] == pytest.approx(
+        [hit[2] / 2] * 2
+    )
+    assert any("from the hit" in line for line in one.remarks)
+
+
+def test_turning_is_read_and_only_from_above(tmp_path: Path) -> None:
+    path, _ = made(tmp_path, 53)
+    seen = measure(gx.load(path)).observation
+    assert seen.axes == ("x", "y", "turning")
+    content = yaml.safe_load(path.with_suffix(".yaml").read_text())
+    content |= {"scenario": "multi", "ramp_angle_deg": 20.0}
+    path.with_suffix(".yaml").write_text(yaml.safe_dump(content))
+    with pytest.raises(InputError, match="angle_rad': means nothing in scenario multi"):
+        gx.load(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("shape: cylinder", "a puck is a cylinder"), ("angle_rad", "are these degrees")],
+)
+def test_bad_input_is_one_line(tmp_path: Path, text: str, said: str) -> None:
+    path, _ = made(tmp_path, 54)
+    if text == "angle_rad":
+        rows = [row.split(",") for row in path.read_text().splitlines()]
+        at = rows[0].index("object1_sd_angle_rad")
+        for row in rows[1:]:
+            row[at] = "5.0"
+        path.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    else:
+        edited(path, shape="sphere", size_m=[0.02])
+    with pytest.raises(InputError, match=said):
+        gx.load(path)
+    with pytest.raises(InputError, match="tracks only"):
+        gx.simulate(tmp_path / "film.mp4", scenario="from_above")
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth(tmp_path: Path) -> None:
+    z = []
+    for seed in range(61, 73):
+        path, true = made(tmp_path, seed)
+        told = gx.fit(path).result["parameters"]
+        z += [
+            (told[name]["mean"] - true[name]) / told[name]["sd"]
+            for name in ("k1", "k2", "restitution", "start_turning1")
+        ]
+    assert np.sqrt(np.mean(np.square(z))) < 1.35
+    assert np.max(np.abs(z)) < 4.5
+
+
+@pytest.mark.slow
+def test_a_tilted_table_is_named(tmp_path: Path) -> None:
+    path, _ = made(tmp_path, 31, effects=["table_tilt"], strength=0.9)
+    verdict = gx.diagnose(path).document["verdict"]
+    assert verdict["effects"] == ["table_tilt"], verdict
