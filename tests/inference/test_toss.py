@@ -44,10 +44,13 @@ def tosses(tmp_path_factory) -> list[Path]:
     """Six tosses of one cube, as the engine makes them, with 0.1 mm and 0.05 degrees of noise."""
     folder, rng, count = tmp_path_factory.mktemp("tosses"), np.random.default_rng(8), 6
     with in_64_bit():
-        solid = box(  # pyright: ignore[reportCallIssue] - the numbers are unpacked
+        solid = box(
             jnp.full(3, TRUE["edge"]),
-            *(jnp.asarray(TRUE[name]) for name in ("friction", "restitution", "gravity", "floor")),
-            TRUE["rounding"],
+            friction=jnp.asarray(TRUE["friction"]),
+            restitution=jnp.asarray(TRUE["restitution"]),
+            gravity=jnp.asarray(TRUE["gravity"]),
+            floor_m=jnp.asarray(TRUE["floor"]),
+            round_m=TRUE["rounding"],
         )._replace(inertia_m2=jnp.full(3, TRUE["inertia"] * TRUE["edge"] ** 2))
         starts = [
             thrown(

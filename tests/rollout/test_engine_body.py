@@ -1,10 +1,11 @@
 """The body engine: conservation laws, closed forms, slopes, and MuJoCo's C engine."""
 
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-import mujoco
+import mujoco as mujoco_stubs
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -14,6 +15,7 @@ from galileo_jax.rollout.body import Pose, Solid, box, energy_j_kg, gaps_m, spin
 from galileo_jax.rollout.engine_body import roll_out, roll_out_batch, substeps_for
 from tests.precision import in_64_bit
 
+mujoco: Any = mujoco_stubs  # its stubs lack what is used here
 EDGE_M, G, FPS = 0.1048, 9.81, 148.0
 FRAMES = 80
 STEPS_S = np.full(FRAMES, 1 / FPS)
