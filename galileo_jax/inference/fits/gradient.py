@@ -259,15 +259,15 @@ class GradientFitter:
         return scattered_round(self.trials, centres, is_open, num, seed)
 
     def _best_valley(self, ends: Ends, free: np.ndarray) -> GradientFit:
-        """Polishes the best of every valley and variants of the first; the most evident fit."""
-        first, *others = ends.best.z
-        variants = self._variants(first, free)
-        points = self._batch(np.stack([*variants, *others]), free)
+        """Polishes the best of every valley and its variants; the most evident fit.
+
+        Variants are of what is polished: at the noise of a search, which is more than the
+        clip's, the other parameters stand where the valleys beside are not yet told apart.
+        """
+        points = self._batch(ends.best.z, free)
         fits = self._polish(points, np.zeros(len(points.z), int), ends.num_steps)
-        best = max(fits, key=lambda row: fits[row].log_evidence)
-        if best < len(variants):
-            return fits[best]
-        return self._best_variant(fits[best].z[: self._count], free, ends.num_steps)
+        best = max(fits.values(), key=_evidence)
+        return self._best_variant(best.z[: self._count], free, ends.num_steps)
 
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
         """Polishes z and variants of it; the most evident fit."""
