@@ -282,7 +282,7 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "lens_without_number": _edit("gravity:", "lens: {k1_sd: 0.1}\ngravity:", "lens.k1", "missing"),
     # values and units
     "unknown_scenario": _edit(
-        "scenario: ramp", "scenario: slope", "slope", "fall, flight, incline"
+        "scenario: ramp", "scenario: slope", "slope", "fall, flight, from_above, incline"
     ),
     "unknown_shape": _edit("shape: box", "shape: cube", "shape", "cube", "box, cylinder"),
     "box_that_rolls": _edit(

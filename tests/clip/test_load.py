@@ -147,6 +147,10 @@ def test_every_scenario_loads(scenario: str, tmp_path: Path) -> None:
     text = GOOD_YAML.replace("scenario: ramp", f"scenario: {scenario}")
     if not SCENARIOS[scenario].has_ramp:
         text = text.replace("ramp_angle_deg: 20.0\n", "")
+    if scenario == "from_above":
+        text = text.replace("shape: box", "shape: cylinder").replace(
+            "[0.06, 0.05, 0.06]", "[0.03, 0.01]"
+        )
     path.write_text(text.split("  - name: object2")[0])
     assert load_clip(path).scenario == scenario
 

@@ -79,8 +79,10 @@ class MiscountedVideo:
 @pytest.mark.parametrize("num_lost", [1, 2])
 def test_one_or_two_missing_frames_are_a_warning(num_lost: int, video: Path, monkeypatch) -> None:
     monkeypatch.setattr(decode.cv2, "VideoCapture", partial(MiscountedVideo, 24 - num_lost))
+    decode._scanned.cache_clear()  # other tests have looked at this video
     info = probe(video)
     assert info.frame_count == 24 - num_lost
+    decode._scanned.cache_clear()
     assert f"{24 - num_lost} of 24" in info.warnings[0]
 
 
