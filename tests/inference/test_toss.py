@@ -1,6 +1,7 @@
 """Joint fits of tosses: starts, the arrow, recovery of what was simulated, the public function."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -14,9 +15,19 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.commands import command
 from galileo_jax.commands import toss as toss_command
-from galileo_jax.inference.toss.residuals import backward, between, forward, small, times
+from galileo_jax.inference.toss.residuals import (
+    COMMON,
+    EDGE,
+    backward,
+    between,
+    forward,
+    small,
+    times,
+)
 from galileo_jax.measurement.measure import measure
+from galileo_jax.measurement.resting_height import resting_height_m
 from galileo_jax.measurement.toss_flight import flight_of
+from galileo_jax.observation.poses import Poses
 from galileo_jax.rollout.body import box, thrown
 from galileo_jax.rollout.engine_body import roll_out_batch
 from galileo_jax.runtime.errors import InputError
@@ -204,3 +215,24 @@ def test_poses_with_y_up_are_turned(tosses, tmp_path):
     assert again.position_m == pytest.approx(poses.position_m, abs=1e-7)
     apart = np.abs(np.sum(again.quaternion * poses.quaternion, axis=1))
     assert apart == pytest.approx(1.0, abs=1e-7)
+
+
+def test_the_height_at_rest_counts_where_a_face_lies_down():
+    frames, upright = 20, np.tile([1.0, 0.0, 0.0, 0.0], (20, 1))
+    place = np.tile([0.1, 0.2, 0.05], (frames, 1))
+    lies = Poses("lies", np.arange(frames) / FPS, place, upright)
+    on_edge = np.tile(
+        Rotation.from_euler("x", 45, degrees=True).as_quat(scalar_first=True), (20, 1)
+    )
+    stands = replace(lies, quaternion=on_edge, position_m=place + [0, 0, 0.02])
+    moves = replace(lies, position_m=place + np.linspace(0, 0.01, frames)[:, None])
+    assert resting_height_m([stands, lies, moves]) == pytest.approx(0.05)
+    assert resting_height_m([stands, moves]) is None
+
+
+def test_the_search_has_the_height_at_rest_in_place_of_the_floor():
+    """Edge and floor change together where that height stays."""
+    z = backward(jnp.array([0.2, 0.1, 0.1, 0.01, 9.8, 0.002, 0.2]))
+    values = dict(zip(COMMON, np.asarray(forward(z.at[EDGE].add(0.1))), strict=True))
+    assert values["edge"] == pytest.approx(0.1 * np.exp(0.1))
+    assert values["floor"] + values["edge"] / 2 == pytest.approx(0.06)

@@ -18,12 +18,14 @@ import numpy as np
 from galileo_jax.inference.toss.least_squares import Solution, solve
 from galileo_jax.inference.toss.residuals import (
     COMMON,
+    FLOOR,
     Seen,
     Start,
     backward,
     forward,
     left_over,
 )
+from galileo_jax.measurement.resting_height import resting_height_m
 from galileo_jax.measurement.toss_flight import Flight, flight_of
 from galileo_jax.observation.poses import Poses
 from galileo_jax.runtime import progress
@@ -33,8 +35,9 @@ PLACE_SD_M, TURN_SD_RAD = 0.001, np.radians(1.0)
 OWN_SD = np.repeat([0.002, 0.02, 0.05, 0.5], 3)  # of a start about what its flight told
 STAGES_S = (0.02, 0.06, 0.1)  # after the first impact
 PRIOR = {"friction": 0.2, "restitution": 0.2, "rounding": 0.002, "inertia": 0.2}  # the middles
-# Widths: of logarithms, of the restitution's log-odds, of the floor in metres.
-PRIOR_SD = np.array([1.0, 1.0, 0.1, 0.003, 0.05, 0.7, 0.3])
+# Widths: of logarithms, of the restitution's log-odds, of the height at rest in metres.
+PRIOR_SD = np.array([1.0, 1.0, 0.03, 0.003, 0.05, 0.7, 0.3])
+REST_SD_M = 2e-4  # of the height at rest, where it is seen: poses are placed to a tenth of it
 FRAMES = 16  # the length of a window is rounded up to multiples, so that fits share programs
 
 _left = jax.jit(jax.vmap(left_over, (None, 0, 0, 0)))
@@ -86,13 +89,17 @@ def fit_poses(
     ends = [flight.last for _, flight in kept]
     usual = {**PRIOR, "edge": edge_m, "floor": 0.0, "gravity": gravity}
     middle = np.asarray(backward(jnp.asarray([usual[name] for name in COMMON])))
+    poses, prior_sd = [one for one, _ in kept], PRIOR_SD.copy()
+    resting_m = resting_height_m(poses)
+    if resting_m is not None:
+        middle = np.where(np.arange(len(middle)) == FLOOR, resting_m, middle)
+        prior_sd[FLOOR] = REST_SD_M
     common, own = middle, np.zeros((len(kept), len(OWN_SD)))
-    poses = [one for one, _ in kept]
     windows = [_until(poses, ends, stage) for stage in stages]
     seen = padded(poses, -(-max(windows[-1]) // FRAMES) * FRAMES + 1)
     for index, until in enumerate(windows):
         with progress.part(index / len(stages), (index + 1) / len(stages)):
-            solution = solve_window(seen, start, until, common, own, middle, PRIOR_SD)
+            solution = solve_window(seen, start, until, common, own, middle, prior_sd)
             common, own = solution.common, solution.own
     by = np.asarray(jax.jacfwd(forward)(jnp.asarray(common)))
     square = np.sum(solution.residuals**2, axis=(1, 2))

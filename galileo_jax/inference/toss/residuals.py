@@ -17,7 +17,7 @@ from galileo_jax.rollout.engine_body import roll_out
 # Inertia: principal moment over mass times edge squared; 1/6 of a solid cube, 5/18 of a thin shell.
 COMMON = ("friction", "restitution", "edge", "floor", "gravity", "rounding", "inertia")
 UNITS = {"edge": "m", "floor": "m", "gravity": "m/s^2", "rounding": "m"}
-RESTITUTION, FLOOR = COMMON.index("restitution"), COMMON.index("floor")
+RESTITUTION, FLOOR, EDGE = (COMMON.index(name) for name in ("restitution", "floor", "edge"))
 SUBSTEPS = 2  # from frame to frame; what that leaves out is far below the model's own errors
 
 
@@ -39,17 +39,22 @@ class Seen(NamedTuple):
 
 
 def forward(z: Float[jax.Array, " common"]) -> Float[jax.Array, " common"]:
-    """From unbounded numbers to the parameters, in their units."""
+    """From unbounded numbers to the parameters, in their units.
+
+    In place of the floor the search has the height of the centre when the cube rests on a face,
+    floor + edge / 2: impacts hardly tell floor and edge apart, and that height is seen.
+    """
     positive = jnp.exp(z)
     share = jax.nn.sigmoid(z[RESTITUTION])
-    return positive.at[RESTITUTION].set(share).at[FLOOR].set(z[FLOOR])
+    return positive.at[RESTITUTION].set(share).at[FLOOR].set(z[FLOOR] - positive[EDGE] / 2)
 
 
 def backward(value: Float[jax.Array, " common"]) -> Float[jax.Array, " common"]:
     """The inverse."""
     share = value[RESTITUTION]
     logs = jnp.log(value.at[FLOOR].set(1.0))
-    return logs.at[RESTITUTION].set(jnp.log(share / (1 - share))).at[FLOOR].set(value[FLOOR])
+    resting = value[FLOOR] + value[EDGE] / 2
+    return logs.at[RESTITUTION].set(jnp.log(share / (1 - share))).at[FLOOR].set(resting)
 
 
 def motion(z: jax.Array, change: jax.Array, start: Start, steps_s: jax.Array) -> Pose:
