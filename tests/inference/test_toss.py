@@ -224,7 +224,7 @@ def test_the_height_at_rest_counts_where_a_face_lies_down():
     on_edge = np.tile(
         Rotation.from_euler("x", 45, degrees=True).as_quat(scalar_first=True), (20, 1)
     )
-    stands = replace(lies, quaternion=on_edge, position_m=place + [0, 0, 0.02])
+    stands = replace(lies, quaternion=on_edge, position_m=place + np.array([0, 0, 0.02]))
     moves = replace(lies, position_m=place + np.linspace(0, 0.01, frames)[:, None])
     assert resting_height_m([stands, lies, moves]) == pytest.approx(0.05)
     assert resting_height_m([stands, moves]) is None
