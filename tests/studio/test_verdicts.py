@@ -97,7 +97,7 @@ def test_unknown_shows_the_missing_acceleration_and_takes_an_effect_of_ones_own(
         assert "class CubicDrag" in own.read_text()
         hand.wait("diagnose")
         first = page.locator("[data-candidate]").first.get_attribute("data-candidate")
-        assert first == "cubic_drag" and verdict(folder)["status"] != "unknown"
+        assert first == "cubic_drag" and verdict(folder)["status"] == "named"
         hand.click("[data-add=cubic_drag]")
         hand.wait_for("[data-do=remove]")
         hand.wait("compare")
