@@ -31,6 +31,7 @@ import verdicts
 from galileo_jax.commands import command
 from galileo_jax.model.effects.registry import effect_names
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.simulation.declared import Declared
 from galileo_jax.simulation.like import truth_like
 from galileo_jax.simulation.motion import roll_out
 
@@ -120,10 +121,13 @@ def seen_truth(yaml: Path, kind: str) -> str:
     whole = roll_out(truth, "fine").at(times).position_m
     found = []
     for effect in truth.effects:
+        own = {parameter.name for parameter in effect.parameters(truth.surroundings)}
+        values = {name: value for name, value in truth.effect_values.items() if name not in own}
         others = tuple(each for each in truth.effects if each is not effect)
-        without = roll_out(replace(truth, effects=others), "fine").at(times).position_m
-        change = np.linalg.norm(whole - without) / noise_m
-        if change > NO_TRACE or effect not in truth.motion_effects:
+        less = replace(truth, effects=others, effect_values=values)
+        change = np.linalg.norm(whole - roll_out(less, "fine").at(times).position_m) / noise_m
+        is_in_what_is_said = Declared.of(less, 1.0) != Declared.of(truth, 1.0)
+        if change > NO_TRACE or is_in_what_is_said:
             found.append(effect.name)
     return "+".join(found) or "none"
 
