@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from galileo_jax.observation.poses import Poses
 
@@ -14,6 +13,8 @@ FLAT = np.cos(np.radians(2.0))  # one of its axes is upright to within two degre
 
 def resting_height_m(tosses: Sequence[Poses]) -> float | None:
     """The median height over those tosses that end at rest on a face; None where none does."""
+    from scipy.spatial.transform import Rotation  # a third of a second, for tosses alone
+
     found = []
     for poses in tosses:
         place = poses.position_m[-LAST_FRAMES:]

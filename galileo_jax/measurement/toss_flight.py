@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from galileo_jax.observation.poses import Poses
 
@@ -39,6 +38,8 @@ def last_free_frame(poses: Poses, size_m: Sequence[float] | None) -> int | None:
       poses: in the world's axes, the plane near z = 0.
       size_m: the box's edges; None: what its lowest place says.
     """
+    from scipy.spatial.transform import Rotation  # a third of a second, for tosses alone
+
     lowest = 2 * float(poses.position_m[:, 2].min())
     size = np.full(3, lowest) if size_m is None else np.asarray(size_m)
     turned = Rotation.from_quat(poses.quaternion, scalar_first=True).as_matrix()
@@ -56,6 +57,8 @@ def flight_of(poses: Poses, size_m: np.ndarray) -> Flight | None:
       poses: in the world's axes, the plane near z = 0.
       size_m: `[3]`, the box's edges.
     """
+    from scipy.spatial.transform import Rotation  # a third of a second, for tosses alone
+
     turned = Rotation.from_quat(poses.quaternion, scalar_first=True)
     found = last_free_frame(poses, tuple(size_m))
     last = len(poses.times_s) - 1 if found is None else found

@@ -28,7 +28,7 @@ from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.rollout.engine_rigid import roll_out
 from galileo_jax.rollout.rollout import at_times
 from galileo_jax.rollout.trajectory import Trajectory
-from galileo_jax.similarity import discrepancy
+from galileo_jax.similarity import discrepancy, hit_discrepancy
 
 IDEAL_SHARE = 0.3
 IDEAL_FRICTION = (0.0, 0.3)
@@ -155,16 +155,16 @@ def _film(position: jax.Array, times: jax.Array, normal, imperfect: jax.Array) -
     gone = jnp.abs(x[1] - x[1, 0])
     is_after = gone > 1e-6
     at_hit = jnp.where(is_after.any(), x[:, jnp.argmax(is_after)], x[:, -1])
-    along = discrepancy.IMPULSE_SD * normal((2, 1)) * (x - at_hit[:, None])
-    step = discrepancy.HIT_STEP_SD_M * normal((2, 1))
+    along = hit_discrepancy.IMPULSE_SD * normal((2, 1)) * (x - at_hit[:, None])
+    step = hit_discrepancy.HIT_STEP_SD_M * normal((2, 1))
     # What moves no more drifts no more.
     moves = jnp.abs(jnp.diff(x, prepend=x[:, :1])) > 1e-7
     moving_s = jax.lax.cummax(jnp.where(moves, times, 0.0), axis=1)[:, None]
-    frequency = normal((2, NUM_WAVES, 1)) / discrepancy.HIT_DRIFT_S
+    frequency = normal((2, NUM_WAVES, 1)) / hit_discrepancy.HIT_DRIFT_S
     waves = normal((2, NUM_WAVES, 1)) * jnp.cos(
         frequency * moving_s + 7 * normal((2, NUM_WAVES, 1))
     )
-    drift = discrepancy.HIT_DRIFT_SD_M * jnp.sqrt(2 / NUM_WAVES) * waves.sum(1)
+    drift = hit_discrepancy.HIT_DRIFT_SD_M * jnp.sqrt(2 / NUM_WAVES) * waves.sum(1)
     extra = extra.at[:, 0].add(jnp.where(is_after, along + step + drift, 0.0))
     return position + imperfect * extra
 

@@ -8,13 +8,13 @@ covariance. Intervals then contain it, and no residual of this shape is taken fo
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
+from galileo_jax.similarity.hit_discrepancy import after_hits
+from galileo_jax.similarity.random_patterns import random_patterns
 
 POINT_SD_M = 0.003  # how far a marked point is from the centre
 OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table
@@ -27,17 +27,6 @@ THROW_SD_RAD = 0.05  # nobody throws square to the camera: what comes nearer gro
 LENS_SD, LENS_CENTRE_SD = 0.005, 0.3
 READ_OFF = 10.0  # times an angle's sd: so wide that the direction tells nothing more
 SCALE_SD = 0.001
-IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
-HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none
-# A soft hit takes this long to end: bodies that friction pulls apart meanwhile leave without the
-# last of its impulse.
-HIT_END_S = 0.005
-MIN_FRAMES_APART = 4  # to tell how fast friction pulls bodies apart
-HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # trackers are pulled along by what they pass
-# Boxes turn a little at a hit, however straight, and while they are close a corner of one pushes
-# the other on: they come apart, or together, otherwise than points do.
-PUSH_SD_M_S2, PUSH_S = 0.05, 0.2
-CLOSE_M = 0.008  # half of a box 60 mm deep, against another, each turned by some eight degrees
 # Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
 # millimetre; how fast they go along it shows none of that.
 WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
@@ -46,9 +35,6 @@ WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
 WANDER_SD_M, WANDER_S = 2e-3, 0.15
 # Nothing holds a falling body to its line: where it is across it says nothing of the fall.
 ASIDE_SD_M = 1.0
-SMALLEST_MODE = 1e-3  # of a family's largest variance; what is smaller is left out
-STILL_M_S = 0.02  # what is slower rests
-MOVED_M = 0.002  # an object that has gone so far has been hit
 
 
 def offsets(observation: Observation) -> list[np.ndarray]:
@@ -71,9 +57,7 @@ def wander(
 ) -> list[np.ndarray]:
     """For each object and axis of a track a slow wander (Ornstein-Uhlenbeck)."""
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    values, vectors = np.linalg.eigh(sd_m**2 * np.exp(-apart / lasts_s))
-    kept = values > SMALLEST_MODE * values[-1]
-    patterns = (np.sqrt(values[kept]) * vectors[:, kept]).T
+    patterns = random_patterns(sd_m**2 * np.exp(-apart / lasts_s))
     count, axes, _ = observation.position_m.shape
     found = []
     for i in range(count):
@@ -120,7 +104,7 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
         found.extend(_wobble(position, observation, scene))
     elif not scene.moves_in_plane:
         found.extend(_aside(position))
-    found.extend(_after_hit(position, observation, is_filmed))
+    found.extend(after_hits(position, observation, is_filmed))
     return np.stack(found)
 
 
@@ -177,9 +161,7 @@ def _wobble(
 ) -> list[np.ndarray]:
     """For each object a rough wobble across its path (an Ornstein-Uhlenbeck process)."""
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    values, vectors = np.linalg.eigh(WOBBLE_SD_M**2 * np.exp(-apart / WOBBLE_S))
-    kept = values > SMALLEST_MODE * values[-1]
-    patterns = (np.sqrt(values[kept]) * vectors[:, kept]).T
+    patterns = random_patterns(WOBBLE_SD_M**2 * np.exp(-apart / WOBBLE_S))
     found = []
     for i, corner in enumerate(scene.corner_m):
         is_on_ramp = scene.comes_down[i] & (position[i, 0] < corner) | (not scene.has_table)
@@ -209,155 +191,6 @@ def _aside(position: np.ndarray) -> list[np.ndarray]:
             aside = np.zeros_like(position)
             aside[i, 0, frame] = ASIDE_SD_M
             found.append(aside)
-    return found
-
-
-def _after_hit(position: np.ndarray, observation: Observation, is_filmed: bool) -> list[np.ndarray]:
-    """For each hit and who is in it a step, the way it goes from there; filmed, a slow drift."""
-    found = []
-    for i in range(1, len(position)):
-        seen = np.flatnonzero(observation.mask[i])
-        if not seen.size:
-            continue
-        gone = np.abs(position[i, 0] - np.median(position[i, 0, seen[:3]]))
-        moved = observation.mask[i] & (gone > MOVED_M)
-        if moved.any():
-            hit = max(int(np.argmax(moved)) - 1, 0)
-            found.extend(_after(hit, (i - 1, i), position))
-            found.extend(_at_the_hit(hit, i, position, observation))
-            if is_filmed:
-                found.extend(_drift(hit, (i - 1, i), position, observation))
-    return found
-
-
-def _after(hit: int, objects: tuple[int, int], position: np.ndarray) -> list[np.ndarray]:
-    """What a hit in frame `hit` leaves behind in either object's motion."""
-    x = position[:, 0]
-    found = []
-    for i in objects:
-        way, step = np.zeros_like(position), np.zeros_like(position)
-        way[i, 0, hit:] = IMPULSE_SD * (x[i, hit:] - x[i, hit])
-        step[i, 0, hit + 1 :] = HIT_STEP_SD_M
-        found.extend([way, step])
-    return found
-
-
-@dataclass(frozen=True)
-class _Hit:
-    """A hit of two bodies in a frame, and how each goes on from there.
-
-    Attributes:
-      frame: of the hit.
-      front: the object that is hit; the one before hits it.
-      both: `[k]`, frames after it in which both are seen and move.
-      loses, gains: of the rear's speed and of the front's, m/s; as the masses, the other way round.
-      pulled_apart: by friction, m/s^2; negative where it presses the bodies together.
-    """
-
-    frame: int
-    front: int
-    both: np.ndarray
-    loses: float
-    gains: float
-    pulled_apart: float
-
-
-def _at_the_hit(
-    frame: int, front: int, position: np.ndarray, observation: Observation
-) -> list[np.ndarray]:
-    """What bodies that are no points do at a hit and while they are close."""
-    hit = _speeds_at(frame, front, position, observation)
-    if hit is None:
-        return []
-    return [*_soft_end(hit, position, observation), *_pushes(hit, position, observation)]
-
-
-def _speeds_at(
-    frame: int, front: int, position: np.ndarray, observation: Observation
-) -> _Hit | None:
-    """The hit in `frame`; None where too little of it is seen, or it is no hit."""
-    times = observation.times_s
-    rear, ahead = position[front - 1, 0], position[front, 0]
-    seen = observation.mask[front - 1] & observation.mask[front]
-    moves = np.minimum(np.diff(rear), np.diff(ahead)) > STILL_M_S * np.diff(times)
-    stops = frame + 1 + int(np.argmin(np.append(moves[frame + 1 :], False)))
-    both = np.arange(frame + 1, stops)[seen[frame + 1 : stops]]
-    if len(both) < MIN_FRAMES_APART or frame < 2 or not seen[frame - 2 : frame + 1].all():
-        return None
-    since = times[both] - times[frame]
-    loses = np.polyfit(times[frame - 2 : frame + 1], rear[frame - 2 : frame + 1], 1)[0]
-    loses -= np.polyfit(since, rear[both], 2)[1]
-    gains = np.polyfit(since, ahead[both], 2)[1]
-    if min(loses, gains) <= 0:
-        return None
-    bend = np.polyfit(since, (ahead - rear)[both], 2)[0]
-    return _Hit(frame, front, both, float(loses), float(gains), 2 * float(bend))
-
-
-def _soft_end(hit: _Hit, position: np.ndarray, observation: Observation) -> list[np.ndarray]:
-    """What the bodies' relative speed lacks because a hit did not end at once.
-
-    As much as friction changes it in `HIT_END_S`; nothing where friction presses the bodies
-    together.
-    """
-    if hit.pulled_apart <= 0:
-        return []
-    since = np.maximum(observation.times_s - observation.times_s[hit.frame], 0.0)
-    return [_between(hit, -hit.pulled_apart * HIT_END_S * since, position, observation)]
-
-
-def _pushes(hit: _Hit, position: np.ndarray, observation: Observation) -> list[np.ndarray]:
-    """A slowly varying push between two bodies while they are close, and what comes of it."""
-    times = observation.times_s
-    apart = position[hit.front, 0] - position[hit.front - 1, 0]
-    touching = apart[hit.both[:2]].min()
-    is_far = apart[hit.both] - touching > CLOSE_M
-    close = hit.both[: int(np.argmax(is_far)) if is_far.any() else None]
-    between_s = times[close][:, None] - times[close]
-    values, vectors = np.linalg.eigh(PUSH_SD_M_S2**2 * np.exp(-0.5 * (between_s / PUSH_S) ** 2))
-    kept = values > SMALLEST_MODE * values[-1]
-    found = []
-    for pattern in (np.sqrt(values[kept]) * vectors[:, kept]).T:
-        push = np.zeros(len(times))
-        push[close] = pattern
-        speed = cumulative_trapezoid(push, times, initial=0.0)
-        further = cumulative_trapezoid(speed, times, initial=0.0)
-        found.append(_between(hit, further, position, observation))
-    return found
-
-
-def _between(
-    hit: _Hit, apart_m: np.ndarray, position: np.ndarray, observation: Observation
-) -> np.ndarray:
-    """The mode by which two bodies are `apart_m` `[frame]` further apart, momentum conserved.
-
-    Each holds what it has when it comes to rest.
-    """
-    times, found = observation.times_s, np.zeros_like(position)
-    total = hit.loses + hit.gains
-    for i, share in ((hit.front - 1, -hit.loses / total), (hit.front, hit.gains / total)):
-        speed = np.append(np.diff(position[i, 0]) / np.diff(times), 0.0)
-        rests = hit.frame + 1 + int(np.argmin(speed[hit.frame + 1 :] > STILL_M_S))
-        upto = np.minimum(np.arange(len(times)), rests)
-        found[i, 0, hit.frame + 1 :] = share * apart_m[upto][hit.frame + 1 :]
-    return found
-
-
-def _drift(
-    hit: int, objects: tuple[int, int], position: np.ndarray, observation: Observation
-) -> list[np.ndarray]:
-    """What a hit in frame `hit` leaves behind in either object's track."""
-    after = observation.times_s[hit + 1 :]
-    values, vectors = np.linalg.eigh(
-        HIT_DRIFT_SD_M**2 * np.exp(-0.5 * ((after[:, None] - after) / HIT_DRIFT_S) ** 2)
-    )
-    kept = values > SMALLEST_MODE * values[-1]
-    found = []
-    for i in objects:
-        for pattern in (np.sqrt(values[kept]) * vectors[:, kept]).T:
-            drift = np.zeros_like(position)
-            drift[i, 0, hit + 1 :] = pattern
-            found.append(drift)
     return found
 
 

@@ -1,8 +1,8 @@
 """What is imperfect in measurements of pucks seen from above, as covariance (see `discrepancy`).
 
 Offsets of each puck and axis; what camera and tracker do, which wander by tenths of a pixel; a real
-hit's duration; and, where the turning
-is known, a followed point that is not the centre, which goes round it.
+hit's duration; and, where the turning is known, a followed point that is not the centre, which goes
+round it.
 """
 
 from itertools import combinations
@@ -12,13 +12,13 @@ import numpy as np
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import (
-    HIT_STEP_SD_M,
     WOBBLE_S,
     WOBBLE_SD_M,
     camera,
     offsets,
     wander,
 )
+from galileo_jax.similarity.hit_discrepancy import HIT_STEP_SD_M
 
 NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other in some frame
 CENTRE_SHARE = 0.1  # of a radius: how far a followed point may be from the centre

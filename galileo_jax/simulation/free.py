@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipObject
@@ -34,11 +33,12 @@ from galileo_jax.simulation.hidden import Hidden, prior_value
 from galileo_jax.simulation.level import LevelTruth
 from galileo_jax.simulation.motion import RECORD_S, Motion
 from galileo_jax.simulation.pendulum import swung
+from galileo_jax.simulation.to_event import to_event
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
 
 WATER_KG_M3 = 998.0
 DRAG_COEFFICIENT = (0.4, 0.6)  # of a sphere, at Reynolds numbers of 1e3 to 1e5
-RTOL, ATOL = 1e-10, 1e-12
+TOLERANCES = (1e-10, 1e-12)  # relative, absolute
 LONGEST_DELAY_S = 0.1
 # From weak to strong, in z: what a prior holds for likely.
 WEAK_Z, STRONG_Z = -0.5, 1.0
@@ -239,22 +239,12 @@ def solve_free(truth: FreeTruth) -> tuple[Motion, tuple[float, ...]]:
     def touch(t: float, y: np.ndarray) -> float:
         return 1.0 if floor is None or rests else float(y[1] - floor.height_m)
 
-    touch.terminal, touch.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
     while begin < len(times):
-        found = solve_ivp(
-            change,
-            (time, times[-1]),
-            now,
-            method="DOP853",
-            dense_output=True,
-            events=touch,
-            rtol=RTOL,
-            atol=ATOL,
-        )
-        until = int(np.searchsorted(times, found.t[-1] + 1e-12))
-        rows[begin:until] = found.sol(times[begin:until]).T
-        begin, time, now = until, float(found.t[-1]), found.y[:, -1].copy()
-        if floor is None or found.status != 1:
+        found = to_event(change, touch, time, now, times[begin:], TOLERANCES)
+        until = begin + len(found.rows)
+        rows[begin:until] = found.rows
+        begin, time, now = until, found.time_s, found.state
+        if floor is None or not found.is_event:
             break
         bounces.append(time)
         falling = -now[3]

@@ -1,16 +1,17 @@
 """A pendulum with known truth: the laws are the engine's, the integrator is SciPy's."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.engine_pendulum import Swing, make_pendulum, place, rates, start
 from galileo_jax.simulation.motion import RECORD_S, Motion
+from galileo_jax.simulation.to_event import to_event
 
-RTOL, ATOL = 1e-11, 1e-13
+TOLERANCES = (1e-11, 1e-13)  # relative, absolute
 
 
 def swung(
@@ -22,6 +23,10 @@ def swung(
     times = RECORD_S * np.arange(round(seconds / RECORD_S) + 2)
     rows, turns = np.empty((len(times), 2)), np.zeros(len(times))
     now, time, begin = np.array(first, float), 0.0, 0
+
+    def change(t: float, y: np.ndarray, slip: float) -> np.ndarray:
+        return np.hstack(rates(Swing(*y), np.asarray(t), slip, pendulum, scene)[0])
+
     while begin < len(times):
         here = Swing(*now)
         pulled, excess = rates(here, np.asarray(time), 0.0, pendulum, scene)
@@ -31,29 +36,17 @@ def swung(
             break
         slip = way if pendulum.has_friction else 0.0
 
-        def change(t: float, y: np.ndarray, slip: float = slip) -> np.ndarray:
-            return np.hstack(rates(Swing(*y), np.asarray(t), slip, pendulum, scene)[0])
-
         def turn(t: float, y: np.ndarray, way: float = way, began: float = time) -> float:
             return float(y[1] * way) if pendulum.has_friction and t > began else 1.0
 
-        turn.terminal, turn.direction = True, -1.0  # pyright: ignore[reportFunctionMemberAccess]
-        found = solve_ivp(
-            change,
-            (time, times[-1]),
-            now,
-            method="DOP853",
-            dense_output=True,
-            events=turn,
-            rtol=RTOL,
-            atol=ATOL,
-        )
-        until = int(np.searchsorted(times, found.t[-1] + 1e-12))
-        rows[begin:until] = found.sol(times[begin:until]).T
+        move = partial(change, slip=slip)
+        found = to_event(move, turn, time, now, times[begin:], TOLERANCES)
+        until = begin + len(found.rows)
+        rows[begin:until] = found.rows
         for i in range(begin, until):
-            turns[i] = change(times[i], rows[i])[1]
-        begin, time, now = until, float(found.t[-1]), found.y[:, -1].copy()
-        if found.status != 1:
+            turns[i] = move(times[i], rows[i])[1]
+        begin, time, now = until, found.time_s, found.state
+        if not found.is_event:
             break
         now[1] = 0.0
     pairs = zip(rows, turns, strict=True)

@@ -74,7 +74,7 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
     """
     found = path.stat() if path.is_file() else None
     stamp = (found.st_mtime_ns, found.st_size, found.st_ino) if found is not None else ()
-    announced, container_fps, size_px, times_ms = _scanned(path.resolve(), *stamp)
+    announced, container_fps, size_px, times_ms = _scanned(path, path.resolve(), *stamp)
     count = len(times_ms)
     if count == 0:
         raise InputError(f"{path}: not one frame can be decoded; a video expected")
@@ -129,7 +129,9 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
 
 
 @functools.lru_cache(64)
-def _scanned(path: Path, *stamp: int) -> tuple[float, float, tuple[int, int], tuple[float, ...]]:
+def _scanned(
+    path: Path, _whole: Path, *_stamp: int
+) -> tuple[float, float, tuple[int, int], tuple[float, ...]]:
     """Frames announced, the container's rate, the frames' size and times, ms.
 
     Once for each content: who draws marks has the clip checked at every step.

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import (
+from galileo_jax.similarity.discrepancy import LENS_SD, WOBBLE_SD_M, modes
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.hit_discrepancy import (
     CLOSE_M,
     HIT_END_S,
-    LENS_SD,
     PUSH_SD_M_S2,
-    WOBBLE_SD_M,
     _pushes,
     _speeds_at,
-    modes,
 )
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
@@ -130,7 +128,7 @@ def soft_ends(experiment, monkeypatch):
     """What of the modes is only there because hits end late."""
     seen = observe(experiment, 0, noise_m=0.0)
     whole = modes(seen, SCENE, is_filmed=False)
-    monkeypatch.setattr("galileo_jax.similarity.discrepancy.HIT_END_S", 0.0)
+    monkeypatch.setattr("galileo_jax.similarity.hit_discrepancy.HIT_END_S", 0.0)
     less = modes(seen, SCENE, is_filmed=False)
     return seen.times_s, [a - b for a, b in zip(whole, less, strict=True) if (a != b).any()]
 

@@ -267,6 +267,8 @@ class GradientFitter:
         points = self._batch(ends.best.z, free)
         fits = self._polish(points, np.zeros(len(points.z), int), ends.num_steps)
         best = max(fits.values(), key=_evidence)
+        if not (self._is_positive_nuisance & free).any():
+            return best
         return self._best_variant(best.z[: self._count], free, ends.num_steps)
 
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:

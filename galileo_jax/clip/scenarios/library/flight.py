@@ -6,6 +6,14 @@ is unknown. Gravity tells the scale where `pixels_per_metre` is null.
 
 from galileo_jax.clip.scenarios.scenario import Scenario, register
 
+# What no thrown body's path shows; `toss` has the same.
+WITHOUT = (
+    "constant_force",  # along the velocity: nothing pushes so
+    "initial_push",  # start_velocity
+    "release_delay",  # start_velocity: it flies when the clip begins
+    "spring_tether",  # along the velocity
+)
+
 register(
     Scenario(
         name="flight",
@@ -13,12 +21,7 @@ register(
         has_ramp=False,
         moves_in_plane=True,
         laws=("start_velocity",),
-        without=(
-            "constant_force",  # along the velocity: nothing pushes so
-            "initial_push",  # start_velocity
-            "release_delay",  # start_velocity: it flies when the clip begins
-            "spring_tether",  # along the velocity
-        ),
+        without=WITHOUT,
         keys=("floor", "launch_angle_deg", "vertical_sd_deg"),
     )
 )

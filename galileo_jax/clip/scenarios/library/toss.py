@@ -4,6 +4,7 @@
 first impact.
 """
 
+from galileo_jax.clip.scenarios.library.flight import WITHOUT
 from galileo_jax.clip.scenarios.scenario import Scenario, register
 
 register(
@@ -13,11 +14,6 @@ register(
         has_ramp=False,
         moves_in_plane=True,
         laws=("start_velocity",),
-        without=(
-            "constant_force",  # along the velocity: nothing pushes so
-            "initial_push",  # start_velocity
-            "release_delay",  # start_velocity: it flies when the clip begins
-            "spring_tether",  # along the velocity
-        ),
+        without=WITHOUT,
     )
 )

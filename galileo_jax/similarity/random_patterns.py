@@ -1,0 +1,18 @@
+"""A random function of time as a few patterns, each with an independent amplitude."""
+
+import numpy as np
+from jaxtyping import Float
+
+SMALLEST = 1e-3  # of the largest pattern's variance; what is smaller is left out
+
+
+def random_patterns(
+    covariance: Float[np.ndarray, "frame frame"],
+) -> Float[np.ndarray, "pattern frame"]:
+    """The patterns of a covariance, each times the standard deviation of its amplitude.
+
+    Source: Karhunen and Loeve; Rasmussen and Williams (2006), Gaussian Processes, section 4.3.
+    """
+    values, vectors = np.linalg.eigh(covariance)
+    large = values > SMALLEST * values[-1]
+    return (np.sqrt(values[large]) * vectors[:, large]).T
