@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.clip.fields import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, short
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, ClipFile, short
+from galileo_jax.clip.schema import ClipFile
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
     MIN_ROWS,
