@@ -36,6 +36,7 @@ from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
+LEADS_ON = 1.0  # nats: less is no other valley
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
 LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
 CHANCE = 0.01  # a fit that noise leaves so seldom as bad or worse is searched for once more
@@ -272,9 +273,30 @@ class GradientFitter:
         return self._best_variant(best.z[: self._count], free, ends.num_steps)
 
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
-        """Polishes z and variants of it; the most evident fit."""
-        points = self._batch(np.stack(self._variants(z, free)), free)
-        fits = self._polish(points, np.zeros(len(points.z), int), num_steps)
+        """Polishes z and variants of it; the most evident fit.
+
+        Where noise does not explain that, each positive nuisance is moved alone as well, as long
+        as that leads on: bodies that leave a gap need not be those that rebound little.
+        """
+        best = self._most_evident(self._variants(z, free), free, num_steps)
+        own = np.flatnonzero(self._is_positive_nuisance & free)
+        for _ in own if len(own) > 1 else ():
+            if self._is_explained(best):
+                break
+            z, each = best.z[: self._count], np.eye(self._count, dtype=bool)[own]
+            alone = [np.where(one, other, z) for one in each for other in VARIANTS_Z]
+            found = self._most_evident(alone, free, num_steps)
+            if not _evidence(found) - _evidence(best) > LEADS_ON:  # nor if both failed
+                break
+            best = found
+        return best
+
+    def _most_evident(
+        self, points: Sequence[np.ndarray], free: np.ndarray, num_steps: int
+    ) -> GradientFit:
+        """The best fit of those polished from some points."""
+        batch = self._batch(np.stack(points), free)
+        fits = self._polish(batch, np.zeros(len(batch.z), int), num_steps)
         return max(fits.values(), key=_evidence)
 
     def _variants(self, z: np.ndarray, free: np.ndarray) -> list[np.ndarray]:

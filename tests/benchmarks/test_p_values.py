@@ -1,0 +1,66 @@
+"""Tracks for the calibration of `compare`'s p are what the likelihood says, and are fitted well."""
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from galileo_jax.similarity.discrepancy import crossings, modes
+from tests.precision import in_64_bit
+
+NUM_TRACKS = 16
+LEAST = 1e-4  # of one track in 600 by chance; the seeds are fixed
+SIDE_VALLEY = [903, 20]  # its fit was once 39 nats behind the best, and p 2.5e-5
+ADEQUATE_P = 0.01
+
+
+@pytest.fixture(scope="module")
+def p_values():
+    with in_64_bit(), pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(Path(__file__).resolve().parents[2] / "benchmarks")
+        yield importlib.import_module("p_values")
+
+
+def drawn(p_values, seed):
+    """A track with imperfections, and what it would be without."""
+    rng = np.random.default_rng([901, seed])
+    case = p_values.make_case(int(rng.integers(1 << 30)), "exact", p_values.NOISE_M)
+    problem = case.problem
+    values = [case.values.get(p.name, p.absent) for p in problem.model.parameters]
+    clean = problem.simulate(np.array(values))
+    noisy = clean + p_values.NOISE_M * rng.standard_normal(clean.shape)
+    position = p_values.imperfect(noisy, problem, True, rng)
+    return p_values.measured(problem, position, "camera"), clean, position - noisy
+
+
+def test_drawn_tracks_are_what_their_own_likelihood_says(p_values):
+    """At the truth whitened residuals are unit normal, whatever the patterns moved.
+
+    Where patterns were those of another track, a quarter of these were below 0.01, down to 1e-100.
+    """
+    chances = []
+    for seed in range(NUM_TRACKS):
+        problem, clean, _ = drawn(p_values, seed)
+        white = problem.whiten(clean, 1.0)
+        chances.append(stats.chi2.sf(np.sum(white**2), white.size))
+    assert min(chances) > LEAST, np.sort(chances)[:4]
+    assert stats.kstest(chances, "uniform").pvalue > ADEQUATE_P
+
+
+def test_imperfections_are_as_large_as_the_likelihood_says(p_values):
+    problem, _, away = drawn(p_values, 0)
+    scene, seen = problem.model.scene.surroundings, problem.observation
+    patterns = np.concatenate([modes(seen, scene), crossings(seen, scene)])
+    flat = patterns.reshape(len(patterns), -1)
+    amplitude, *_ = np.linalg.lstsq(flat.T, away.ravel(), rcond=None)
+    np.testing.assert_allclose(amplitude @ flat, away.ravel(), atol=1e-6)
+    # Drawn normals would fit as well: the least squares can be no longer than these.
+    assert 0.3 * len(patterns) < np.sum(amplitude**2) < 2 * len(patterns)
+
+
+def test_a_right_model_is_not_rejected_for_a_side_valley_of_one_nuisance(p_values):
+    """No gap, but a rebound: neither both nuisances moved up nor both down lead there."""
+    p, *_ = p_values.one("camera", True, 1, SIDE_VALLEY)
+    assert p > ADEQUATE_P
