@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,7 +14,14 @@ import numpy as np
 from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.fits.residuals import Residuals
-from galileo_jax.inference.fits.valley import along, scattered, valley_round
+from galileo_jax.inference.fits.valley import (
+    Coordinates,
+    Valley,
+    along,
+    learned,
+    scattered,
+    valley_round,
+)
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import IDENTIFIED_SD_Z
@@ -23,6 +31,9 @@ from galileo_jax.inference.samplers.driver import Progress, Settings
 # R-hat < 1.01 needs about 50 effective draws for each half chain, so that fewer chains would be
 # cheaper; but four learn too poor a proposal (measured: acceptance 0.14 against 0.41).
 NUM_CHAINS = 8
+# Where the fit's widths are wrong, the warm-up's few draws do not mend them. Whoever has not
+# converged after so many steps knows the posterior well enough to set off anew.
+FIRST_STEPS = 1000
 
 
 def metropolis_posterior(
@@ -40,18 +51,21 @@ def metropolis_posterior(
 ) -> Posterior:
     """Samples the trials' posterior, started from and tuned by a gradient fit.
 
-    Chains run in coordinates in which the fit's valley is straight (`fits/valley.py`).
+    Chains run in coordinates in which the fit's valley is straight (`fits/valley.py`). Where they
+    have not converged after `FIRST_STEPS`, what they have drawn so far tunes a second run, from
+    where they are, in coordinates and with proposals that suit it; it alone is returned.
 
     Args:
       trials: the target is `trials.log_density`, noise scales included.
       fit: its covariance is the first proposal; chains start dispersed along its valley.
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
-      settings: how long.
+      settings: how long, both runs together.
       num_chains: how many.
       starts: `[chain, parameter]`, where they begin, in z, led along the valley as proposals
         are; default: dispersed in it.
-      checkpoint: file that interrupted chains go on from; see `samplers.sample`.
+      checkpoint: file that interrupted chains go on from; see `samplers.sample`. That of a
+        second run is beside it.
       identity: of what is sampled; a checkpoint of anything else is refused.
       on_block: called with the progress.
 
@@ -72,7 +86,7 @@ def metropolis_posterior(
         if parameter.role != "nuisance" and sd[i] < IDENTIFIED_SD_Z
     ]
 
-    def monitor(u: np.ndarray) -> dict[str, np.ndarray]:
+    def monitor(valley: Valley, u: np.ndarray) -> dict[str, np.ndarray]:
         draws = valley(u)
         found = {name: draws[..., i] for i, name in watched}
         masses = [i for i, name in enumerate(trials.names) if re.fullmatch(r"m\d+", name)]
@@ -80,19 +94,51 @@ def metropolis_posterior(
             found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]
         return found or {"log_noise": draws[..., -1]}
 
-    dim = len(trials.names)
-    posterior = sample(
-        jax.random.key(seed),
-        sampler_class(sampler).from_gaussian(jnp.zeros(dim), jnp.eye(dim)),  # pyright: ignore
-        along(density_of(trials), valley),
-        jnp.asarray(begin),
-        trials.names,
-        settings=settings,
-        monitor=monitor,
-        on_block=on_block,
-        checkpoint=checkpoint,
-        identity=identity,
-    )
+    kernel, density = sampler_class(sampler), density_of(trials)
+    dim, key = len(trials.names), jax.random.key(seed)
+    first, second = _parts(settings)
+    total = settings.warmup_steps + settings.max_steps
+
+    def run(at: Coordinates, begin: np.ndarray, part: Settings, is_second: bool) -> Posterior:
+        before = total - part.warmup_steps - part.max_steps if is_second else 0
+
+        def report(state: Progress) -> None:
+            assert on_block is not None
+            on_block(replace(state, num_steps=before + state.num_steps, max_steps=total))
+
+        beside = checkpoint and checkpoint.with_name(f"{checkpoint.name}.second")
+        mean, covariance = jnp.asarray(at.mean), jnp.asarray(at.covariance)
+        return sample(
+            jax.random.fold_in(key, 1) if is_second else key,
+            kernel.from_gaussian(mean, covariance),  # pyright: ignore
+            along(density, at.valley),
+            jnp.asarray(begin),
+            trials.names,
+            settings=part,
+            monitor=partial(monitor, at.valley),
+            on_block=report if on_block else None,
+            checkpoint=beside if is_second else checkpoint,
+            identity=identity,
+        )
+
+    at = Coordinates(valley, np.zeros(dim), np.eye(dim))
+    posterior = run(at, begin, first, is_second=False)
     count = posterior.stats["num_evaluations"] + residuals.num_rollouts
+    if second is not None and not posterior.is_converged:
+        u = posterior.draws
+        at = learned(valley, u[:, u.shape[1] // 2 :].reshape(-1, dim))
+        last = u[:, -1]
+        begin = last if at.valley is valley else at.valley.straight(valley(last))
+        posterior = run(at, begin, second, is_second=True)
+        count += posterior.stats["num_evaluations"]
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
-    return posterior.mapped(lambda u: trials.theta(valley(u)), trials.names)
+    return posterior.mapped(lambda u: trials.theta(at.valley(u)), trials.names)
+
+
+def _parts(settings: Settings) -> tuple[Settings, Settings | None]:
+    """The settings of the first run and, where there may be one, of the second."""
+    few = FIRST_STEPS - FIRST_STEPS % settings.block_steps
+    rest = settings.max_steps - few - settings.warmup_steps
+    if not settings.stops_early or few <= 0 or rest <= 0:
+        return settings, None
+    return replace(settings, max_steps=few), replace(settings, max_steps=rest)

@@ -11,6 +11,8 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 
 NUM_FRAMES = 128  # longer clips are thinned out evenly
+WINDOW = 4  # frames before and after
+MOVES_SDS = 5.0  # of the noise: who goes no further within the windows rests
 LEAST_NOISE_M = 5e-6  # of the simulated clips; a more certain tracker is taken for one of these
 
 
@@ -21,7 +23,7 @@ class Seen(NamedTuple):
       times_s: `[frame]`, evenly spaced.
       position_m: `[object, 2, frame]`, 0 where masked.
       mask: `[object, frame]`.
-      noise_m: `[object]`, the tracker's own standard deviation of a coordinate.
+      noise_m: `[object]`, the tracker's own standard deviation of a coordinate while it moves.
       angle_rad, gravity: of the scene.
       half_length_m, half_height_m: `[object]`.
       is_ideal: 1.0 where nothing but noise stands between the rigid bodies and their
@@ -57,9 +59,8 @@ def see(observation: Observation, scene: Surroundings, is_ideal: bool = False) -
     times, mask = observation.times_s[chosen], observation.mask[:, chosen]
     position = np.where(mask[:, None], observation.position_m[..., chosen], 0.0)
     variance = np.trace(observation.covariance_m2[..., chosen], axis1=1, axis2=2) / 2
-    noise = [
-        np.sqrt(np.median(v[m])) if m.any() else 0.0 for v, m in zip(variance, mask, strict=True)
-    ]
+    shown = zip(position, variance, mask, strict=True)
+    noise = [np.sqrt(_usual(*one)) if one[2].any() else 0.0 for one in shown]
     missing_frames, missing = NUM_FRAMES - len(times), 2 - len(mask)
     step = times[1] - times[0]
     more = times[-1] + step * np.arange(1, missing_frames + 1)
@@ -75,3 +76,12 @@ def see(observation: Observation, scene: Surroundings, is_ideal: bool = False) -
         half_height_m=jnp.asarray(np.pad(scene.half_height_m, objects, mode="edge")),
         is_ideal=jnp.asarray(float(is_ideal)),
     )
+
+
+def _usual(position: np.ndarray, variance: np.ndarray, mask: np.ndarray) -> float:
+    """The median variance of an object's frames in which it moves; of all, where it never does."""
+    frames = np.arange(len(mask))
+    before, after = np.maximum(frames - WINDOW, 0), np.minimum(frames + WINDOW, len(mask) - 1)
+    gone = np.linalg.norm(position[:, after] - position[:, before], axis=0)
+    moves = mask & mask[before] & mask[after] & (gone > MOVES_SDS * np.sqrt(variance))
+    return float(np.median(variance[moves if moves.any() else mask]))

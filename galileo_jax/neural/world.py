@@ -3,7 +3,7 @@
 Two worlds are mixed, and the network is told which one it looks at:
 
     clips   priors and nuisances of the fit (foot, restitution, release, points off the centre)
-            and the imperfections of a camera (similarity/discrepancy.py); friction of object 1
+            and the imperfections of camera, coder and bodies (`film.py`); friction of object 1
             uniform among those at which it slides.
     ideal   the thesis's: masses uniform in (0, 1) kg, friction in (0, 0.3), rigid bodies
             exactly as declared, noise only.
@@ -16,6 +16,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from galileo_jax.measurement.noise_at_rest import LEAST_SCALE
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.nuisances import (
     NUISANCES,
@@ -24,11 +25,11 @@ from galileo_jax.model.effects.nuisances import (
     impact_restitution,
 )
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
+from galileo_jax.neural.film import Bodies, filmed, noisy
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.rollout.engine_rigid import roll_out
 from galileo_jax.rollout.rollout import at_times
 from galileo_jax.rollout.trajectory import Trajectory
-from galileo_jax.similarity import discrepancy, hit_discrepancy
 
 IDEAL_SHARE = 0.3
 IDEAL_FRICTION = (0.0, 0.3)
@@ -40,8 +41,8 @@ FPS, FRAMES = (20.0, 120.0), (40, NUM_FRAMES)
 NOISE_PX, SCALE_PX_PER_M = (0.005, 1.0), (300.0, 1200.0)
 LATE_SHARE, LATEST_S = 0.15, 0.3  # releases seconds after the first frame
 GAP_SHARE, LONGEST_GAP = 0.3, 0.15  # of the frames
+CODED_SHARE = 0.4  # clips whose coder shifts what rests once
 NOISE_SCALE_SD = 0.3
-NUM_WAVES = 8
 NAMES = (
     *("m1", "k1", "m2", "k2", "start_offset_object1", "start_offset_object2"),
     *("foot_transition", "impact_restitution", "contact_gap", "release_instant"),
@@ -58,7 +59,7 @@ class Truth(NamedTuple):
 
 def draw(key: jax.Array) -> tuple[Seen, Truth]:
     """One experiment and its truth; to be vmapped over keys."""
-    keys = iter(jax.random.split(key, 40))
+    keys = iter(jax.random.split(key, 60))
 
     def uniform(low, high, shape=()):
         return jax.random.uniform(next(keys), shape, minval=low, maxval=high)
@@ -113,11 +114,14 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     times = jnp.arange(NUM_FRAMES) / fps
     motion = Trajectory(records, position, velocity)
     clean, _ = at_times(motion, times - instant)
-    seen = _film(clean, times, normal, imperfect)
+    bodies = Bodies(angle, half_length, corner[0], jnp.stack([m1, m2]))
+    seen = jnp.where(imperfect > 0, filmed(clean, times, bodies, normal), clean)
     noise = log_uniform(*NOISE_PX, (2,)) / log_uniform(*SCALE_PX_PER_M)
     noise = jnp.where(uniform(0, 1) < 0.3, noise[0], noise)
     truly = noise * jnp.exp(imperfect * NOISE_SCALE_SD * normal())
-    seen = seen + truly[:, None, None] * normal(seen.shape)
+    is_coded = imperfect * uniform(0, 1) > 1 - CODED_SHARE
+    scatter = jnp.where(is_coded, uniform(LEAST_SCALE, 1.0), 1.0)
+    seen = noisy(clean, seen, times, truly, scatter, normal)
     frames = jnp.arange(NUM_FRAMES)
     # Rollouts end: beyond, the bodies would stand still.
     mask = jnp.tile((frames < num_frames) & (times < records[-1]), (2, 1))
@@ -139,34 +143,6 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
         ),
         Truth(k1, k2, m1 / m2),
     )
-
-
-def _film(position: jax.Array, times: jax.Array, normal, imperfect: jax.Array) -> jax.Array:
-    """Adds the imperfections of `similarity/discrepancy.py`: `[object, 2, frame]`, m.
-
-    Here they are drawn; there they are covariance.
-    """
-    x, y = position[:, 0], position[:, 1]
-    keystone = discrepancy.KEYSTONE_SD * normal((2,))
-    extra = keystone[0] * jnp.stack([x * x, x * y], 1) + keystone[1] * jnp.stack([x * y, y * y], 1)
-    extra += discrepancy.ROLL_SD_RAD * normal() * jnp.stack([-y, x], 1)
-    extra += discrepancy.SCALE_SD * normal() * position
-    extra += discrepancy.POINT_SD_M * normal((2, 2, 1))
-    gone = jnp.abs(x[1] - x[1, 0])
-    is_after = gone > 1e-6
-    at_hit = jnp.where(is_after.any(), x[:, jnp.argmax(is_after)], x[:, -1])
-    along = hit_discrepancy.IMPULSE_SD * normal((2, 1)) * (x - at_hit[:, None])
-    step = hit_discrepancy.HIT_STEP_SD_M * normal((2, 1))
-    # What moves no more drifts no more.
-    moves = jnp.abs(jnp.diff(x, prepend=x[:, :1])) > 1e-7
-    moving_s = jax.lax.cummax(jnp.where(moves, times, 0.0), axis=1)[:, None]
-    frequency = normal((2, NUM_WAVES, 1)) / hit_discrepancy.HIT_DRIFT_S
-    waves = normal((2, NUM_WAVES, 1)) * jnp.cos(
-        frequency * moving_s + 7 * normal((2, NUM_WAVES, 1))
-    )
-    drift = hit_discrepancy.HIT_DRIFT_SD_M * jnp.sqrt(2 / NUM_WAVES) * waves.sum(1)
-    extra = extra.at[:, 0].add(jnp.where(is_after, along + step + drift, 0.0))
-    return position + imperfect * extra
 
 
 def targets(truth: Truth) -> jax.Array:

@@ -7,11 +7,19 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from galileo_jax.inference import metropolis
 from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.residuals import Residuals
-from galileo_jax.inference.fits.valley import Valley, along, scattered, valley_round
+from galileo_jax.inference.fits.valley import (
+    Valley,
+    along,
+    learned,
+    scattered,
+    valley_round,
+)
 from galileo_jax.inference.metropolis import metropolis_posterior
+from galileo_jax.inference.samplers import Settings
 from galileo_jax.inference.samplers.program import Program
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -112,6 +120,58 @@ def test_other_densities_go_along_it_too(gentle):
     assert not isinstance(closure, Program)
     u = jnp.asarray(np.random.default_rng(4).standard_normal(len(trials.names)))
     assert float(program(u)) == pytest.approx(float(closure(u)), rel=1e-6)
+
+
+def test_draws_that_a_valley_suits_keep_it():
+    valley, generator = any_valley(), np.random.default_rng(5)
+    u = generator.standard_normal((2000, DIM))
+    kept = learned(valley, u)
+    assert kept.valley is valley
+    np.testing.assert_allclose(kept.covariance, np.eye(DIM), atol=0.15)
+
+
+def test_draws_of_another_shape_get_coordinates_of_their_own():
+    """Where the fit's widths are a third of the true ones, its bends are wrong, too."""
+    valley, generator = any_valley(), np.random.default_rng(6)
+    valley = replace(valley, quadratic=0.3 * valley.quadratic, cubic=0.1 * valley.cubic)
+    unbent = replace(valley, quadratic=0 * valley.quadratic, cubic=0 * valley.cubic)
+    z = valley.mode + 3.0 * generator.standard_normal((2000, DIM)) @ valley.root.T
+    bent = np.array([u_of(valley, one) for one in unbent.straight(z)])
+    np.testing.assert_allclose(valley(bent), z, atol=1e-6)
+    found = learned(valley, bent)
+    assert not found.valley.quadratic.any()
+    assert not found.valley.cubic.any()
+    own = found.valley.straight(z)
+    np.testing.assert_allclose(own.mean(axis=0), found.mean, atol=1e-9)
+    np.testing.assert_allclose(np.cov(own, rowvar=False), found.covariance, atol=1e-9)
+
+
+def u_of(valley, straight):
+    """The inverse of the bends: each direction is bent by those before it alone."""
+    u = np.zeros(DIM)
+    for i in range(DIM):
+        u[i] = straight[i] - valley.quadratic[i] @ u**2 - valley.cubic[i] @ u**3
+    return u
+
+
+@pytest.mark.slow
+def test_chains_that_have_not_converged_set_off_anew(tmp_path):
+    """The fit's widths are too small; what a first run drew mends them for the second."""
+    trials = make_trials([HIT], seed=1)
+    fit = GradientFitter(trials).fit(0)
+    narrow = replace(fit, covariance=fit.covariance / 6)
+    seen, file, settings = [], tmp_path / "chains", Settings(max_steps=3000)
+    posterior = metropolis_posterior(
+        trials, narrow, 0, settings=settings, on_block=seen.append, checkpoint=file
+    )
+    assert posterior.is_converged
+    assert file.with_name("chains.second").exists()
+    steps = [state.num_steps for state in seen]
+    assert steps == sorted(set(steps))
+    assert steps[-1] > metropolis.FIRST_STEPS + settings.warmup_steps
+    assert {state.max_steps for state in seen} == {3200}
+    again = metropolis_posterior(trials, narrow, 0, settings=settings, checkpoint=file)
+    np.testing.assert_array_equal(again.draws, posterior.draws)
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ M. D. Parno, Y. M. Marzouk, Transport map accelerated Markov chain Monte Carlo, 
 Uncertain. Quantif. 6 (2018), 10.1137/17M1134640.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -62,6 +62,20 @@ class Valley(eqx.Module):
         return np.linalg.solve(self.root, (z - self.mode).T).T
 
 
+class Coordinates(NamedTuple):
+    """Coordinates u for chains, and what a density looks like in them.
+
+    Attributes:
+      valley: from u to z.
+      mean: `[parameter]`, of u.
+      covariance: `[parameter, parameter]`, of u.
+    """
+
+    valley: Valley
+    mean: np.ndarray
+    covariance: np.ndarray
+
+
 def along(log_density: LogDensity, valley: Valley) -> LogDensity:
     """A log density of z as one of u."""
     if isinstance(log_density, Program):
@@ -101,6 +115,28 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     quadratic[:count, :count] = _stiffer(-(ahead + behind) / (2 * REACH**2))
     cubic[:count, :count] = _stiffer(-(ahead - behind) / (2 * REACH**3))
     return Valley(fit.z, root, quadratic, cubic)
+
+
+def learned(valley: Valley, u: np.ndarray) -> Coordinates:
+    """Coordinates that suit draws, and the draws' mean and covariance in them.
+
+    The valley's own; or straight ones, if in these a normal density comes closer to the draws: a
+    fit whose widths are wrong, at a kink of the misfit, has wrong bends, too. The determinants are
+    constant, so that those of the covariances compare.
+
+    Args:
+      valley: in whose coordinates the draws were made.
+      u: `[draw, parameter]`.
+    """
+    z = valley(u)
+    bent, straight = np.cov(u, rowvar=False), np.cov(z, rowvar=False)
+    size = np.linalg.slogdet(bent)[1] + 2 * np.linalg.slogdet(valley.root)[1]
+    if size <= np.linalg.slogdet(straight)[1]:
+        return Coordinates(valley, u.mean(axis=0), bent)
+    dim = len(straight)
+    none = np.zeros((dim, dim))
+    unbent = Valley(z.mean(axis=0), np.linalg.cholesky(straight), none, none)
+    return Coordinates(unbent, np.zeros(dim), np.eye(dim))
 
 
 def scattered(

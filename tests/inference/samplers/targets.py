@@ -41,3 +41,22 @@ def gumbel_and_logistic() -> Target:
     mean = np.array([0.5772157, 0.0], np.float32)
     covariance = np.diag([np.pi**2 / 6, np.pi**2 / 3]).astype(np.float32)
     return Target(log_density, mean, covariance)
+
+
+APART, WEIGHTS = 3.5, (0.7, 0.3)  # of two valleys: sds of the wider, shares
+
+
+def two_valleys(dim: int = 4) -> Target:
+    """Two normal valleys, the second half as wide; along the first coordinate they are apart."""
+    centres = np.zeros((2, dim), np.float32)
+    centres[1, 0] = APART
+    sds, weights = np.array([1.0, 0.5]), np.array(WEIGHTS)
+
+    def log_density(z):
+        away = jnp.sum((z - centres) ** 2, axis=1) / sds**2
+        return jax.nn.logsumexp(jnp.log(weights) - dim * jnp.log(sds) - 0.5 * away)
+
+    mean = weights @ centres
+    covariance = np.diag(np.full(dim, weights @ sds**2))
+    covariance[0, 0] += weights[0] * weights[1] * APART**2
+    return Target(log_density, mean.astype(np.float32), covariance.astype(np.float32))

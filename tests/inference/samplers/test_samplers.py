@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from galileo_jax.inference.convergence import convergence
 from galileo_jax.inference.samplers import (
     AbstractTunedSampler,
     Settings,
@@ -16,7 +17,14 @@ from galileo_jax.inference.samplers import (
     sampler_names,
 )
 from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
-from tests.inference.samplers.targets import Target, gaussian, gumbel_and_logistic
+from tests.inference.samplers.targets import (
+    APART,
+    WEIGHTS,
+    Target,
+    gaussian,
+    gumbel_and_logistic,
+    two_valleys,
+)
 
 TUNED = ("mixture", "random_walk")
 TARGETS = {"gaussian": gaussian(), "gumbel_logistic": gumbel_and_logistic()}
@@ -69,6 +77,26 @@ def test_moments(name, target):
         np.outer(np.diag(known.covariance), np.diag(known.covariance))
     )
     np.testing.assert_allclose(correlation, expected, atol=MONTE_CARLO_ERRORS / np.sqrt(1000))
+
+
+def test_two_valleys_have_their_weights():
+    """Chains that all start in the wider valley find the narrow one, and its share of the draws."""
+    known = two_valleys()
+    posterior = sample(
+        jax.random.key(2),
+        tuned("mixture", np.zeros(4, np.float32), np.eye(4, dtype=np.float32)),
+        known.log_density,
+        0.1 * jax.random.normal(jax.random.key(3), (8, 4)),
+        ["z0", "z1", "z2", "z3"],
+        settings=Settings(min_ess=1500),
+    )
+    assert posterior.is_converged
+    in_second = posterior["z0"] > 0.6 * APART
+    # Of the wider valley two in a hundred lie beyond, and of the narrow one as many before.
+    expected = WEIGHTS[0] * stats.norm.sf(0.6 * APART) + WEIGHTS[1] * stats.norm.cdf(0.8 * APART)
+    error = np.sqrt(expected * (1 - expected) / convergence(in_second.astype(float)).ess_bulk)
+    assert abs(in_second.mean() - expected) < MONTE_CARLO_ERRORS * error
+    assert error < 0.02
 
 
 @pytest.mark.parametrize("name", TUNED)
