@@ -80,7 +80,7 @@ def metropolis_posterior(
             found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]
         return found or {"log_noise": draws[..., -1]}
 
-    dim = len(trials.names)
+    dim = valley.root.shape[1]
     posterior = sample(
         jax.random.key(seed),
         sampler_class(sampler).from_gaussian(jnp.zeros(dim), jnp.eye(dim)),  # pyright: ignore
