@@ -1,4 +1,4 @@
-"""The evidence of hypotheses between which a nat or two decides: of all valleys, and by rollouts."""
+"""The evidence of hypotheses where a nat or two decides: of all valleys, and by rollouts."""
 
 from collections.abc import Sequence
 
