@@ -1,6 +1,7 @@
 """The evidence by importance, against posteriors whose evidence a sum over a grid gives."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -68,17 +69,17 @@ class Known:
         return logsumexp(-costs) + 2 * np.log(axis[1] - axis[0]) - np.log(2 * np.pi)
 
 
-BENT = Known(lambda a, b: ((a - 0.5) / 0.8, (b - a**2) / 0.2))
+BENT: Any = Known(lambda a, b: ((a - 0.5) / 0.8, (b - a**2) / 0.2))
 # Of a positive parameter at the end of its prior: anything below -1 leaves no trace.
-AT_THE_EDGE = Known(lambda a, b: (8 * np.maximum(a + 1.0, 0.0) ** 2, (b - 0.3) / 0.2))
+AT_THE_EDGE: Any = Known(lambda a, b: (8 * np.maximum(a + 1.0, 0.0) ** 2, (b - 0.3) / 0.2))
 # An effect that hardly shows, and nothing of it where its place is beyond what was seen.
 LEFT = 1.5
-UNSEEN = Known(lambda a, b: (6 * np.exp(a) / (1 + np.exp(8 * b)) - LEFT, 0 * a))
-TWO = Known(lambda a, b: ((a**2 - 1) / 0.1, (b - 0.2 * a) / 0.3))
+UNSEEN: Any = Known(lambda a, b: (6 * np.exp(a) / (1 + np.exp(8 * b)) - LEFT, 0 * a))
+TWO: Any = Known(lambda a, b: ((a**2 - 1) / 0.1, (b - 0.2 * a) / 0.3))
 
 
 def test_a_normal_posterior_is_laplace_s():
-    known = Known(lambda a, b: ((a - 1) / 0.1, (b + 0.5) / 0.3))
+    known: Any = Known(lambda a, b: ((a - 1) / 0.1, (b + 0.5) / 0.3))
     fit = known.fit((1 / 1.01, -0.5 / 1.09))
     assert fit.log_evidence == pytest.approx(known.exact(), abs=1e-3)
     assert weighed([fit], known, 0).log_evidence == pytest.approx(known.exact(), abs=AGREES_NATS)
