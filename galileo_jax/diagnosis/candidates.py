@@ -155,7 +155,7 @@ def fit_candidates(
         for row, fit in polished.items():
             take(int(whose[row]), fit)
     hypotheses = [Hypothesis(tuple(e), fits[i]) for i, e in enumerate(candidates)]
-    for i in np.flatnonzero(needs_mending(hypotheses)):
+    for i in np.flatnonzero(needs_mending(hypotheses)).tolist():
         fit, found = mended(fitter, ends_at[i], seed, bases[i].fit)
         hypotheses[i] = replace(hypotheses[i], fit=fit, weighed=found)
     return hypotheses
