@@ -1,8 +1,8 @@
 """Adaptive tempered sequential Monte Carlo: from the prior to the posterior, with the evidence.
 
     p_t(z)  ~  N(z; 0, 1) L(z)^t,   t from 0 to 1
-    every stage: resample; `num_moves` steps of a random walk with the particles' own covariance;
-                 raise t until only half of the particles count
+    every stage: resample; `num_moves` turns of the sampler `mixture` with the particles' own mean
+                 and covariance; raise t until only half of the particles count
     at t = 1:    resample and move once more, for BlackJAX leaves its last particles weighted
 
 It needs no fit to start from and finds several modes, where they are wide enough to hold particles
@@ -22,7 +22,8 @@ import numpy as np
 from blackjax.smc import adaptive_tempered, resampling
 from blackjax.smc.base import extend_params
 
-from galileo_jax.inference.samplers.library.random_walk import RandomWalk, optimal_log_scale
+from galileo_jax.inference.samplers.library.mixture import Mixture
+from galileo_jax.inference.samplers.library.random_walk import optimal_log_scale
 from galileo_jax.inference.samplers.sampler import LogDensity, State
 
 LEAST_ESS = 0.5
@@ -55,8 +56,9 @@ def temper(
     dim: int,
     *,
     num_particles: int = 512,
-    num_moves: int = 10,
+    num_moves: int = 3,
     max_stages: int = 200,
+    is_moved: bool = True,
 ) -> Population:
     """Draws from N(z; 0, 1) L(z).
 
@@ -66,8 +68,11 @@ def temper(
         without a new compilation.
       dim: of z.
       num_particles: per stage.
-      num_moves: random-walk steps of each particle and stage.
+      num_moves: turns of each particle and stage: a step of a random walk, and four independent
+        ones, without which evidences come out too low by many nats.
       max_stages: a population that has not arrived by then is an error.
+      is_moved: at t = 1, too; without it the particles are not yet draws of the posterior, which
+        the evidence needs not.
 
     Raises:
       RuntimeError: `max_stages` is reached.
@@ -86,11 +91,14 @@ def temper(
             break
     else:
         raise RuntimeError(f"tempering has come to {temperatures[-1]:.3g} in {max_stages} stages")
+    stages, each = len(temperatures), num_moves * Mixture.steps_per_turn + 3
+    if not is_moved:
+        count, ts = num_particles * stages * each, tuple(temperatures)
+        return Population(np.asarray(state.particles), log_evidence, ts, count)
     moved = _last(key, state, log_likelihood, LAST_MOVES * num_moves)
     # A stage evaluates all particles for the next t, at the start of the moves, in each of them,
     # and for the weights.
-    stages, each = len(temperatures), num_moves + 3
-    count = num_particles * (stages * each + LAST_MOVES * num_moves + 1)
+    count = num_particles * (stages * each + LAST_MOVES * num_moves * Mixture.steps_per_turn + 1)
     return Population(np.asarray(moved), log_evidence, tuple(temperatures), count)
 
 
@@ -99,14 +107,14 @@ def _stage(key: jax.Array, state: Any, log_likelihood: LogDensity, num_moves: in
     kernel = adaptive_tempered.build_kernel(
         _log_prior, _finite(log_likelihood), _move, _start, resampling.systematic, LEAST_ESS
     )
-    parameters = extend_params({"cholesky": _cholesky(state)})  # pyright: ignore
+    parameters = extend_params(_shape(state))  # pyright: ignore
     moved, info = kernel(key, state, num_moves, parameters)
     return moved, info.log_likelihood_increment
 
 
 @eqx.filter_jit
 def _last(key: jax.Array, state: Any, log_likelihood: LogDensity, num_moves: int) -> jax.Array:
-    likelihood, cholesky = _finite(log_likelihood), _cholesky(state)
+    likelihood, shape = _finite(log_likelihood), _shape(state)
     of_choice, of_moves = jax.random.split(key)
     chosen = resampling.systematic(of_choice, state.weights, len(state.weights))
 
@@ -115,7 +123,7 @@ def _last(key: jax.Array, state: Any, log_likelihood: LogDensity, num_moves: int
 
     def walk(key: jax.Array, z: jax.Array) -> jax.Array:
         def move(state: State, key: jax.Array):
-            return _move(key, state, density, cholesky)[0], None
+            return _move(key, state, density, **shape)[0], None
 
         end, _ = jax.lax.scan(move, State(z, density(z)), jax.random.split(key, num_moves))
         return end.position
@@ -128,15 +136,18 @@ def _start(position: jax.Array, log_density: LogDensity) -> State:
     return State(position, log_density(position))
 
 
-def _move(key: jax.Array, state: State, log_density: LogDensity, cholesky: jax.Array):
-    scale = jnp.asarray(optimal_log_scale(state.position.shape[0]))
-    return RandomWalk(cholesky=cholesky, log_scale=scale).step(key, state, log_density)
+def _move(key: jax.Array, state: State, log_density: LogDensity, mean: Any, cholesky: Any):
+    scale = jnp.asarray(optimal_log_scale(mean.shape[0]))
+    sampler = Mixture(mean=mean, cholesky=cholesky, log_scale=scale)
+    moved, (_, info) = sampler.turn(key, state, log_density)
+    return moved, info
 
 
-def _cholesky(state: Any) -> jax.Array:
-    """Of the weighted particles' covariance."""
+def _shape(state: Any) -> dict[str, jax.Array]:
+    """Of the weighted particles: their mean, and the Cholesky factor of their covariance."""
+    mean = jnp.average(state.particles, axis=0, weights=state.weights)
     covariance = jnp.cov(state.particles, rowvar=False, aweights=state.weights)
-    return jnp.linalg.cholesky(covariance + RIDGE * jnp.eye(covariance.shape[0]))
+    return {"mean": mean, "cholesky": jnp.linalg.cholesky(covariance + RIDGE * jnp.eye(len(mean)))}
 
 
 def _log_prior(z: jax.Array) -> jax.Array:

@@ -14,6 +14,8 @@ every parameter, according to how much of its prior the data exclude.
     4. Of the candidates that the verdict may hang on, every valley that was found is refined, and
        the best fit once more with its positive nuisances moved. Of the others this could change
        nothing that a rule looks at.
+    5. Where a verdict hangs on a few nats, the evidence of those that are so close is mended by
+       rollouts round the valleys that were found (`inference/fits/weighed.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -22,9 +24,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.diagnosis.candidate_starts import matched, scattered
-from galileo_jax.inference.fits.descent import Descended, ends_of, in_valley
+from galileo_jax.diagnosis.mended_evidence import mended
+from galileo_jax.inference.fits.descent import (
+    Descended,
+    ends_of,
+    in_valley,
+)
 from galileo_jax.inference.fits.ends import valleys
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.inference.fits.weighed import Weighed
 from galileo_jax.inference.joint_problem import JointProblem
 
 NUM_REFITTED, OUT_OF_THE_RACE = 6, 100.0  # candidates, unless so many nats behind the best
@@ -40,15 +48,30 @@ class Hypothesis:
       effects: names, in the order in which they were added.
       fit: of all parameters.
       trials: whose parameters these are, where not the diagnosis's own: of a law.
+      weighed: its evidence, mended; None where Laplace's has to do.
     """
 
     effects: tuple[str, ...]
     fit: GradientFit
     trials: JointProblem | None = None
+    weighed: Weighed | None = None
 
     def of(self, trials: JointProblem) -> JointProblem:
         """The trials that it was fitted to, where the diagnosis's own are `trials`."""
         return self.trials or trials
+
+    def evidence_over(self, base: "Hypothesis") -> float:
+        """Log evidence less that of another, nats: like with like, where only Laplace's is known.
+
+        Errors of Laplace's are alike where hypotheses are.
+        """
+        if self.weighed is None or base.weighed is None:
+            return self.fit.log_evidence - base.fit.log_evidence
+        return self.weighed.log_evidence - base.weighed.log_evidence
+
+    def is_same(self, other: "Hypothesis") -> bool:
+        """Whether it has the same fit and evidence."""
+        return self.fit is other.fit and self.weighed is other.weighed
 
     @property
     def misfit(self) -> float:
@@ -68,6 +91,11 @@ def not_far_behind(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
     return evidence > evidence.max() - OUT_OF_THE_RACE
 
 
+def none_of(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+    """None of them."""
+    return np.zeros(len(hypotheses), bool)
+
+
 def fit_candidates(
     fitter: GradientFitter,
     bases: Sequence[Hypothesis],
@@ -75,6 +103,7 @@ def fit_candidates(
     seed: int,
     matters: Callable[[Sequence[Hypothesis]], np.ndarray] = not_far_behind,
     on_fit: Callable[[Hypothesis], None] = lambda _: None,
+    needs_mending: Callable[[Sequence[Hypothesis]], np.ndarray] = none_of,
 ) -> list[Hypothesis]:
     """Fits every candidate (a set of effects), all in one race.
 
@@ -85,6 +114,7 @@ def fit_candidates(
       seed: of the starts.
       matters: `[hypothesis]`, on which the verdict may hang; only these are fitted in every valley.
       on_fit: called with each as soon as it is fitted; the fit may yet become better.
+      needs_mending: `[hypothesis]`, of which Laplace's evidence will not do.
     """
     trials = fitter.trials
     count = len(trials.model_parameters)
@@ -101,8 +131,10 @@ def fit_candidates(
     ends = [valleys(found.best, _left(found, of == i)) for i in range(len(candidates))]
     first = np.array([rows[0] for rows in ends])
     fits: dict[int, GradientFit] = {}
+    ends_at: dict[int, list[GradientFit]] = {i: [] for i in range(len(candidates))}
 
     def take(i: int, fit: GradientFit) -> None:
+        ends_at[i].append(fit)
         if i not in fits or fit.log_evidence > fits[i].log_evidence:
             fits[i] = fit
 
@@ -122,7 +154,11 @@ def fit_candidates(
         polished = fitter.polish(np.concatenate(again), free[whose], owner)
         for row, fit in polished.items():
             take(int(whose[row]), fit)
-    return [Hypothesis(tuple(e), fits[i]) for i, e in enumerate(candidates)]
+    hypotheses = [Hypothesis(tuple(e), fits[i]) for i, e in enumerate(candidates)]
+    for i in np.flatnonzero(needs_mending(hypotheses)).tolist():
+        fit, found = mended(fitter, ends_at[i], seed, bases[i].fit)
+        hypotheses[i] = replace(hypotheses[i], fit=fit, weighed=found)
+    return hypotheses
 
 
 def _left(found: Descended, is_own: np.ndarray) -> np.ndarray:

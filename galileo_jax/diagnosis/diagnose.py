@@ -30,6 +30,7 @@ from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.laws.in_model import fitted_laws
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
+from galileo_jax.diagnosis.mended_evidence import mended
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_from_scratch, pairs_to_try
 from galileo_jax.diagnosis.score_tests import best_gains, score_tests
@@ -40,6 +41,7 @@ from galileo_jax.diagnosis.verdict import (
     decisive_margin,
     explains,
     form_that_leads,
+    is_close_call,
     is_contested_by_law,
     is_nothing_missing,
     law_contested,
@@ -222,6 +224,14 @@ class _Race:
             )
             return may_decide(log_odds, is_form, best, decisive, self.is_adequate)
 
+        def needs_mending(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+            log_odds = np.array([self._log_odds(one) for one in hypotheses])
+            close = is_close_call(log_odds, best, decisive, self.is_adequate)
+            if close.any() and self.base.weighed is None:
+                _, found = mended(self.fitter, [self.base.fit], self.seed, None)
+                self.base = replace(self.base, weighed=found)
+            return close & (self.base.weighed is not None)
+
         trials = self.fitter.trials
         scores = dict.fromkeys(sets, 0.0)
         for start in {id(start): start for start in starts}.values():
@@ -238,9 +248,9 @@ class _Race:
             table = ranked(self._made.values())
             self._on_candidate(next(c for c in table if c.effects == made.effects))
 
-        found = fit_candidates(self.fitter, starts, sets, self.seed, matters, on_fit)
+        found = fit_candidates(self.fitter, starts, sets, self.seed, matters, on_fit, needs_mending)
         return [
-            made if (made := self._made[one.effects]).hypothesis.fit is one.fit else make(one)
+            made if (made := self._made[one.effects]).hypothesis.is_same(one) else make(one)
             for one in found
         ]
 
@@ -248,7 +258,7 @@ class _Race:
         return self._log_evidence(hypothesis) + self._log_prior(hypothesis)
 
     def _log_evidence(self, hypothesis: Hypothesis) -> float:
-        return hypothesis.fit.log_evidence - self.base.fit.log_evidence
+        return hypothesis.evidence_over(self.base)
 
     def _log_prior(self, hypothesis: Hypothesis) -> float:
         trials = self.fitter.trials
@@ -284,7 +294,7 @@ def _laws(
                 hypothesis=law.hypothesis,
                 error=error_of(own, own.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
                 score_z=float(np.sqrt(2 * max(law.score, 0.0))),
-                log_evidence=fit.log_evidence - base.fit.log_evidence,
+                log_evidence=law.hypothesis.evidence_over(base),
                 log_prior=log_prior([law_odds(len(law.structure.factors))], num_effects),
                 probability=0.0,
                 p_value=None,

@@ -38,6 +38,9 @@ LEAST_GAIN = 10.0
 # Of the best single effects so many are joined with others, to so many pairs in all. Then either
 # effect of the best pair is kept, and joined with so many that may explain what the other does.
 NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 3
+# By how much Laplace's evidences may be wrong, nats: hypotheses so much farther apart than a rule
+# asks are as far apart by any other.
+LAPLACE_NATS = 3.0
 # Where no pair explains the data, the best pairs and all of so many single effects are fitted from
 # the fit without effects.
 NUM_CROSSED = 4
@@ -339,3 +342,27 @@ def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | Non
         return best if best.log_evidence > LEAST_GAIN else None
     names = ("+".join(verdict.effects), verdict.effects[0])
     return next(c for c in candidates if c.name in names)
+
+
+def is_close_call(
+    log_odds: np.ndarray, best: float, decisive: float, is_base_adequate: bool
+) -> np.ndarray:
+    """Of which hypotheses, `[hypothesis]`, Laplace's evidence will not do.
+
+    The verdict might be another if their evidences were, by `LAPLACE_NATS`. Of one that is far
+    ahead of all others, the model without effects among them, that is never so.
+
+    Args:
+      log_odds: `[hypothesis]`, by Laplace.
+      best: of the log odds of others, so far; -inf where there are none.
+      decisive: nats by which a rival must be behind.
+      is_base_adequate: whether the model without effects leaves nothing but noise.
+    """
+    top = max(best, float(log_odds.max()))
+    if is_base_adequate and top < CONVINCING - LAPLACE_NATS:
+        return np.zeros(len(log_odds), bool)
+    least = top - decisive - LAPLACE_NATS
+    close = log_odds > least
+    is_beside_none = least < (CONVINCING if is_base_adequate else 0.0)
+    others = (best > least) + is_beside_none
+    return close if close.sum() + others > 1 else np.zeros(len(log_odds), bool)

@@ -95,7 +95,7 @@ def metropolis_posterior(
         return found or {"log_noise": draws[..., -1]}
 
     kernel, density = sampler_class(sampler), density_of(trials)
-    dim, key = len(trials.names), jax.random.key(seed)
+    dim, key = valley.root.shape[1], jax.random.key(seed)
     first, second = _parts(settings)
     total = settings.warmup_steps + settings.max_steps
 

@@ -16,6 +16,7 @@ from galileo_jax.diagnosis.verdict import (
     decisive_margin,
     explains,
     form_that_leads,
+    is_close_call,
     is_nothing_missing,
     log_prior,
     looked_at_again,
@@ -449,3 +450,23 @@ def test_a_form_alone_convinces_nobody_and_what_leads_elsewhere_counts():
     assert not alone.any()
     behind = may_decide(np.array([30.0, 0.0]), np.array([False, False]), 60.0, 3.0, False)
     assert not behind.any()
+
+
+@pytest.mark.parametrize(
+    ("log_odds", "best", "is_adequate", "expected"),
+    [
+        ([30.0, 24.0 - EDGE, 0.0], -np.inf, False, [False, False, False]),  # 6 nats ahead of all
+        ([30.0, 24.0 + EDGE, 0.0], -np.inf, False, [True, True, False]),
+        ([30.0, 0.0], 31.0, False, [True, False]),  # of a pair, one beside the best single
+        ([6.0 + EDGE], -np.inf, False, [False]),  # far ahead of no effect
+        ([6.0 - EDGE], -np.inf, False, [True]),
+        ([16.0 + EDGE, 0.0], -np.inf, True, [False, False]),  # a faint effect needs 7 nats
+        ([16.0 - EDGE, 0.0], -np.inf, True, [True, False]),
+        ([4.0 + EDGE, -4.0], -np.inf, True, [True, True]),
+        ([4.0 - EDGE, 3.0], -np.inf, True, [False, False]),  # never comes to convince
+    ],
+)
+def test_whose_evidence_must_be_right_to_a_nat(log_odds, best, is_adequate, expected):
+    margin = 6.0 if is_adequate else 3.0
+    found = is_close_call(np.array(log_odds), best, margin, is_adequate)
+    assert found.tolist() == expected

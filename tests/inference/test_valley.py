@@ -182,3 +182,17 @@ def test_chains_converge_in_it(gentle):
         posterior = metropolis_posterior(trials, fit, seed)
         assert posterior.is_converged
         assert posterior.stats["num_evaluations"] < 16_000
+
+
+def test_the_way_back_and_of_a_pinned_parameter_there_is_none():
+    valley, u = any_valley(), np.random.default_rng(5).standard_normal((20, DIM))
+    every = np.ones(DIM, bool)
+    np.testing.assert_allclose(valley.inverse(valley(u), every), u, atol=1e-6)
+    assert valley.log_volume == pytest.approx(np.linalg.slogdet(valley.root)[1])
+    # The same with a parameter more, which is held at 7.
+    wider = replace(
+        valley, mode=np.append(valley.mode, 7.0), root=np.vstack([valley.root, np.zeros(DIM)])
+    )
+    assert np.all(wider(u)[:, -1] == 7.0)
+    np.testing.assert_allclose(wider.inverse(wider(u), np.append(every, False)), u, atol=1e-6)
+    assert wider.log_volume == pytest.approx(valley.log_volume)

@@ -90,6 +90,11 @@ class GradientFitter:
         is_nuisance = np.array([p.role == "nuisance" for p in parameters])
         self._is_positive_nuisance = is_nuisance & [p.is_positive for p in parameters]
 
+    @property
+    def residuals(self) -> Residuals:
+        """Of the trials."""
+        return self._residuals
+
     def compile(self) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
         for effects in dict.fromkeys([(), self.trials.all_effects]):

@@ -27,7 +27,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.programs import FAILED
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD
@@ -35,6 +35,7 @@ from galileo_jax.inference.samplers.program import Program
 from galileo_jax.inference.samplers.sampler import LogDensity
 
 REACH = 2.0  # standard deviations: what proposals mostly keep within
+LEAST_VARIANCE = 1e-18  # in z: where slopes are absurd, rounding leaves some below 0
 NUM_SCATTERED = 64  # that starts are chosen from
 
 
@@ -43,7 +44,7 @@ class Valley(eqx.Module):
 
     Attributes:
       mode: `[parameter]`, z at u = 0.
-      root: `[parameter, direction]`, R.
+      root: `[parameter, direction]`, R; pinned parameters have no direction.
       quadratic: `[direction, direction]`, B.
       cubic: `[direction, direction]`, C.
     """
@@ -60,6 +61,18 @@ class Valley(eqx.Module):
     def straight(self, z: np.ndarray) -> np.ndarray:
         """(z - mode) in standard deviations along the directions: u, if there were no bend."""
         return np.linalg.solve(self.root, (z - self.mode).T).T
+
+    def inverse(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """From z `[point, parameter]` to u; `free`: `[parameter]`, those that have directions."""
+        u = np.linalg.solve(self.root[free], (z - self.mode)[:, free].T).T
+        for i in range(1, u.shape[1]):
+            u[:, i] -= u[:, :i] ** 2 @ self.quadratic[i, :i] + u[:, :i] ** 3 @ self.cubic[i, :i]
+        return u
+
+    @property
+    def log_volume(self) -> float:
+        """Log of what a unit of u is in z, which is the same everywhere."""
+        return float(np.sum(np.log(np.linalg.svd(self.root, compute_uv=False))))
 
 
 class Coordinates(NamedTuple):
@@ -96,24 +109,25 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
       fit: the mode, with slopes at `fit.steps`.
       residuals: of the trials that were fitted.
     """
-    count = len(fit.steps)
-    root, quadratic, cubic = (np.zeros_like(fit.covariance) for _ in range(3))
-    variance, vectors = np.linalg.eigh(fit.covariance[:count, :count])
-    own = (vectors * np.sqrt(np.maximum(variance, 0.0)))[:, ::-1]
-    root[:count, :count] = own
+    count, own = len(fit.steps), np.flatnonzero(fit.free[: len(fit.steps)])
+    size, directions = len(own), len(fit.z) - count + len(own)
+    root = np.zeros((len(fit.z), directions))
+    quadratic, cubic = np.zeros((directions, directions)), np.zeros((directions, directions))
+    variance, vectors = np.linalg.eigh(fit.covariance[np.ix_(own, own)])
+    root[own, :size] = (vectors * np.sqrt(np.maximum(variance, LEAST_VARIANCE)))[:, ::-1]
     # Noise scales, behind the others, hardly depend on these.
-    root[count:, count:] = np.diag(np.sqrt(np.diag(fit.covariance)[count:]))
+    root[count:, size:] = np.diag(np.sqrt(np.diag(fit.covariance)[count:]))
     slopes = residuals.slopes(_near(fit, fit.z[None]), fit.steps[None], is_central=True)
     jacobian = np.concatenate([slopes.among_all(clip, axis=2)[0] for clip in slopes.jacobian])
-    step = REACH * np.eye(count)
-    z = np.tile(fit.z, (1 + 2 * count, 1))
-    z[:, :count] += np.concatenate([np.zeros((1, count)), step, -step]) @ own.T
+    step = REACH * np.eye(size)
+    z = np.tile(fit.z, (1 + 2 * size, 1))
+    z += np.concatenate([np.zeros((1, size)), step, -step]) @ root[:, :size].T
     white = np.concatenate(residuals.whites(_near(fit, z)), axis=1)
     white[np.abs(white).max(axis=1) >= FAILED] = np.nan
-    gradient = white @ (jacobian @ own) + z[:, :count] @ own
-    ahead, behind = gradient[1:].reshape(2, count, count) - gradient[0]
-    quadratic[:count, :count] = _stiffer(-(ahead + behind) / (2 * REACH**2))
-    cubic[:count, :count] = _stiffer(-(ahead - behind) / (2 * REACH**3))
+    gradient = white @ (jacobian @ root[:count, :size]) + z[:, :count] @ root[:count, :size]
+    ahead, behind = gradient[1:].reshape(2, size, size) - gradient[0]
+    quadratic[:size, :size] = _stiffer(-(ahead + behind) / (2 * REACH**2))
+    cubic[:size, :size] = _stiffer(-(ahead - behind) / (2 * REACH**3))
     return Valley(fit.z, root, quadratic, cubic)
 
 
@@ -130,7 +144,7 @@ def learned(valley: Valley, u: np.ndarray) -> Coordinates:
     """
     z = valley(u)
     bent, straight = np.cov(u, rowvar=False), np.cov(z, rowvar=False)
-    size = np.linalg.slogdet(bent)[1] + 2 * np.linalg.slogdet(valley.root)[1]
+    size = np.linalg.slogdet(bent)[1] + 2 * valley.log_volume
     if size <= np.linalg.slogdet(straight)[1]:
         return Coordinates(valley, u.mean(axis=0), bent)
     dim = len(straight)
@@ -147,11 +161,11 @@ def scattered(
     Drawn from the density to the power 1/2, by importance from N(0, 2): where the map leads
     astray, far off, none is left.
     """
-    count = len(fit.steps)
+    size = int(np.sum(fit.free[: len(fit.steps)]))
     generator = np.random.default_rng([seed, 10])
-    u = np.sqrt(2) * generator.standard_normal((max(NUM_SCATTERED, num), len(fit.z)))
+    u = np.sqrt(2) * generator.standard_normal((max(NUM_SCATTERED, num), valley.root.shape[1]))
     points = _near(fit, valley(u))
-    surplus = 0.25 * np.sum(u[:, :count] ** 2, axis=1) - 0.5 * residuals.costs(points)
+    surplus = 0.25 * np.sum(u[:, :size] ** 2, axis=1) - 0.5 * residuals.costs(points)
     # The largest of log-weights with Gumbel noise: a draw without replacement.
     return u[np.argsort(-(surplus + generator.gumbel(size=len(u))))[:num]]
 

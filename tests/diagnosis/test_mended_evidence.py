@@ -1,0 +1,40 @@
+"""Whose evidence is compared with whose, and which valleys add to it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.mended_evidence import apart
+from galileo_jax.inference.fits.evidence import Code, GradientFit
+from galileo_jax.inference.fits.weighed import Weighed
+
+FIT = GradientFit(
+    z=np.zeros(3), free=np.array([True, True, False]), covariance=np.diag([0.01, 1.0, 0.0]),
+    chi2=0.0, log_evidence=-100.0, num_values=9, steps=np.ones(2), jacobian=np.zeros((9, 2)),
+    code=Code.CONVERGED, stats={}, pull=0.0, num_pulled=0.0,
+)  # fmt: skip
+
+
+def at(z, log_evidence):
+    return replace(FIT, z=np.array(z), log_evidence=log_evidence)
+
+
+def mended(log_evidence):
+    return Weighed(log_evidence, np.zeros(256), 200.0)
+
+
+def test_mended_with_mended_and_laplace_with_laplace():
+    base = Hypothesis((), FIT, weighed=mended(-99.5))
+    known = Hypothesis(("air_drag",), at([0, 0, 0], -90.0), weighed=mended(-88.0))
+    unknown = Hypothesis(("stribeck",), at([0, 0, 0], -95.0))
+    assert known.evidence_over(base) == pytest.approx(11.5)
+    assert unknown.evidence_over(base) == pytest.approx(5.0)
+    assert known.evidence_over(Hypothesis((), FIT)) == pytest.approx(10.0)
+
+
+def test_valleys_apart_the_best_first_and_none_twice():
+    best, same = at([0.0, 0.0, 0.0], -90.0), at([0.05, 0.5, 0.0], -90.1)
+    other, behind = at([1.0, 0.0, 0.0], -91.0), at([-1.0, 0.0, 0.0], -93.5)
+    assert apart([other, behind, same, best]) == [best, other]

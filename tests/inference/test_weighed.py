@@ -1,0 +1,133 @@
+"""The evidence by importance, against posteriors whose evidence a sum over a grid gives."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+from scipy.special import logsumexp
+
+from galileo_jax.inference.fits.evidence import Code, GradientFit
+from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
+from galileo_jax.inference.fits.weighed import weighed
+
+STEP = 1e-5
+AGREES_NATS = 0.1  # four errors of 4096 draws
+
+
+def points(z):
+    return Batch(np.atleast_2d(z), np.empty(0), np.empty(0))
+
+
+class Known:
+    """Residuals `white(z)` of two parameters, without clips and noise scales."""
+
+    clips = ()
+
+    def __init__(self, white):
+        self.white = white
+
+    def whites(self, points):
+        return [np.stack(self.white(*points.z.T), axis=1)]
+
+    def costs(self, points):
+        return cost(self.whites(points), points.z)
+
+    def slopes(self, points, steps, is_central):
+        (z,) = points.z
+        ahead, behind = (
+            np.stack(self.white(*(z + s * np.eye(2)).T), axis=1) for s in (STEP, -STEP)
+        )
+        jacobian = ((ahead - behind) / (2 * STEP)).T
+        return Slopes([jacobian[None]], self.whites(points), np.arange(2)[None], 2)
+
+    def fit(self, z, free=(True, True)):
+        """Laplace's, round `z`; a pinned parameter stays at 0."""
+        z, free = np.array(z, float), np.array(free)
+        jacobian = self.slopes(points(z), None, True).jacobian[0][0]
+        own = np.ix_(free, free)
+        covariance = np.zeros((2, 2))
+        covariance[own] = np.linalg.inv((jacobian.T @ jacobian + np.eye(2))[own])
+        evidence = -float(self.costs(points(z))[0]) + 0.5 * np.linalg.slogdet(covariance[own])[1]
+        return GradientFit(
+            z=z, free=free, covariance=covariance, chi2=0.0, log_evidence=float(evidence),
+            num_values=2, steps=np.full(2, STEP), jacobian=jacobian, code=Code.CONVERGED, stats={},
+            pull=0.0, num_pulled=0.0,
+        )  # fmt: skip
+
+    def best(self, start):
+        """Laplace's, round the mode near `start`."""
+        found = minimize(lambda z: self.costs(points(z))[0], start, method="Nelder-Mead")
+        return self.fit(found.x)
+
+    def exact(self):
+        """By a sum over a grid."""
+        axis = np.linspace(-6, 6, 3001)
+        grid = np.stack([each.ravel() for each in np.meshgrid(axis, axis)], axis=1)
+        costs = self.costs(points(grid))
+        return logsumexp(-costs) + 2 * np.log(axis[1] - axis[0]) - np.log(2 * np.pi)
+
+
+BENT: Any = Known(lambda a, b: ((a - 0.5) / 0.8, (b - a**2) / 0.2))
+# Of a positive parameter at the end of its prior: anything below -1 leaves no trace.
+AT_THE_EDGE: Any = Known(lambda a, b: (8 * np.maximum(a + 1.0, 0.0) ** 2, (b - 0.3) / 0.2))
+# An effect that hardly shows, and nothing of it where its place is beyond what was seen.
+LEFT = 1.5
+UNSEEN: Any = Known(lambda a, b: (6 * np.exp(a) / (1 + np.exp(8 * b)) - LEFT, 0 * a))
+TWO: Any = Known(lambda a, b: ((a**2 - 1) / 0.1, (b - 0.2 * a) / 0.3))
+
+
+def test_a_normal_posterior_is_laplace_s():
+    known: Any = Known(lambda a, b: ((a - 1) / 0.1, (b + 0.5) / 0.3))
+    fit = known.fit((1 / 1.01, -0.5 / 1.09))
+    assert fit.log_evidence == pytest.approx(known.exact(), abs=1e-3)
+    assert weighed([fit], known, 0).log_evidence == pytest.approx(known.exact(), abs=AGREES_NATS)
+
+
+@pytest.mark.parametrize(
+    ("known", "mode", "least_off"),
+    [(BENT, (0.3, 0.1), 0.05), (AT_THE_EDGE, (-0.8, 0.3), 0.15)],
+    ids=["bent", "at the edge"],
+)
+def test_the_exact_one_where_laplace_is_off(known, mode, least_off):
+    fit, exact = known.best(mode), known.exact()
+    assert abs(fit.log_evidence - exact) > least_off
+    found = weighed([fit], known, 0, num=4096)
+    assert found.log_evidence == pytest.approx(exact, abs=AGREES_NATS)
+
+
+def test_an_effect_that_does_not_show_may_be_anywhere():
+    fit, exact = UNSEEN.best((-1.6, -1.0)), UNSEEN.exact()
+    nothing = np.zeros(2, bool)
+    without = replace(fit, free=nothing, covariance=np.zeros((2, 2)), log_evidence=-(LEFT**2) / 2)
+    found = weighed([fit], UNSEEN, 0, without, num=4096)
+    assert found.log_evidence == pytest.approx(exact, abs=AGREES_NATS)
+    alone = weighed([fit], UNSEEN, 0, num=4096)
+    assert found.log_evidence != alone.log_evidence
+    far_behind = replace(without, log_evidence=fit.log_evidence - 50.0)  # no draw from there
+    assert weighed([fit], UNSEEN, 0, far_behind, num=4096).log_evidence == alone.log_evidence
+
+
+def test_a_draw_that_is_better_than_the_fit_is_told_of():
+    assert weighed([BENT.best((0.3, 0.1))], BENT, 0).better is None
+    beside = BENT.fit((1.0, 1.3))
+    better = weighed([beside], BENT, 0).better
+    assert BENT.costs(points(better))[0] < BENT.costs(points(beside.z))[0] - 0.5
+
+
+def test_valleys_add_up_and_one_counts_once():
+    near, far = TWO.best((0.99, 0.2)), TWO.best((-0.99, -0.2))
+    both, one = weighed([near, far], TWO, 0, num=4096), weighed([near], TWO, 0, num=4096)
+    assert both.log_evidence == pytest.approx(TWO.exact(), abs=AGREES_NATS)
+    assert both.log_evidence - one.log_evidence == pytest.approx(np.log(2), abs=AGREES_NATS)
+    twice = weighed([near, near], TWO, 0, num=4096)
+    assert twice.log_evidence == pytest.approx(one.log_evidence, abs=AGREES_NATS)
+
+
+def test_the_same_seed_gives_the_same_and_few_draws_say_that_they_are_few():
+    fit = BENT.best((0.3, 0.1))
+    assert weighed([fit], BENT, 3).log_evidence == weighed([fit], BENT, 3).log_evidence
+    assert weighed([fit], BENT, 3).is_sure
+    narrow = replace(fit, covariance=fit.covariance * 1e-4)
+    assert not weighed([narrow], BENT, 3, num=12).is_sure
