@@ -111,8 +111,7 @@ class FittedClip:
     @property
     def kind(self) -> Kind:
         """What its programs are compiled for."""
-        model = self.problem.model
-        return Kind(model.effects + model.nuisances, model.names, model.record_dt_s)
+        return Kind(*self.problem.kind)
 
     @property
     def scene(self) -> Surroundings:
