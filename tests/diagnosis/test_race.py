@@ -6,6 +6,7 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis import candidates
 from galileo_jax.diagnosis.candidate_starts import matched, scattered
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
 from galileo_jax.diagnosis.diagnose import fitter_of
@@ -27,9 +28,8 @@ def full_search(fitter: GradientFitter, base: Hypothesis) -> np.ndarray:
     free = np.stack([trials.free(effects)[:count] for effects in sets])
     bases = [base.fit] * len(sets)
     found = []
-    for own, *starts in zip(
-        free, scattered(fitter, bases, free, 0), matched(fitter, bases, sets, 0), strict=True
-    ):
+    matching, _ = matched(fitter, bases, sets, 0)
+    for own, *starts in zip(free, scattered(fitter, bases, free, 0), matching, strict=True):
         z = np.concatenate(starts)
         fits = fitter.fit_from(z, np.tile(own, (len(z), 1)), np.arange(len(z)))
         best = max(fits, key=lambda fit: fit.log_evidence)
@@ -37,9 +37,16 @@ def full_search(fitter: GradientFitter, base: Hypothesis) -> np.ndarray:
     return np.array(found)
 
 
+def test_the_few_that_promise_most_race_first():
+    gains = np.array([1.0, 9.0, 0.0, 2.0, 8.0, 7.0, 3.0, 4.0, 5.0])
+    assert [own.tolist() for own in candidates._heats(gains)] == [[1, 4, 5, 8], [0, 2, 3, 6, 7]]
+    assert [own.tolist() for own in candidates._heats(gains[:8])] == [list(range(8))]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("hidden", SEEDS, ids="+".join)
-def test_no_candidate_that_may_decide_is_dropped(tmp_path, hidden):
+def test_no_candidate_that_may_decide_is_dropped(tmp_path, hidden, monkeypatch):
+    monkeypatch.setattr(candidates, "NUM_FIRST", 2)  # five effects race in two heats
     path = tmp_path / "clip.csv"
     simulate(
         path,

@@ -15,7 +15,7 @@ are compared; scattered starting points cost only one batch. Which optimiser, an
 docs/explanation/optimiser.md.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -110,7 +110,7 @@ class GradientFitter:
           on_stage: told what is being done.
           effects: names of the effects that are there; default: all of the models'.
         """
-        self._residuals.num_rollouts = 0
+        self._residuals.begin()
         effects = self.trials.all_effects if effects is None else effects
         free = self.trials.free(effects)[: self._count]
         on_stage("searching")
@@ -132,7 +132,7 @@ class GradientFitter:
 
     def refit(self, fit: GradientFit) -> GradientFit:
         """Fits again from a fit, with its positive nuisances moved: the better of both."""
-        self._residuals.num_rollouts = 0
+        self._residuals.begin()
         count = self._count
         return self._best_variant(fit.z[:count], fit.free[:count], 0)
 
@@ -152,7 +152,7 @@ class GradientFitter:
         Returns:
           One fit per hypothesis, of its best start.
         """
-        self._residuals.num_rollouts = 0
+        self._residuals.begin()
         points = self._batch(starts, free)
         found = self._search(points, owner)
         best = []
@@ -181,6 +181,7 @@ class GradientFitter:
           owner: `[start]`, which hypothesis each belongs to.
           lowest: cost that others have already come to, nats.
         """
+        self._residuals.forget()
         give_up = GiveUp(owner, BEHIND_IN_SEARCH, 0.0, OUT_OF_THE_RACE, lowest)
         settings = self.settings
         points = self._batch(starts, free)
@@ -208,7 +209,7 @@ class GradientFitter:
         self,
         z: Float[np.ndarray, "hypothesis parameter"],
         free: Bool[np.ndarray, "hypothesis parameter"],
-        parts: Sequence[np.ndarray],
+        parts: Iterable[np.ndarray],
     ) -> Iterator[tuple[int, GradientFit]]:
         """Fits one end of each of several hypotheses, part by part of them.
 
@@ -217,7 +218,7 @@ class GradientFitter:
         Args:
           z: `[hypothesis, model parameter]`.
           free: `[hypothesis, model parameter]`.
-          parts: indices of hypotheses.
+          parts: indices of hypotheses, whose rows of `z` need not be there before.
         """
         lowest = np.inf
         for own in parts:
