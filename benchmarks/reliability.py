@@ -153,7 +153,7 @@ def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
 
 def summary(entries: Sequence[Mapping[str, Any]], library: Sequence[str]) -> dict[str, Any]:
     """The curve, its expected calibration error, and the rates that the docs state."""
-    claims = [claim for entry in entries for claim in _claims(entry)]
+    claims = [claim for entry in entries for claim in _claims(entry, library)]
     probability, is_true = (np.array([c[i] for c in claims], float) for i in range(2))
     place = np.clip(np.digitize(probability, EDGES) - 1, 0, len(EDGES) - 2)
     curve = [
@@ -190,18 +190,22 @@ def summary(entries: Sequence[Mapping[str, Any]], library: Sequence[str]) -> dic
     }
 
 
-def _claims(entry: Mapping[str, Any]) -> list[tuple[float, bool]]:
-    """Of every hypothesis in a verdict its probability, and whether it is the truth."""
+def _claims(entry: Mapping[str, Any], library: Sequence[str]) -> list[tuple[float, bool]]:
+    """Of every hypothesis in a verdict its probability, and whether it is the truth.
+
+    A form without a name says that it is something outside of the library, and no more.
+    """
     diagnosis, truth = entry["diagnosis"], set(entry["truth"].split("+"))
+    is_outside = not truth <= {*library, "none"}
     verdict = diagnosis["verdict"]
     if verdict["status"] not in ("named", "ambiguous"):
         return []
     named = verdict["status"] == "named"
     answers = ["+".join(verdict["effects"])] if named else verdict["effects"]
     odds = {frozenset(c["effect"].split("+")): c["probability"] for c in diagnosis["candidates"]}
+    parts = [frozenset(each.split("+")) for each in answers]
     return [
-        (odds.get(frozenset(each.split("+")), 0.0), set(each.split("+")) == truth)
-        for each in answers
+        (odds.get(each, 0.0), each == truth if each <= {*library} else is_outside) for each in parts
     ]
 
 

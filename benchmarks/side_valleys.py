@@ -26,7 +26,8 @@ import jax.numpy as jnp
 import numpy as np
 import tables
 
-from galileo_jax.clip.schema import Clip, ClipObject, Shape
+from galileo_jax.clip.fields import Shape
+from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.commands import command
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from galileo_jax.clip.fields import Direction
 from galileo_jax.clip.load import check_clip
-from galileo_jax.clip.schema import Clip, Direction
+from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.measure import measure
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError

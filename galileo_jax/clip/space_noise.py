@@ -7,7 +7,7 @@ across it:
     covariance = s^2 (1 - u u^T) + s_along^2 u u^T
 
 Each is the scatter about cubics in windows of `WINDOW` rows: a triangulated track wanders over
-several rows, so that differences of neighbours, as `track_csv` takes them of a picture's tracks,
+several rows, so that differences of neighbours, as `plane_noise` takes them of a picture's tracks,
 would find only a part of it.
 """
 
@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.clip.plane_noise import MIN_SD_M
 from galileo_jax.runtime.errors import InputError
 
 FEWEST = 8
 WINDOW, TERMS = 16, 4  # rows; numbers of a cubic
-MIN_SD_M = 1e-5
 HALF_WINDOW = 2  # points on either side, that give the direction of the velocity
 
 

@@ -24,6 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.clip.plane_noise import position_noise_m, roughness_covariance_m2
 from galileo_jax.clip.space_noise import space_covariance_m2, space_noise_m, space_sds_m
 from galileo_jax.clip.track_files.cells import Rows, parse_columns, read_cells
 from galileo_jax.observation.observation import Observation
@@ -33,12 +34,6 @@ from galileo_jax.runtime.errors import InputError
 TIME = "time_s"
 MIN_ROWS = 4
 """Three differences: the fewest that show whether a speed changes."""
-
-MIN_NOISE_WINDOWS = 8
-"""Fewer third differences give a standard deviation that is off by a third or more."""
-
-MIN_SD_M = 1e-5
-"""No camera sees less than ten micrometres; also what is taken for positions without noise."""
 
 MAX_POSITION_M = 100.0
 MAX_SD_M = 1.0
@@ -136,54 +131,6 @@ def write_observation_csv(path: Path, observation: Observation) -> None:
     for row in zip(*columns, strict=True):
         writer.writerow("" if math.isnan(value) else repr(float(value)) for value in row)
     write_text(path, text.getvalue())
-
-
-def position_noise_m(times_s: np.ndarray, position_m: np.ndarray) -> float:
-    """The standard deviation of one coordinate's error, estimated from its roughness, m.
-
-    Over every four consecutive visible points the third divided difference
-    `sum_j w_j x_j, w_j = 1 / prod_{k != j} (t_j - t_k)` cancels any motion of constant
-    acceleration; divided by `sqrt(sum w_j^2)` it is a draw of the error alone. The median of
-    its absolute value times 1.4826 is the standard deviation, and is not moved by the few
-    points at an impact. Not below `MIN_SD_M`.
-
-    Args:
-      times_s: `[frame]`, s, increasing; need not be evenly spaced.
-      position_m: `[frame]`, m; NaN where not visible.
-
-    Returns:
-      the standard deviation; NaN if fewer than `MIN_NOISE_WINDOWS` windows are visible.
-
-    Limits: assumes errors independent between frames. Motion that changes within three
-    frames for most of the clip counts as noise.
-    """
-    t = np.lib.stride_tricks.sliding_window_view(times_s, 4)
-    x = np.lib.stride_tricks.sliding_window_view(position_m, 4)
-    is_whole = np.isfinite(x).all(axis=1)
-    if is_whole.sum() < MIN_NOISE_WINDOWS:
-        return math.nan
-    t, x = t[is_whole], x[is_whole]
-    gaps = t[:, :, None] - t[:, None, :] + np.eye(4)
-    weights = 1 / gaps.prod(axis=2)
-    draws = (weights * x).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
-    return max(1.4826 * float(np.median(np.abs(draws))), MIN_SD_M)
-
-
-def roughness_covariance_m2(
-    path: Path, name: str, times_s: np.ndarray, position_m: np.ndarray
-) -> np.ndarray:
-    """`[2, 2, row]`, m^2: errors of the same size in every row, by `position_noise_m`.
-
-    Raises:
-      InputError: too few consecutive rows to tell.
-    """
-    sd = [position_noise_m(times_s, coordinate) for coordinate in position_m]
-    if any(map(math.isnan, sd)):
-        raise InputError(
-            f"{path}: column '{name}_sd_m': missing, and too few consecutive rows "
-            f"({MIN_NOISE_WINDOWS + 3} expected) to estimate it; give the error in metres"
-        )
-    return np.repeat(np.diag(np.square(sd))[:, :, None], len(times_s), axis=2)
 
 
 def _read_table(path: Path) -> tuple[list[str], Rows]:

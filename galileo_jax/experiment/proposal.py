@@ -10,8 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from galileo_jax.clip.fields import MIN_RAMP_ANGLE_DEG
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import MIN_RAMP_ANGLE_DEG, Clip
+from galileo_jax.clip.schema import Clip
 from galileo_jax.experiment.settings import Setting, known_as
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem

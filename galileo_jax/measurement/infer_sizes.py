@@ -11,8 +11,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from galileo_jax.clip.fields import MAX_SIZE_M, MIN_SIZE_M
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import MAX_SIZE_M, MIN_SIZE_M, Clip, ClipObject
+from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.observation.observation import Observation
 
 SIZE_SD_M = 0.003

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from galileo_jax.clip.fields import MAX_ANGLE_SD_DEG, MIN_RAMP_ANGLE_DEG
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import MAX_ANGLE_SD_DEG, MIN_RAMP_ANGLE_DEG, Clip
+from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.clip.fields import short
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import short
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode

@@ -9,7 +9,7 @@ from dataclasses import replace
 from numbers import Integral, Real
 from typing import Any, NamedTuple, get_args
 
-from galileo_jax.clip.schema import MAX_ACROSS_M, Shape
+from galileo_jax.clip.fields import MAX_ACROSS_M, Shape
 from galileo_jax.rollout.engine_names import MOTIONS
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known

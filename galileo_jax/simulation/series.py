@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.clip.schema import Shape
+from galileo_jax.clip.fields import Shape
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant

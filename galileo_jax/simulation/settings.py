@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from galileo_jax.clip.schema import Shape
+from galileo_jax.clip.fields import Shape
 from galileo_jax.simulation.motion import Solver
 
 SHAPES: dict[str, tuple[Shape, ...]] = {

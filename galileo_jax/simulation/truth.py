@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from galileo_jax.clip.fields import Shape
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import ClipObject, Shape
+from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.scene.scene import extents, rolling, start_paths
 

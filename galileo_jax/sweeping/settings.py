@@ -11,7 +11,7 @@ from pydantic import (
     ValidationError,
 )
 
-from galileo_jax.clip.schema import wrong
+from galileo_jax.clip.fields import wrong
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.registry import entry_names
 

@@ -10,14 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.clip.fields import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, short
+from galileo_jax.clip.plane_noise import roughness_covariance_m2
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, ClipFile, short
+from galileo_jax.clip.schema import ClipFile
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
     MIN_ROWS,
     check_times,
     read_observation_csv,
-    roughness_covariance_m2,
 )
 from galileo_jax.clip.track_files.cells import first_cells
 from galileo_jax.clip.track_files.track_table import (

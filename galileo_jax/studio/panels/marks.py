@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from galileo_jax.clip.fields import SIZE_MEANING
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import SIZE_MEANING
 from galileo_jax.studio.marks import (
     Marks,
     ObjectMark,

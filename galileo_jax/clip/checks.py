@@ -1,0 +1,177 @@
+"""Checks of a clip that take several keys of its yaml, or its video or track, to judge.
+
+Each calls `fail(key, problem)`, which raises, for the first thing that is wrong.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.clip import placement
+from galileo_jax.clip.fields import MAX_SCALE_SD_SHARE, SIZE_MEANING, short
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip, ClipFile, ClipObject
+from galileo_jax.observation.observation import Observation
+
+
+def check_objects(file: ClipFile, fail: Any) -> None:
+    """What takes several values of the yaml to judge."""
+    scenario = SCENARIOS[file.scenario]
+    if scenario.has_ramp and "ramp_angle_deg" not in file.model_fields_set:
+        fail(
+            "ramp_angle_deg",
+            f"missing; scenario {file.scenario} needs it, in degrees, or null where it is to be "
+            "found from the path",
+        )
+    is_alone = scenario.num_objects[1] == 1  # several objects may slide beside a ramp
+    if is_alone and not scenario.has_ramp and file.ramp_angle_deg is not None:
+        fail(
+            "ramp_angle_deg",
+            f"{file.ramp_angle_deg:g} given; scenario {file.scenario} ({scenario.meaning}) has no "
+            "ramp; leave it out",
+        )
+    for key in (key for other in SCENARIOS.values() for key in other.keys):
+        is_given = getattr(file, key) != ClipFile.model_fields[key].default
+        if is_given and key not in scenario.keys:
+            where = ", ".join(name for name, other in SCENARIOS.items() if key in other.keys)
+            fail(key, f"means nothing in scenario {file.scenario}, only in {where}; leave it out")
+    fewest, most = scenario.num_objects
+    count = len(file.objects)
+    if count < fewest:
+        fail("objects", "empty; at least one object expected")
+    if most is not None and count > most:
+        fail(
+            "objects",
+            f"{count} objects; scenario {file.scenario} ({scenario.meaning}) "
+            f"has at most {most}; did you mean scenario: multi?",
+        )
+    names: dict[str, int] = {}
+    for index, item in enumerate(file.objects):
+        if item.name in names:
+            fail(
+                f"objects[{index}].name",
+                f"{item.name!r} is also the name of objects[{names[item.name]}]; names must differ",
+            )
+        names[item.name] = index
+        if item.rolls is not None:
+            _check_rolls(f"objects[{index}].rolls", item, file.scenario, fail)
+        if scenario.is_level and item.shape != "cylinder":
+            fail(f"objects[{index}].shape", f"{item.shape}; a puck is a cylinder, seen from above")
+        if item.size_m is None:
+            continue
+        meaning = SIZE_MEANING[item.shape]
+        if len(item.size_m) != meaning.count(",") + 1:
+            fail(
+                f"objects[{index}].size_m",
+                f"{list(item.size_m)} has {len(item.size_m)} values; "
+                f"a {item.shape} has {meaning}, in metres",
+            )
+        if item.shape == "torus" and item.size_m[1] >= item.size_m[0]:
+            fail(
+                f"objects[{index}].size_m",
+                f"{list(item.size_m)}: the tube is thicker than the ring; {meaning} expected",
+            )
+
+
+def _check_rolls(key: str, item: ClipObject, scenario: str, fail: Any) -> None:
+    given = short(item.rolls)
+    if not SCENARIOS[scenario].has_ramp:
+        fail(key, f"{given} means nothing in scenario {scenario}, where nothing is touched")
+    if item.shape == "box" and item.rolls:
+        fail(key, f"{given}, but a box slides; leave it out, or mend shape")
+    if item.shape == "sphere" and item.rolls is False:
+        fail(key, "false, but a sphere rolls as far as friction lets it; leave it out")
+
+
+def check_against_source(clip: Clip, observation: Observation | None, fail: Any) -> None:
+    """What takes the video or the csv track to judge."""
+    _check_uncertainties(clip, fail)
+    for index, item in enumerate(clip.objects):
+        key = f"objects[{index}]"
+        if (item.first_frame or 0) >= clip.frame_count:
+            fail(
+                f"{key}.first_frame",
+                f"{item.first_frame} is beyond the end; the clip has "
+                f"{clip.frame_count} frames (0 to {clip.frame_count - 1})",
+            )
+        check_frames(key, item, clip, fail)
+        if item.point_px is not None and clip.frame_size_px is not None:
+            _check_in_frame(f"{key}.point_px", item.point_px, clip.frame_size_px, 0, fail)
+    if clip.origin_px is not None and clip.frame_size_px is not None:
+        # The foot may lie outside the picture, but not by more than its own size.
+        _check_in_frame("origin_px", clip.origin_px, clip.frame_size_px, 1, fail)
+    centres_m = (
+        _first_positions(observation) if observation else placement.centres_from_pixels(clip)
+    )
+    for problem in (placement.find_odd_size(clip), placement.find_misplacement(clip, centres_m)):
+        if problem:
+            fail(*problem)
+
+
+def check_camera(file: ClipFile, fail: Any) -> None:
+    """Refuses two scales, and a camera's geometry where there is no picture."""
+    if file.rectangle is not None and file.pixels_per_metre is not None:
+        fail("rectangle", "given together with pixels_per_metre; leave one of them out")
+    for key in ("rectangle", "lens"):
+        if getattr(file, key) is not None and file.video is None:
+            fail(key, "means nothing beside a track, only beside a video; leave it out")
+
+
+def check_frames(key: str, item: ClipObject, clip: Clip, fail: Any) -> None:
+    """Refuses a last frame or corrections outside of the frames in which the object is used."""
+    first, end = item.first_frame or 0, clip.frame_count - 1
+    last = end if item.last_frame is None else item.last_frame
+    if not first < last <= end:
+        fail(
+            f"{key}.last_frame",
+            f"{last} is not after first_frame ({first}) and within the clip (to {end})",
+        )
+    for n, (frame, x, y) in enumerate(item.corrections):
+        if not first < frame <= last:
+            fail(
+                f"{key}.corrections[{n}]",
+                f"frame {frame} is not after the first that is used ({first}) and up to the last "
+                f"({last})",
+            )
+        if clip.frame_size_px is not None:
+            _check_in_frame(f"{key}.corrections[{n}]", (x, y), clip.frame_size_px, 0, fail)
+
+
+def _check_uncertainties(clip: Clip, fail: Any) -> None:
+    """Refuses the uncertainty of what nobody declared, and of a scale that is a guess."""
+    for key, of in (
+        ("ramp_angle_sd_deg", "ramp_angle_deg"),
+        ("pixels_per_metre_sd", "pixels_per_metre"),
+        ("origin_sd_px", "origin_px"),
+    ):
+        if getattr(clip, key) and getattr(clip, of) is None:
+            fail(key, f"{getattr(clip, key):g} given without {of}; give both, or leave it out")
+    scale, sd = clip.pixels_per_metre, clip.pixels_per_metre_sd
+    if scale is not None and sd > MAX_SCALE_SD_SHARE * scale:
+        fail(
+            "pixels_per_metre_sd",
+            f"{sd:g} is more than {MAX_SCALE_SD_SHARE:.0%} of pixels_per_metre ({scale:g}); "
+            "one standard deviation in pixels per metre expected",
+        )
+
+
+def _check_in_frame(
+    key: str, point: tuple[float, float], size_px: tuple[int, int], margin: int, fail: Any
+) -> None:
+    width, height = size_px
+    x, y = point
+    is_inside = (
+        -margin * width <= x < (1 + margin) * width
+        and -margin * height <= y < (1 + margin) * height
+    )
+    if not is_inside:
+        far = "far " if margin else ""
+        fail(key, f"{list(point)} is {far}outside the frame of {width} x {height} pixels")
+
+
+def _first_positions(observation: Observation) -> dict[str, np.ndarray]:
+    first = observation.mask.argmax(axis=1)
+    return {
+        name: observation.position_m[index, :, first[index]]
+        for index, name in enumerate(observation.names)
+    }

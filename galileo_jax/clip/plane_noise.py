@@ -1,0 +1,62 @@
+"""The errors of a track in the picture's plane, of which nobody said how large they are."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax.runtime.errors import InputError
+
+MIN_NOISE_WINDOWS = 8
+"""Fewer third differences give a standard deviation that is off by a third or more."""
+
+MIN_SD_M = 1e-5
+"""No camera sees less than ten micrometres; also what is taken for positions without noise."""
+
+
+def position_noise_m(times_s: np.ndarray, position_m: np.ndarray) -> float:
+    """The standard deviation of one coordinate's error, estimated from its roughness, m.
+
+    Over every four consecutive visible points the third divided difference
+    `sum_j w_j x_j, w_j = 1 / prod_{k != j} (t_j - t_k)` cancels any motion of constant
+    acceleration; divided by `sqrt(sum w_j^2)` it is a draw of the error alone. The median of
+    its absolute value times 1.4826 is the standard deviation, and is not moved by the few
+    points at an impact. Not below `MIN_SD_M`.
+
+    Args:
+      times_s: `[frame]`, s, increasing; need not be evenly spaced.
+      position_m: `[frame]`, m; NaN where not visible.
+
+    Returns:
+      the standard deviation; NaN if fewer than `MIN_NOISE_WINDOWS` windows are visible.
+
+    Limits: assumes errors independent between frames. Motion that changes within three
+    frames for most of the clip counts as noise.
+    """
+    t = np.lib.stride_tricks.sliding_window_view(times_s, 4)
+    x = np.lib.stride_tricks.sliding_window_view(position_m, 4)
+    is_whole = np.isfinite(x).all(axis=1)
+    if is_whole.sum() < MIN_NOISE_WINDOWS:
+        return math.nan
+    t, x = t[is_whole], x[is_whole]
+    gaps = t[:, :, None] - t[:, None, :] + np.eye(4)
+    weights = 1 / gaps.prod(axis=2)
+    draws = (weights * x).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
+    return max(1.4826 * float(np.median(np.abs(draws))), MIN_SD_M)
+
+
+def roughness_covariance_m2(
+    path: Path, name: str, times_s: np.ndarray, position_m: np.ndarray
+) -> np.ndarray:
+    """`[2, 2, row]`, m^2: errors of the same size in every row, by `position_noise_m`.
+
+    Raises:
+      InputError: too few consecutive rows to tell.
+    """
+    sd = [position_noise_m(times_s, coordinate) for coordinate in position_m]
+    if any(map(math.isnan, sd)):
+        raise InputError(
+            f"{path}: column '{name}_sd_m': missing, and too few consecutive rows "
+            f"({MIN_NOISE_WINDOWS + 3} expected) to estimate it; give the error in metres"
+        )
+    return np.repeat(np.diag(np.square(sd))[:, :, None], len(times_s), axis=2)
