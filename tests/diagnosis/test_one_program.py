@@ -1,6 +1,7 @@
 """Proposed formulas as numbers: the same motion as their classes, and no program of their own."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,9 +28,9 @@ MODEL = make_model(HIT, 1.0)
 SIZE = 12  # parameters of formulas and spare ones
 
 
-def source_of(structure) -> str:
+def law_of(structure) -> Any:
     constants = ", ".join(f'"{name}": ("1", {PRIOR})' for name in structure.constants)
-    return CLASS.format(
+    source = CLASS.format(
         text="",
         name=name_of(structure),
         nature=structure.nature,
@@ -38,12 +39,13 @@ def source_of(structure) -> str:
         arguments="".join(f", {name}" for name in structure.constants),
         code=structure.code,
     )
+    return law_class(source)()
 
 
 @pytest.mark.parametrize("structure", EVERY.values(), ids=EVERY)
 def test_a_formula_as_numbers_does_what_its_class_does(structure):
     scene = MODEL.scene.surroundings
-    law, name = law_class(source_of(structure))(), name_of(structure)
+    law, name = law_of(structure), name_of(structure)
     values = np.linspace(0.3, 0.7, len(structure.constants))
     codes, slots = codes_of(structure)
     numbers = codes.copy()
@@ -67,7 +69,7 @@ def test_a_formula_as_numbers_does_what_its_class_does(structure):
 
 def motions_of(*names: str):
     """Rollouts with each of some formulas, by their classes and as numbers."""
-    laws = tuple(law_class(source_of(EVERY[name]))() for name in names)
+    laws = tuple(law_of(EVERY[name]) for name in names)
     used = sum(1 + len(EVERY[name].constants) for name in names)
     model = replace(MODEL, effects=(*laws, Spare(SIZE - used)))
     theta = np.tile([p.absent for p in model.parameters], (len(names) + 1, 1))
