@@ -4,10 +4,9 @@ Each effect is fitted together with all other parameters, from several starting 
 (`candidate_starts`), and the evidence is computed by Laplace's method. The evidence charges for
 every parameter, according to how much of its prior the data exclude.
 
-    1. All starts of the few candidates whose slopes explain most descend in one batch, then those
-       of all others. A start leaves it where it has come to the valley of a better one of its
-       candidate, or is far behind: of its candidate, or of the best of all, and its next step
-       promises little of that.
+    1. All starts of all candidates descend in one batch. A start leaves it where it has come to
+       the valley of a better one of its candidate, or is far behind: of its candidate, or of the
+       best of all, and its next step promises little of that.
     2. The best end of each candidate is refined at the clip's own noise, the most promising first.
     3. Every candidate starts once more from values that reproduce the motion of the best one, with
        all other parameters as in that. Where it comes to another valley that may be better, that
@@ -17,19 +16,18 @@ every parameter, according to how much of its prior the data exclude.
        nothing that a rule looks at.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from galileo_jax.diagnosis.candidate_starts import matched, scattered
-from galileo_jax.inference.fits.descent import Descended, all_of, ends_of, in_valley
+from galileo_jax.inference.fits.descent import Descended, ends_of, in_valley
 from galileo_jax.inference.fits.ends import valleys
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 
 NUM_REFITTED, OUT_OF_THE_RACE = 6, 100.0  # candidates, unless so many nats behind the best
-NUM_FIRST = 4  # that race first: those whose slopes explain most
 NUM_AT_ONCE = 6  # refined in one batch: the sooner the first can be shown
 MAY_STILL_GAIN = 5.0  # nats that a valley with more cost in the search may yet have the better of
 
@@ -86,38 +84,34 @@ def fit_candidates(
       candidates: names of all effects of each.
       seed: of the starts.
       matters: `[hypothesis]`, on which the verdict may hang; only these are fitted in every valley.
-      on_fit: called with each as soon as it is fitted; the fit may yet become better.
+      on_fit: called with each as soon as it is fitted; the fit may yet become better. Of many the
+        one whose slope explains most is fitted from there and shown before the race, and again in
+        its turn.
     """
     trials = fitter.trials
     count = len(trials.model_parameters)
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
     from_fits = [base.fit for base in bases]
-    starts, gains = matched(fitter, from_fits, candidates, seed)
-    z, owners = np.zeros(free.shape), list[np.ndarray]()
-    heats, fits = list[Descended](), dict[int, GradientFit]()
-
-    def in_heats() -> Iterator[np.ndarray]:
-        lowest = np.inf
-        for own in _heats(gains):
-            more = scattered(fitter, [from_fits[i] for i in own], free[own], seed)
-            tried = [np.concatenate([other, starts[i]]) for i, other in zip(own, more, strict=True)]
-            owners.append(np.repeat(own, [len(each) for each in tried]))
-            heats.append(fitter.race(np.concatenate(tried), free[owners[-1]], owners[-1], lowest))
-            rows = np.array([_ends(heats[-1], owners[-1] == i)[0] for i in own])
-            z[own] = heats[-1].best.z[rows]
-            lowest = min(lowest, float(heats[-1].best.cost[rows].min()))
-            yield from (own[part] for part in _by_promise(heats[-1], rows))
+    matching, gains = matched(fitter, from_fits, candidates, seed)
+    if len(candidates) > NUM_AT_ONCE:
+        best = int(np.argmax(gains))
+        [fit] = fitter.fit_from(matching[best][:1], free[[best]], np.zeros(1, int))
+        on_fit(Hypothesis(tuple(candidates[best]), fit))
+    starts = zip(scattered(fitter, from_fits, free, seed), matching, strict=True)
+    own_starts = [np.concatenate(pair) for pair in starts]
+    of = np.repeat(np.arange(len(candidates)), [len(own) for own in own_starts])
+    found = fitter.race(np.concatenate(own_starts), free[of], of)
+    ends = [valleys(found.best, _left(found, of == i)) for i in range(len(candidates))]
+    first = np.array([rows[0] for rows in ends])
+    fits: dict[int, GradientFit] = {}
 
     def take(i: int, fit: GradientFit) -> None:
         if i not in fits or fit.log_evidence > fits[i].log_evidence:
             fits[i] = fit
 
-    for i, fit in fitter.polish_in_turn(z, free, in_heats()):
+    for i, fit in fitter.polish_in_turn(found.best.z[first], free, _by_promise(found, first)):
         take(i, fit)
         on_fit(Hypothesis(tuple(candidates[i]), fit))
-    found, of = all_of(heats), np.concatenate(owners)
-    ends = [_ends(found, of == i) for i in range(len(candidates))]
-    first = np.array([rows[0] for rows in ends])
     _second(fitter, from_fits, candidates, found, first, fits, take, seed)
     hypotheses = [Hypothesis(tuple(e), fits[i]) for i, e in enumerate(candidates)]
     evidence = np.array([fits[i].log_evidence for i in range(len(candidates))])
@@ -134,20 +128,9 @@ def fit_candidates(
     return [Hypothesis(tuple(e), fits[i]) for i, e in enumerate(candidates)]
 
 
-def _heats(gains: np.ndarray) -> list[np.ndarray]:
-    """Candidates in the order in which they race: the few that promise most go first.
-
-    So the first can be shown soon, and the others know early how far behind they are.
-    """
-    if len(gains) <= 2 * NUM_FIRST:
-        return [np.arange(len(gains))]
-    order = np.argsort(-gains, kind="stable")
-    return [np.sort(order[:NUM_FIRST]), np.sort(order[NUM_FIRST:])]
-
-
-def _ends(found: Descended, is_own: np.ndarray) -> list[int]:
-    """The best of a candidate's ends in each valley that is not far behind."""
-    return valleys(found.best, np.unique(ends_of(found.joined)[is_own]))
+def _left(found: Descended, is_own: np.ndarray) -> np.ndarray:
+    """The ends of a candidate's starts that no other joined, `[end]`, indices."""
+    return np.unique(ends_of(found.joined)[is_own])
 
 
 def _by_promise(found: Descended, rows: np.ndarray) -> list[np.ndarray]:

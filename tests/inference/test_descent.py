@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from galileo_jax.inference.fits.descent import FEW, Descent, GiveUp, all_of, ends_of, join
+from galileo_jax.inference.fits.descent import FEW, Descent, GiveUp, ends_of, join
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.programs import Quadratic
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
@@ -86,14 +86,6 @@ def test_slopes_are_taken_only_where_a_step_has_got_somewhere(monkeypatch):
     count = FEW + 1  # fewer are not looked at beforehand
     found = descent(batch(*[[-1.2, 1.0, 0.0]] * count), 1e-9, 200)
     assert all(np.diff(costs) < 0) and len(costs) < found.num_steps
-
-
-def test_parts_of_a_descent_are_one():
-    first, second = descend(batch([-1.2, 1.0, 0.5])), descend(batch([2.0, -1.0, 0.0], [0, 0, 3]))
-    second.joined[1] = 0
-    found = all_of([first, second])
-    assert found.joined.tolist() == [0, 1, 1]
-    np.testing.assert_array_equal(found.best.z[1:], second.best.z)
 
 
 def test_steps_that_run_out_are_told():

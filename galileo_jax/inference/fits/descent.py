@@ -8,7 +8,6 @@ the batch.
 Source: Levenberg (1944), Marquardt (1963, 10.1137/0111030); optimistix, arXiv 2402.09983.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -82,21 +81,6 @@ class Descended(NamedTuple):
     is_settled: np.ndarray
     num_steps: int
     joined: np.ndarray
-
-
-def all_of(parts: Sequence[Descended]) -> Descended:
-    """Points that descended in several batches, one after the other."""
-    begins = np.cumsum([0, *(len(part.joined) for part in parts)])
-    joined = [part.joined + begin for part, begin in zip(parts, begins, strict=False)]
-    leaves = zip(*(part.best for part in parts), strict=True)
-    return Descended(
-        best=Quadratic(*map(np.concatenate, leaves)),
-        first_cost=np.concatenate([part.first_cost for part in parts]),
-        widths=np.concatenate([part.widths for part in parts]),
-        is_settled=np.concatenate([part.is_settled for part in parts]),
-        num_steps=max(part.num_steps for part in parts),
-        joined=np.concatenate(joined),
-    )
 
 
 def in_valley(best: Quadratic, first: int, others: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ are compared; scattered starting points cost only one batch. Which optimiser, an
 docs/explanation/optimiser.md.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -209,7 +209,7 @@ class GradientFitter:
         self,
         z: Float[np.ndarray, "hypothesis parameter"],
         free: Bool[np.ndarray, "hypothesis parameter"],
-        parts: Iterable[np.ndarray],
+        parts: Sequence[np.ndarray],
     ) -> Iterator[tuple[int, GradientFit]]:
         """Fits one end of each of several hypotheses, part by part of them.
 
@@ -218,7 +218,7 @@ class GradientFitter:
         Args:
           z: `[hypothesis, model parameter]`.
           free: `[hypothesis, model parameter]`.
-          parts: indices of hypotheses, whose rows of `z` need not be there before.
+          parts: indices of hypotheses.
         """
         lowest = np.inf
         for own in parts:
