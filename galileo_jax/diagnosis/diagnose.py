@@ -16,7 +16,7 @@
    is unknown.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,13 +31,14 @@ from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.laws.in_model import fitted_laws
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
-from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_to_try
+from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_from_scratch, pairs_to_try
 from galileo_jax.diagnosis.score_tests import best_gains, score_tests
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
     NUM_JOINED,
     best_named,
     decisive_margin,
+    explains,
     form_that_leads,
     is_contested_by_law,
     is_nothing_missing,
@@ -128,6 +129,13 @@ def diagnose(
             on_candidate(candidate)
         on_stage("comparing the best pairs with the data")
         candidates = _compared(trials, (*candidates, *pairs), decisive, seed, compared)
+        if not any(explains(c) for c in candidates):
+            on_stage("searching pairs from the fit without effects")
+            better = _from_scratch(race, base, candidates)
+            for candidate in better:
+                compared.pop(candidate.effects, None)
+            known = {frozenset(c.effects): c for c in (*candidates, *better)}
+            candidates = _compared(trials, known.values(), decisive, seed, compared)
     verdict = verdict_of(candidates, decisive)
     if verdict.status == "named":
         on_stage("looking at what could be confused with it")
@@ -356,9 +364,28 @@ def _pairs(
     return ranked(made)
 
 
+def _from_scratch(
+    race: _Race, base: Hypothesis, candidates: Sequence[Candidate]
+) -> list[Candidate]:
+    """Pairs fitted from the fit without effects: those that come to a better valley, and new ones.
+
+    A single effect's fit bends all else to do what the second one does, and the pair may not be
+    reached from there, nor seem to promise much.
+    """
+    known = {frozenset(c.effects): c for c in candidates}
+    sets = pairs_from_scratch(candidates)
+    made = race([base] * len(sets), sets)
+    olds = [known.get(frozenset(new.effects)) for new in made]
+    return [
+        new
+        for old, new in zip(olds, made, strict=True)
+        if old is None or new.log_evidence > old.log_evidence
+    ]
+
+
 def _compared(
     trials: JointProblem,
-    candidates: Sequence[Candidate],
+    candidates: Iterable[Candidate],
     decisive: float,
     seed: int,
     compared: dict[tuple[str, ...], Comparison],

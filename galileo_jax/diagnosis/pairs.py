@@ -1,11 +1,12 @@
 """Which pairs of effects are tried where no single effect explains the data."""
 
 from collections.abc import Collection, Sequence
+from itertools import combinations
 
 import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import Candidate
-from galileo_jax.diagnosis.verdict import NUM_PAIRS, NUM_SWAPPED
+from galileo_jax.diagnosis.verdict import NUM_CROSSED, NUM_JOINED, NUM_PAIRS, NUM_SWAPPED
 
 
 def pairs_to_try(
@@ -29,6 +30,18 @@ def pairs_to_try(
         if first != second and len(found) < NUM_PAIRS:
             found.setdefault(frozenset((first, second)), (i, (first, second)))
     return [[pair for i, pair in found.values() if i == own] for own in range(len(singles))]
+
+
+def pairs_from_scratch(candidates: Sequence[Candidate]) -> list[tuple[str, ...]]:
+    """The best pairs so far, and all that the best single effects make with each other.
+
+    Args:
+      candidates: ranked; forms are left out.
+    """
+    best = [c.effects for c in candidates if len(c.effects) == 2][:NUM_JOINED]
+    singles = [c.name for c in candidates if len(c.effects) == 1 and not c.is_form]
+    crossed = combinations(singles[:NUM_CROSSED], 2)
+    return list({frozenset(pair): pair for pair in (*best, *crossed)}.values())
 
 
 def not_tried(

@@ -21,6 +21,9 @@ PROBE_Z = 0.1
 SMALL_QUANTILE_Z = -2.0
 NUM_SHAPES = 96  # tried per candidate whose effect has a shape
 SHOWS = 1e-9  # a slope below does not
+# Standard deviations by which a probe may change the track and still be a slope: a nuisance that
+# is bent far to take an effect's place follows its slope, but not a large effect.
+SMALL_CHANGE = 3.0
 
 
 def score_tests(
@@ -38,9 +41,7 @@ def score_tests(
     for probe, effects in zip(probes, candidates, strict=True):
         where, size = strength_of(trials, effects[-1])
         probe[where] = size
-    residual, slopes = _beside(trials, base, probes)
-    length = np.linalg.norm(slopes, axis=1)
-    return np.abs(slopes @ residual) / np.where(length > SHOWS, length, np.inf)
+    return np.sqrt(_explained_by(trials, base, probes, candidates))
 
 
 def best_gains(
@@ -54,9 +55,11 @@ def best_gains(
       `[candidate]`.
     """
     probes = [shapes_beside(trials, base, effects, seed)[1] for effects in candidates]
-    found = explained(*slopes_along(trials, base, np.concatenate(probes)))
     ends = np.cumsum([len(own) for own in probes])[:-1]
-    return np.array([0.5 * own.max() for own in np.split(found, ends)])
+    along, power = slopes_along(trials, base, np.concatenate(probes))
+    found = np.split(explained(along, power), ends)
+    best = np.array([own[np.argmax(gain)] for own, gain in zip(probes, found, strict=True)])
+    return 0.5 * _explained_by(trials, base, best, candidates)
 
 
 def strength_of(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:
@@ -93,6 +96,41 @@ def slopes_along(
     """The slopes to each of `probes` along the base fit's residuals, and their squares."""
     residual, slopes = _beside(trials, base, probes)
     return slopes @ residual, np.sum(slopes**2, axis=1)
+
+
+def _explained_by(
+    trials: JointProblem,
+    base: GradientFit,
+    probes: np.ndarray,
+    candidates: Sequence[tuple[str, ...]],
+) -> np.ndarray:
+    """How much of the squared residuals the slope to each candidate's probe explains.
+
+    The better of the probe as it is, for effects that only act above some strength, and of one so
+    small that the change of the track is a slope.
+    """
+    smaller = _smaller(trials, base, probes, candidates)
+    along, power = slopes_along(trials, base, np.concatenate([probes, smaller]))
+    return explained(along, power).reshape(2, -1).max(axis=0)
+
+
+def _smaller(
+    trials: JointProblem,
+    base: GradientFit,
+    probes: np.ndarray,
+    candidates: Sequence[tuple[str, ...]],
+) -> np.ndarray:
+    """The probes, each with so little of its effect that the track changes by `SMALL_CHANGE`."""
+    here = trials.theta(base.z, base.free)
+    scale = here[len(trials.model_parameters) :]
+    white = np.concatenate(whitened(trials, np.vstack([here, probes]), scale), axis=1)
+    change = np.linalg.norm(white[1:] - white[:1], axis=1)
+    share = np.minimum(SMALL_CHANGE / np.maximum(change, SHOWS), 1.0)
+    smaller = probes.copy()
+    for row, own, effects in zip(smaller, share, candidates, strict=True):
+        where, _ = strength_of(trials, effects[-1])
+        row[where] = here[where] + own * (row[where] - here[where])
+    return smaller
 
 
 def explained(along: np.ndarray, power: np.ndarray) -> np.ndarray:
