@@ -87,6 +87,20 @@ def test_force_waves_in_time():
     assert force(STATE._replace(time_s=0.6)) == pytest.approx(np.array([0.5, 0.25]) * -1.5)
 
 
+def test_friction_from_a_time():
+    law = friction(
+        "friction_from_a_time", friction_from_a_time=0.1, friction_from_a_time_moment=0.4
+    )
+    before, middle, after = (law(STATE._replace(time_s=np.asarray(t)), K) for t in (0.2, 0.4, 0.6))
+    np.testing.assert_allclose(before, K, atol=1e-8)
+    np.testing.assert_allclose(middle, K + np.array([0.05, 0.0]), atol=1e-8)
+    np.testing.assert_allclose(after, K + np.array([0.1, 0.0]), atol=1e-8)
+    law = friction(
+        "friction_from_a_time", friction_from_a_time=-0.5, friction_from_a_time_moment=0.0
+    )
+    np.testing.assert_allclose(law(STATE, K), [0.0, 0.3], atol=1e-8)
+
+
 def test_force_at_a_time():
     force = push(
         "force_at_a_time",
@@ -136,6 +150,6 @@ def test_absent_is_nothing_at_all_with_a_finite_slope(form, scene):
 def test_a_fall_has_no_friction_to_change():
     fall = replace(INCLINE, has_surface=False)
     without = {form.name for form in FORMS if not form.parameters(fall)}
-    assert without == {"friction_waves_in_place", "friction_with_place", "friction_with_time"}
+    assert without == {name for name in FORM_NAMES if name.startswith("friction")}
     law = dynamics(FORMS, fall, {"m1": jnp.ones(())} | theta(), jnp)
     assert np.isfinite(law.drive(STATE._replace(path_m=np.zeros(1), speed_m_s=np.zeros(1)))).all()

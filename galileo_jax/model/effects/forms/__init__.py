@@ -4,7 +4,8 @@ The library's effects are certain dependences: on two powers of the speed (drags
 (Stribeck), on a place (a patch). The rest of that table stands here,
 
                  steadily               at one                 in waves
-    time         friction_with_time     force_at_a_time        force_waves_in_time
+    time         friction_with_time     force_at_a_time,       force_waves_in_time
+                                        friction_from_a_time
     place        friction_with_place    (friction_patch)       friction_waves_in_place
     speed        drag_of_a_power        (stribeck)
 
@@ -19,6 +20,7 @@ from galileo_jax.model.effects.forms.drag_of_a_power import DragOfAPower
 from galileo_jax.model.effects.forms.force_at_a_time import ForceAtATime
 from galileo_jax.model.effects.forms.force_waves_in_time import ForceWavesInTime
 from galileo_jax.model.effects.forms.form import Form
+from galileo_jax.model.effects.forms.friction_from_a_time import FrictionFromATime
 from galileo_jax.model.effects.forms.friction_waves_in_place import FrictionWavesInPlace
 from galileo_jax.model.effects.forms.friction_with_place import FrictionWithPlace
 from galileo_jax.model.effects.forms.friction_with_time import FrictionWithTime
@@ -27,6 +29,7 @@ FORMS: tuple[Form, ...] = (
     DragOfAPower(),
     ForceAtATime(),
     ForceWavesInTime(),
+    FrictionFromATime(),
     FrictionWavesInPlace(),
     FrictionWithPlace(),
     FrictionWithTime(),
