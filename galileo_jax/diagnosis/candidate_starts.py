@@ -59,30 +59,34 @@ def matched(
     bases: Sequence[GradientFit],
     candidates: Sequence[tuple[str, ...]],
     seed: int,
-) -> list[np.ndarray]:
+) -> tuple[list[np.ndarray], np.ndarray]:
     """For each candidate starts that match its base fit's residuals, `[start, z]`, best first.
 
     Those whose effect has a strength and no shape get one more: the best of all its strengths. As
     far as the slope goes is too far where a little more of an effect changes everything, as
     friction does that nearly holds.
+
+    Returns:
+      The starts, and how much of the squared residuals each candidate's best slope explains,
+      `[candidate]`.
     """
     trials, count = fitter.trials, len(fitter.trials.model_parameters)
     starts: list[np.ndarray] = [np.empty(0)] * len(candidates)
+    gains = np.zeros(len(candidates))
     for base in {id(base): base for base in bases}.values():
         own = [i for i, other in enumerate(bases) if other is base]
-        for i, found in zip(
-            own, _matched_shapes(trials, base, [candidates[i] for i in own], seed), strict=True
-        ):
-            starts[i] = found
+        found = _matched_shapes(trials, base, [candidates[i] for i in own], seed)
+        for i, (shapes, gain) in zip(own, found, strict=True):
+            starts[i], gains[i] = shapes, gain
     plain = [i for i, own in enumerate(starts) if len(own) == 1]
     if not plain:
-        return starts
+        return starts, gains
     free = np.stack([trials.free(candidates[i])[:count] for i in plain])
     where = [strength_of(trials, candidates[i][-1])[0] for i in plain]
     found = best_strengths(fitter, np.concatenate([starts[i] for i in plain]), free, where)
     for i, best in zip(plain, found, strict=True):
         starts[i] = np.stack([best, starts[i][0]])
-    return starts
+    return starts, gains
 
 
 def best_strengths(
@@ -105,10 +109,11 @@ def best_strengths(
 
 def _matched_shapes(
     trials: JointProblem, base: GradientFit, candidates: Sequence[tuple[str, ...]], seed: int
-) -> list[np.ndarray]:
+) -> list[tuple[np.ndarray, float]]:
     """Of each candidate the shapes of its last effect that match the residuals, `[start, z]`.
 
-    For each shape the strength is the one that its slope at no strength asks for.
+    For each shape the strength is the one that its slope at no strength asks for. With them how
+    much of the squared residuals the best explains.
     """
     beside = [shapes_beside(trials, base, effects, seed) for effects in candidates]
     ends = np.cumsum([len(z) for z, _ in beside])[:-1]
@@ -117,7 +122,8 @@ def _matched_shapes(
     starts = []
     for effects, (z, probes), along, power in zip(candidates, beside, *parts, strict=True):
         where, size = strength_of(trials, effects[-1])
-        best = np.argsort(-explained(along, power))[:NUM_MATCHED]
+        gains = explained(along, power)
+        best = np.argsort(-gains)[:NUM_MATCHED]
         # As far as the slope goes: the strength at which the residuals along it would vanish.
         wanted = probes[best]
         wanted[:, where] = (-along / np.maximum(power, SHOWS))[best, None] * size
@@ -126,7 +132,7 @@ def _matched_shapes(
             own = prior.inverse(wanted[:, column])
             z[best, column] = np.clip(np.nan_to_num(own, nan=-MOST_Z), -MOST_Z, MOST_Z)
         free = trials.free(effects)[: len(trials.model_parameters)]
-        starts.append(np.where(free, z[best, : len(free)], 0.0))
+        starts.append((np.where(free, z[best, : len(free)], 0.0), float(gains[best[0]])))
     return starts
 
 

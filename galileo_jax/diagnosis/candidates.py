@@ -113,18 +113,21 @@ def fit_candidates(
       candidates: names of all effects of each.
       seed: of the starts.
       matters: `[hypothesis]`, on which the verdict may hang; only these are fitted in every valley.
-      on_fit: called with each as soon as it is fitted; the fit may yet become better.
+      on_fit: called with each as soon as it is fitted; the fit may yet become better. Of many the
+        one whose slope explains most is fitted from there and shown before the race, and again in
+        its turn.
       needs_mending: `[hypothesis]`, of which Laplace's evidence will not do.
     """
     trials = fitter.trials
     count = len(trials.model_parameters)
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
     from_fits = [base.fit for base in bases]
-    starts = zip(
-        scattered(fitter, from_fits, free, seed),
-        matched(fitter, from_fits, candidates, seed),
-        strict=True,
-    )
+    matching, gains = matched(fitter, from_fits, candidates, seed)
+    if len(candidates) > NUM_AT_ONCE:
+        best = int(np.argmax(gains))
+        [fit] = fitter.fit_from(matching[best][:1], free[[best]], np.zeros(1, int))
+        on_fit(Hypothesis(tuple(candidates[best]), fit))
+    starts = zip(scattered(fitter, from_fits, free, seed), matching, strict=True)
     own_starts = [np.concatenate(pair) for pair in starts]
     of = np.repeat(np.arange(len(candidates)), [len(own) for own in own_starts])
     found = fitter.race(np.concatenate(own_starts), free[of], of)
@@ -210,7 +213,7 @@ def _second(
         for base in bases
     }
     named = [candidates[i] for i in others]
-    starts = matched(fitter, [without[id(bases[i])] for i in others], named, seed)
+    starts, _ = matched(fitter, [without[id(bases[i])] for i in others], named, seed)
     free = np.stack([trials.free(effects)[:count] for effects in named])
     of = np.arange(len(others))
     lowest = float(found.best.cost[first].min())

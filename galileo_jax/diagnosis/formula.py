@@ -162,10 +162,7 @@ def _pursue(sights: Sequence[Sight], target: np.ndarray, terms: Sequence[Term]) 
     plain = [i for i, term in enumerate(kept) if not term.scanned]
     chosen = [[i] for i in plain]
     chosen += [list(pair) for pair in combinations(plain, 2)]
-    from sklearn.linear_model import orthogonal_mp  # and pandas: only where a force is missing
-
-    path = orthogonal_mp(columns, target, n_nonzero_coefs=MAX_TERMS, return_path=True)
-    chosen += [np.flatnonzero(step).tolist() for step in np.reshape(path, (len(kept), -1)).T]
+    chosen += _matching_pursuit(columns, target)
     fits = []
     for index in chosen:
         found = np.linalg.lstsq(columns[:, index], target, rcond=None)[0]
@@ -173,6 +170,25 @@ def _pursue(sights: Sequence[Sight], target: np.ndarray, terms: Sequence[Term]) 
         coefficients = found / size[is_seen][index]
         fits.append(_Fit(tuple(kept[i] for i in index), coefficients, float(left @ left)))
     return fits
+
+
+def _matching_pursuit(columns: np.ndarray, target: np.ndarray) -> list[list[int]]:
+    """The first column that orthogonal matching pursuit chooses, the first two, and so on.
+
+    Columns have unit length. These few lines spare the import of scikit-learn, which takes longer
+    than all formulas together.
+    """
+    found: list[list[int]] = []
+    chosen, left = [], target
+    while len(chosen) < min(MAX_TERMS, columns.shape[1]):
+        best = int(np.argmax(np.abs(columns.T @ left)))
+        if best in chosen:  # nothing but rounding is left
+            break
+        chosen = sorted([*chosen, best])
+        found.append(chosen)
+        own = columns[:, chosen]
+        left = target - own @ np.linalg.lstsq(own, target, rcond=None)[0]
+    return found
 
 
 def _columns(sight: Sight, terms: Sequence[Term]) -> np.ndarray:

@@ -28,6 +28,7 @@ NOISE_SCALE = Parameter("noise_scale", "1", LogNormal(1.0, NOISE_SD), 1.0, "nuis
 # Fitted noise over what the tracker states: so far a tracker may be wrong about it. Beyond, the
 # statement is wrong or what is left is no noise.
 NOISE_SCALE_RANGE = (0.5, 1.5)
+NUM_PRIOR_DRAWS = 2000
 
 
 @dataclass(frozen=True)
@@ -153,6 +154,12 @@ class JointProblem:
         """Parameters in their units, `[..., parameter]`, noise scales last."""
         theta = np.asarray(in_units(self.priors, jnp.asarray(z)))
         return theta if free is None else np.where(free, theta, self.absent)
+
+    @cached_property
+    def prior_draws(self) -> np.ndarray:
+        """Draws from the priors in the parameters' units, `[draw, parameter]`: always the same."""
+        generator = np.random.default_rng(0)
+        return self.theta(generator.standard_normal((NUM_PRIOR_DRAWS, len(self.parameters))))
 
     def of_clip(self, theta: np.ndarray, clip: int) -> np.ndarray:
         """The parameters of one clip's model, `[..., model parameter]`."""

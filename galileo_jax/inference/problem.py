@@ -51,6 +51,31 @@ class Problem:
         return self.model.parameters
 
     @cached_property
+    def kind(self) -> tuple[tuple[Effect, ...], tuple[str, ...], float]:
+        """What programs are compiled for that take its motions as data.
+
+        The effects that change what is seen of a motion, the parameters' names, and the time
+        between records. A parameter of another effect is called by its place: the programs are the
+        same whichever effects made the motion.
+        """
+        model = self.model
+        scene, every = model.scene.surroundings, model.effects + model.nuisances
+        own = [type(effect) for effect in every]
+        is_seen = [e.time is not Effect.time or e.measure is not Effect.measure for e in own]
+        used, other = (
+            {
+                p.name
+                for e, seen in zip(every, is_seen, strict=True)
+                if seen is wanted
+                for p in e.parameters(scene)
+            }
+            for wanted in (True, False)
+        )
+        names = (f"_{i}" if n in other - used else n for i, n in enumerate(model.names))
+        effects = tuple(e for e, seen in zip(every, is_seen, strict=True) if seen)
+        return effects, tuple(names), model.record_dt_s
+
+    @cached_property
     def data(self) -> Whitening:
         """The data and their covariance, decomposed."""
         scene = self.model.scene.surroundings
@@ -59,11 +84,9 @@ class Problem:
     def predict(self, theta: Float[jax.Array, " parameter"]) -> Float[jax.Array, "object 2 frame"]:
         """What the camera would see, in JAX: `[parameter]` to `[object, 2, frame]`, m."""
         position, velocity = in_jax(self.engine)(theta[None])
-        model = self.model
-        kind = (model.effects + model.nuisances, model.names, model.record_dt_s)
         frames = jnp.asarray(self.observation.times_s)
-        surroundings = model.scene.surroundings
-        return _seen_one(kind, theta, position[0], velocity[0], frames, surroundings)
+        surroundings = self.model.scene.surroundings
+        return _seen_one(self.kind, theta, position[0], velocity[0], frames, surroundings)
 
     def simulate(
         self, theta: Float[np.ndarray, " parameter"]
@@ -79,9 +102,7 @@ class Problem:
         motion = self.motion(theta)
         times = self.observation.times_s
         frames = np.pad(times, (0, rounded_up(len(times), FRAMES) - len(times)), mode="edge")
-        model = self.model
-        kind = (model.effects + model.nuisances, model.names, model.record_dt_s)
-        scene = model.scene.surroundings
+        kind, scene = self.kind, self.model.scene.surroundings
         found = in_chunks(
             MOTIONS, lambda *rows: _seen_batch(kind, *rows, frames, scene), theta, *motion
         )

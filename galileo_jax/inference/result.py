@@ -116,9 +116,6 @@ def error_of(
     return error
 
 
-NUM_PRIOR_DRAWS = 2000
-
-
 def per_mass_entries(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[str, Any]]:
     """Entries of the force constants over m1, by name; empty where the mass is known.
 
@@ -128,8 +125,7 @@ def per_mass_entries(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[
     """
     if not force_constants(trials) or is_mass_known(trials, draws):
         return {}
-    z = np.random.default_rng(0).standard_normal((NUM_PRIOR_DRAWS, len(trials.parameters)))
-    before = per_mass(trials, trials.theta(z))
+    before = per_mass(trials, trials.prior_draws)
     return {
         name: {
             **summarise(values),
@@ -176,8 +172,7 @@ def _derived_by_laws(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[
                 found[name] = np.asarray(values), unit
         return found
 
-    z = np.random.default_rng(0).standard_normal((NUM_PRIOR_DRAWS, len(trials.parameters)))
-    before = by_name(trials.theta(z))
+    before = by_name(trials.prior_draws)
     return {
         name: {
             **summarise(values),

@@ -34,6 +34,10 @@ class Share:
     names: tuple[str, ...]
     columns: tuple[int, ...]
 
+    def of(self, theta: np.ndarray) -> np.ndarray:
+        """Of `theta` `[batch, parameter]` the columns of `names`."""
+        return theta[:, self.columns]
+
 
 class ActingLaws:
     """Of a model."""
@@ -55,14 +59,19 @@ class ActingLaws:
 
         Where few rollouts have the same, they have what acts in any.
         """
-        found = np.full(len(theta), 0 if self._table else FORCES | FRICTIONS)
-        for law, columns, absent in self._table:
-            acts = (theta[:, columns] != absent).any(axis=1)
-            found |= np.where(acts, law, 0)
+        found = self.acting(theta)
         kinds, where, count = np.unique(found, return_inverse=True, return_counts=True)
         few = count < FEW
         if len(kinds) > 1 and few.any():
             found[few[where]] = np.bitwise_or.reduce(found)
+        return found
+
+    def acting(self, theta: np.ndarray) -> np.ndarray:
+        """As `in_each`, of each rollout by itself."""
+        found = np.full(len(theta), 0 if self._table else FORCES | FRICTIONS)
+        for law, columns, absent in self._table:
+            acts = (theta[:, columns] != absent).any(axis=1)
+            found |= np.where(acts, law, 0)
         return found
 
     def share(self, laws: int) -> Share:

@@ -35,9 +35,9 @@ class EngineJax:
     name = "rigid"
     roll_out: ClassVar[Callable[..., Motion]]
 
-    def __init__(self, model: Model):
+    def __init__(self, model: Model, laws: ActingLaws | None = None):
         self.model = model
-        self._laws = ActingLaws(model)
+        self._laws = ActingLaws(model) if laws is None else laws
 
     def simulate(
         self, theta: Float[np.ndarray, "batch parameter"]
@@ -89,7 +89,7 @@ class EngineJax:
             share.names,
             rounded_up(most, LONG),
             model.record_dt_s,
-            theta[:, share.columns],
+            share.of(theta),
             model.scene.surroundings,
             np.asarray(count),
         )

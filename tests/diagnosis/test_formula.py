@@ -6,7 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.diagnosis.formula import NOT_SIMPLE, NOTHING, Sight, find_formula
+from galileo_jax.diagnosis.formula import (
+    NOT_SIMPLE,
+    NOTHING,
+    Sight,
+    _matching_pursuit,
+    find_formula,
+)
 
 NUM_TIMES = 200
 NOISE_M_S2 = 0.05
@@ -103,3 +109,13 @@ def test_what_is_not_simple_is_said_to_be():
     assert found.text == NOT_SIMPLE
     assert found.terms == ()
     assert found.share_explained < 0.8
+
+
+def test_matching_pursuit_takes_what_explains_most_of_what_is_left():
+    generator = np.random.default_rng(5)
+    columns = np.linalg.qr(generator.standard_normal((40, 9)))[0]
+    columns[:, 7] = columns[:, 5] + 0.1 * columns[:, 0]  # much like the first that is chosen
+    columns /= np.linalg.norm(columns, axis=0)
+    target = -3.0 * columns[:, 5] + 2.0 * columns[:, 1] + columns[:, 8]
+    assert _matching_pursuit(columns, target) == [[5], [1, 5], [1, 5, 8]]
+    assert _matching_pursuit(columns[:, :1], columns[:, 0]) == [[0]]

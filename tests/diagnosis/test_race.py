@@ -6,6 +6,7 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis import candidates
 from galileo_jax.diagnosis.candidate_starts import matched, scattered
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
 from galileo_jax.diagnosis.diagnose import fitter_of
@@ -27,9 +28,8 @@ def full_search(fitter: GradientFitter, base: Hypothesis) -> np.ndarray:
     free = np.stack([trials.free(effects)[:count] for effects in sets])
     bases = [base.fit] * len(sets)
     found = []
-    for own, *starts in zip(
-        free, scattered(fitter, bases, free, 0), matched(fitter, bases, sets, 0), strict=True
-    ):
+    matching, _ = matched(fitter, bases, sets, 0)
+    for own, *starts in zip(free, scattered(fitter, bases, free, 0), matching, strict=True):
         z = np.concatenate(starts)
         fits = fitter.fit_from(z, np.tile(own, (len(z), 1)), np.arange(len(z)))
         best = max(fits, key=lambda fit: fit.log_evidence)
@@ -39,7 +39,8 @@ def full_search(fitter: GradientFitter, base: Hypothesis) -> np.ndarray:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hidden", SEEDS, ids="+".join)
-def test_no_candidate_that_may_decide_is_dropped(tmp_path, hidden):
+def test_no_candidate_that_may_decide_is_dropped(tmp_path, hidden, monkeypatch):
+    monkeypatch.setattr(candidates, "NUM_AT_ONCE", 4)  # five effects are many
     path = tmp_path / "clip.csv"
     simulate(
         path,
@@ -64,6 +65,8 @@ def test_no_candidate_that_may_decide_is_dropped(tmp_path, hidden):
         full = full_search(fitter, base)
     evidence = np.array([one.fit.log_evidence for one in raced])
     assert {one.effects for one in shown} == set(sets)
+    assert len(shown) == len(sets) + 1  # the one that promises most, before the race
+    assert evidence[sets.index(shown[0].effects)] > shown[0].fit.log_evidence - AGREES_NATS
     np.testing.assert_array_equal(evidence, [one.fit.log_evidence for one in again])
     decides = full > full.max() - DECIDING_NATS
     assert np.all(evidence[decides] > full[decides] - AGREES_NATS)

@@ -56,6 +56,12 @@ class Factor:
         """`power_v`."""
         return f"{self.name}_{self.variable}"
 
+    def value(self, t: Any, q: Any, v: Any, xp: Any, constants: Sequence[Any]) -> Any:
+        """The shape, with its constants by their order; `xp` is NumPy or JAX."""
+        names = dict(zip(self.constants, constants, strict=False))
+        code = self.code.format(**{name: name for name in names})
+        return eval(code, {"__builtins__": {}}, {"t": t, "q": q, "v": v, "xp": xp, **names})
+
 
 POWERS = (0.25, 0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0)
 TIMES_S = tuple(np.geomspace(0.05, 1.5, 12).tolist())
@@ -255,6 +261,7 @@ ALONE: Mapping[Nature, str] = {"push": "tq", "drag": "v", "drag_force": "v", "fr
 """The variables of a single factor, by nature; what else there is is in the library or a push."""
 TOGETHER = ("power_t", "decay_t", "linear_q", "growth_q", "pulse_q", "power_v", "backward_v")
 """Factors that are tried in pairs."""
+SEVERAL = tuple(factor for factor in FACTORS if factor.label in TOGETHER)
 
 
 def structures(has_surface: bool, num_objects: int) -> Iterator[Structure]:
@@ -264,8 +271,7 @@ def structures(has_surface: bool, num_objects: int) -> Iterator[Structure]:
         natures.append("drag_force")
     if has_surface:
         natures.append("friction")
-    several = [factor for factor in FACTORS if factor.label in TOGETHER]
-    pairs = [pair for pair in combinations(several, 2) if pair[0].variable != pair[1].variable]
+    pairs = [pair for pair in combinations(SEVERAL, 2) if pair[0].variable != pair[1].variable]
     for nature, is_on_all in product(natures, (False, True) if num_objects > 1 else (False,)):
         if nature == "drag_force" and not is_on_all:
             continue

@@ -8,11 +8,13 @@ import numpy as np
 
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.laws.grammar import Structure
-from galileo_jax.diagnosis.laws.screen import Suggestion, suggestions
+from galileo_jax.diagnosis.laws.one_program import MOST_NUMBERS, ActingFormulas, Spare
+from galileo_jax.diagnosis.laws.screen import NUM_LAWS, Suggestion, suggestions
 from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
 
 NUM_REFITTED = 3
@@ -69,7 +71,7 @@ def fitted_laws(trials: JointProblem, base: Hypothesis, views: Sequence[View]) -
     if not found:
         return []
     sources = [class_source(one.structure, views) for one in found]
-    extended = _with_laws(trials, sources)
+    extended = _with_laws(trials, [one.structure for one in found], sources)
     fitter, count = GradientFitter(extended), len(extended.model_parameters)
     where = [extended.names.index(name) if name in extended.names else -1 for name in trials.names]
     z = np.zeros(len(extended.names))
@@ -99,14 +101,21 @@ def fitted_laws(trials: JointProblem, base: Hypothesis, views: Sequence[View]) -
     return sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence)
 
 
-def _with_laws(trials: JointProblem, sources: Sequence[str]) -> JointProblem:
+def _with_laws(
+    trials: JointProblem, structures: Sequence[Structure], sources: Sequence[str]
+) -> JointProblem:
     """The trials with these laws in place of the library."""
     laws = tuple(law_class(source)() for source in sources)
     laws = tuple(sorted(laws, key=lambda law: law.name))
+    used = sum(1 + len(structure.constants) for structure in structures)
+    spare = Spare(NUM_LAWS * MOST_NUMBERS - used)
+    named = {name_of(structure): structure for structure in structures}
     problems = []
     for problem in trials.problems:
-        model = replace(problem.model, effects=laws)
+        model = replace(problem.model, effects=(*laws, spare))
         engine = make_engine(problem.engine.name, model)
+        if isinstance(engine, EngineJax):
+            engine = type(engine)(model, ActingFormulas(model, named))
         problems.append(replace(problem, model=model, engine=engine))
     return JointProblem(tuple(problems))
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from galileo_jax.inference.fits.known_motions import KnownMotions, Motion, put_together
 from galileo_jax.inference.fits.programs import (
     ClipArrays,
     Kind,
@@ -111,8 +112,7 @@ class FittedClip:
     @property
     def kind(self) -> Kind:
         """What its programs are compiled for."""
-        model = self.problem.model
-        return Kind(model.effects + model.nuisances, model.names, model.record_dt_s)
+        return Kind(*self.problem.kind)
 
     @property
     def scene(self) -> Surroundings:
@@ -159,6 +159,16 @@ class Residuals:
         self.num_rollouts = 0
         self._count = len(trials.model_parameters)
         self._is_simulated = np.array([p.step is not None for p in trials.model_parameters])
+        self.forget()
+
+    def begin(self) -> None:
+        """Counts rollouts from here on."""
+        self.num_rollouts = 0
+        self.forget()
+
+    def forget(self) -> None:
+        """Forgets motions, lest the next fit depend on the last: programs differ in rounding."""
+        self._known = [KnownMotions() for _ in self.clips]
 
     def costs(self, points: Batch) -> Float[np.ndarray, " point"]:
         """chi2 / 2 and the prior's part, `[point]`."""
@@ -170,7 +180,15 @@ class Residuals:
 
     def motions(self, points: Batch) -> Motions:
         """By rollouts, clip by clip."""
-        return [self._simulate(clip, points.z, points.free) for clip in self.clips]
+        found = []
+        for clip, memory in zip(self.clips, self._known, strict=True):
+            known = memory.of(points.z, points.free)
+            if all(known):
+                motion = put_together([one and one[:2] for one in known], None, 0)
+                found.append((clip.theta(points.z, points.free), *motion))
+            else:
+                found.append(self._simulate(clip, points.z, points.free))
+        return found
 
     def whites_of(self, points: Batch, motions: Motions) -> list[Float[np.ndarray, "point value"]]:
         """Whitened residuals, `[point, value]`, clip by clip, of points that were rolled out."""
@@ -199,33 +217,12 @@ class Residuals:
           motions: of the points, where they are known.
         """
         index = _free_index(points.free)
-        padded = np.pad(self._is_simulated, (0, 1))
-        signs = (1.0, -1.0) if is_central else (1.0,)
         jacobians, whites = [], []
         for c, clip in enumerate(self.clips):
-            own = np.pad(np.isin(np.arange(self._count), clip.column), (0, 1))
-            point, slot = np.nonzero(padded[index] & own[index])
-            which = index[point, slot]
-            h = steps[point, which]
-            offsets = np.zeros((len(point), self._count))
-            offsets[np.arange(len(point)), which] = h
-            first = 0 if motions else len(points.z)  # of the points themselves
-            owner = np.concatenate([np.arange(first), *([point] * len(signs))])
-            moved = points.z[owner]
-            moved[first:] += np.concatenate([s * offsets for s in signs])
-            _, *out = self._simulate(clip, moved, points.free[owner])
-            bases = motions[c][1:] if motions else [values[:first] for values in out]
-            slopes = []
-            for values, base in zip(out, bases, strict=True):
-                rest = values[first:]
-                low = rest[len(point) :] if is_central else base[point]
-                width = (2 * h if is_central else h)[:, None, None, None]
-                slope = np.zeros((*index.shape, *base.shape[1:]))
-                # A proposal whose motion overflows costs too much to be taken, whatever its slopes.
-                with np.errstate(invalid="ignore"):
-                    slope[point, slot] = (rest[: len(point)] - low) / width
-                slopes.append(slope)
-            motion = (*bases, *slopes)
+            if is_central:
+                motion = self._differences(c, points, index, steps, motions, True)
+            else:
+                motion = self._forward_differences(c, points, index, steps, motions)
             white, jacobian = in_chunks(
                 POINTS,
                 lambda *rows, clip=clip: jacobian_batch(clip.kind, *rows, clip.arrays),
@@ -234,6 +231,60 @@ class Residuals:
             whites.append(white)
             jacobians.append(jacobian)
         return Slopes(jacobians, whites, index, self._count)
+
+    def _forward_differences(
+        self, c: int, points: Batch, index: np.ndarray, steps: np.ndarray, motions: Motions | None
+    ) -> Motion:
+        """As `_differences`, to one side: of points that are not known."""
+        known = self._known[c].of(points.z, points.free)
+        new = np.flatnonzero([one is None for one in known])
+        found = None
+        if new.size:
+            rows, some = points.take(new), None
+            if motions:
+                some = [tuple(values[new] for values in own) for own in motions]
+            found = self._differences(c, rows, index[new], steps[new], some, False)
+            self._known[c].keep(rows.z, rows.free, found)
+        if found is not None and len(new) == len(known):
+            return found
+        return put_together(known, found, index.shape[1])
+
+    def _differences(
+        self,
+        c: int,
+        points: Batch,
+        index: np.ndarray,
+        steps: np.ndarray,
+        motions: Motions | None,
+        is_central: bool,
+    ) -> Motion:
+        """A clip's motions and their slopes; arguments as of `slopes`, `index` as of `Slopes`."""
+        clip = self.clips[c]
+        padded = np.pad(self._is_simulated, (0, 1))
+        signs = (1.0, -1.0) if is_central else (1.0,)
+        own = np.pad(np.isin(np.arange(self._count), clip.column), (0, 1))
+        point, slot = np.nonzero(padded[index] & own[index])
+        which = index[point, slot]
+        h = steps[point, which]
+        offsets = np.zeros((len(point), self._count))
+        offsets[np.arange(len(point)), which] = h
+        first = 0 if motions else len(points.z)  # of the points themselves
+        owner = np.concatenate([np.arange(first), *([point] * len(signs))])
+        moved = points.z[owner]
+        moved[first:] += np.concatenate([s * offsets for s in signs])
+        _, *out = self._simulate(clip, moved, points.free[owner])
+        bases = motions[c][1:] if motions else [values[:first] for values in out]
+        slopes = []
+        for values, base in zip(out, bases, strict=True):
+            rest = values[first:]
+            low = rest[len(point) :] if is_central else base[point]
+            width = (2 * h if is_central else h)[:, None, None, None]
+            slope = np.zeros((*index.shape, *base.shape[1:]))
+            # A proposal whose motion overflows costs too much to be taken, whatever its slopes.
+            with np.errstate(invalid="ignore"):
+                slope[point, slot] = (rest[: len(point)] - low) / width
+            slopes.append(slope)
+        return (*bases, *slopes)
 
     def _simulate(self, clip: FittedClip, z: np.ndarray, free: np.ndarray):
         """`[point, ...]`: parameters in their units, centres and velocities."""

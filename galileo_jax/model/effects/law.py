@@ -28,6 +28,17 @@ SLOWEST_M_S = 0.01  # below it a drag's direction fades away, lest it push what 
 STRENGTH = {"push": 2.0, "drag": 2.0, "drag_force": 2.0, "friction": 1.0}  # the prior's sd
 
 
+def against_motion(size: Array, speed_m_s: Array) -> Array:
+    """A drag of a size, N, with its direction."""
+    xp = speed_m_s.__array_namespace__()
+    return -size * speed_m_s / xp.sqrt(speed_m_s * speed_m_s + SLOWEST_M_S**2)
+
+
+def changed_friction(k: Array, value: Array) -> Array:
+    """Coefficients k times 1 + value, but not negative."""
+    return k.__array_namespace__().maximum(k * (1.0 + value), 0.0 * k)
+
+
 class Law(Effect):
     """One formula; subclasses give `name`, `nature`, `is_on_all`, `constants` and `formula`."""
 
@@ -66,10 +77,7 @@ class Law(Effect):
 
         def act(state: State) -> Array:
             size = mass * value(state)
-            if self.nature == "push":
-                return size
-            speed = state.speed_m_s
-            return -size * speed / xp.sqrt(speed * speed + SLOWEST_M_S**2)
+            return size if self.nature == "push" else against_motion(size, state.speed_m_s)
 
         return act
 
@@ -79,10 +87,7 @@ class Law(Effect):
             return None
         value = self._value(theta, scene)
 
-        def law(state: State, k: Array) -> Array:
-            return k.__array_namespace__().maximum(k * (1.0 + value(state)), 0.0 * k)
-
-        return law
+        return lambda state, k: changed_friction(k, value(state))
 
     def _value(self, theta: Theta, scene: Surroundings) -> Force:
         """C f on the objects it acts on, 0 on others."""

@@ -1,0 +1,198 @@
+"""Formulas as numbers: the same compiled rollouts for all that are ever proposed.
+
+A program with the formulas written into it would have to be compiled for every clip anew, since no
+two suggest the same: 14 CPU seconds. A hypothesis has one formula only; so a rollout gets the
+formula that acts in it as codes (its nature, whom it acts on, which factors) beside its constants.
+All factors are computed and one is taken, which costs no more than the eight formulas did.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from galileo_jax.diagnosis.laws.grammar import FACTORS, SEVERAL, Factor, Structure
+from galileo_jax.model.effects.effect import (
+    Array,
+    Effect,
+    Force,
+    Friction,
+    State,
+    Surroundings,
+    Theta,
+)
+from galileo_jax.model.effects.law import against_motion, changed_friction
+from galileo_jax.model.model import Model
+from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.rollout.acting_laws import FORCES, FRICTIONS, ActingLaws, Share
+
+STRENGTH, IS_ON_ALL, NATURE = "law", "law_is_on_all", "law_nature"
+FIRST, SECOND = ("law_1", "law_1_a", "law_1_b"), ("law_2", "law_2_a", "law_2_b")
+NAMES = (STRENGTH, IS_ON_ALL, NATURE, *FIRST, *SECOND)
+NATURES = ("push", "drag", "drag_force", "friction")
+MOST_NUMBERS = 5  # of a formula: the strength and the constants of two factors
+TOGETHER = FORCES | FRICTIONS | 4  # of rollouts in which several formulas act
+
+
+class LawAsForce(Effect):
+    """The formula that acts, where it is a push or a drag."""
+
+    name: ClassVar[str] = "law_as_force"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """None: what a rollout is given stands in no model."""
+        return ()
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force:
+        """As `Law.force`."""
+        masses = scene.mass(theta)
+        xp = masses[0].__array_namespace__()
+        mass = xp.stack(masses, axis=-1)
+        nature = theta[NATURE][..., None]
+        mass = xp.where(nature == NATURES.index("drag_force"), masses[0][..., None], mass)
+
+        def act(state: State) -> Array:
+            size = mass * _value(theta, scene, state)
+            against = against_motion(size, state.speed_m_s)
+            force = xp.where(nature == NATURES.index("push"), size, against)
+            return xp.where(nature == NATURES.index("friction"), 0.0, force)
+
+        return act
+
+
+class LawAsFriction(Effect):
+    """The formula that acts, where it changes friction."""
+
+    name: ClassVar[str] = "law_as_friction"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """None: what a rollout is given stands in no model."""
+        return ()
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
+        """As `Law.friction`."""
+
+        def law(state: State, k: Array) -> Array:
+            changed = changed_friction(k, _value(theta, scene, state))
+            is_own = theta[NATURE][..., None] == NATURES.index("friction")
+            return k.__array_namespace__().where(is_own, changed, k)
+
+        return law
+
+
+def _value(theta: Theta, scene: Surroundings, state: State) -> Array:
+    """C f on the objects it acts on, 0 on others."""
+    path, speed = state.path_m, state.speed_m_s
+    xp = path.__array_namespace__()
+    is_first = xp.asarray([float(i == 0) for i in range(len(scene.names))])
+    chosen = xp.maximum(theta[IS_ON_ALL][..., None], is_first)
+    place = (state.time_s + 0.0 * path, path, speed)
+    f = _factor(FACTORS, [theta[name][..., None] for name in FIRST], place, xp)
+    f = f * _factor(SEVERAL, [theta[name][..., None] for name in SECOND], place, xp)
+    return theta[STRENGTH][..., None] * chosen * f
+
+
+def _factor(factors: Sequence[Factor], own: Sequence[Array], place: tuple, xp: Any) -> Array:
+    """One of `factors` by its code, counted from 1, and its constants; code 0: 1."""
+    code, *constants = own
+    t, q, v = place
+    value = 1.0 + 0.0 * q
+    for i, factor in enumerate(factors):
+        one = factor.value(t, q, v, xp, constants)
+        value = xp.where(code == i + 1, one, value)
+    return value
+
+
+@dataclass(frozen=True)
+class OneLaw(Share):
+    """Part of a model: without its formulas, but with the one that acts in each rollout.
+
+    Attributes:
+      acting: by formula, where its strength and constants stand, and its numbers.
+    """
+
+    acting: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...] = ()
+
+    def of(self, theta: np.ndarray) -> np.ndarray:
+        """Of `theta` `[batch, parameter]` the columns of `names`."""
+        numbers = np.ones((len(theta), len(NAMES)))
+        numbers[:, 0] = 0.0
+        for columns, codes, slots in self.acting:
+            acts = np.flatnonzero(theta[:, columns[0]])
+            numbers[acts] = codes
+            numbers[np.ix_(acts, slots)] = theta[np.ix_(acts, columns)]
+        return np.concatenate([super().of(theta), numbers], axis=1)
+
+
+class ActingFormulas(ActingLaws):
+    """Of a model whose effects are proposed formulas.
+
+    Args:
+      model: of the clip.
+      structures: by the formulas' names.
+    """
+
+    def __init__(self, model: Model, structures: Mapping[str, Structure]):
+        super().__init__(model)
+        found = {}
+        for effect in model.effects:
+            columns = self._columns(effect)
+            if effect.name in structures and columns.size:
+                structure = structures[effect.name]
+                kind = FRICTIONS if structure.nature == "friction" else FORCES
+                found[effect.name] = kind, (columns, *codes_of(structure))
+        self._formulas = found
+
+    def acting(self, theta: np.ndarray) -> np.ndarray:
+        """As in a rollout of codes; `TOGETHER` where several formulas act."""
+        found, count = np.zeros(len(theta), int), np.zeros(len(theta), int)
+        for kind, (columns, *_) in self._formulas.values():
+            acts = theta[:, columns[0]] != 0
+            found |= np.where(acts, kind, 0)
+            count += acts
+        return np.where(count > 1, TOGETHER, found)
+
+    def _share_of(self, laws: int) -> Share:
+        if laws & TOGETHER == TOGETHER:
+            return super()._share_of(FORCES | FRICTIONS)
+        model = self._model
+        gone = {int(i) for effect in model.effects for i in self._columns(effect)}
+        columns = tuple(i for i in range(len(model.names)) if i not in gone)
+        acting = (LawAsForce(),) * bool(laws & FORCES) + (LawAsFriction(),) * bool(laws & FRICTIONS)
+        return OneLaw(
+            acting + model.nuisances,
+            (*(model.names[i] for i in columns), *NAMES),
+            columns,
+            tuple(formula for _, formula in self._formulas.values()),
+        )
+
+
+def codes_of(structure: Structure) -> tuple[np.ndarray, np.ndarray]:
+    """What a formula has in `NAMES`, and where its strength and constants stand there."""
+    codes, slots = dict.fromkeys(NAMES, 1.0), [STRENGTH]
+    codes[IS_ON_ALL] = float(structure.is_on_all)
+    codes[NATURE] = float(NATURES.index(structure.nature))
+    codes[SECOND[0]] = 0.0
+    for names, factors, factor in zip(
+        (FIRST, SECOND), (FACTORS, SEVERAL), structure.factors, strict=False
+    ):
+        codes[names[0]] = float(factors.index(factor)) + 1.0
+        slots += names[1 : 1 + len(factor.constants)]
+    return np.array(list(codes.values())), np.array([NAMES.index(name) for name in slots])
+
+
+@dataclass(frozen=True, eq=False)
+class Spare(Effect):
+    """Parameters of no effect, never free: models of few formulas are as large as of many."""
+
+    count: int
+
+    name: ClassVar[str] = "spare"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """As many as are wanted."""
+        prior = Normal(0.0, 1.0)
+        return tuple(
+            Parameter(f"spare_{i}", "1", prior, 0.0, "given", None) for i in range(self.count)
+        )
