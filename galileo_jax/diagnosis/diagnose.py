@@ -16,43 +16,31 @@
    is unknown.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import replace
-
-import numpy as np
 
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
-from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates, reduced
-from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Law, Round, Verdict
+from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
-from galileo_jax.diagnosis.laws.in_model import fitted_laws
+from galileo_jax.diagnosis.fitted_pairs import fitted_pairs, pairs_from_base
+from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
-from galileo_jax.diagnosis.mended_evidence import mended
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
-from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_from_scratch, pairs_to_try
-from galileo_jax.diagnosis.score_tests import best_gains, score_tests
+from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
-    NUM_JOINED,
     best_named,
     decisive_margin,
     explains,
     form_that_leads,
-    is_close_call,
-    is_contested_by_law,
     is_nothing_missing,
-    law_contested,
-    law_odds,
-    law_verdict,
-    log_prior,
     looked_at_again,
-    may_decide,
     needs_laws,
     needs_pairs,
-    other_formulas,
     ranked,
     rivals,
     to_add,
@@ -62,7 +50,6 @@ from galileo_jax.diagnosis.verdict import (
 )
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.result import error_of
 from galileo_jax.model.effects.forms import FORM_NAMES
 
 
@@ -103,7 +90,7 @@ def diagnose(
         trials.free([add])  # raises for unknown names
     on_stage(f"fitting {len(library)} candidates")
     is_adequate = first.comparison.is_adequate
-    race = _Race(fitter, base, is_adequate, seed, on_candidate)
+    race = Race(fitter, base, is_adequate, seed, on_candidate)
     singles = [(name,) for name in trials.all_effects]
     candidates = ranked(race([base] * len(singles), singles))
     for candidate in candidates:
@@ -123,7 +110,7 @@ def diagnose(
     candidates = _compared(trials, candidates, decisive, seed, compared)
     if needs_pairs(candidates):
         on_stage("fitting pairs of effects")
-        pairs = _pairs(race, candidates, library)
+        pairs = fitted_pairs(race, candidates, library)
         if pairs:
             form, single = form_that_leads(candidates), best_named(candidates)
             why = (*why, reasons.pairs_tried(single, form, len(pairs)))
@@ -133,7 +120,7 @@ def diagnose(
         candidates = _compared(trials, (*candidates, *pairs), decisive, seed, compared)
         if not any(explains(c) for c in candidates):
             on_stage("searching pairs from the fit without effects")
-            better = _from_scratch(race, base, candidates)
+            better = pairs_from_base(race, candidates)
             for candidate in better:
                 compared.pop(candidate.effects, None)
             known = {frozenset(c.effects): c for c in (*candidates, *better)}
@@ -150,11 +137,11 @@ def diagnose(
         on_stage("inferring the missing force without a form")
         views = views_of(trials, base)
         on_stage("looking for a law")
-        laws = _laws(trials, base, views, len(library))
+        laws = law_candidates(trials, base, views, len(library))
         for candidate in ranked(laws):
             on_candidate(candidate)
         candidates = _compared(trials, (*candidates, *laws), decisive, seed, compared)
-        verdict = _law_or(trials, verdict, candidates, decisive)
+        verdict = law_or(trials, verdict, candidates, decisive)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
@@ -185,212 +172,6 @@ def diagnose(
 def fitter_of(trials: JointProblem) -> GradientFitter:
     """What fits all hypotheses."""
     return GradientFitter(trials)
-
-
-class _Race:
-    """Fits candidates, and makes a table of what was fitted so far.
-
-    Attributes:
-      fitter: of trials whose models have the whole library.
-      base: the fit without effects, from which evidence counts.
-      is_adequate: whether that will do.
-      seed: of the starts.
-      on_candidate: called with each candidate as soon as it is fitted.
-    """
-
-    def __init__(
-        self,
-        fitter: GradientFitter,
-        base: Hypothesis,
-        is_adequate: bool,
-        seed: int,
-        on_candidate: Callable[[Candidate], None],
-    ):
-        self.fitter, self.base, self.is_adequate, self.seed = fitter, base, is_adequate, seed
-        self._on_candidate = on_candidate
-        self._made: dict[tuple[str, ...], Candidate] = {}
-
-    def __call__(
-        self, starts: Sequence[Hypothesis], sets: Sequence[tuple[str, ...]]
-    ) -> list[Candidate]:
-        """Fits sets of effects, each from the fit of all but its last; not ranked yet."""
-        best = max((c.log_odds for c in self._made.values()), default=-np.inf)
-        decisive = decisive_margin(self.is_adequate)
-
-        def matters(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-            log_odds = np.array([self._log_odds(one) for one in hypotheses])
-            is_form = np.array(
-                [any(name in FORM_NAMES for name in one.effects) for one in hypotheses]
-            )
-            return may_decide(log_odds, is_form, best, decisive, self.is_adequate)
-
-        def needs_mending(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-            log_odds = np.array([self._log_odds(one) for one in hypotheses])
-            close = is_close_call(log_odds, best, decisive, self.is_adequate)
-            if close.any() and self.base.weighed is None:
-                _, found = mended(self.fitter, [self.base.fit], self.seed, None)
-                self.base = replace(self.base, weighed=found)
-            return close & (self.base.weighed is not None)
-
-        trials = self.fitter.trials
-        scores = dict.fromkeys(sets, 0.0)
-        for start in {id(start): start for start in starts}.values():
-            own = [e for e, other in zip(sets, starts, strict=True) if other is start]
-            scores |= dict(zip(own, score_tests(trials, start.fit, own).tolist(), strict=True))
-
-        def make(hypothesis: Hypothesis) -> Candidate:
-            made = self._candidate(hypothesis, scores[hypothesis.effects])
-            self._made[made.effects] = made
-            return made
-
-        def on_fit(hypothesis: Hypothesis) -> None:
-            made = make(hypothesis)
-            table = ranked(self._made.values())
-            self._on_candidate(next(c for c in table if c.effects == made.effects))
-
-        found = fit_candidates(self.fitter, starts, sets, self.seed, matters, on_fit, needs_mending)
-        return [
-            made if (made := self._made[one.effects]).hypothesis.is_same(one) else make(one)
-            for one in found
-        ]
-
-    def _log_odds(self, hypothesis: Hypothesis) -> float:
-        return self._log_evidence(hypothesis) + self._log_prior(hypothesis)
-
-    def _log_evidence(self, hypothesis: Hypothesis) -> float:
-        return hypothesis.evidence_over(self.base)
-
-    def _log_prior(self, hypothesis: Hypothesis) -> float:
-        trials = self.fitter.trials
-        library = [name for name in trials.all_effects if name not in FORM_NAMES]
-        return log_prior(_odds(trials, hypothesis), len(library))
-
-    def _candidate(self, hypothesis: Hypothesis, score_z: float) -> Candidate:
-        trials, fit = self.fitter.trials, hypothesis.fit
-        return Candidate(
-            effects=hypothesis.effects,
-            hypothesis=hypothesis,
-            error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
-            score_z=score_z,
-            log_evidence=self._log_evidence(hypothesis),
-            log_prior=self._log_prior(hypothesis),
-            probability=0.0,
-            p_value=None,
-            confounded_with=(),
-        )
-
-
-def _laws(
-    trials: JointProblem, base: Hypothesis, views: Sequence[View], num_effects: int
-) -> list[Candidate]:
-    """Formulas that the missing force suggests, fitted in the model."""
-    made = []
-    for law in fitted_laws(trials, base, views):
-        fit, own = law.hypothesis.fit, law.hypothesis.of(trials)
-        values = {name: f"{value:.4g}" for name, value in law.constants().items()}
-        made.append(
-            Candidate(
-                effects=law.hypothesis.effects,
-                hypothesis=law.hypothesis,
-                error=error_of(own, own.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
-                score_z=float(np.sqrt(2 * max(law.score, 0.0))),
-                log_evidence=law.hypothesis.evidence_over(base),
-                log_prior=log_prior([law_odds(len(law.structure.factors))], num_effects),
-                probability=0.0,
-                p_value=None,
-                confounded_with=(),
-                law=Law(law.text, law.structure.family, law.source, values),
-            )
-        )
-    return made
-
-
-def _law_or(
-    trials: JointProblem, before: Verdict, candidates: Sequence[Candidate], decisive: float
-) -> Verdict:
-    """The verdict law where a formula does what a named effect must; else as before.
-
-    A pair of effects that a formula explains as well is named no more.
-    """
-    unknown = replace(before, status="unknown", effects=())
-    verdict = law_verdict(candidates, decisive)
-    if verdict is None:
-        said = law_contested(candidates, decisive)
-        is_open = is_contested_by_law(before, candidates, decisive)
-        return replace(unknown if is_open else before, reasons=(*before.reasons, *said))
-    best = next(c for c in candidates if c.effects == verdict.effects)
-    alike = within_luck(best, other_formulas(best, candidates), decisive)
-    leads = expected_leads(trials, best, alike)
-    again = looked_at_again(verdict, best, list(zip(alike, leads, strict=True)), decisive)
-    if again.status == "law":
-        return again
-    return replace(unknown, reasons=(*unknown.reasons, *again.reasons))
-
-
-def _odds(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:
-    """Of each effect of a hypothesis, as far as the clip leads to expect it."""
-    problem = trials.problems[0]
-    theta = trials.of_clip(trials.theta(hypothesis.fit.z, hypothesis.fit.free), 0)
-    named = dict(zip(problem.model.names, theta, strict=True))
-    scene = problem.model.scene.surroundings
-    effects = [e for e in problem.model.effects if e.name in hypothesis.effects]
-    return [effect.odds(named, scene) for effect in effects]
-
-
-def _pairs(
-    race: _Race, candidates: Sequence[Candidate], library: Sequence[str]
-) -> tuple[Candidate, ...]:
-    """Pairs of the best single effects with others, and what could be confused with the best pair.
-
-    The first are fitted from the single effects' fits. One that is as good as the best pair may not
-    be reached from there: it is, from the best pair without one of its effects.
-    """
-    trials, seed = race.fitter.trials, race.seed
-    singles = [c for c in candidates if not c.is_form][:NUM_JOINED]
-    gains = np.stack(
-        [
-            best_gains(trials, one.hypothesis.fit, [(*one.effects, name) for name in library], seed)
-            for one in singles
-        ]
-    )
-    sets, starts = [], []
-    for one, pairs in zip(singles, pairs_to_try(singles, library, gains), strict=True):
-        sets += pairs
-        starts += [one.hypothesis] * len(pairs)
-    if not sets:
-        return ()
-    made = race(starts, sets)
-    best = ranked(made)[0]
-    sets, starts = [], []
-    for kept in best.effects:
-        start = reduced(trials, best.hypothesis, [kept])
-        if others := not_tried(kept, library, made):
-            gains = best_gains(trials, start.fit, others, seed)
-            alike = most_alike(others, gains)
-            sets += alike
-            starts += [start] * len(alike)
-    if sets:
-        made += race(starts, sets)
-    return ranked(made)
-
-
-def _from_scratch(
-    race: _Race, base: Hypothesis, candidates: Sequence[Candidate]
-) -> list[Candidate]:
-    """Pairs fitted from the fit without effects: those that come to a better valley, and new ones.
-
-    A single effect's fit bends all else to do what the second one does, and the pair may not be
-    reached from there, nor seem to promise much.
-    """
-    known = {frozenset(c.effects): c for c in candidates}
-    sets = pairs_from_scratch(candidates)
-    made = race([base] * len(sets), sets)
-    olds = [known.get(frozenset(new.effects)) for new in made]
-    return [
-        new
-        for old, new in zip(olds, made, strict=True)
-        if old is None or new.log_evidence > old.log_evidence
-    ]
 
 
 def _compared(

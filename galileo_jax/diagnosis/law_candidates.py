@@ -1,0 +1,71 @@
+"""Formulas as candidates, and the verdict that one of them is the law."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
+from galileo_jax.diagnosis.expected_lead import expected_leads
+from galileo_jax.diagnosis.laws.in_model import fitted_laws
+from galileo_jax.diagnosis.missing_force import View
+from galileo_jax.diagnosis.verdict import (
+    is_contested_by_law,
+    law_contested,
+    law_odds,
+    law_verdict,
+    log_prior,
+    looked_at_again,
+    other_formulas,
+    within_luck,
+)
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.result import error_of
+
+
+def law_candidates(
+    trials: JointProblem, base: Hypothesis, views: Sequence[View], num_effects: int
+) -> list[Candidate]:
+    """Formulas that the missing force suggests, fitted in the model."""
+    made = []
+    for law in fitted_laws(trials, base, views):
+        fit, own = law.hypothesis.fit, law.hypothesis.of(trials)
+        values = {name: f"{value:.4g}" for name, value in law.constants().items()}
+        made.append(
+            Candidate(
+                effects=law.hypothesis.effects,
+                hypothesis=law.hypothesis,
+                error=error_of(own, own.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
+                score_z=float(np.sqrt(2 * max(law.score, 0.0))),
+                log_evidence=law.hypothesis.evidence_over(base),
+                log_prior=log_prior([law_odds(len(law.structure.factors))], num_effects),
+                probability=0.0,
+                p_value=None,
+                confounded_with=(),
+                law=Law(law.text, law.structure.family, law.source, values),
+            )
+        )
+    return made
+
+
+def law_or(
+    trials: JointProblem, before: Verdict, candidates: Sequence[Candidate], decisive: float
+) -> Verdict:
+    """The verdict law where a formula does what a named effect must; else as before.
+
+    A pair of effects that a formula explains as well is named no more.
+    """
+    unknown = replace(before, status="unknown", effects=())
+    verdict = law_verdict(candidates, decisive)
+    if verdict is None:
+        said = law_contested(candidates, decisive)
+        is_open = is_contested_by_law(before, candidates, decisive)
+        return replace(unknown if is_open else before, reasons=(*before.reasons, *said))
+    best = next(c for c in candidates if c.effects == verdict.effects)
+    alike = within_luck(best, other_formulas(best, candidates), decisive)
+    leads = expected_leads(trials, best, alike)
+    again = looked_at_again(verdict, best, list(zip(alike, leads, strict=True)), decisive)
+    if again.status == "law":
+        return again
+    return replace(unknown, reasons=(*unknown.reasons, *again.reasons))

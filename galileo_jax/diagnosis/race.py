@@ -1,0 +1,125 @@
+"""The table of the hypotheses fitted so far, to which every race of candidates adds."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
+from galileo_jax.diagnosis.diagnosis import Candidate
+from galileo_jax.diagnosis.mended_evidence import mended
+from galileo_jax.diagnosis.score_tests import score_tests
+from galileo_jax.diagnosis.verdict import (
+    decisive_margin,
+    is_close_call,
+    log_prior,
+    may_decide,
+    ranked,
+)
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.result import error_of
+from galileo_jax.model.effects.forms import FORM_NAMES
+
+
+class Race:
+    """Fits candidates, and makes a table of what was fitted so far.
+
+    Attributes:
+      fitter: of trials whose models have the whole library.
+      base: the fit without effects, from which evidence counts.
+      is_adequate: whether that will do.
+      seed: of the starts.
+      on_candidate: called with each candidate as soon as it is fitted.
+    """
+
+    def __init__(
+        self,
+        fitter: GradientFitter,
+        base: Hypothesis,
+        is_adequate: bool,
+        seed: int,
+        on_candidate: Callable[[Candidate], None],
+    ):
+        self.fitter, self.base, self.is_adequate, self.seed = fitter, base, is_adequate, seed
+        self._on_candidate = on_candidate
+        self._made: dict[tuple[str, ...], Candidate] = {}
+
+    def __call__(
+        self, starts: Sequence[Hypothesis], sets: Sequence[tuple[str, ...]]
+    ) -> list[Candidate]:
+        """Fits sets of effects, each from the fit of all but its last; not ranked yet."""
+        best = max((c.log_odds for c in self._made.values()), default=-np.inf)
+        decisive = decisive_margin(self.is_adequate)
+
+        def matters(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+            log_odds = np.array([self._log_odds(one) for one in hypotheses])
+            is_form = np.array(
+                [any(name in FORM_NAMES for name in one.effects) for one in hypotheses]
+            )
+            return may_decide(log_odds, is_form, best, decisive, self.is_adequate)
+
+        def needs_mending(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+            log_odds = np.array([self._log_odds(one) for one in hypotheses])
+            close = is_close_call(log_odds, best, decisive, self.is_adequate)
+            if close.any() and self.base.weighed is None:
+                _, found = mended(self.fitter, [self.base.fit], self.seed, None)
+                self.base = replace(self.base, weighed=found)
+            return close & (self.base.weighed is not None)
+
+        trials = self.fitter.trials
+        scores = dict.fromkeys(sets, 0.0)
+        for start in {id(start): start for start in starts}.values():
+            own = [e for e, other in zip(sets, starts, strict=True) if other is start]
+            scores |= dict(zip(own, score_tests(trials, start.fit, own).tolist(), strict=True))
+
+        def make(hypothesis: Hypothesis) -> Candidate:
+            made = self._candidate(hypothesis, scores[hypothesis.effects])
+            self._made[made.effects] = made
+            return made
+
+        def on_fit(hypothesis: Hypothesis) -> None:
+            made = make(hypothesis)
+            table = ranked(self._made.values())
+            self._on_candidate(next(c for c in table if c.effects == made.effects))
+
+        found = fit_candidates(self.fitter, starts, sets, self.seed, matters, on_fit, needs_mending)
+        return [
+            made if (made := self._made[one.effects]).hypothesis.is_same(one) else make(one)
+            for one in found
+        ]
+
+    def _log_odds(self, hypothesis: Hypothesis) -> float:
+        return self._log_evidence(hypothesis) + self._log_prior(hypothesis)
+
+    def _log_evidence(self, hypothesis: Hypothesis) -> float:
+        return hypothesis.evidence_over(self.base)
+
+    def _log_prior(self, hypothesis: Hypothesis) -> float:
+        trials = self.fitter.trials
+        library = [name for name in trials.all_effects if name not in FORM_NAMES]
+        return log_prior(_odds(trials, hypothesis), len(library))
+
+    def _candidate(self, hypothesis: Hypothesis, score_z: float) -> Candidate:
+        trials, fit = self.fitter.trials, hypothesis.fit
+        return Candidate(
+            effects=hypothesis.effects,
+            hypothesis=hypothesis,
+            error=error_of(trials, trials.theta(fit.z, fit.free), fit.num_fitted, fit.pull),
+            score_z=score_z,
+            log_evidence=self._log_evidence(hypothesis),
+            log_prior=self._log_prior(hypothesis),
+            probability=0.0,
+            p_value=None,
+            confounded_with=(),
+        )
+
+
+def _odds(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:
+    """Of each effect of a hypothesis, as far as the clip leads to expect it."""
+    problem = trials.problems[0]
+    theta = trials.of_clip(trials.theta(hypothesis.fit.z, hypothesis.fit.free), 0)
+    named = dict(zip(problem.model.names, theta, strict=True))
+    scene = problem.model.scene.surroundings
+    effects = [e for e in problem.model.effects if e.name in hypothesis.effects]
+    return [effect.odds(named, scene) for effect in effects]
