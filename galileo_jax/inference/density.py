@@ -17,6 +17,7 @@ from galileo_jax.inference.fits.residuals import FittedClip
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.samplers.program import Program
 from galileo_jax.inference.samplers.sampler import LogDensity
+from galileo_jax.model.effects.effect import Effect
 from galileo_jax.rollout.engine_jax import RECORDS
 from galileo_jax.runtime.batching import rounded_up
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -27,11 +28,15 @@ class Rolled(NamedTuple):
 
     Attributes:
       roll_out: of its engine.
+      effects: all that move things.
+      names: of its parameters.
       num_records: of a rollout, rounded up.
-      kind: of its model.
+      kind: of what is seen of a motion.
     """
 
     roll_out: Callable[..., Any]
+    effects: tuple[Effect, ...]
+    names: tuple[str, ...]
     num_records: int
     kind: Kind
 
@@ -74,7 +79,7 @@ def _of_clip(part: Rolled, data: Part, z: jax.Array, noise: jax.Array) -> jax.Ar
     clip, kind = data.clip, part.kind
     theta = clip.priors.forward(z[clip.column])
     position, velocity = part.roll_out(
-        kind.effects, kind.names, part.num_records, kind.record_dt_s, theta, clip.scene
+        part.effects, part.names, part.num_records, kind.record_dt_s, theta, clip.scene
     )
     # As `padded_motion`: at rest beyond its end.
     is_over = jnp.arange(part.num_records) > data.last_record
@@ -92,7 +97,9 @@ def _program_of(trials: JointProblem, function: Callable[..., jax.Array]) -> Pro
         roll_out = getattr(problem.engine, "roll_out", None)
         if roll_out is None:
             return None
-        clip, last = FittedClip.of(trials, index), problem.model.num_records
-        parts.append(Rolled(roll_out, rounded_up(last + 1, RECORDS), clip.kind))
+        clip, model = FittedClip.of(trials, index), problem.model
+        last, every = model.num_records, model.effects + model.nuisances
+        long = rounded_up(last + 1, RECORDS)
+        parts.append(Rolled(roll_out, every, model.names, long, clip.kind))
         data.append(Part(clip.arrays, np.asarray(last)))
     return Program((function, tuple(parts)), jax.tree.map(jnp.asarray, tuple(data)))
