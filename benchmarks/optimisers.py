@@ -40,15 +40,13 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.commands import command
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.density import Part, Rolled
+from galileo_jax.inference.density import Part, Rolled, parts_of
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
 from galileo_jax.inference.fits.programs import white_of
 from galileo_jax.inference.fits.residuals import FittedClip
 from galileo_jax.inference.fits.starts import absent_z, scattered_starts
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.model.effects.registry import make_effects
-from galileo_jax.rollout.engine_jax import RECORDS
-from galileo_jax.runtime.batching import rounded_up
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NOISE_M = 0.3 / 900
@@ -157,7 +155,7 @@ def whole_fit(trials: JointProblem, starts: np.ndarray) -> Ends:
 
 def with_optimistix(trials: JointProblem, starts: np.ndarray, solver: str) -> Ends:
     """optimistix, see the module."""
-    rolled, data = _program(trials)
+    rolled, data = _parts(trials)
     clips = [part.clip for part in data]
     noise = np.tile([FittedClip.of(trials, c).search_noise(Settings().search_sd_m)
                      for c in range(len(clips))], (len(starts), 1))  # fmt: skip
@@ -175,15 +173,10 @@ SOLVERS = {
 }
 
 
-def _program(trials: JointProblem) -> tuple[tuple[Rolled, ...], Any]:
-    """What is compiled for, and data, as in `inference/density.py`."""
-    rolled, data = [], []
-    for index, problem in enumerate(trials.problems):
-        clip, last = FittedClip.of(trials, index), problem.model.num_records
-        roll_out = problem.engine.roll_out  # pyright: ignore[reportAttributeAccessIssue]
-        rolled.append(Rolled(roll_out, rounded_up(last + 1, RECORDS), clip.kind))
-        data.append(Part(clip.arrays, np.asarray(last)))
-    return tuple(rolled), jax.tree.map(jnp.asarray, tuple(data))
+def _parts(trials: JointProblem) -> tuple[tuple[Rolled, ...], tuple[Part, ...]]:
+    found = parts_of(trials)
+    assert found is not None  # the engine is the rigid one
+    return found
 
 
 def _residuals(rolled: tuple[Rolled, ...], z: jax.Array, noise: jax.Array, data: Any) -> jax.Array:
@@ -299,7 +292,7 @@ def _compare(name: str, scenes: Sequence[Scene], methods: dict[str, Method]) -> 
             count.compile_s += begin - first - took
             count.rollouts += ends.num_rollouts
             noise, costs = _noise_and_costs(scene.trials, ends.z)
-            rolled, data = _program(scene.trials)
+            rolled, data = _parts(scene.trials)
             promised = _promised(rolled, jnp.asarray(ends.z), np.exp(NOISE_SD * noise), data)
             count.costs.append(costs)
             count.promised.append(np.asarray(promised))

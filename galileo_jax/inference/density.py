@@ -91,8 +91,9 @@ def _of_clip(part: Rolled, data: Part, z: jax.Array, noise: jax.Array) -> jax.Ar
     return jnp.where(has_failed, -jnp.inf, -0.5 * (jnp.sum(white**2) + log_determinant))
 
 
-def _program_of(trials: JointProblem, function: Callable[..., jax.Array]) -> Program | None:
-    parts, data = [], []
+def parts_of(trials: JointProblem) -> tuple[tuple[Rolled, ...], tuple[Part, ...]] | None:
+    """What is compiled for, and data, clip by clip; None unless the engine is written in JAX."""
+    rolled, data = [], []
     for index, problem in enumerate(trials.problems):
         roll_out = getattr(problem.engine, "roll_out", None)
         if roll_out is None:
@@ -100,6 +101,14 @@ def _program_of(trials: JointProblem, function: Callable[..., jax.Array]) -> Pro
         clip, model = FittedClip.of(trials, index), problem.model
         last, every = model.num_records, model.effects + model.nuisances
         long = rounded_up(last + 1, RECORDS)
-        parts.append(Rolled(roll_out, every, model.names, long, clip.kind))
+        rolled.append(Rolled(roll_out, every, model.names, long, clip.kind))
         data.append(Part(clip.arrays, np.asarray(last)))
-    return Program((function, tuple(parts)), jax.tree.map(jnp.asarray, tuple(data)))
+    return tuple(rolled), jax.tree.map(jnp.asarray, tuple(data))
+
+
+def _program_of(trials: JointProblem, function: Callable[..., jax.Array]) -> Program | None:
+    parts = parts_of(trials)
+    if parts is None:
+        return None
+    rolled, data = parts
+    return Program((function, rolled), data)

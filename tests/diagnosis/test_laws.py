@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.diagnosis.diagnosis import Law as FoundLaw
-from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure, structures
+from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure, structures, without_one_factor
 from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of, proposed_file
 from galileo_jax.model.effects import registry
 from galileo_jax.model.effects.effect import State
@@ -84,6 +84,27 @@ def test_formulas_are_told_apart_by_their_shape():
     drag = Structure("drag", False, (FACTOR["power_v"],))
     assert drag.family == DRAG.family
     assert Structure("drag", True, (FACTOR["decay_t"], FACTOR["power_v"])).family != DRAG.family
+
+
+def test_one_factor_may_do_nothing():
+    both = Structure("drag", False, (FACTOR["decay_t"], FACTOR["power_v"]))
+    decay, power = both.constants
+    values = {"c": -3.5, decay: 0.3, power: 0.03}
+    push, drag = without_one_factor(both, values)
+    assert push == (Structure("push", False, (FACTOR["decay_t"],)), {decay: 0.3}, 3.5)
+    assert drag == (Structure("drag", False, (FACTOR["power_v"],)), {power: 0.03}, -3.5)
+    assert without_one_factor(DRAG, {"c": 1.0, "n": 2.0}) == []
+
+
+def test_constants_of_the_same_name_keep_their_factor():
+    both = Structure("push", True, (FACTOR["pulse_t"], FACTOR["pulse_q"]))
+    values = {"c": 0.4, "moment": 1.0, "width": 2.0, "place": 3.0, "width2": 4.0}
+    assert set(both.constants) == set(values) - {"c"}
+    found = without_one_factor(both, values)
+    assert [constants for _, constants, _ in found] == [
+        {"moment": 1.0, "width": 2.0},
+        {"place": 3.0, "width": 4.0},
+    ]
 
 
 def test_as_a_physicist_writes_it():

@@ -282,3 +282,32 @@ def structures(has_surface: bool, num_objects: int) -> Iterator[Structure]:
             has_speed = any(factor.variable == "v" for factor in pair)
             if has_speed == nature.startswith("drag"):
                 yield Structure(nature, is_on_all, pair)
+
+
+def without_one_factor(
+    structure: Structure, values: Mapping[str, float]
+) -> list[tuple[Structure, dict[str, float], float]]:
+    """What a formula of two factors is without either of them: one may do nothing.
+
+    Args:
+      structure: of one factor or two.
+      values: of its constants, and its strength as `c`.
+
+    Returns:
+      The simpler formulas, each with its constants and strength.
+    """
+    found = []
+    for factor in structure.factors if len(structure.factors) > 1 else ():
+        nature = structure.nature if factor.variable in ALONE[structure.nature] else "push"
+        if factor.variable not in ALONE[nature]:
+            continue
+        constants = {
+            name if name in factor.constants else name.removesuffix("2"): values[name]
+            for name, (own, _) in structure.constants.items()
+            if own is factor
+        }
+        # A drag is against the motion, which is forward.
+        strength = values["c"] * (1.0 if nature == structure.nature else -1.0)
+        alone = Structure(nature, structure.is_on_all, (factor,))
+        found.append((alone, constants, strength))
+    return found

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.diagnosis.candidates import Hypothesis
-from galileo_jax.diagnosis.laws.grammar import Structure
+from galileo_jax.diagnosis.laws.grammar import Structure, without_one_factor
 from galileo_jax.diagnosis.laws.one_program import MOST_NUMBERS, ActingFormulas, Spare
 from galileo_jax.diagnosis.laws.screen import NUM_LAWS, Suggestion, suggestions
 from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of
@@ -62,12 +62,32 @@ class FittedLaw:
 def fitted_laws(trials: JointProblem, base: Hypothesis, views: Sequence[View]) -> list[FittedLaw]:
     """The best few formulas, fitted; the most evident first.
 
+    If the best has two factors, it is tried without either, too: one may do nothing.
+
     Args:
       trials: what was diagnosed.
       base: the model without effects, fitted to them.
       views: of each clip, from `missing_force.views_of`.
     """
-    found = suggestions(views)
+    made = _fitted(trials, base, suggestions(views), views)
+    known = {name_of(law.structure) for law in made}
+    simpler = (
+        [one for one in _simpler(made[0]) if name_of(one.structure) not in known] if made else []
+    )
+    made += _fitted(trials, base, simpler, views)
+    return sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence)
+
+
+def _simpler(law: FittedLaw) -> list[Suggestion]:
+    """A formula of two factors without one of them, from where it was fitted."""
+    found = without_one_factor(law.structure, law.constants())
+    return [Suggestion(one, (own,), (strength,), law.score) for one, own, strength in found]
+
+
+def _fitted(
+    trials: JointProblem, base: Hypothesis, found: Sequence[Suggestion], views: Sequence[View]
+) -> list[FittedLaw]:
+    """Suggestions as laws in the model, fitted; the most evident first."""
     if not found:
         return []
     sources = [class_source(one.structure, views) for one in found]
