@@ -13,11 +13,15 @@ demo: $(READY)
 	$(BIN)/galileo fit demo/clip.mp4 --method mh --out demo/mh
 	@echo "reports: demo/grad/report.html demo/mh/report.html"
 
+# Two processes: one that has compiled all programs of 3,000 tests runs out of memory mappings
+# (Linux gives it 65,530) and dies.
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile
+
 test: $(READY)
-	$(BIN)/python -m pytest -m "not slow"
+	$(PYTEST) -m "not slow"
 
 test-all: $(READY)
-	$(BIN)/python -m pytest
+	$(PYTEST)
 
 lint: $(READY)
 	$(BIN)/ruff format --check .
