@@ -25,11 +25,7 @@ import numpy as np
 
 from galileo_jax.diagnosis.candidate_starts import matched, scattered
 from galileo_jax.diagnosis.mended_evidence import mended
-from galileo_jax.inference.fits.descent import (
-    Descended,
-    ends_of,
-    in_valley,
-)
+from galileo_jax.inference.fits.descent import Descended, ends_of, in_valley
 from galileo_jax.inference.fits.ends import valleys
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.fits.weighed import Weighed

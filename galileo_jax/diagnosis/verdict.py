@@ -38,12 +38,12 @@ LEAST_GAIN = 10.0
 # Of the best single effects so many are joined with others, to so many pairs in all. Then either
 # effect of the best pair is kept, and joined with so many that may explain what the other does.
 NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 3
-# By how much Laplace's evidences may be wrong, nats: hypotheses so much farther apart than a rule
-# asks are as far apart by any other.
-LAPLACE_NATS = 3.0
 # Where no pair explains the data, the best pairs and all of so many single effects are fitted from
 # the fit without effects.
 NUM_CROSSED = 4
+# By how much Laplace's evidences may be wrong, nats: hypotheses so much farther apart than a rule
+# asks are as far apart by any other.
+LAPLACE_NATS = 3.0
 # The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
 # sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
 MOST_LUCK = 4.0
