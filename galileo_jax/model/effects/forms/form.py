@@ -4,7 +4,8 @@ from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Effect, Surroundings, Theta
 
-UNNAMED_ODDS = 0.05  # of a law that nobody has named, against one that is met again and again
+# Against an effect that is met again and again: all forms together are as probable as two of those.
+UNNAMED_ODDS = 0.25
 
 
 class Form(Effect):
@@ -15,5 +16,5 @@ class Form(Effect):
     """The shape of its formula, as `diagnosis.laws` calls it; a law of that shape is the same."""
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
-        """One in twenty."""
+        """One in four."""
         return UNNAMED_ODDS
