@@ -14,7 +14,6 @@ from galileo_jax.diagnosis.verdict import (
     contested_by_law,
     law_contested,
     law_odds,
-    law_that_contests,
     law_verdict,
     log_prior,
     looked_at_again,
@@ -60,8 +59,7 @@ def law_or(
     verdict = law_verdict(candidates, decisive)
     if verdict is None:
         said = law_contested(candidates, decisive)
-        rival = law_that_contests(before, candidates, decisive)
-        after = before if rival is None else contested_by_law(before, rival)
+        after = contested_by_law(before, candidates, decisive)
         return replace(after, reasons=(*before.reasons, *said))
     best = next(c for c in candidates if c.effects == verdict.effects)
     alike = within_luck(best, other_formulas(best, candidates), decisive)
@@ -69,4 +67,5 @@ def law_or(
     again = looked_at_again(verdict, best, list(zip(alike, leads, strict=True)), decisive)
     if again.status == "law":
         return again
-    return replace(contested_by_law(before, best), reasons=(*before.reasons, *again.reasons))
+    unknown = replace(before, status="unknown", effects=())
+    return replace(unknown, reasons=(*before.reasons, *again.reasons))

@@ -210,23 +210,17 @@ def joined_names(verdict: Verdict) -> tuple[str, ...]:
     return verdict.effects
 
 
-def law_that_contests(
-    verdict: Verdict, candidates: Sequence[Candidate], decisive: float
-) -> Candidate | None:
-    """The formula that explains the data about as well as what a verdict is about, if one does."""
+def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive: float) -> Verdict:
+    """The verdict where a formula explains the data about as well as what it is about, or better.
+
+    One effect is ambiguous then, with the formula; two at once, or one that is far behind the
+    formula, are not worth naming. All else stays.
+    """
     law = next((c for c in candidates if c.law is not None and explains(c)), None)
     own = next((c for c in candidates if c.name in joined_names(verdict)), None)
     if law is None or own is None or own.log_odds - law.log_odds >= decisive:
-        return None
-    return law
-
-
-def contested_by_law(verdict: Verdict, law: Candidate) -> Verdict:
-    """The verdict where a formula explains the data as well.
-
-    Two effects at once are not worth naming then; one effect is ambiguous, with the formula.
-    """
-    if verdict.status == "unknown" or any("+" in name for name in joined_names(verdict)):
+        return verdict
+    if len(own.effects) > 1 or law.log_odds - own.log_odds >= decisive:
         return replace(verdict, status="unknown", effects=())
     return replace(verdict, status="ambiguous", law=law.law)
 

@@ -10,7 +10,6 @@ from galileo_jax.diagnosis.verdict import (
     contested_by_law,
     law_contested,
     law_odds,
-    law_that_contests,
     law_verdict,
     looked_at_again,
     needs_laws,
@@ -110,23 +109,25 @@ def test_rivals_are_of_another_formula():
     assert other_formulas(best, [best, same, other, form]) == (best, other)
 
 
-@pytest.mark.parametrize(("ahead", "expected"), [(DECISIVE, False), (DECISIVE - EDGE, True)])
-@pytest.mark.parametrize("effects", [("air_drag", "rolling"), ("friction_patch",)])
+@pytest.mark.parametrize(
+    ("effects", "ahead", "expected"),
+    [
+        (("air_drag", "rolling"), DECISIVE, "named"),
+        (("air_drag", "rolling"), DECISIVE - EDGE, "unknown"),
+        (("friction_patch",), DECISIVE, "named"),
+        (("friction_patch",), DECISIVE - EDGE, "ambiguous"),
+        (("friction_patch",), EDGE - DECISIVE, "ambiguous"),
+        (("friction_patch",), -DECISIVE, "unknown"),
+    ],
+)
 def test_what_a_formula_explains_as_well_is_contested(effects, ahead, expected):
-    named = Verdict("named", effects)
-    table = ranked([candidate("+".join(effects), 50.0 + ahead), law(50.0)])
-    assert (law_that_contests(named, table, DECISIVE) is table[1]) == expected
-    assert law_that_contests(named, ranked([table[0], law(50.0, 0.001)]), DECISIVE) is None
-
-
-def test_a_contested_pair_is_unknown_and_a_contested_effect_ambiguous_with_the_formula():
-    rival = law(50.0)
-    for before in (Verdict("named", ("air_drag", "rolling")), Verdict("unknown", ())):
-        found = contested_by_law(before, rival)
-        assert (found.status, found.effects, found.law) == ("unknown", (), None)
-    found = contested_by_law(Verdict("named", ("friction_patch",)), rival)
-    assert (found.status, found.effects) == ("ambiguous", ("friction_patch",))
-    assert found.law == rival.law
+    named, rival = Verdict("named", effects), law(50.0)
+    own = candidate("+".join(effects), 50.0 + ahead)
+    found = contested_by_law(named, ranked([own, rival]), DECISIVE)
+    assert found.status == expected
+    assert found.effects == (() if expected == "unknown" else effects)
+    assert found.law == (rival.law if expected == "ambiguous" else None)
+    assert contested_by_law(named, ranked([own, law(50.0, 0.001)]), DECISIVE) == named
 
 
 def test_formulas_are_tried_where_nothing_explains_or_only_what_could_explain_much():
