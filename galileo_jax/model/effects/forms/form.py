@@ -14,7 +14,9 @@ class Form(Effect):
     meaning: ClassVar[str]
     family: ClassVar[str]
     """The shape of its formula, as `diagnosis.laws` calls it; a law of that shape is the same."""
+    how_likely: ClassVar[float] = UNNAMED_ODDS
+    """Before the data, against an effect with a name."""
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
-        """One in four."""
-        return UNNAMED_ODDS
+        """As likely as such a form is."""
+        return self.how_likely
