@@ -26,8 +26,8 @@ from galileo_jax.runtime.atomic_write import replacing
 
 FOLDER = "traces"  # in that of JAX's cache
 LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "lineax", "optimistix")
-# Compiled programs that one function holds. Each takes a hundred memory mappings, of which a process
-# has 65,530 on Linux; one that was dropped is read again in tens of milliseconds.
+# Compiled programs that one function holds. Each takes a hundred memory mappings, of which Linux
+# gives a process 65,530; one that was dropped is read again in tens of milliseconds.
 MOST_PROGRAMS = 24
 # LAPACK's routines may change with jaxlib; programs of another jaxlib are not read.
 LAPACK = tuple(
