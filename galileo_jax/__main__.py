@@ -1,5 +1,6 @@
 """The `galileo` console script: `galileo VERB ...` is `python -m galileo_jax.VERB ...`."""
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -47,6 +48,8 @@ def main(argv: Sequence[str]) -> int | None:
     if verb == "--version":
         print(f"galileo {__version__}")
         return 0
+    # Read when NumPy is imported. Matrices here are small: its threads would wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if verb not in dict(VERBS):
         hint = did_you_mean(verb, dict(VERBS)) or ";"
         raise InputError(f"unknown verb {verb!r}{hint} {_known()}")
