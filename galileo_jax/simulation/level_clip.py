@@ -20,6 +20,7 @@ from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.settings import Settings
 from galileo_jax.video import synthetic
 
+RUN_UP_S = 0.2  # no exposure is longer
 MARGIN_M = 0.05  # of the picture round the centres: pucks are small, and no wider than that
 
 
@@ -85,12 +86,25 @@ def _write(settings: Settings, truth: LevelTruth, looks: np.random.Generator, ou
             "origin_px": list(camera.origin_px),
         }
         record["pixels_per_metre_true"] = camera.pixels_per_metre
-        path = synthetic.Motion(taken, frames.position_m, frames.pitch_rad)
+        path = _with_run_up(motion)
         # From above a puck is a disc.
         bodies = tuple(synthetic.Body("sphere", (radius,)) for radius in scene.half_length_m)
         filming = plane_filming(settings, clock)
         film(out, path, bodies, camera, None, filming, len(taken), settings.seed)
     write_yaml_and_truth(out, content, record)
+
+
+def _with_run_up(motion: Motion) -> synthetic.Motion:
+    """As it is filmed: half of the first exposure is before the start, and pucks move then, too."""
+    place, turned = motion.position_m, motion.pitch_rad
+    spin = (turned[:, 1] - turned[:, 0]) / (motion.times_s[1] - motion.times_s[0])
+    return synthetic.Motion(
+        np.append(-RUN_UP_S, motion.times_s),
+        np.concatenate(
+            [(place[..., 0] - RUN_UP_S * motion.velocity_m_s[..., 0])[..., None], place], axis=-1
+        ),
+        np.concatenate([(turned[:, 0] - RUN_UP_S * spin)[:, None], turned], axis=-1),
+    )
 
 
 def _noisy(
