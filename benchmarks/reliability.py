@@ -195,7 +195,7 @@ def summary(entries: Sequence[Mapping[str, Any]], library: Sequence[str]) -> dic
 def _claims(entry: Mapping[str, Any], library: Sequence[str]) -> list[tuple[float, bool]]:
     """Of every hypothesis in a verdict its probability, and whether it is the truth.
 
-    A form without a name says that it is something outside of the library, and no more.
+    A form without a name, and a law, say that it is something outside of the library, and no more.
     """
     diagnosis, truth = entry["diagnosis"], set(entry["truth"].split("+"))
     is_outside = not truth <= {*library, "none"}
@@ -205,6 +205,9 @@ def _claims(entry: Mapping[str, Any], library: Sequence[str]) -> list[tuple[floa
     named = verdict["status"] == "named"
     answers = ["+".join(verdict["effects"])] if named else verdict["effects"]
     odds = {frozenset(c["effect"].split("+")): c["probability"] for c in diagnosis["candidates"]}
+    if verdict.get("law"):
+        laws = [c["effect"] for c in diagnosis["candidates"] if c["effect"].startswith("law_")]
+        answers = [*answers, *laws[:1]]
     parts = [frozenset(each.split("+")) for each in answers]
     return [
         (odds.get(each, 0.0), each == truth if each <= {*library} else is_outside) for each in parts

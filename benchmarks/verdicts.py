@@ -70,12 +70,13 @@ def judge(truth: str, library: Sequence[str], diagnosis: Mapping[str, Any]) -> S
             answers, label = [frozenset(told)], "+".join(sorted(told))
         case "ambiguous":
             answers = [frozenset(each.split("+")) for each in told]
-            label = " or ".join(sorted(told))
+            law = ["a law"] if diagnosis["verdict"].get("law") else []
+            label = " or ".join([*sorted(told), *law])
         case "unknown" | "law":
             answers, label = [], status
         case _:
             raise ValueError(f"unknown status {status!r} in a diagnosis")
-    is_right = len(answers) == 1 and answers[0] == there and kind != "exotic"
+    is_right = status in ("none", "named") and answers == [there] and kind != "exotic"
     is_among = there in answers and kind != "exotic"
     history = diagnosis["history"]
     return Score(

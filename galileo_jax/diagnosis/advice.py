@@ -86,6 +86,8 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
             f"it may as well be {meant}: {again}, for what belongs to a place "
             "stays there, and what belongs to a speed comes with it"
         )
+    if verdict.law is not None:
+        said.append(f"it may as well be {verdict.law.text} (proposed_effect.py): {again}")
     if not said:
         said = [f"{again}, or use another angle of the ramp" if motion == "slide" else again]
     if num_clips == 1:

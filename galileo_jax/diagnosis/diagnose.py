@@ -10,8 +10,9 @@
    same table (rules: `verdict`).
 4. What leaves only noise and is far more probable than all else is named, unless a clip like this
    one would not tell it from another (`expected_lead`). Several are ambiguous.
-5. Where only a form explains the data, or nothing does, the missing force is inferred without a
-   form (`missing_force`). Short formulas that it suggests are fitted in the model (`laws`) and
+5. Where only a form explains the data, or nothing does, or only what could explain much (two
+   effects, or one of many constants), the missing force is inferred without a form
+   (`missing_force`). Short formulas that it suggests are fitted in the model (`laws`) and
    stand in the same table. The verdict is law where one does what a named effect must; else it
    is unknown.
 """
@@ -133,7 +134,7 @@ def diagnose(
         leads = expected_leads(trials, named, alike)
         verdict = looked_at_again(verdict, named, list(zip(alike, leads, strict=True)), decisive)
     views: list[View] = []
-    if needs_laws(verdict):
+    if needs_laws(verdict, candidates):
         on_stage("inferring the missing force without a form")
         views = views_of(trials, base)
         on_stage("looking for a law")

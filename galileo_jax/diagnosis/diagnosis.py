@@ -50,6 +50,7 @@ class Candidate:
       p_value: of its adequacy; None where it was not compared (too improbable).
       confounded_with: candidates that these data do not tell from it.
       law: the formula, where it is a law that the missing force suggested; else None.
+      num_constants: parameters of its effects.
     """
 
     effects: tuple[str, ...]
@@ -62,11 +63,17 @@ class Candidate:
     p_value: float | None
     confounded_with: tuple[str, ...]
     law: "Law | None" = None
+    num_constants: int = 1
 
     @property
     def name(self) -> str:
         """The effects, joined by +."""
         return "+".join(self.effects)
+
+    @property
+    def title(self) -> str:
+        """What a sentence calls it: a law by its formula."""
+        return self.name if self.law is None else self.law.text
 
     @property
     def log_odds(self) -> float:
@@ -109,7 +116,7 @@ class Verdict:
       status: none, named, ambiguous, law or unknown.
       effects: one effect (or set) where it is named, all that explain the data equally well
         where it is ambiguous; a form without a name stands last; the proposed effect of a law.
-      law: the formula, where the verdict is a law.
+      law: the formula, where the verdict is a law, or ambiguous because one does as well.
       form: where it is unknown: the form without a name that explains the data; None if not
         even that is known.
       advice: what would tell more, one sentence each.

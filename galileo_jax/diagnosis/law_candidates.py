@@ -11,7 +11,7 @@ from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.laws.in_model import fitted_laws
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.diagnosis.verdict import (
-    is_contested_by_law,
+    contested_by_law,
     law_contested,
     law_odds,
     law_verdict,
@@ -54,18 +54,18 @@ def law_or(
 ) -> Verdict:
     """The verdict law where a formula does what a named effect must; else as before.
 
-    A pair of effects that a formula explains as well is named no more.
+    What a formula explains as well is contested.
     """
-    unknown = replace(before, status="unknown", effects=())
     verdict = law_verdict(candidates, decisive)
     if verdict is None:
         said = law_contested(candidates, decisive)
-        is_open = is_contested_by_law(before, candidates, decisive)
-        return replace(unknown if is_open else before, reasons=(*before.reasons, *said))
+        after = contested_by_law(before, candidates, decisive)
+        return replace(after, reasons=(*before.reasons, *said))
     best = next(c for c in candidates if c.effects == verdict.effects)
     alike = within_luck(best, other_formulas(best, candidates), decisive)
     leads = expected_leads(trials, best, alike)
     again = looked_at_again(verdict, best, list(zip(alike, leads, strict=True)), decisive)
     if again.status == "law":
         return again
-    return replace(unknown, reasons=(*unknown.reasons, *again.reasons))
+    unknown = replace(before, status="unknown", effects=())
+    return replace(unknown, reasons=(*before.reasons, *again.reasons))

@@ -19,6 +19,7 @@ from galileo_jax.diagnosis.verdict import (
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
+from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.forms import FORM_NAMES
 
 
@@ -112,6 +113,7 @@ class Race:
             probability=0.0,
             p_value=None,
             confounded_with=(),
+            num_constants=_num_constants(trials, hypothesis),
         )
 
 
@@ -121,5 +123,15 @@ def _odds(trials: JointProblem, hypothesis: Hypothesis) -> list[float]:
     theta = trials.of_clip(trials.theta(hypothesis.fit.z, hypothesis.fit.free), 0)
     named = dict(zip(problem.model.names, theta, strict=True))
     scene = problem.model.scene.surroundings
-    effects = [e for e in problem.model.effects if e.name in hypothesis.effects]
-    return [effect.odds(named, scene) for effect in effects]
+    return [effect.odds(named, scene) for effect in _effects(trials, hypothesis)]
+
+
+def _num_constants(trials: JointProblem, hypothesis: Hypothesis) -> int:
+    """Parameters of its effects, in one clip."""
+    scene = trials.problems[0].model.scene.surroundings
+    return sum(len(effect.parameters(scene)) for effect in _effects(trials, hypothesis))
+
+
+def _effects(trials: JointProblem, hypothesis: Hypothesis) -> list[Effect]:
+    effects = trials.problems[0].model.effects
+    return [effect for effect in effects if effect.name in hypothesis.effects]

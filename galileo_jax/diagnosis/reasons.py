@@ -69,7 +69,7 @@ def nothing_convinces(best: Candidate, needed: float) -> Reason:
     """Where the model without effects will do, the best effect does not convince."""
     return Reason(
         "nothing_convinces",
-        f"The best effect, {best.name}, is {times_text(best.log_odds)} as probable as none; "
+        f"The best effect, {best.title}, is {times_text(best.log_odds)} as probable as none; "
         f"{times_text(needed)} are needed where the model without effects will do.",
         {"hypothesis": best.name, "log_odds": best.log_odds, "least_log_odds": needed},
     )
@@ -84,9 +84,9 @@ def pairs_tried(single: Candidate, form: Candidate | None, count: int) -> Reason
       count: how many pairs.
     """
     said = (
-        f"The best single effect, {single.name}, leaves {p_equals(single.p_value or 0.0)}"
+        f"The best single effect, {single.title}, leaves {p_equals(single.p_value or 0.0)}"
         if form is None
-        else f"{form.name} explains the data better than any single effect"
+        else f"{form.title} explains the data better than any single effect"
     )
     return Reason(
         "pairs_tried",
@@ -99,7 +99,7 @@ def explains(best: Candidate) -> Reason:
     """The best hypothesis of those that leave only noise."""
     return Reason(
         "explains",
-        f"With {best.name} only noise is left: {p_equals(best.p_value or 0.0)}; "
+        f"With {best.title} only noise is left: {p_equals(best.p_value or 0.0)}; "
         f"it is {times_text(best.log_odds)} as probable as no effect.",
         {"hypothesis": best.name, "p_value": best.p_value, "log_odds": best.log_odds},
     )
@@ -110,7 +110,7 @@ def nothing_explains(best: Candidate) -> Reason:
     p_value = best.p_value or 0.0
     return Reason(
         "nothing_explains",
-        f"No effect, pair or form leaves only noise: the most probable, {best.name}, leaves "
+        f"No effect, pair or form leaves only noise: the most probable, {best.title}, leaves "
         f"{p_equals(p_value)}.",
         {"hypothesis": best.name, "p_value": p_value},
     )
@@ -131,7 +131,7 @@ def less_probable_than_none(best: Candidate) -> Reason:
     """What explains the data is less probable than no effect at all."""
     return Reason(
         "less_probable_than_none",
-        f"{best.name} is less probable than no effect: luck would do as well.",
+        f"{best.title} is less probable than no effect: luck would do as well.",
         {"hypothesis": best.name, "log_odds": best.log_odds},
     )
 
@@ -141,7 +141,7 @@ def better_but_contradicted(better: Candidate, best: Candidate) -> Reason:
     ahead = better.log_odds - best.log_odds
     return Reason(
         "better_but_contradicted",
-        f"{better.name} is {times_text(ahead)} as probable as {best.name}, yet leaves "
+        f"{better.title} is {times_text(ahead)} as probable as {best.title}, yet leaves "
         f"{p_equals(better.p_value or 0.0)}: neither is the truth.",
         {
             "hypothesis": best.name,
@@ -162,13 +162,13 @@ def only_a_form(form: Candidate, name: Candidate | None) -> Reason:
     if name is None:
         return Reason(
             "only_a_form",
-            f"Only {form.name}, a form without a name, leaves nothing but noise.",
+            f"Only {form.title}, a form without a name, leaves nothing but noise.",
             {"hypothesis": form.name, "p_value": form.p_value},
         )
     ahead = form.log_odds - name.log_odds
     return Reason(
         "only_a_form",
-        f"{form.name}, a form without a name, is {times_text(ahead)} as probable as {name.name}, "
+        f"{form.title}, a form without a name, is {times_text(ahead)} as probable as {name.title}, "
         "the best with a name.",
         {"hypothesis": form.name, "rival": name.name, "log_odds_behind": ahead},
     )
@@ -178,10 +178,12 @@ def contested(best: Candidate, rival: Candidate, needed: float) -> Reason:
     """A rival explains the data about as well."""
     behind = best.log_odds - rival.log_odds
     first, second = (best, rival) if behind >= 0 else (rival, best)
+    is_close = abs(behind) < needed
     return Reason(
-        "contested",
-        f"{rival.name} explains the data, too: {first.name} is {times_text(abs(behind))} as "
-        f"probable as {second.name}, and only {times_text(needed)} would decide.",
+        "contested" if is_close else "less_probable",
+        f"{rival.title} explains the data, too: {first.title} is {times_text(abs(behind))} as "
+        f"probable as {second.title}, and {'only ' if is_close else ''}{times_text(needed)} would "
+        "decide.",
         {
             "hypothesis": best.name,
             "rival": rival.name,
@@ -201,11 +203,11 @@ def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) ->
     """
     others = [c for c in candidates if c.effects != best.effects]
     if not others:
-        return Reason("no_rival", f"Nothing but {best.name} could be tried.", {})
+        return Reason("no_rival", f"Nothing but {best.title} could be tried.", {})
     behind = best.log_odds - others[0].log_odds
     return Reason(
         "decisive",
-        f"{best.name} is {times_text(behind)} as probable as the next, {others[0].name} "
+        f"{best.title} is {times_text(behind)} as probable as the next, {others[0].title} "
         f"({times_text(needed)} are needed).",
         {
             "hypothesis": best.name,
@@ -228,8 +230,8 @@ def told_apart(best: Candidate, rival: Candidate, expected: float, needed: float
     is_told = expected >= needed
     return Reason(
         "told_apart" if is_told else "not_told_apart",
-        f"If {best.name} is there, a clip like this one makes it {times_text(expected)} as "
-        f"probable as {rival.name}: "
+        f"If {best.title} is there, a clip like this one makes it {times_text(expected)} as "
+        f"probable as {rival.title}: "
         + ("enough to tell them apart." if is_told else f"{times_text(needed)} are needed."),
         {
             "hypothesis": best.name,

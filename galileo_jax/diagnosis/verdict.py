@@ -35,6 +35,8 @@ PAIR_P = 0.05
 SECOND_EFFECT_ODDS = 0.1
 # Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
+# An effect of so many constants (how strong, where, how wide) can imitate many motions.
+MANY_CONSTANTS = 3
 # Of the best single effects so many are joined with others, to so many pairs in all. Then either
 # effect of the best pair is kept, and joined with so many that may explain what the other does.
 NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 3
@@ -189,12 +191,16 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *contests))
 
 
-def needs_laws(verdict: Verdict) -> bool:
-    """Whether formulas are to be tried: nothing explains the data, or only two effects at once do.
+def needs_laws(verdict: Verdict, candidates: Sequence[Candidate]) -> bool:
+    """Whether formulas are to be tried: nothing explains the data, or only what could explain much.
 
-    Two effects come close to almost any motion, and one formula may be simpler.
+    Two effects at once, or one of many constants, come close to almost any motion; one formula may
+    be simpler.
     """
-    return verdict.status == "unknown" or any("+" in name for name in joined_names(verdict)[:1])
+    if verdict.status == "unknown":
+        return True
+    best = next(c for c in candidates if c.name in joined_names(verdict)[:1])
+    return len(best.effects) > 1 or best.num_constants >= MANY_CONSTANTS
 
 
 def joined_names(verdict: Verdict) -> tuple[str, ...]:
@@ -204,11 +210,19 @@ def joined_names(verdict: Verdict) -> tuple[str, ...]:
     return verdict.effects
 
 
-def is_contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive: float) -> bool:
-    """Whether a formula explains the data about as well as the pair that a verdict is about."""
+def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive: float) -> Verdict:
+    """The verdict where a formula explains the data about as well as what it is about, or better.
+
+    One effect is ambiguous then, with the formula; two at once, or one that is far behind the
+    formula, are not worth naming. All else stays.
+    """
     law = next((c for c in candidates if c.law is not None and explains(c)), None)
     own = next((c for c in candidates if c.name in joined_names(verdict)), None)
-    return law is not None and own is not None and own.log_odds - law.log_odds < decisive
+    if law is None or own is None or own.log_odds - law.log_odds >= decisive:
+        return verdict
+    if len(own.effects) > 1 or law.log_odds - own.log_odds >= decisive:
+        return replace(verdict, status="unknown", effects=())
+    return replace(verdict, status="ambiguous", law=law.law)
 
 
 def other_formulas(law: Candidate, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
@@ -250,7 +264,10 @@ def law_contested(candidates: Sequence[Candidate], decisive: float) -> tuple[Rea
         return (reasons.no_law_explains(laws[0]),)
     others = [c for c in other_formulas(best, candidates) if c.effects != best.effects]
     ahead = [c for c in others if best.log_odds - c.log_odds < decisive]
-    return tuple(reasons.contested(best, c, decisive) for c in ahead[:1])
+    alike = [c for c in ahead if explains(c)]
+    if ahead and not alike:
+        return (reasons.better_but_contradicted(ahead[0], best),)
+    return tuple(reasons.contested(best, c, decisive) for c in alike[:1])
 
 
 def within_luck(

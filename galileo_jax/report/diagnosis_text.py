@@ -63,7 +63,8 @@ def verdict(diagnosis: Diagnosis) -> str:
         both = "" if p is None else f" ({p_equals(first.p_value)} without, {p_equals(p)} with)"
         return f"{names} {verb} the data{both}."
     if found.status == "ambiguous":
-        names = ", ".join(found.effects)
+        rivals = found.effects if found.law is None else (*found.effects, found.law.text)
+        names = " and ".join([", ".join(rivals[:-1]), rivals[-1]])
         return f"This clip cannot distinguish between {names}; each of them explains the data."
     if found.law is not None:
         (chosen,) = (c for c in diagnosis.candidates if c.effects == found.effects)

@@ -123,6 +123,8 @@ def _pushes(hit: _Hit, position: np.ndarray, observation: Observation) -> list[n
     touching = apart[hit.both[:2]].min()
     is_far = apart[hit.both] - touching > CLOSE_M
     close = hit.both[: int(np.argmax(is_far)) if is_far.any() else None]
+    if not close.size:  # they come closer by more than that from one frame to the next
+        return []
     between_s = times[close][:, None] - times[close]
     found = []
     for pattern in random_patterns(PUSH_SD_M_S2**2 * np.exp(-0.5 * (between_s / PUSH_S) ** 2)):

@@ -7,7 +7,7 @@ import pytest
 from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
 from galileo_jax.diagnosis.verdict import (
     best_named,
-    is_contested_by_law,
+    contested_by_law,
     law_contested,
     law_odds,
     law_verdict,
@@ -16,6 +16,7 @@ from galileo_jax.diagnosis.verdict import (
     other_formulas,
     ranked,
 )
+from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 from tests.diagnosis.test_verdict import DECISIVE, EDGE, candidate
 
 FORM_OF_POWER_V, FORM_OF_PULSE_T = "drag_of_a_power", "force_at_a_time"
@@ -79,11 +80,17 @@ def test_a_library_effect_is_named_before_any_law():
     assert best_named(ranked([law(50.0), candidate("air_drag", 10.0)])).name == "air_drag"
 
 
-def test_why_there_is_no_law_is_told():
+def test_reasons_say_why_there_is_no_law():
     contested = ranked([law(50.0), law(48.0, family="power_t", name="law_2")])
     assert [why.rule for why in law_contested(contested, DECISIVE)] == ["contested"]
     contradicted = ranked([law(50.0, 1e-5)])
     assert [why.rule for why in law_contested(contradicted, DECISIVE)] == ["no_law_explains"]
+    far_ahead = ranked([law(50.0), candidate("friction_patch", 50.0 + 2 * DECISIVE)])
+    assert [why.rule for why in law_contested(far_ahead, DECISIVE)] == ["less_probable"]
+    ahead_but_wrong = ranked([law(50.0), candidate("friction_patch", 60.0, 1e-5)])
+    assert [why.rule for why in law_contested(ahead_but_wrong, DECISIVE)] == [
+        "better_but_contradicted"
+    ]
     assert law_contested(ranked([candidate("air_drag", 10.0)]), DECISIVE) == ()
 
 
@@ -102,22 +109,41 @@ def test_rivals_are_of_another_formula():
     assert other_formulas(best, [best, same, other, form]) == (best, other)
 
 
-@pytest.mark.parametrize(("ahead", "expected"), [(DECISIVE, False), (DECISIVE - EDGE, True)])
-def test_a_pair_that_a_formula_explains_as_well_is_contested(ahead, expected):
-    named = Verdict("named", ("air_drag", "rolling"))
-    table = ranked([candidate("air_drag+rolling", 50.0 + ahead), law(50.0)])
-    assert is_contested_by_law(named, table, DECISIVE) == expected
-    assert not is_contested_by_law(named, ranked([table[0], law(50.0, 0.001)]), DECISIVE)
+@pytest.mark.parametrize(
+    ("effects", "ahead", "expected"),
+    [
+        (("air_drag", "rolling"), DECISIVE, "named"),
+        (("air_drag", "rolling"), DECISIVE - EDGE, "unknown"),
+        (("friction_patch",), DECISIVE, "named"),
+        (("friction_patch",), DECISIVE - EDGE, "ambiguous"),
+        (("friction_patch",), EDGE - DECISIVE, "ambiguous"),
+        (("friction_patch",), -DECISIVE, "unknown"),
+    ],
+)
+def test_what_a_formula_explains_as_well_is_contested(effects, ahead, expected):
+    named, rival = Verdict("named", effects), law(50.0)
+    own = candidate("+".join(effects), 50.0 + ahead)
+    found = contested_by_law(named, ranked([own, rival]), DECISIVE)
+    assert found.status == expected
+    assert found.effects == (() if expected == "unknown" else effects)
+    assert found.law == (rival.law if expected == "ambiguous" else None)
+    assert contested_by_law(named, ranked([own, law(50.0, 0.001)]), DECISIVE) == named
 
 
-def test_formulas_are_tried_where_nothing_or_only_a_pair_explains():
-    assert needs_laws(Verdict("unknown", ()))
-    assert needs_laws(Verdict("named", ("air_drag", "rolling")))
-    assert needs_laws(Verdict("ambiguous", ("air_drag+rolling", "stribeck+rolling")))
-    assert not needs_laws(Verdict("named", ("air_drag",)))
-    assert not needs_laws(Verdict("ambiguous", ("air_drag", "stribeck+rolling")))
+def test_formulas_are_tried_where_nothing_explains_or_only_what_could_explain_much():
+    patch = replace(candidate("friction_patch", 60.0), num_constants=3)
+    two = replace(candidate("stribeck", 60.0), num_constants=2)
+    pairs = [candidate("air_drag+rolling", 50.0), candidate("stribeck+rolling", 50.0)]
+    table = ranked([candidate("air_drag", 50.0), patch, two, *pairs])
+    assert needs_laws(Verdict("unknown", ()), table)
+    assert needs_laws(Verdict("named", ("air_drag", "rolling")), table)
+    assert needs_laws(Verdict("ambiguous", ("air_drag+rolling", "stribeck+rolling")), table)
+    assert needs_laws(Verdict("named", ("friction_patch",)), table)
+    assert not needs_laws(Verdict("named", ("stribeck",)), table)
+    assert not needs_laws(Verdict("named", ("air_drag",)), table)
+    assert not needs_laws(Verdict("ambiguous", ("air_drag", "stribeck+rolling")), table)
 
 
 def test_a_second_factor_makes_a_formula_a_tenth_as_probable():
-    assert law_odds(1) == pytest.approx(0.05)
-    assert law_odds(2) == pytest.approx(0.005)
+    assert law_odds(1) == pytest.approx(UNNAMED_ODDS)
+    assert law_odds(2) == pytest.approx(UNNAMED_ODDS / 10)

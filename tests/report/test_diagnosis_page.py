@@ -25,7 +25,7 @@ STATUSES = ("none", "named", "ambiguous", "unknown")
 SAYS = {
     "none": "The model is adequate: no effect is missing",
     "named": "air_drag explains the data (p = 1e-09 without, p = 0.4 with)",
-    "ambiguous": "This clip cannot distinguish between air_drag, viscous_drag",
+    "ambiguous": "This clip cannot distinguish between air_drag and viscous_drag",
     "unknown": "see the missing force",
 }
 GO_ON = "galileo fit a.yaml --effects air_drag"

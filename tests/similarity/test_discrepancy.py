@@ -190,3 +190,12 @@ def test_bodies_that_are_far_apart_no_longer_push():
     speed = np.diff(gained, axis=1) / np.diff(times[far])
     assert np.abs(speed).max() > 1e-4
     assert np.abs(np.diff(speed, axis=1)).max() < 1e-6
+
+
+def test_bodies_that_close_in_by_more_than_that_in_one_frame_do_not_push():
+    seen = observe(HIT, 0, noise_m=0.0)
+    after = int(np.argmax(seen.times_s > solve(HIT, seen.times_s).hit_s)) + 1
+    hit = _speeds_at(after - 2, 1, seen.position_m, seen)
+    assert hit is not None
+    seen.position_m[1, 0, hit.both[0]] += 2 * CLOSE_M
+    assert _pushes(hit, seen.position_m, seen) == []

@@ -4,7 +4,8 @@ from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Effect, Surroundings, Theta
 
-UNNAMED_ODDS = 0.05  # of a law that nobody has named, against one that is met again and again
+# Against an effect that is met again and again: all forms together are as probable as two of those.
+UNNAMED_ODDS = 0.25
 
 
 class Form(Effect):
@@ -13,7 +14,9 @@ class Form(Effect):
     meaning: ClassVar[str]
     family: ClassVar[str]
     """The shape of its formula, as `diagnosis.laws` calls it; a law of that shape is the same."""
+    how_likely: ClassVar[float] = UNNAMED_ODDS
+    """Before the data, against an effect with a name."""
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
-        """One in twenty."""
-        return UNNAMED_ODDS
+        """As likely as such a form is."""
+        return self.how_likely
