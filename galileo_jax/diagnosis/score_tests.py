@@ -41,7 +41,8 @@ def score_tests(
     for probe, effects in zip(probes, candidates, strict=True):
         where, size = strength_of(trials, effects[-1])
         probe[where] = size
-    return np.sqrt(_explained_by(trials, base, probes, candidates))
+    residual, change = _changes(trials, base, probes)
+    return np.sqrt(_explained_by(trials, base, probes, candidates, residual, change))
 
 
 def best_gains(
@@ -55,11 +56,12 @@ def best_gains(
       `[candidate]`.
     """
     probes = [shapes_beside(trials, base, effects, seed)[1] for effects in candidates]
-    ends = np.cumsum([len(own) for own in probes])[:-1]
-    along, power = slopes_along(trials, base, np.concatenate(probes))
-    found = np.split(explained(along, power), ends)
-    best = np.array([own[np.argmax(gain)] for own, gain in zip(probes, found, strict=True)])
-    return 0.5 * _explained_by(trials, base, best, candidates)
+    first = np.cumsum([0, *(len(own) for own in probes)])
+    every = np.concatenate(probes)
+    residual, change = _changes(trials, base, every)
+    gains = np.split(explained(*_along(base, residual, change)), first[1:-1])
+    best = first[:-1] + [np.argmax(own) for own in gains]
+    return 0.5 * _explained_by(trials, base, every[best], candidates, residual, change[best])
 
 
 def strength_of(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:
@@ -94,8 +96,7 @@ def slopes_along(
     trials: JointProblem, base: GradientFit, probes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The slopes to each of `probes` along the base fit's residuals, and their squares."""
-    residual, slopes = _beside(trials, base, probes)
-    return slopes @ residual, np.sum(slopes**2, axis=1)
+    return _along(base, *_changes(trials, base, probes))
 
 
 def _explained_by(
@@ -103,34 +104,23 @@ def _explained_by(
     base: GradientFit,
     probes: np.ndarray,
     candidates: Sequence[tuple[str, ...]],
+    residual: np.ndarray,
+    change: np.ndarray,
 ) -> np.ndarray:
     """How much of the squared residuals the slope to each candidate's probe explains.
 
     The better of the probe as it is, for effects that only act above some strength, and of one so
-    small that the change of the track is a slope.
+    small that the change of the track, `SMALL_CHANGE`, is a slope. The last two arguments are what
+    `_changes` finds of the probes.
     """
-    smaller = _smaller(trials, base, probes, candidates)
-    along, power = slopes_along(trials, base, np.concatenate([probes, smaller]))
-    return explained(along, power).reshape(2, -1).max(axis=0)
-
-
-def _smaller(
-    trials: JointProblem,
-    base: GradientFit,
-    probes: np.ndarray,
-    candidates: Sequence[tuple[str, ...]],
-) -> np.ndarray:
-    """The probes, each with so little of its effect that the track changes by `SMALL_CHANGE`."""
     here = trials.theta(base.z, base.free)
-    scale = here[len(trials.model_parameters) :]
-    white = np.concatenate(whitened(trials, np.vstack([here, probes]), scale), axis=1)
-    change = np.linalg.norm(white[1:] - white[:1], axis=1)
-    share = np.minimum(SMALL_CHANGE / np.maximum(change, SHOWS), 1.0)
+    share = np.minimum(SMALL_CHANGE / np.maximum(np.linalg.norm(change, axis=1), SHOWS), 1.0)
     smaller = probes.copy()
     for row, own, effects in zip(smaller, share, candidates, strict=True):
         where, _ = strength_of(trials, effects[-1])
         row[where] = here[where] + own * (row[where] - here[where])
-    return smaller
+    both = np.concatenate([change, _changes(trials, base, smaller)[1]])
+    return explained(*_along(base, residual, both)).reshape(2, -1).max(axis=0)
 
 
 def explained(along: np.ndarray, power: np.ndarray) -> np.ndarray:
@@ -138,21 +128,27 @@ def explained(along: np.ndarray, power: np.ndarray) -> np.ndarray:
     return np.where(power > SHOWS, along**2 / np.maximum(power, SHOWS), 0.0)
 
 
-def _beside(
+def _changes(
     trials: JointProblem, base: GradientFit, probes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The base fit's whitened residuals, and how they change to each of `probes`.
+    """The base fit's whitened residuals, and how they change to each of `probes`."""
+    here = trials.theta(base.z, base.free)
+    scale = here[len(trials.model_parameters) :]
+    white = np.concatenate(whitened(trials, np.vstack([here, probes]), scale), axis=1)
+    return white[0], white[1:] - white[:1]
+
+
+def _along(
+    base: GradientFit, residual: np.ndarray, change: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The slopes along the base fit's residuals, and their squares, as `_changes` finds them.
 
     Both without what the parameters that are there can take up. The priors' residuals count
     among them: a nuisance that is bent is a misfit, too.
     """
-    here = trials.theta(base.z, base.free)
-    scale = here[len(trials.model_parameters) :]
-    white = np.concatenate(whitened(trials, np.vstack([here, probes]), scale), axis=1)
-    residual, slopes = white[0], white[1:] - white[:1]
     free = base.free[: base.jacobian.shape[1]]
-    used = np.vstack([base.jacobian[:, free], np.eye(int(free.sum()))])
-    basis, _ = np.linalg.qr(used)
+    basis, _ = np.linalg.qr(np.vstack([base.jacobian[:, free], np.eye(int(free.sum()))]))
     whole = np.append(residual, base.z[: len(free)][free])
-    padded = np.pad(slopes, [(0, 0), (0, int(free.sum()))])
-    return whole - basis @ (basis.T @ whole), padded - (padded @ basis) @ basis.T
+    padded = np.pad(change, [(0, 0), (0, int(free.sum()))])
+    slopes = padded - (padded @ basis) @ basis.T
+    return slopes @ (whole - basis @ (basis.T @ whole)), np.sum(slopes**2, axis=1)

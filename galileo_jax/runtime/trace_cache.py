@@ -12,6 +12,7 @@ import contextlib
 import functools
 import hashlib
 import threading
+from collections import OrderedDict
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -25,6 +26,9 @@ from galileo_jax.runtime.atomic_write import replacing
 
 FOLDER = "traces"  # in that of JAX's cache
 LIBRARIES = ("jax", "jaxlib", "numpy", "equinox", "lineax", "optimistix")
+# Compiled programs that one function holds. Each takes a hundred memory mappings, of which Linux
+# gives a process 65,530; one that was dropped is read again in tens of milliseconds.
+MOST_PROGRAMS = 24
 # LAPACK's routines may change with jaxlib; programs of another jaxlib are not read.
 LAPACK = tuple(
     jax.export.DisabledSafetyCheck.custom_call(name)
@@ -49,7 +53,7 @@ class TraceCached:
         functools.update_wrapper(self, function)
         self._function, self._num_static = function, num_static
         self._jitted = jax.jit(function, static_argnums=tuple(range(num_static)))
-        self._programs: dict[Any, Callable[..., Any]] = {}
+        self._programs: OrderedDict[Any, Callable[..., Any]] = OrderedDict()
         self._lock = threading.Lock()
 
     def __call__(self, *args: Any) -> Any:
@@ -62,11 +66,12 @@ class TraceCached:
         shapes = tuple((leaf.shape, leaf.dtype) for leaf in leaves)
         # The setting may be the calling thread's own; dtypes of constants follow it.
         key = (static, tree, shapes, _setting("jax_enable_x64"))
-        program = self._programs.get(key)
-        if program is None:
-            with self._lock:  # parts of a batch come on threads: one of them traces
-                program = self._programs.get(key) or self._program(key)
-                self._programs[key] = program
+        with self._lock:  # parts of a batch come on threads: one of them traces
+            program = self._programs.get(key) or self._program(key)
+            self._programs[key] = program
+            self._programs.move_to_end(key)
+            while len(self._programs) > MOST_PROGRAMS:
+                self._programs.popitem(last=False)
         return program(leaves)
 
     def _program(self, key: Any) -> Callable[..., Any]:

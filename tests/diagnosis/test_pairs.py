@@ -10,11 +10,24 @@ from galileo_jax.diagnosis.score_tests import best_gains
 from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.registry import make_effects
 from tests.diagnosis.test_verdict import candidate
 from tests.precision import in_64_bit
 
 EFFECTS = ("initial_push", "spring_tether")
+
+
+def count_rollouts(monkeypatch) -> list[int]:
+    """Sizes of the batches that are rolled out from here on."""
+    sizes, simulate_batch = [], Problem.simulate_batch
+
+    def counted(self, theta):
+        sizes.append(len(theta))
+        return simulate_batch(self, theta)
+
+    monkeypatch.setattr(Problem, "simulate_batch", counted)
+    return sizes
 
 
 def test_pairs_from_scratch_are_the_best_so_far_and_those_of_the_best_singles():
@@ -26,7 +39,9 @@ def test_pairs_from_scratch_are_the_best_so_far_and_those_of_the_best_singles():
     assert found == {frozenset(pair) for pair in expected}
 
 
-def test_a_nuisance_far_out_promises_its_own_to_the_effect_that_it_stands_for(tmp_path):
+def test_a_nuisance_far_out_promises_its_own_to_the_effect_that_it_stands_for(
+    tmp_path, monkeypatch
+):
     path = tmp_path / "clip.csv"
     simulate(
         path,
@@ -44,7 +59,10 @@ def test_a_nuisance_far_out_promises_its_own_to_the_effect_that_it_stands_for(tm
     with in_64_bit():
         fitter = GradientFitter(trials)
         base, whole = (fitter.fit(0, effects=names) for names in ((), EFFECTS[:1]))
+        rolled = count_rollouts(monkeypatch)
         push, spring = best_gains(trials, base, [(name,) for name in EFFECTS], 0)
+    # The base fit and each effect; then the base fit and less of each.
+    assert rolled == [1 + len(EFFECTS), 1 + len(EFFECTS)]
     released = base.z[list(trials.names).index("release_instant")]
     assert abs(released) > 5  # sds: an early release does what the push does
     assert push > 0.5 * np.square(released) / 2

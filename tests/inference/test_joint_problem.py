@@ -158,35 +158,6 @@ def test_a_place_is_the_same_in_all_clips():
         assert np.sum(own**2) == pytest.approx(np.sum(joint**2), rel=BETWEEN_PROGRAMS)
 
 
-def test_slopes_at_a_known_point_take_no_rollouts(base):
-    count = len(base.model_parameters)
-    z = np.stack([draw(base, seed)[:count] for seed in (1, 2)])
-    steps = np.tile(1e-3 * base.coarse_steps, (2, 1))
-    points = Batch(z, np.ones(z.shape, bool), np.ones((2, 2)))
-    residuals = Residuals(base)
-    residuals.slopes(points, steps, False)
-    num = residuals.num_rollouts
-    louder = points._replace(noise=np.full((2, 2), 1.4))
-    found = residuals.slopes(louder, steps, False)
-    assert residuals.num_rollouts == num
-    residuals.whites(louder)
-    assert residuals.num_rollouts == num
-    expected = Residuals(base).slopes(louder, steps, False)
-    for name in ("white", "jacobian"):
-        for own, new in zip(getattr(found, name), getattr(expected, name), strict=True):
-            np.testing.assert_array_equal(own, new)
-    # One that is new, beside one that is known.
-    moved = points._replace(z=z + np.array([[0.1], [0.0]]))
-    found = residuals.slopes(moved, steps, False)
-    assert num < residuals.num_rollouts < 2 * num
-    expected = Residuals(base).slopes(moved, steps, False)
-    for own, new in zip(found.jacobian, expected.jacobian, strict=True):
-        np.testing.assert_allclose(own, new, rtol=1e-4, atol=1e-4 * np.abs(new).max())
-    residuals.forget()
-    residuals.whites(louder)
-    assert residuals.num_rollouts > num + 2
-
-
 def test_clips_that_disagree_about_a_prior_are_refused():
     trials = make_trials([HIT, STEEPER], effects=make_effects(("friction_patch",)))
     parted = [replace(p, model=replace(p.model, shared=())) for p in trials.problems]

@@ -132,3 +132,13 @@ def test_each_precision_has_its_own(folder):
     with jax.enable_x64(False):
         assert function(3, X, REST)[0].dtype == np.float32
     assert traced.count == 2
+
+
+def test_it_holds_the_last_programs_only(folder, monkeypatch):
+    monkeypatch.setattr("galileo_jax.runtime.trace_cache.MOST_PROGRAMS", 2)
+    function, traced = fresh()
+    for power in (1, 2, 1, 3, 1):  # 1 is used again and again, 2 is dropped
+        np.testing.assert_array_equal(function(power, X, REST)[0], X**power + 2)
+    assert traced.count == 3 and [key[0] for key in function._programs] == [(3,), (1,)]
+    np.testing.assert_array_equal(function(2, X, REST)[0], X**2 + 2)
+    assert traced.count == 3 and len(function._programs) == 2  # read from the folder

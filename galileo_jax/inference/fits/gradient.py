@@ -116,7 +116,7 @@ class GradientFitter:
           on_stage: told what is being done.
           effects: names of the effects that are there; default: all of the models'.
         """
-        self._residuals.begin()
+        self._residuals.num_rollouts = 0
         effects = self.trials.all_effects if effects is None else effects
         free = self.trials.free(effects)[: self._count]
         on_stage("searching")
@@ -138,7 +138,7 @@ class GradientFitter:
 
     def refit(self, fit: GradientFit) -> GradientFit:
         """Fits again from a fit, with its positive nuisances moved: the better of both."""
-        self._residuals.begin()
+        self._residuals.num_rollouts = 0
         count = self._count
         return self._best_variant(fit.z[:count], fit.free[:count], 0)
 
@@ -158,7 +158,7 @@ class GradientFitter:
         Returns:
           One fit per hypothesis, of its best start.
         """
-        self._residuals.begin()
+        self._residuals.num_rollouts = 0
         points = self._batch(starts, free)
         found = self._search(points, owner)
         best = []
@@ -187,7 +187,6 @@ class GradientFitter:
           owner: `[start]`, which hypothesis each belongs to.
           lowest: cost that others have already come to, nats.
         """
-        self._residuals.forget()
         give_up = GiveUp(owner, BEHIND_IN_SEARCH, 0.0, OUT_OF_THE_RACE, lowest)
         settings = self.settings
         points = self._batch(starts, free)

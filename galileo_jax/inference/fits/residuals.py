@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from galileo_jax.inference.fits.known_motions import KnownMotions, Motion, put_together
 from galileo_jax.inference.fits.programs import (
     ClipArrays,
     Kind,
@@ -159,16 +158,6 @@ class Residuals:
         self.num_rollouts = 0
         self._count = len(trials.model_parameters)
         self._is_simulated = np.array([p.step is not None for p in trials.model_parameters])
-        self.forget()
-
-    def begin(self) -> None:
-        """Counts rollouts from here on."""
-        self.num_rollouts = 0
-        self.forget()
-
-    def forget(self) -> None:
-        """Forgets motions, lest the next fit depend on the last: programs differ in rounding."""
-        self._known = [KnownMotions() for _ in self.clips]
 
     def costs(self, points: Batch) -> Float[np.ndarray, " point"]:
         """chi2 / 2 and the prior's part, `[point]`."""
@@ -180,15 +169,7 @@ class Residuals:
 
     def motions(self, points: Batch) -> Motions:
         """By rollouts, clip by clip."""
-        found = []
-        for clip, memory in zip(self.clips, self._known, strict=True):
-            known = memory.of(points.z, points.free)
-            if all(known):
-                motion = put_together([one and one[:2] for one in known], None, 0)
-                found.append((clip.theta(points.z, points.free), *motion))
-            else:
-                found.append(self._simulate(clip, points.z, points.free))
-        return found
+        return [self._simulate(clip, points.z, points.free) for clip in self.clips]
 
     def whites_of(self, points: Batch, motions: Motions) -> list[Float[np.ndarray, "point value"]]:
         """Whitened residuals, `[point, value]`, clip by clip, of points that were rolled out."""
@@ -219,10 +200,7 @@ class Residuals:
         index = _free_index(points.free)
         jacobians, whites = [], []
         for c, clip in enumerate(self.clips):
-            if is_central:
-                motion = self._differences(c, points, index, steps, motions, True)
-            else:
-                motion = self._forward_differences(c, points, index, steps, motions)
+            motion = self._differences(c, points, index, steps, is_central, motions)
             white, jacobian = in_chunks(
                 POINTS,
                 lambda *rows, clip=clip: jacobian_batch(clip.kind, *rows, clip.arrays),
@@ -232,32 +210,15 @@ class Residuals:
             jacobians.append(jacobian)
         return Slopes(jacobians, whites, index, self._count)
 
-    def _forward_differences(
-        self, c: int, points: Batch, index: np.ndarray, steps: np.ndarray, motions: Motions | None
-    ) -> Motion:
-        """As `_differences`, to one side: of points that are not known."""
-        known = self._known[c].of(points.z, points.free)
-        new = np.flatnonzero([one is None for one in known])
-        found = None
-        if new.size:
-            rows, some = points.take(new), None
-            if motions:
-                some = [tuple(values[new] for values in own) for own in motions]
-            found = self._differences(c, rows, index[new], steps[new], some, False)
-            self._known[c].keep(rows.z, rows.free, found)
-        if found is not None and len(new) == len(known):
-            return found
-        return put_together(known, found, index.shape[1])
-
     def _differences(
         self,
         c: int,
         points: Batch,
         index: np.ndarray,
         steps: np.ndarray,
-        motions: Motions | None,
         is_central: bool,
-    ) -> Motion:
+        motions: Motions | None,
+    ) -> tuple[np.ndarray, ...]:
         """A clip's motions and their slopes; arguments as of `slopes`, `index` as of `Slopes`."""
         clip = self.clips[c]
         padded = np.pad(self._is_simulated, (0, 1))
