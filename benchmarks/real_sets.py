@@ -136,9 +136,10 @@ def spin_flights(folder: Path, out: Path, most: int) -> str:
 
 def cube_tosses(folder: Path, out: Path, _: int) -> str:
     """Why the cube falls at 9.63 m/s^2, and what its impacts tell."""
-    script = Path(__file__).with_name("cube_tosses.py")
-    call = [sys.executable, str(script), str(folder / "cube_tosses"), "--fit"]
-    subprocess.run(call, check=True)
+    poses = str(folder / "cube_tosses")
+    for call in (["cube_impacts.py", poses], ["cube_tosses.py", poses, "--fit"]):
+        script = Path(__file__).with_name(call[0])
+        subprocess.run([sys.executable, str(script), *call[1:]], check=True)
     return "see the lines above"
 
 

@@ -82,8 +82,19 @@ def test_bad_input_is_one_line(tmp_path: Path, text: str, said: str) -> None:
         edited(path, shape="sphere", size_m=[0.02])
     with pytest.raises(InputError, match=said):
         gx.load(path)
-    with pytest.raises(InputError, match="tracks only"):
-        gx.simulate(tmp_path / "film.mp4", scenario="from_above")
+
+
+def test_a_film_shows_the_pucks_where_the_track_has_them(tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    options = {"scenario": "from_above", "seed": 58, "fps": 240.0, "seconds": 0.3}
+    gx.simulate(path, size=(960, 540), **options)
+    gx.simulate(tmp_path / "track.csv", track_only=True, track_noise=1e-6, **options)
+    filmed = gx.track(path).observation
+    true = measure(gx.load(tmp_path / "track.csv")).observation
+    assert filmed.mask.mean() > 0.8
+    apart = np.linalg.norm(filmed.position_m[:, :2] - true.position_m[:, :2], axis=1)[filmed.mask]
+    assert np.median(apart) < 3e-4
+    assert apart.max() < 2e-3  # where the hit falls into an exposure
 
 
 @pytest.mark.slow

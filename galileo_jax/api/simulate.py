@@ -96,7 +96,7 @@ def simulate(
       out: DIR/NAME.mp4, or DIR/NAME.csv for a track.
       seed: of everything that is drawn, 0 or more.
       scenario: "ramp", "multi" or "incline"; "fall", "flight", "spring", "liquid",
-        "pendulum" or "from_above" (tracks only).
+        "pendulum" or "from_above".
       shapes: of the objects on a ramp, in the order of the travel (box, cylinder, torus,
         sphere); round ones roll. None: as many boxes as the scenario has.
       angle: of the ramp, degrees, 1 to 60.

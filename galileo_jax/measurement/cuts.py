@@ -6,17 +6,21 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
     board without a table    from where the hand is off; to a stop or a blow
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
     toss                     to the first impact
+    from_above               to a quarter of a second after everything has come to rest
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.find_blow import blow_frame, goes_on
 from galileo_jax.measurement.find_hand import hand_frame
+from galileo_jax.measurement.find_rest import rest_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
 from galileo_jax.measurement.toss_flight import last_free_frame
 from galileo_jax.observation.observation import Observation
@@ -24,6 +28,7 @@ from galileo_jax.observation.observation import Observation
 STOPPED = "is stopped by something that is not in the scene"
 STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
 LANDED = "comes down on the table"
+RESTS = "is at rest, as is all that is still seen"
 HELD = "is moved by a hand until then: it accelerates otherwise than on its way"
 
 
@@ -57,6 +62,8 @@ def is_board(clip: Clip) -> bool:
 def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:
     """The observation with what is not of the scene masked, and where and why, in time's order."""
     cuts = []
+    if SCENARIOS[clip.scenario].is_level:
+        return _to_rest(clip, observation)
     ends = [
         (frame, why)
         for frame, why in ((find(observation), why) for find, why in _ends(clip))
@@ -97,7 +104,17 @@ def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
     return []
 
 
-def _without(observation: Observation, frames: slice) -> Observation:
+def _to_rest(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:
+    radii = [item.size_m[0] for item in clip.objects if item.size_m is not None]
+    last = rest_frame(observation, min(radii)) if radii else None
+    if last is None:
+        return observation, ()
+    rests = int(np.argmax(observation.mask[:, last]))  # one that is still seen
+    found = Cut(observation.names[rests], float(observation.times_s[last]), "after", RESTS)
+    return _without(observation, slice(last + 1, None), slice(None)), (found,)
+
+
+def _without(observation: Observation, frames: slice, objects: slice | int = 0) -> Observation:
     mask = observation.mask.copy()
-    mask[0, frames] = False
+    mask[objects, frames] = False
     return replace(observation, mask=mask)

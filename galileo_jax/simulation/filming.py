@@ -52,11 +52,13 @@ def ramp_camera(
     )
 
 
-def plane_camera(settings: Settings, motion: Motion) -> synthetic.Camera:
-    """A camera that has the whole motion in the picture, the floor (y = 0) just in it."""
+def plane_camera(
+    settings: Settings, motion: Motion, margin_m: float = MARGIN_M
+) -> synthetic.Camera:
+    """A camera that has the motion of all objects in the picture, the floor (y = 0) just in it."""
     width, height = settings.size
-    low, high = motion.position_m[0].min(axis=1), motion.position_m[0].max(axis=1)
-    span = np.maximum(high - low, SMALLEST_SPAN_M) + 2 * MARGIN_M
+    low, high = motion.position_m.min(axis=(0, 2)), motion.position_m.max(axis=(0, 2))
+    span = np.maximum(high - low, SMALLEST_SPAN_M) + 2 * margin_m
     scale = float(math.floor(min(width / span[0], height / span[1])))
     middle = (low + high) / 2
     sign = 1.0 if settings.direction == "right" else -1.0

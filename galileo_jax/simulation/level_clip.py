@@ -1,4 +1,4 @@
-"""Tracks of pucks seen from above: drawn, and then written."""
+"""Clips of pucks seen from above: drawn, and then written."""
 
 import math
 from collections.abc import Sequence
@@ -12,20 +12,24 @@ from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
+from galileo_jax.simulation.filming import film, plane_camera, plane_filming
 from galileo_jax.simulation.free import hide_free
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.level import SCENARIO, LevelTruth, draw_level, solve_level
+from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.settings import Settings
+from galileo_jax.video import synthetic
+
+RUN_UP_S = 0.2  # no exposure is longer
+MARGIN_M = 0.05  # of the picture round the centres: pucks are small, and no wider than that
 
 
 def level_clips(settings: Settings, hidden: Sequence[Hidden]) -> list[WriteClip]:
     """Draws the clip; returns what writes it into the file that it is given.
 
     Raises:
-      InputError: a video is asked for, or the scenario has no such parameter, floor or effect.
+      InputError: the scenario has no such parameter, floor or effect.
     """
-    if not settings.track_only:
-        raise InputError(f"--scenario {SCENARIO}: tracks only; add --track-only")
     if settings.floor:
         raise InputError(f"--floor: there is none in scenario {SCENARIO}")
     things, secrets, looks = np.random.default_rng(settings.seed).spawn(3)
@@ -36,7 +40,7 @@ def level_clips(settings: Settings, hidden: Sequence[Hidden]) -> list[WriteClip]
 
 
 def _write(settings: Settings, truth: LevelTruth, looks: np.random.Generator, out: Path) -> None:
-    """Writes the track, its yaml and its truth into the folder of `out`."""
+    """Writes the clip, its yaml and its truth into the folder of `out`."""
     motion, hits = solve_level(truth)
     clock = 1.0 + truth.values.get("frame_rate", 0.0)
     true_fps = settings.fps / clock
@@ -44,7 +48,7 @@ def _write(settings: Settings, truth: LevelTruth, looks: np.random.Generator, ou
     taken = np.arange(max(2, math.floor(seconds * true_fps) + 1)) / true_fps
     frames = motion.at(taken)
     content: dict[str, Any] = {
-        "track": out.name,
+        "track" if settings.track_only else "video": out.name,
         "scenario": truth.scenario,
         "fps": settings.fps,
         "gravity": truth.gravity,
@@ -68,20 +72,57 @@ def _write(settings: Settings, truth: LevelTruth, looks: np.random.Generator, ou
         "fps_declared": settings.fps,
         "seed": settings.seed,
     }
-    radii = np.array(scene.half_length_m)
+    if settings.track_only:
+        write_observation_csv(out, _noisy(settings, truth, frames, taken / clock, looks))
+    else:
+        camera = plane_camera(settings, motion, MARGIN_M)
+        for entry, point in zip(
+            content["objects"], camera.project(frames.position_m[:, :, 0]), strict=True
+        ):
+            entry["point_px"] = np.round(point, 1).tolist()
+        content |= {
+            "direction": settings.direction,
+            "pixels_per_metre": camera.pixels_per_metre,
+            "origin_px": list(camera.origin_px),
+        }
+        record["pixels_per_metre_true"] = camera.pixels_per_metre
+        path = _with_run_up(motion)
+        # From above a puck is a disc.
+        bodies = tuple(synthetic.Body("sphere", (radius,)) for radius in scene.half_length_m)
+        filming = plane_filming(settings, clock)
+        film(out, path, bodies, camera, None, filming, len(taken), settings.seed)
+    write_yaml_and_truth(out, content, record)
+
+
+def _with_run_up(motion: Motion) -> synthetic.Motion:
+    """As it is filmed: half of the first exposure is before the start, and pucks move then, too."""
+    place, turned = motion.position_m, motion.pitch_rad
+    spin = (turned[:, 1] - turned[:, 0]) / (motion.times_s[1] - motion.times_s[0])
+    return synthetic.Motion(
+        np.append(-RUN_UP_S, motion.times_s),
+        np.concatenate(
+            [(place[..., 0] - RUN_UP_S * motion.velocity_m_s[..., 0])[..., None], place], axis=-1
+        ),
+        np.concatenate([(turned[:, 0] - RUN_UP_S * spin)[:, None], turned], axis=-1),
+    )
+
+
+def _noisy(
+    settings: Settings,
+    truth: LevelTruth,
+    frames: Motion,
+    times_s: np.ndarray,
+    looks: np.random.Generator,
+) -> Observation:
+    """The track with normal errors, of centres and of turning: rims are followed as well."""
+    radii = np.array(truth.surroundings.half_length_m)
     places = np.concatenate([frames.position_m, frames.pitch_rad[:, None]], axis=1)
-    # Rims are followed as well as centres.
     sd = np.stack([np.full(len(radii), settings.track_noise)] * 2 + [settings.track_noise / radii])
-    noisy = places + sd.T[:, :, None] * looks.standard_normal(places.shape)
-    covariance = np.einsum("ao,ab->oab", sd**2, np.eye(3))[..., None] * np.ones(len(taken))
-    seen = np.ones((len(radii), len(taken)), bool)
-    track = Observation(
+    return Observation(
         tuple(item.name for item in truth.things),
-        taken / clock,
-        noisy,
-        covariance,
-        seen,
+        times_s,
+        places + sd.T[:, :, None] * looks.standard_normal(places.shape),
+        np.einsum("ao,ab->oab", sd**2, np.eye(3))[..., None] * np.ones(len(times_s)),
+        np.ones((len(radii), len(times_s)), bool),
         is_turning=True,
     )
-    write_observation_csv(out, track)
-    write_yaml_and_truth(out, content, record)

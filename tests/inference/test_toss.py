@@ -16,11 +16,15 @@ from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.commands import command
 from galileo_jax.commands import toss as toss_command
 from galileo_jax.inference.toss.residuals import (
+    CENTRE,
     COMMON,
     EDGE,
+    FLOOR,
+    Start,
     backward,
     between,
     forward,
+    motion,
     small,
     times,
 )
@@ -36,6 +40,7 @@ from tests.precision import in_64_bit
 EDGE_M, FPS, FRAMES = 0.1, 148.0, 60
 TRUE = {"friction": 0.25, "restitution": 0.2, "edge": 0.1, "floor": 0.001, "gravity": 9.7}
 TRUE |= {"rounding": 0.003, "inertia": 0.22}
+CENTRE_M = np.array([0.0, -0.002, 0.005])  # of mass, from the middle, along the cube's axes
 YAML = """\
 track: {track}
 track_up: z
@@ -62,7 +67,11 @@ def tosses(tmp_path_factory) -> list[Path]:
             gravity=jnp.asarray(TRUE["gravity"]),
             floor_m=jnp.asarray(TRUE["floor"]),
             round_m=TRUE["rounding"],
-        )._replace(inertia_m2=jnp.full(3, TRUE["inertia"] * TRUE["edge"] ** 2))
+        )
+        solid = solid._replace(
+            corners_m=solid.corners_m - CENTRE_M,
+            inertia_m2=jnp.full(3, TRUE["inertia"] * TRUE["edge"] ** 2),
+        )
         starts = [
             thrown(
                 solid,
@@ -80,7 +89,9 @@ def tosses(tmp_path_factory) -> list[Path]:
     return [
         write(
             folder / f"toss{i}.csv",
-            poses.position_m[i] + rng.normal(0, 1e-4, (FRAMES + 1, 3)),
+            poses.position_m[i]
+            - Rotation.from_quat(poses.quaternion[i], scalar_first=True).apply(CENTRE_M)
+            + rng.normal(0, 1e-4, (FRAMES + 1, 3)),
             (
                 Rotation.from_rotvec(rng.normal(0, 1e-3, (FRAMES + 1, 3)))
                 * Rotation.from_quat(poses.quaternion[i], scalar_first=True)
@@ -108,8 +119,6 @@ def test_quaternions_multiply_as_turnings_do():
     found = between(start, -times(small(turn), start))
     assert np.linalg.norm(found) == pytest.approx(2 * np.arctan(np.linalg.norm(turn) / 2))
     assert np.cross(found, turn) == pytest.approx(0.0, abs=1e-12)
-    values = jnp.array([0.2, 0.1, 0.1, 0.01, 9.8, 0.002, 0.2])
-    assert np.asarray(forward(backward(values))) == pytest.approx(np.asarray(values))
 
 
 def test_a_flight_tells_its_start(tosses):
@@ -135,7 +144,8 @@ def test_to_other_commands_it_is_a_flight_to_the_first_impact(tosses):
 @pytest.mark.slow
 def test_a_joint_fit_finds_what_was_simulated(tosses, tmp_path):
     found = fit_tosses(tosses, window=0.1, ahead=True)
-    for name, true in TRUE.items():
+    centre = dict(zip(CENTRE, CENTRE_M, strict=True))
+    for name, true in (TRUE | centre).items():
         told = found.parameters[name]
         assert abs(told["mean"] - true) < 4 * told["sd"] + 1e-3 * abs(true), name
     assert found.parameters["friction"]["sd"] < 0.02
@@ -230,9 +240,32 @@ def test_the_height_at_rest_counts_where_a_face_lies_down():
     assert resting_height_m([stands, moves]) is None
 
 
-def test_the_search_has_the_height_at_rest_in_place_of_the_floor():
-    """Edge and floor change together where that height stays."""
-    z = backward(jnp.array([0.2, 0.1, 0.1, 0.01, 9.8, 0.002, 0.2]))
-    values = dict(zip(COMMON, np.asarray(forward(z.at[EDGE].add(0.1))), strict=True))
-    assert values["edge"] == pytest.approx(0.1 * np.exp(0.1))
-    assert values["floor"] + values["edge"] / 2 == pytest.approx(0.06)
+def test_the_search_has_the_height_at_rest_in_place_of_the_edge():
+    """Where the floor changes and that height stays, the edge changes with it."""
+    values = jnp.array([0.2, 0.1, 0.1, 0.01, 9.8, 0.002, 0.2, 0.001, -0.002, 0.003])
+    z = backward(values)
+    assert np.asarray(forward(z)) == pytest.approx(np.asarray(values))
+    lower = dict(zip(COMMON, np.asarray(forward(z.at[FLOOR].add(-0.004))), strict=True))
+    assert lower["floor"] == pytest.approx(0.006)
+    assert lower["edge"] == pytest.approx(0.108)
+    higher = forward(z.at[EDGE].add(0.1))
+    assert float(higher[EDGE] / 2 + higher[FLOOR]) == pytest.approx(0.06 * np.exp(0.1))
+
+
+def test_the_middle_turns_about_the_centre_of_mass():
+    """In flight that centre runs along a parabola, and what poses follow circles about it."""
+    values = jnp.array([0.2, 0.1, 0.1, 0.0, 9.8, 0.002, 0.2, 0.0, -0.002, 0.005])
+    start = Start(
+        jnp.array([0.0, 0.0, 2.0]),
+        jnp.array([1.0, 0.0, 0.0, 0.0]),
+        jnp.array([0.5, 0.0, 0.0]),
+        jnp.array([6.0, 0.0, 0.0]),
+    )
+    poses = motion(backward(values), jnp.zeros(12), start, jnp.full(30, 1 / FPS))
+    time = np.arange(31) / FPS
+    turned = Rotation.from_quat(np.asarray(poses.quaternion), scalar_first=True)
+    centre = np.asarray(poses.position_m) + turned.apply(np.array(values[-3:]))
+    rises = 6.0 * -0.002  # of the centre of mass: spin times its lever
+    assert centre[:, 2] == pytest.approx(2.005 + rises * time - 4.9 * time**2, abs=1e-9)
+    assert np.ptp(centre[:, 1] - centre[0, 1] + 6.0 * 0.005 * time) < 1e-9
+    assert np.ptp(np.asarray(poses.position_m)[:, 1]) > 0.002

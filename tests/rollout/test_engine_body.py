@@ -11,7 +11,18 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from galileo_jax.rollout.body import Pose, Solid, box, energy_j_kg, gaps_m, spin_rad_s, thrown
+from galileo_jax.rollout import engine_body
+from galileo_jax.rollout.body import (
+    Pose,
+    Solid,
+    box,
+    climbs_m_s,
+    energy_j_kg,
+    gaps_m,
+    levers_m,
+    spin_rad_s,
+    thrown,
+)
 from galileo_jax.rollout.engine_body import roll_out, roll_out_batch, substeps_for
 from tests.precision import in_64_bit
 
@@ -20,6 +31,7 @@ EDGE_M, G, FPS = 0.1048, 9.81, 148.0
 FRAMES = 80
 STEPS_S = np.full(FRAMES, 1 / FPS)
 TURNED = np.array([0.3, 0.5, 0.2, 0.7])
+PARTS_WITHIN = 0.015  # of an impulse, where slip turns or ends on the way: parts are finite
 SOFT_M = 0.002  # MuJoCo's contacts give way, and its impacts take a few steps
 
 
@@ -201,3 +213,145 @@ def test_mujoco_says_the_same():
 def test_steps_are_short_enough():
     assert substeps_for(1 / 148) == 4
     assert substeps_for(1 / 1000) == 1
+
+
+def struck(solid: Solid, quaternion, velocity, spin) -> tuple[Pose, Pose, np.ndarray]:
+    """Just before and just after the impact of the lowest corner(s), and their levers."""
+    quaternion = np.asarray(quaternion) / np.linalg.norm(quaternion)
+    lever = np.asarray(levers_m(solid, jnp.asarray(quaternion)))
+    high = -lever[:, 2].min()
+    before = start(solid, high, quaternion, velocity, spin)
+    hits = jnp.asarray(lever[:, 2] < -high + 1e-9)
+    after = engine_body._struck(before, solid, hits, jnp.argsort(lever[:, 2])[:4])
+    return before, after, lever[np.asarray(hits)]
+
+
+def corner_speed(solid: Solid, pose: Pose, lever: np.ndarray) -> np.ndarray:
+    return np.asarray(pose.velocity_m_s) + np.cross(spin_rad_s(solid, pose), lever)
+
+
+def response(solid: Solid, lever: np.ndarray) -> np.ndarray:
+    """K of u -> u + K p, of a cube's corner and impulses over the mass."""
+    x, y, z = lever
+    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) - skew @ skew / float(solid.inertia_m2[0])
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 1.0])
+def test_a_smooth_corner_gets_newtons_impulse(restitution):
+    """p = -(1 + e) u_n / (n (1 + I^-1 (r x n) x r) n), upwards, wherever the corner goes."""
+    solid = cube(friction=0.0, restitution=restitution)
+    before, after, levers = struck(solid, TURNED, (0.7, 0.2, -1.1), (3.0, -5.0, 4.0))
+    (lever,) = levers
+    normal = np.array([0.0, 0.0, 1.0])
+    turn = np.cross(lever, normal)
+    share = 1 + turn @ turn / float(solid.inertia_m2[0])
+    push = -(1 + restitution) * corner_speed(solid, before, lever)[2] / share * normal
+    assert np.asarray(after.velocity_m_s - before.velocity_m_s) == pytest.approx(push, abs=1e-9)
+    twist = np.asarray(after.momentum_m2_s - before.momentum_m2_s)
+    assert twist == pytest.approx(np.cross(lever, push), abs=1e-9)
+    if restitution == 1.0:
+        energy = energy_j_kg(solid, before)
+        assert float(energy_j_kg(solid, after)) == pytest.approx(float(energy), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("along", "spin", "friction"),
+    [(3.0, 0.0, 0.18), (-3.0, 4.0, 0.3), (0.4, 0.0, 2.0), (0.1, 0.0, 0.35)],
+    ids=["slips", "slips back", "sticks", "slips, then the other way"],
+)
+def test_a_corner_that_slips_along_a_line_is_coulombs(along, spin, friction):
+    """In a plane: slip at -mu p_n, until it ends; then it sticks, or goes the other way."""
+    solid = cube(friction=friction, restitution=0.3, size=(EDGE_M, 0, EDGE_M))
+    solid = solid._replace(inertia_m2=jnp.full(3, EDGE_M**2 / 6))
+    tilt = 0.9
+    quaternion = np.array([math.cos(tilt / 2), 0.0, math.sin(tilt / 2), 0.0])
+    before, after, levers = struck(solid, quaternion, (along, 0.0, -1.0), (0.0, spin, 0.0))
+    lever = levers[0] * [1, 0, 1]
+    k = response(solid, lever)
+    u = corner_speed(solid, before, lever)
+    rises, impulse = -0.3 * u[2], np.zeros(3)
+    way = -np.sign(u[0])
+    direction = np.array([friction * way, 0, 1])
+    ends = -u[0] / (k @ direction)[0]  # p_n at which the slip ends
+    whole = (rises - u[2]) / (k @ direction)[2]
+    if turns := 0 < ends < whole:
+        impulse += ends * direction
+        u = u + k @ impulse
+        stays = -k[0, 2] / k[0, 0]  # p_t / p_n that keeps it from slipping
+        direction = np.array([np.clip(stays, -friction, friction), 0, 1])
+        whole = (rises - u[2]) / (k @ direction)[2]
+    impulse += whole * direction
+    found = np.asarray(after.velocity_m_s - before.velocity_m_s)
+    assert found == pytest.approx(impulse, abs=PARTS_WITHIN * impulse[2] if turns else 1e-7)
+    assert corner_speed(solid, after, lever)[2] == pytest.approx(rises, abs=1e-7)
+
+
+def test_slip_that_turns_during_an_impact_is_rubbed_along_its_way():
+    """dp_t = -mu u_t / |u_t| dp_n all along (Darboux, Keller), not only at the end."""
+    solid = cube(friction=0.17, restitution=0.26)
+    before, after, levers = struck(solid, TURNED, (0.35, 0.45, -1.0), (3.0, -5.0, 4.0))
+    (lever,) = levers
+    k, first = response(solid, lever), corner_speed(solid, before, lever)
+
+    def rub(_: float, p: np.ndarray) -> np.ndarray:
+        u = first + k @ p
+        return np.append(-0.17 * u[:2] / np.linalg.norm(u[:2]), 1.0)
+
+    def done(_: float, p: np.ndarray) -> float:
+        return (first + k @ p)[2] + 0.26 * first[2]
+
+    done.terminal = True
+    path = solve_ivp(rub, (0, 9), np.zeros(3), events=done, rtol=1e-10, atol=1e-12)
+    exact = path.y[:, -1]
+    last = first + k @ exact
+    turned = math.acos(last[:2] @ first[:2] / np.linalg.norm(last[:2]) / np.linalg.norm(first[:2]))
+    assert turned > 0.5  # so that it matters
+    found = np.asarray(after.velocity_m_s - before.velocity_m_s)
+    assert found == pytest.approx(exact, abs=PARTS_WITHIN * exact[2])
+
+
+@pytest.mark.parametrize(
+    ("quaternion", "corners"),
+    [([1.0, 0, 0, 0], 4), ([math.cos(0.4), 0, math.sin(0.4), 0], 2)],
+    ids=["face", "edge"],
+)
+def test_corners_that_strike_together_all_leave(quaternion, corners):
+    """Straight down: a face bounces like a ball; an edge turns the cube; as one impulse would."""
+    solid = cube(friction=0.0, restitution=0.25)
+    _, after, levers = struck(solid, np.array(quaternion), (0.3, 0.0, -1.0), (0, 0, 0))
+    assert len(levers) == corners
+    for lever in levers:
+        assert corner_speed(solid, after, lever)[2] == pytest.approx(0.25, abs=1e-8)
+    lever = levers.mean(axis=0)
+    turn = np.cross(lever, [0, 0, 1])
+    push = 1.25 / (1 + turn @ turn / float(solid.inertia_m2[0]))
+    assert float(after.velocity_m_s[2]) == pytest.approx(push - 1.0, abs=1e-8)
+    assert np.asarray(after.momentum_m2_s) == pytest.approx(push * turn, abs=1e-8)
+
+
+def test_no_impact_gains_energy():
+    """Of 200 corners at random, rough and smooth, with a centre of mass off the middle."""
+    rng = np.random.default_rng(14)
+
+    def change(quaternion, velocity, spin, friction, restitution):
+        solid = cube(friction=friction, restitution=restitution)
+        solid = solid._replace(corners_m=solid.corners_m - jnp.array([0.0, 0.002, 0.006]))
+        lever = levers_m(solid, quaternion / jnp.linalg.norm(quaternion))
+        low = jnp.argsort(lever[:, 2])[:4]
+        pose = thrown(solid, jnp.array([0, 0, -lever[low[0], 2]]), quaternion, velocity, spin)
+        falls = climbs_m_s(solid, pose)[low[0]] < 0
+        after = engine_body._struck(pose, solid, jnp.arange(8) == low[0], low)
+        return falls, energy_j_kg(solid, after) - energy_j_kg(solid, pose)
+
+    count = 200
+    falls, gain = jax.vmap(change)(
+        jnp.asarray(rng.normal(size=(count, 4))),
+        jnp.asarray(rng.normal(0, 1, (count, 3)) - np.array([0, 0, 1.0])),
+        jnp.asarray(rng.normal(0, 5, (count, 3))),
+        jnp.asarray(rng.uniform(0, 0.6, count)),
+        jnp.asarray(rng.uniform(0, 0.6, count)),
+    )
+    falls, gain = np.asarray(falls), np.asarray(gain)
+    assert falls.sum() > 100
+    assert gain[falls].max() < 1e-9

@@ -18,7 +18,7 @@ import numpy as np
 from galileo_jax.inference.toss.least_squares import Solution, solve
 from galileo_jax.inference.toss.residuals import (
     COMMON,
-    FLOOR,
+    EDGE,
     Seen,
     Start,
     backward,
@@ -35,8 +35,9 @@ PLACE_SD_M, TURN_SD_RAD = 0.001, np.radians(1.0)
 OWN_SD = np.repeat([0.002, 0.02, 0.05, 0.5], 3)  # of a start about what its flight told
 STAGES_S = (0.02, 0.06, 0.1)  # after the first impact
 PRIOR = {"friction": 0.2, "restitution": 0.2, "rounding": 0.002, "inertia": 0.2}  # the middles
-# Widths: of logarithms, of the restitution's log-odds, of the height at rest in metres.
-PRIOR_SD = np.array([1.0, 1.0, 0.03, 0.003, 0.05, 0.7, 0.3])
+# Widths: of logarithms, of the restitution's log-odds; of floor and centre in metres.
+FLOOR_SD_M, CENTRE_SD_M = 0.001, 0.005
+PRIOR_SD = np.array([1.0, 1.0, 0.03, FLOOR_SD_M, 0.05, 0.7, 0.3, *3 * [CENTRE_SD_M]])
 REST_SD_M = 2e-4  # of the height at rest, where it is seen: poses are placed to a tenth of it
 FRAMES = 16  # the length of a window is rounded up to multiples, so that fits share programs
 
@@ -87,13 +88,12 @@ def fit_poses(
     last_s = window_s or STAGES_S[-1]
     stages = [stage for stage in STAGES_S if stage < last_s] + [last_s]
     ends = [flight.last for _, flight in kept]
-    usual = {**PRIOR, "edge": edge_m, "floor": 0.0, "gravity": gravity}
-    middle = np.asarray(backward(jnp.asarray([usual[name] for name in COMMON])))
+    usual = {**PRIOR, "edge": edge_m, "gravity": gravity}
+    middle = np.array(backward(jnp.asarray([usual.get(name, 0.0) for name in COMMON])))
     poses, prior_sd = [one for one, _ in kept], PRIOR_SD.copy()
     resting_m = resting_height_m(poses)
     if resting_m is not None:
-        middle = np.where(np.arange(len(middle)) == FLOOR, resting_m, middle)
-        prior_sd[FLOOR] = REST_SD_M
+        middle[EDGE], prior_sd[EDGE] = np.log(resting_m), REST_SD_M / resting_m
     common, own = middle, np.zeros((len(kept), len(OWN_SD)))
     windows = [_until(poses, ends, stage) for stage in stages]
     seen = padded(poses, -(-max(windows[-1]) // FRAMES) * FRAMES + 1)

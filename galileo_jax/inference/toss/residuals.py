@@ -11,13 +11,18 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-from galileo_jax.rollout.body import Pose, box, thrown
+from galileo_jax.rollout.body import Pose, box, rotation, thrown
 from galileo_jax.rollout.engine_body import roll_out
 
 # Inertia: principal moment over mass times edge squared; 1/6 of a solid cube, 5/18 of a thin shell.
-COMMON = ("friction", "restitution", "edge", "floor", "gravity", "rounding", "inertia")
-UNITS = {"edge": "m", "floor": "m", "gravity": "m/s^2", "rounding": "m"}
+# Centre: of mass, from the middle of the cube (which is what poses follow), along its own axes.
+CENTRE = ("centre_x", "centre_y", "centre_z")
+COMMON = ("friction", "restitution", "edge", "floor", "gravity", "rounding", "inertia", *CENTRE)
+UNITS = {"edge": "m", "floor": "m", "gravity": "m/s^2", "rounding": "m"} | dict.fromkeys(
+    CENTRE, "m"
+)
 RESTITUTION, FLOOR, EDGE = (COMMON.index(name) for name in ("restitution", "floor", "edge"))
+OFF = COMMON.index(CENTRE[0])  # from here on signed lengths
 SUBSTEPS = 2  # from frame to frame; what that leaves out is far below the model's own errors
 
 
@@ -41,35 +46,47 @@ class Seen(NamedTuple):
 def forward(z: Float[jax.Array, " common"]) -> Float[jax.Array, " common"]:
     """From unbounded numbers to the parameters, in their units.
 
-    In place of the floor the search has the height of the centre when the cube rests on a face,
-    floor + edge / 2: impacts hardly tell floor and edge apart, and that height is seen.
+    In place of the edge the search has the height of the middle when the cube rests on a face,
+    floor + edge / 2. That is seen; corners tell only edge - 2 rounding, so that edge, rounding and
+    floor would go together along a line.
     """
-    positive = jnp.exp(z)
     share = jax.nn.sigmoid(z[RESTITUTION])
-    return positive.at[RESTITUTION].set(share).at[FLOOR].set(z[FLOOR] - positive[EDGE] / 2)
+    edge = 2 * (jnp.exp(z[EDGE]) - z[FLOOR])
+    values = jnp.exp(z).at[RESTITUTION].set(share).at[FLOOR].set(z[FLOOR]).at[EDGE].set(edge)
+    return values.at[OFF:].set(z[OFF:])
 
 
 def backward(value: Float[jax.Array, " common"]) -> Float[jax.Array, " common"]:
     """The inverse."""
-    share = value[RESTITUTION]
-    logs = jnp.log(value.at[FLOOR].set(1.0))
-    resting = value[FLOOR] + value[EDGE] / 2
-    return logs.at[RESTITUTION].set(jnp.log(share / (1 - share))).at[FLOOR].set(resting)
+    share, floor = value[RESTITUTION], value[FLOOR]
+    resting = floor + value[EDGE] / 2
+    logs = jnp.log(value.at[FLOOR].set(1.0).at[OFF:].set(1.0).at[EDGE].set(resting))
+    odds = jnp.log(share / (1 - share))
+    return logs.at[RESTITUTION].set(odds).at[FLOOR].set(floor).at[OFF:].set(value[OFF:])
 
 
 def motion(z: jax.Array, change: jax.Array, start: Start, steps_s: jax.Array) -> Pose:
-    """The poses at all frames of one toss."""
-    friction, restitution, edge, floor, gravity, rounding, inertia = forward(z)
+    """The poses at all frames of one toss; places are those of the middle of the cube."""
+    value = forward(z)
+    friction, restitution, edge, floor, gravity, rounding, inertia = value[:OFF]
+    centre = value[OFF:]
     solid = box(edge * jnp.ones(3), friction, restitution, gravity, floor, rounding)
-    solid = solid._replace(inertia_m2=inertia * edge**2 * jnp.ones(3))
+    solid = solid._replace(
+        corners_m=solid.corners_m - centre, inertia_m2=inertia * edge**2 * jnp.ones(3)
+    )
+    quaternion = times(small(change[3:6]), start.quaternion)
+    spin = start.spin_rad_s + change[9:12]
+    lever = rotation(quaternion) @ centre
     pose = thrown(
         solid,
-        start.position_m + change[:3],
-        times(small(change[3:6]), start.quaternion),
-        start.velocity_m_s + change[6:9],
-        start.spin_rad_s + change[9:12],
+        start.position_m + change[:3] + lever,
+        quaternion,
+        start.velocity_m_s + change[6:9] + jnp.cross(spin, lever),
+        spin,
     )
-    return roll_out(solid, pose, steps_s, SUBSTEPS)
+    poses = roll_out(solid, pose, steps_s, SUBSTEPS)
+    middle = poses.position_m - jax.vmap(rotation)(poses.quaternion) @ centre
+    return poses._replace(position_m=middle)
 
 
 def left_over(
