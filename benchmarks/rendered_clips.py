@@ -1,0 +1,33 @@
+"""Random ramp experiments as videos, for the benchmarks that track and fit rendered clips."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import galileo_jax as gx
+
+ANGLES_DEG, EXPOSURES_S = (10.0, 28.0), (0.001, 0.012)
+FRAME_RATES, SIZES_PX = (30.0, 60.0), ((640, 360), (1280, 720))
+IDEAL, FAULTY = "rendered", "rendered-faults"
+FAULTS: dict[str, Any] = {"faults": True, "camera_fault": ("keystone",), "solver": "fine"}
+
+
+def render(folder: Path, sort: str, seed: int) -> gx.Simulated:
+    """Writes one clip.
+
+    Args:
+      folder: of the files.
+      sort: IDEAL: the engine that fits, a camera square to the scene; FAULTY: another solver,
+        release, foot and hit that are not ideal, and a camera held askew.
+      seed: of all that is drawn.
+    """
+    rng = np.random.default_rng([seed, 7])
+    drawn: dict[str, Any] = {
+        "angle": float(rng.uniform(*ANGLES_DEG)),
+        "fps": float(rng.choice(FRAME_RATES)),
+        "size": SIZES_PX[rng.integers(len(SIZES_PX))],
+        "exposure": float(rng.uniform(*EXPOSURES_S)),
+    }
+    faults = FAULTS if sort == FAULTY else {}
+    return gx.simulate(folder / f"{sort}_{seed}.mp4", seed=seed, **drawn, **faults)
