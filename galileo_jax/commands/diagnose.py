@@ -91,7 +91,8 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
         evidence = "far behind" if is_behind and not is_settled else f"{made.log_evidence:+.1f}"
         lines.append(
             f"{entry['effect']:<26}{entry['probability']:>12.3f}{evidence:>12}"
-            f"{diagnosis_text.p_text(entry['p_value']):>9}  " + ", ".join(strengths)
+            f"{diagnosis_text.p_text(entry['p_value']):>9}  "
+            + (entry["law"] or ", ".join(strengths))
         )
     p_none = diagnosis_text.p_text(diagnosis.base.p_value)
     lines.append(f"{'none':<26}{record['probability_none']:>12.3f}{'+0.0':>12}{p_none:>9}")

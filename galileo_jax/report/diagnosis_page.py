@@ -161,7 +161,7 @@ def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -
     for one, entry in zip(diagnosis.candidates, candidates[:NUM_CANDIDATES], strict=False):
         texts = diagnosis_text.strength_texts(one.effects, entry)
         named = [text if len(texts) == 1 else f"{name} = {text}" for name, text in texts.items()]
-        strengths = ", ".join(named)
+        strengths = entry["law"] or ", ".join(named)
         rows.append(
             [
                 escape(entry["effect"]).replace("_", "_<wbr>").replace("+", "+<wbr>"),

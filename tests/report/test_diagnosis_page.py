@@ -1,6 +1,7 @@
 """The page of a diagnosis: every verdict is told, scripts run, nothing comes from outside."""
 
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import Place
 from galileo_jax.comparison.path_residuals import failing_interval, path_residuals
 from galileo_jax.comparison.phases import PHASES
-from galileo_jax.diagnosis.diagnosis import Verdict
+from galileo_jax.diagnosis.diagnosis import Law, Verdict
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.comparison_page import ComparisonReport, write_comparison_page
@@ -147,6 +148,21 @@ def test_a_fit_at_the_truth_lies_on_the_measured_path(trials):
         assert np.nanmax(np.abs(one.measured_m - one.predicted_m)) < 6e-3  # its foot is no bevel
         assert (one.low_m <= one.high_m).all()
         assert one.noise_m == pytest.approx(np.full_like(one.noise_m, 2e-4), rel=0.1)
+
+
+def test_a_formula_that_does_as_well_is_shown(trials, clip, tmp_path):
+    law = Law("a = -1.1 |v|^1.5 sign(v)", "power_v", "", {})
+    found = diagnosis_of(trials, "ambiguous")
+    first = replace(found.candidates[0], law=law)
+    verdict = replace(found.verdict, effects=("viscous_drag",), law=law)
+    found = replace(found, candidates=(first, *found.candidates[1:]), verdict=verdict)
+    said = f"cannot distinguish between viscous_drag and {law.text}; each of them explains"
+    assert said in diagnosis_text.verdict(found)
+    record = diagnosis_document(trials, found, 0)
+    page = tmp_path / "report.html"
+    report = DiagnosisReport(found, record, GO_ON, None, (clip,), AGAIN, 0)
+    write_diagnosis_page(page, "clip", trials, report)
+    assert page.read_text(encoding="utf-8").count(escape(law.text)) >= 2  # verdict, candidates
 
 
 def test_how_to_go_on(trials):
