@@ -244,8 +244,8 @@ class Diagnosis:
     def save(self, folder: str | Path) -> Path:
         """Writes diagnosis.json, report.html and, below model/, the run of the last model.
 
-        And hypotheses.npz, of which `next_experiment` is made; where the verdict is a law, its
-        effect, too: proposed_effect.py, for `--effects-from`.
+        And hypotheses.npz, of which `next_experiment` is made; where a formula explains the data
+        (law, or ambiguous with one), its effect, too: proposed_effect.py, for `--effects-from`.
         """
         folder, best = Path(folder), self.best
         proposed = folder / PROPOSED
@@ -253,8 +253,9 @@ class Diagnosis:
         if self.verdict.law is not None:
             clips = [Path(clip).name for clip in self.document["clips"]]
             write_text(proposed, proposed_file(self.verdict.law, clips))
-            files = [*best.result.get("effects_from", []), str(proposed.resolve())]
-            best = replace(best, result={**best.result, "effects_from": files})
+            if self.verdict.status == "law":  # the last model has it
+                files = [*best.result.get("effects_from", []), str(proposed.resolve())]
+                best = replace(best, result={**best.result, "effects_from": files})
         write_json(folder / DOCUMENT, self.document)
         write_beliefs(folder / FILE, self.problem, beliefs_of(self.found))
         self.report(folder / "report.html")
@@ -344,9 +345,19 @@ def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
 
 
 def with_library(
-    clips: Sequence[Clip], observations: Sequence[Observation], engine: str
+    clips: Sequence[Clip],
+    observations: Sequence[Observation],
+    engine: str,
+    library: Sequence[str] | None = None,
 ) -> JointProblem:
-    """The joint problem with all effects and nameless forms that have a place in the scene."""
+    """The joint problem with all effects and nameless forms that have a place in the scene.
+
+    Args:
+      clips: of the same objects.
+      observations: of the clips.
+      engine: of the rollouts.
+      library: names of the effects; None: all that are registered.
+    """
 
     def problem_with(names: Sequence[str]) -> JointProblem:
         forms = tuple(form for form in FORMS if form.name in names)
@@ -354,7 +365,8 @@ def with_library(
         return make_joint_problem(clips, observations, engine, (*effects, *forms))
 
     without = SCENARIOS[clips[0].scenario].without
-    names = [name for name in (*effect_names(), *FORM_NAMES) if name not in without]
+    effects = effect_names() if library is None else library
+    names = [name for name in (*effects, *FORM_NAMES) if name not in without]
     problem = problem_with(names)
     absent = problem.without_place()
     return problem_with([name for name in names if name not in absent]) if absent else problem

@@ -22,7 +22,7 @@ from galileo_jax.experiment.choose import (
 )
 from galileo_jax.experiment.settings import check_can, grid, parse_can
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.model.effects.registry import load_file
+from galileo_jax.model.effects.registry import effect_names, load_file
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
@@ -234,10 +234,11 @@ def _read(folder: Path) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
         raise InputError(f"{folder / DOCUMENT}: not a diagnosis ({error})") from error
     for path in files:
         load_file(path)
+    library = effect_names()  # the last model may have a law, which the hypotheses do not know
     fit = load_run(folder / "model")
     clips = [one.clip for one in fit.measurements]
     engine = str(document.get("engine", "auto"))
-    trials = with_library(clips, [one.observation for one in fit.measurements], engine)
+    trials = with_library(clips, [one.observation for one in fit.measurements], engine, library)
     return clips[0], trials, read_beliefs(folder / FILE, trials.names), sources
 
 

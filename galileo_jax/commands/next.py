@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from galileo_jax.api.next_experiment import NextExperiment
 
 NUM_SETTINGS = 8
+LARGE = 1000.0
 NUMBERS = {"gain_nats": "gain nats", "named": "named", "lead_nats": "lead nats", "hit": "hit"}
 
 
@@ -45,9 +46,14 @@ def _lines(ahead: "NextExperiment") -> list[str]:
     lines.append("".join(f"{name:>10}" for name in (*names, *NUMBERS.values())))
     for row in rows:
         cells = [f"{row[name]:g}" for name in names]
-        cells += ["-" if row[key] is None else f"{row[key]:.2f}" for key in NUMBERS]
+        cells += ["-" if row[key] is None else _number(row[key]) for key in NUMBERS]
         lines.append("".join(f"{cell:>10}" for cell in cells))
     return [*lines, "", ahead.sentence]
+
+
+def _number(value: float) -> str:
+    """With two places, or a whole one if it is large."""
+    return f"{value:.2f}" if abs(value) < LARGE else f"{value:.0f}"
 
 
 def _parser() -> command.Parser:
