@@ -7,7 +7,7 @@
    without effects will do and nothing convinces: the verdict is none.
 3. Compare the best with the data, too. Where the best single effect leaves more than noise, or a
    form explains the data better, the best single effects are joined by others; pairs stand in the
-   same table (rules: `verdict`).
+   same table (rules: `verdict`, `law_verdict`).
 4. What leaves only noise and is far more probable than all else is named, unless a clip like this
    one would not tell it from another (`expected_lead`). Several are ambiguous.
 5. Where only a form explains the data, or nothing does, or only what could explain much (two
@@ -29,6 +29,7 @@ from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.fitted_pairs import fitted_pairs, pairs_from_base
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
+from galileo_jax.diagnosis.law_verdict import needs_laws
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.race import Race
@@ -40,7 +41,6 @@ from galileo_jax.diagnosis.verdict import (
     form_that_leads,
     is_nothing_missing,
     looked_at_again,
-    needs_laws,
     needs_pairs,
     ranked,
     rivals,

@@ -8,18 +8,16 @@ import numpy as np
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
 from galileo_jax.diagnosis.expected_lead import expected_leads
-from galileo_jax.diagnosis.laws.in_model import fitted_laws
-from galileo_jax.diagnosis.missing_force import View
-from galileo_jax.diagnosis.verdict import (
+from galileo_jax.diagnosis.law_verdict import (
     contested_by_law,
     law_contested,
     law_odds,
     law_verdict,
-    log_prior,
-    looked_at_again,
     other_formulas,
-    within_luck,
 )
+from galileo_jax.diagnosis.laws.in_model import fitted_laws
+from galileo_jax.diagnosis.missing_force import View
+from galileo_jax.diagnosis.verdict import log_prior, looked_at_again, within_luck
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
 
@@ -44,6 +42,7 @@ def law_candidates(
                 p_value=None,
                 confounded_with=(),
                 law=Law(law.text, law.structure.family, law.source, values),
+                num_constants=len(values),
             )
         )
     return made

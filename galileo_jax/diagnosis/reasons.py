@@ -175,7 +175,7 @@ def only_a_form(form: Candidate, name: Candidate | None) -> Reason:
 
 
 def contested(best: Candidate, rival: Candidate, needed: float) -> Reason:
-    """A rival explains the data about as well."""
+    """A rival explains the data, too: about as well, or one of both is far ahead."""
     behind = best.log_odds - rival.log_odds
     first, second = (best, rival) if behind >= 0 else (rival, best)
     is_close = abs(behind) < needed

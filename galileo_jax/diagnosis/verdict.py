@@ -4,7 +4,8 @@ A hypothesis is judged by two numbers. Its log odds (log evidence by Laplace plu
 nats, over the model without any effect) rank it among all others; the p-value of its comparison
 with the data says whether what it leaves unexplained is more than noise. The rules need no trials
 and no fit, so that each can be tested with candidates made by hand. Every threshold of the
-diagnosis stands here, and every rule says in the verdict's reasons why it fired.
+diagnosis stands here but those of formulas (`law_verdict`), and every rule says in the verdict's
+reasons why it fired.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,8 +18,7 @@ from scipy.special import softmax
 from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.candidates import MAY_STILL_GAIN
-from galileo_jax.diagnosis.diagnosis import Candidate, Reason, Verdict
-from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
+from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
 
 # Difference in log odds, in nats, at which the weaker of two hypotheses is given up: it is then
 # twenty times less probable (e^3 = 20).
@@ -35,8 +35,6 @@ PAIR_P = 0.05
 SECOND_EFFECT_ODDS = 0.1
 # Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
-# An effect of so many constants (how strong, where, how wide) can imitate many motions.
-MANY_CONSTANTS = 3
 # Of the best single effects so many are joined with others, to so many pairs in all. Then either
 # effect of the best pair is kept, and joined with so many that may explain what the other does.
 NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 3
@@ -49,15 +47,6 @@ LAPLACE_NATS = 3.0
 # The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
 # sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
 MOST_LUCK = 4.0
-
-
-# A formula of two factors is a tenth as probable as one of one factor, which has a form's odds.
-LENGTH_ODDS = 0.1
-
-
-def law_odds(num_factors: int) -> float:
-    """How many times as likely as an effect with a name a formula is, before the data."""
-    return UNNAMED_ODDS * LENGTH_ODDS ** (num_factors - 1)
 
 
 def log_prior(odds: Sequence[float], num_effects: int) -> float:
@@ -189,85 +178,6 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     alike = [*names, *forms[:1]]
     contests = (reasons.contested(names[0], rival, decisive) for rival in alike[1:])
     return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *contests))
-
-
-def needs_laws(verdict: Verdict, candidates: Sequence[Candidate]) -> bool:
-    """Whether formulas are to be tried: nothing explains the data, or only what could explain much.
-
-    Two effects at once, or one of many constants, come close to almost any motion; one formula may
-    be simpler.
-    """
-    if verdict.status == "unknown":
-        return True
-    best = next(c for c in candidates if c.name in joined_names(verdict)[:1])
-    return len(best.effects) > 1 or best.num_constants >= MANY_CONSTANTS
-
-
-def joined_names(verdict: Verdict) -> tuple[str, ...]:
-    """The hypotheses that a verdict is about; several effects of one are joined by +."""
-    if verdict.status == "named":
-        return ("+".join(verdict.effects),)
-    return verdict.effects
-
-
-def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive: float) -> Verdict:
-    """The verdict where a formula explains the data about as well as what it is about, or better.
-
-    One effect is ambiguous then, with the formula; two at once, or one that is far behind the
-    formula, are not worth naming. All else stays.
-    """
-    law = next((c for c in candidates if c.law is not None and explains(c)), None)
-    own = next((c for c in candidates if c.name in joined_names(verdict)), None)
-    if law is None or own is None or own.log_odds - law.log_odds >= decisive:
-        return verdict
-    if len(own.effects) > 1 or law.log_odds - own.log_odds >= decisive:
-        return replace(verdict, status="unknown", effects=())
-    return replace(verdict, status="ambiguous", law=law.law)
-
-
-def other_formulas(law: Candidate, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
-    """The candidates without those that are the law's formula in another way."""
-    return tuple(c for c in candidates if c.effects == law.effects or c.family != law.family)
-
-
-def law_verdict(candidates: Sequence[Candidate], decisive: float) -> Verdict | None:
-    """The verdict that a formula explains the data; None where none does and beats all others.
-
-    It must do what a hypothesis that is named must, in a table without forms and laws of the same
-    formula: whether it pushes or changes friction may not be told.
-
-    Args:
-      candidates: as of `verdict_of`, laws among them.
-      decisive: difference in log odds, nats, at which one hypothesis rules out another.
-    """
-    best = next((c for c in candidates if c.law is not None and explains(c)), None)
-    if best is None:
-        return None
-    found = verdict_of(other_formulas(best, candidates), decisive)
-    if found.status != "named" or found.effects != best.effects:
-        return None
-    return replace(found, status="law", law=best.law)
-
-
-def law_contested(candidates: Sequence[Candidate], decisive: float) -> tuple[Reason, ...]:
-    """Why there is no law, where formulas were fitted.
-
-    Args:
-      candidates: as of `law_verdict`, which found none.
-      decisive: nats.
-    """
-    laws = [c for c in candidates if c.law is not None]
-    if not laws:
-        return ()
-    best = next((c for c in laws if explains(c)), None)
-    if best is None:
-        return (reasons.no_law_explains(laws[0]),)
-    others = [c for c in other_formulas(best, candidates) if c.effects != best.effects]
-    ahead = [c for c in others if best.log_odds - c.log_odds < decisive]
-    alike = [c for c in ahead if explains(c)]
-    if ahead and not alike:
-        return (reasons.better_but_contradicted(ahead[0], best),)
-    return tuple(reasons.contested(best, c, decisive) for c in alike[:1])
 
 
 def within_luck(

@@ -66,12 +66,16 @@ class TraceCached:
         shapes = tuple((leaf.shape, leaf.dtype) for leaf in leaves)
         # The setting may be the calling thread's own; dtypes of constants follow it.
         key = (static, tree, shapes, _setting("jax_enable_x64"))
-        with self._lock:  # parts of a batch come on threads: one of them traces
-            program = self._programs.get(key) or self._program(key)
-            self._programs[key] = program
-            self._programs.move_to_end(key)
-            while len(self._programs) > MOST_PROGRAMS:
-                self._programs.popitem(last=False)
+        program = self._programs.get(key)
+        if program is None:
+            with self._lock:  # parts of a batch come on threads: one of them traces
+                program = self._programs.get(key) or self._program(key)
+                self._programs[key] = program
+                while len(self._programs) > MOST_PROGRAMS:
+                    self._programs.popitem(last=False)
+        else:
+            with contextlib.suppress(KeyError):  # another thread has just dropped it
+                self._programs.move_to_end(key)
         return program(leaves)
 
     def _program(self, key: Any) -> Callable[..., Any]:

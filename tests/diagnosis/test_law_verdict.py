@@ -5,17 +5,15 @@ from dataclasses import replace
 import pytest
 
 from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
-from galileo_jax.diagnosis.verdict import (
-    best_named,
+from galileo_jax.diagnosis.law_verdict import (
     contested_by_law,
     law_contested,
     law_odds,
     law_verdict,
-    looked_at_again,
     needs_laws,
     other_formulas,
-    ranked,
 )
+from galileo_jax.diagnosis.verdict import best_named, looked_at_again, ranked
 from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 from tests.diagnosis.test_verdict import DECISIVE, EDGE, candidate
 

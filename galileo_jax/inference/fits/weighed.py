@@ -138,9 +138,9 @@ def weighed(
 
 
 def _part(one: GradientFit, whose: GradientFit, residuals: Residuals, width: float) -> _Part:
-    others = np.flatnonzero(whose.free & ~one.free)
     from galileo_jax.inference.fits.valley import valley_round  # and Equinox, which few calls need
 
+    others = np.flatnonzero(whose.free & ~one.free)
     return _Part(valley_round(one, residuals), one.free, others, width)
 
 

@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Effect, Surroundings, Theta
 
-# Against an effect that is met again and again: all forms together are as probable as two of those.
+# Against an effect that is met again and again; the seven forms together come to 1.5 of those.
 UNNAMED_ODDS = 0.25
 
 
@@ -18,5 +18,5 @@ class Form(Effect):
     """Before the data, against an effect with a name."""
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
-        """As likely as such a form is."""
+        """The same for whatever strength and scene."""
         return self.how_likely

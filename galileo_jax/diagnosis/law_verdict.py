@@ -1,0 +1,101 @@
+"""The rules by which a formula becomes a law, or contests what a verdict is about.
+
+As those of `verdict`, they need no trials and no fit.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from galileo_jax.diagnosis import reasons
+from galileo_jax.diagnosis.diagnosis import Candidate, Reason, Verdict
+from galileo_jax.diagnosis.verdict import explains, verdict_of
+from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
+
+# A formula of two factors is a tenth as probable as one of one factor, which has a form's odds.
+LENGTH_ODDS = 0.1
+# An effect of so many constants (how strong, where, how wide) can imitate many motions.
+MANY_CONSTANTS = 3
+
+
+def law_odds(num_factors: int) -> float:
+    """How many times as likely as an effect with a name a formula is, before the data."""
+    return UNNAMED_ODDS * LENGTH_ODDS ** (num_factors - 1)
+
+
+def needs_laws(verdict: Verdict, candidates: Sequence[Candidate]) -> bool:
+    """Whether formulas are to be tried: nothing explains the data, or only what could explain much.
+
+    Two effects at once, or one of many constants, come close to almost any motion; one formula may
+    be simpler.
+    """
+    if verdict.status == "unknown":
+        return True
+    best = next(c for c in candidates if c.name in joined_names(verdict)[:1])
+    return len(best.effects) > 1 or best.num_constants >= MANY_CONSTANTS
+
+
+def joined_names(verdict: Verdict) -> tuple[str, ...]:
+    """The hypotheses that a verdict is about; several effects of one are joined by +."""
+    if verdict.status == "named":
+        return ("+".join(verdict.effects),)
+    return verdict.effects
+
+
+def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive: float) -> Verdict:
+    """The verdict where a formula explains the data about as well as what it is about, or better.
+
+    One effect is ambiguous then, with the formula; two at once, or one that is far behind the
+    formula, are not worth naming. All else stays.
+    """
+    law = next((c for c in candidates if c.law is not None and explains(c)), None)
+    own = next((c for c in candidates if c.name in joined_names(verdict)), None)
+    if law is None or own is None or own.log_odds - law.log_odds >= decisive:
+        return verdict
+    if len(own.effects) > 1 or law.log_odds - own.log_odds >= decisive:
+        return replace(verdict, status="unknown", effects=())
+    return replace(verdict, status="ambiguous", law=law.law)
+
+
+def other_formulas(law: Candidate, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
+    """The candidates without those that are the law's formula in another way."""
+    return tuple(c for c in candidates if c.effects == law.effects or c.family != law.family)
+
+
+def law_verdict(candidates: Sequence[Candidate], decisive: float) -> Verdict | None:
+    """The verdict that a formula explains the data; None where none does and beats all others.
+
+    It must do what a hypothesis that is named must, in a table without forms and laws of the same
+    formula: whether it pushes or changes friction may not be told.
+
+    Args:
+      candidates: as of `verdict_of`, laws among them.
+      decisive: difference in log odds, nats, at which one hypothesis rules out another.
+    """
+    best = next((c for c in candidates if c.law is not None and explains(c)), None)
+    if best is None:
+        return None
+    found = verdict_of(other_formulas(best, candidates), decisive)
+    if found.status != "named" or found.effects != best.effects:
+        return None
+    return replace(found, status="law", law=best.law)
+
+
+def law_contested(candidates: Sequence[Candidate], decisive: float) -> tuple[Reason, ...]:
+    """Why there is no law, where formulas were fitted.
+
+    Args:
+      candidates: as of `law_verdict`, which found none.
+      decisive: nats.
+    """
+    laws = [c for c in candidates if c.law is not None]
+    if not laws:
+        return ()
+    best = next((c for c in laws if explains(c)), None)
+    if best is None:
+        return (reasons.no_law_explains(laws[0]),)
+    others = [c for c in other_formulas(best, candidates) if c.effects != best.effects]
+    ahead = [c for c in others if best.log_odds - c.log_odds < decisive]
+    alike = [c for c in ahead if explains(c)]
+    if ahead and not alike:
+        return (reasons.better_but_contradicted(ahead[0], best),)
+    return tuple(reasons.contested(best, c, decisive) for c in alike[:1])
