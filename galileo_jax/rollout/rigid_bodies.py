@@ -46,8 +46,9 @@ class Bodies(NamedTuple):
         def between(i: int) -> Number:
             x = [self.path_m[j] + scene.corner_m[j] for j in (i, i + 1)]
             apart = x[1] - x[0] - scene.half_length_m[i + 1] - scene.half_length_m[i]
-            # What stands in the way moves once it was hit.
-            hit = (self.path_m[i + 1] > law.start_m[i + 1] + TOUCH_M) | (self.speed_m_s[i + 1] > 0)
+            # What stands in the way is past its start, or about to be, once it was hit.
+            past_m = self.path_m[i + 1] - law.start_m[i + 1]
+            hit = (past_m > TOUCH_M) | ((past_m > -TOUCH_M) & (self.speed_m_s[i + 1] > 0))
             return apart - jnp.where(hit, law.overlap_m, 0.0)
 
         return tuple(between(i) for i in range(len(self.path_m) - 1))
