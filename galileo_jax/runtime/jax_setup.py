@@ -22,8 +22,15 @@ def set_up() -> None:
     given = os.environ.get("NPROC", "")
     if (int(given) if given.isdigit() else num_cores()) < LEAST_THREADS:
         os.environ["NPROC"] = str(LEAST_THREADS)
-    # Read once, before XLA's first use; whoever has set such options for himself keeps his own.
+    compile_loops_whole()
+    compilation_cache.enable()
+
+
+def compile_loops_whole() -> None:
+    """Sets the flag that XLA reads once, before its first use.
+
+    Whoever has set such options already keeps them.
+    """
     flags = os.environ.get("XLA_FLAGS", "")
     if EXTRA_OPTIONS not in flags:
         os.environ["XLA_FLAGS"] = f"{flags} {EXTRA_OPTIONS}{WHOLE_LOOPS}".strip()
-    compilation_cache.enable()
