@@ -224,7 +224,8 @@ class Residuals:
         step = steps[point, which]
         sides = 2 if is_central else 1
         signed = np.concatenate([step, -step][:sides])
-        return _Moves(*(np.tile(values, sides) for values in (point, slot, which)), signed, sides)
+        point, slot, which = (np.tile(values, sides) for values in (point, slot, which))
+        return _Moves(point, slot, which, signed, sides)
 
     def _seen_slopes(
         self, c: int, points: Batch, index: np.ndarray, motion: tuple[np.ndarray, ...]
