@@ -66,6 +66,11 @@ class Bodies(NamedTuple):
         return state_at(jnp.stack(self.path_m), jnp.stack(speed_m_s), time_s, scene)
 
 
+def rolls(scene: Surroundings, i: int) -> bool:
+    """Whether object `i` is round and may turn."""
+    return bool(scene.rolls) and scene.rolls[i]
+
+
 def of_group(values: Sequence[Number], links: Links) -> Numbers:
     """Of each object the sum over its group."""
 

@@ -1,32 +1,23 @@
 """Whitened residuals of many hypotheses' points, and their slopes, by batches of rollouts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from galileo_jax.inference.fits.fitted_clip import FittedClip
 from galileo_jax.inference.fits.programs import (
-    ClipArrays,
-    Kind,
-    Padded,
     Quadratic,
     seen_slopes_batch,
     white_batch,
 )
-from galileo_jax.inference.joint_problem import JointProblem, in_units
-from galileo_jax.inference.problem import Problem
-from galileo_jax.model.effects.effect import Surroundings
-from galileo_jax.model.parameters import PriorTable
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.runtime.batching import (
-    FRAMES,
     MOTIONS,
-    SPARE_MODES,
     in_chunks,
     rounded_up,
 )
-from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 Motions = list[tuple[np.ndarray, ...]]
 """For each clip parameters in their units, and centres and velocities `[point, ...]`."""
@@ -75,74 +66,6 @@ class Slopes(NamedTuple):
         found = np.zeros((*values.shape[:axis], self.count + 1, *values.shape[axis + 1 :]))
         np.put_along_axis(found, self.index.reshape(shape), values, axis)
         return np.delete(found, self.count, axis)
-
-
-@dataclass(frozen=True)
-class FittedClip:
-    """One clip of the trials, ready for compiled code.
-
-    Attributes:
-      problem: of the clip.
-      column: `[own parameter]`, where its model's parameters stand among those of all clips.
-      priors: of its parameters.
-      absent: `[own parameter]`, values in their units where pinned.
-      data: padded.
-    """
-
-    problem: Problem
-    column: np.ndarray
-    priors: PriorTable
-    absent: np.ndarray
-    data: Padded
-
-    @classmethod
-    def of(cls, trials: JointProblem, index: int) -> "FittedClip":
-        """The clip of that index."""
-        problem, column = trials.problems[index], trials.columns[index]
-        parameters = problem.parameters
-        return cls(
-            problem=problem,
-            column=column,
-            priors=PriorTable.of(parameters),
-            absent=np.array([p.absent for p in parameters]),
-            data=_padded(problem),
-        )
-
-    @property
-    def kind(self) -> Kind:
-        """What its programs are compiled for."""
-        return Kind(*self.problem.kind)
-
-    @property
-    def scene(self) -> Surroundings:
-        """As its model's."""
-        return self.problem.model.scene.surroundings
-
-    @property
-    def arrays(self) -> ClipArrays:
-        """All that its programs need."""
-        return ClipArrays(self.data, self.scene, self.priors, self.absent, self.column)
-
-    def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """`[point, joint parameter]` to this clip's parameters in their units."""
-        own, is_free = z[:, self.column], free[:, self.column]
-        theta = in_chunks(MOTIONS, lambda rows: in_units(self.priors, rows), own)
-        return np.where(is_free, theta, self.absent)
-
-    def search_noise(self, search_sd_m: float) -> float:
-        """The noise scale at which the tracker's median error is that."""
-        observation = self.problem.observation
-        variance = np.trace(observation.covariance_m2, axis1=1, axis2=2)[observation.mask] / 2
-        if not variance.size:
-            return 1.0
-        return max(1.0, search_sd_m / float(np.sqrt(np.median(variance))))
-
-    def unpadded(self, jacobian: np.ndarray) -> np.ndarray:
-        """Rows of real frames only."""
-        shape = self.data.whitening.observed_m.shape
-        frames = len(self.problem.observation.times_s)
-        rows = jacobian.reshape(*shape, -1)[:, :, :frames]
-        return rows.reshape(-1, jacobian.shape[1])
 
 
 class Residuals:
@@ -303,20 +226,3 @@ def _free_index(free: np.ndarray) -> np.ndarray:
         found = np.flatnonzero(own)
         row[: len(found)] = found
     return index
-
-
-def _padded(problem: Problem) -> Padded:
-    """Pads with frames that count for nothing and modes without gain."""
-    times, data = problem.observation.times_s, problem.data
-    frames = rounded_up(len(times), FRAMES) - len(times)
-    # A wobble has as many modes as frames; the others are fewer than those to spare.
-    usual = len(data.observed_m) * (len(times) + frames) + SPARE_MODES
-    modes = max(rounded_up(len(data.gain), FRAMES), usual) - len(data.gain)
-    whitening = Whitening(
-        np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),
-        np.pad(data.inverse_root, [(0, 0), (0, 0), (0, 0), (0, frames)]),
-        np.pad(data.basis, [(0, modes), (0, 0), (0, 0), (0, frames)]),
-        np.pad(data.gain, (0, modes)),
-        data.num_values,
-    )
-    return Padded(np.pad(times, (0, frames), mode="edge"), whitening)

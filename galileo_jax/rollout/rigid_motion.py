@@ -1,0 +1,165 @@
+"""Between events: what accelerates bodies, where that takes them, and when the next event is."""
+
+import functools
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.rollout.motion import Dynamics
+from galileo_jax.rollout.rigid_bodies import (
+    Bodies,
+    Links,
+    Number,
+    Numbers,
+    apart,
+    of_group,
+    rolls,
+    with_link,
+)
+
+PAST_FOOT_M = 1e-12
+
+
+class Accelerations(NamedTuple):
+    """Of centres and rims, m/s^2."""
+
+    centre: Numbers
+    rim: Numbers
+
+
+def moved_on(bodies: Bodies, a: Accelerations, t: jax.Array) -> Bodies:
+    """The bodies after a time `t` of constant accelerations."""
+    q, v, u = bodies
+    return Bodies(
+        tuple(q + v * t + 0.5 * a * t**2 for q, v, a in zip(q, v, a.centre, strict=True)),
+        tuple(v + a * t for v, a in zip(v, a.centre, strict=True)),
+        tuple(u + a * t for u, a in zip(u, a.rim, strict=True)),
+    )
+
+
+def accelerations(
+    bodies: Bodies,
+    at: Bodies,
+    touches: Links,
+    time_s: jax.Array,
+    law: Dynamics,
+    scene: Surroundings,
+) -> Accelerations:
+    """Accelerations, with the forces that act `at` a place and speed.
+
+    Bodies that touch move as one where the rear one would otherwise be faster: groups are
+    merged, each with the sum of its members' forces and masses. Of a group's members those
+    that slip are braked by all their friction; those at rest hold it with up to theirs; and
+    those that roll turn with it, each as long as its friction can turn it so fast.
+    """
+    count = len(scene.names)
+    drive = law.drive(at.state(at.speed_m_s, time_s, scene))
+    brake = law.brake(at.state(at.slip_m_s, time_s, scene))
+    direction = [jnp.sign(slip) for slip in bodies.slip_m_s]
+    sticks = [one == 0 for one in direction]
+    pull = [drive[i] - direction[i] * brake[i] for i in range(count)]
+    inertia = [law.inertia[i] for i in range(count)]
+    rolling = [i for i in range(count) if rolls(scene, i)]
+    rest = [
+        jnp.zeros_like(pull[i]) if i in rolling else jnp.where(sticks[i], brake[i], 0.0)
+        for i in range(count)
+    ]
+    turning = {i: 1 / law.rim[i] for i in rolling}  # the inertia that rolling adds
+
+    def each(links: Links) -> tuple[list[Number], dict[int, Number]]:
+        """Accelerations, and the way those that should roll slip all the same."""
+        pulls, holds = of_group(pull, links), of_group(rest, links)
+        left = [
+            force - jnp.clip(force, -held, held) for force, held in zip(pulls, holds, strict=True)
+        ]
+        masses = of_group(inertia, links)
+        slips = {i: jnp.zeros_like(direction[i]) for i in rolling}
+
+        def with_grip() -> list[Number]:
+            grips = {i: sticks[i] & (slips[i] == 0) for i in rolling}
+            rubs = [
+                slips[i] * brake[i] if i in rolling else jnp.zeros_like(pull[i])
+                for i in range(count)
+            ]
+            turns = [
+                jnp.where(grips[i], turning[i], 0.0) if i in rolling else jnp.zeros_like(pull[i])
+                for i in range(count)
+            ]
+            rubbed, turned = of_group(rubs, links), of_group(turns, links)
+            return [(left[i] - rubbed[i]) / (masses[i] + turned[i]) for i in range(count)]
+
+        if not rolling:
+            return [force / mass for force, mass in zip(left, masses, strict=True)], slips
+        a = with_grip()
+        for _ in rolling:
+            for i in rolling:
+                fails = sticks[i] & (jnp.abs(a[i]) * turning[i] > brake[i])
+                slips[i] = jnp.where(fails, jnp.sign(left[i]), slips[i])
+            a = with_grip()
+        return a, slips
+
+    links = apart(count)
+    a, slips = each(links)
+    for _ in range(count - 1):
+        for i in range(count - 1):
+            links = with_link(links, i, touches[i] & (a[i] > a[i + 1]))
+            a, slips = each(links)
+    rim = [jnp.zeros_like(one) for one in a]
+    for i in rolling:
+        turned = (direction[i] + slips[i]) * brake[i] * law.rim[i]
+        rim[i] = jnp.where(sticks[i] & (slips[i] == 0), a[i], turned)
+    return Accelerations(tuple(a), tuple(rim))
+
+
+class Events(NamedTuple):
+    """When each comes, s from now: ends of slipping, arrivals at the foot, hits of neighbours."""
+
+    grip: Numbers
+    foot: Numbers
+    hit: Numbers
+    soonest: jax.Array
+
+
+def event_times(
+    bodies: Bodies,
+    touches: Links,
+    by: Accelerations,
+    left_s: jax.Array,
+    law: Dynamics,
+    scene: Surroundings,
+) -> Events:
+    """When each event comes at constant accelerations, s; inf where it does not."""
+    grip, foot, hit = [], [], []
+    q, v, a = bodies.path_m, bodies.speed_m_s, by.centre
+    for i, slip in enumerate(bodies.slip_m_s):
+        change = a[i] - by.rim[i] if rolls(scene, i) else a[i]
+        ends = slip * change < 0
+        grip.append(jnp.where(ends, -slip / jnp.where(ends, change, 1.0), jnp.inf))
+        if scene.has_table:
+            toward = jnp.where(q[i] < 0, 1.0, -1.0)
+            far = jnp.abs(q[i])
+            comes = _reaches(far, toward * v[i], toward * a[i])
+            foot.append(jnp.where(far > PAST_FOOT_M, comes, jnp.inf))
+    for i, gap in enumerate(bodies.gap_m(law, scene)):
+        meets = _reaches(gap, v[i] - v[i + 1], a[i] - a[i + 1])
+        hit.append(jnp.where(touches[i], jnp.inf, meets))
+    soonest = functools.reduce(jnp.minimum, (*grip, *foot, *hit), left_s)
+    return Events(tuple(grip), tuple(foot), tuple(hit), soonest)
+
+
+def _reaches(distance: jax.Array, v: jax.Array, a: jax.Array) -> jax.Array:
+    """The first time t >= 0 at which v t + a t^2 / 2 >= `distance` on the way there; inf if never.
+
+    Where the distance is negative: as soon as the speed is not.
+    """
+    under_root = v**2 + 2 * a * distance
+    forward = (v > 0) & ((under_root > 0) | (distance <= 0))
+    turning = (v <= 0) & (a > 0)
+    is_real = under_root > 0
+    root = jnp.where(is_real, jnp.sqrt(jnp.where(is_real, under_root, 1.0)), 0.0)
+    # For v > 0 the usual formula times its conjugate: no cancellation, and a may be zero.
+    at_once = 2 * jnp.maximum(distance, 0.0) / jnp.where(forward, v + root, 1.0)
+    later = (root - v) / jnp.where(turning, a, 1.0)
+    return jnp.where(forward, at_once, jnp.where(turning, later, jnp.inf))
