@@ -11,11 +11,11 @@ from galileo_jax.diagnosis.laws.screen import (
     BEHIND,
     NUM_LAWS,
     NUM_SINGLE,
-    Sight,
     Suggestion,
     chosen,
     suggestion_of,
 )
+from galileo_jax.diagnosis.laws.sight import Sight
 
 FACTOR = {factor.label: factor for factor in FACTORS}
 RANGES = {"t": (0.0, 1.0), "q": (-0.5, 0.5)}
