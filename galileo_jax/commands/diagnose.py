@@ -100,7 +100,7 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
     if hidden is not None:
         lines.append(f"truth: {hidden}")
     lines += [f"why: {why.sentence}" for why in found.verdict.reasons]
-    if diagnosis.missing is not None:
+    if diagnosis.missing is not None and found.verdict.status != "law":
         lines += [
             f"missing acceleration of {name}: {entry['formula']}"
             for name, entry in record["missing_force"]["objects"].items()

@@ -23,7 +23,7 @@ from dataclasses import replace
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
-from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.candidates import Hypothesis, reduced
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
@@ -136,9 +136,11 @@ def diagnose(
     views: list[View] = []
     if needs_laws(verdict, candidates):
         on_stage("inferring the missing force without a form")
-        views = views_of(trials, base)
+        # Where much is missing, friction without it is far from the truth: to 0, say.
+        near = reduced(trials, candidates[0].hypothesis, ())
+        views = views_of(trials, near)
         on_stage("looking for a law")
-        laws = law_candidates(trials, base, views, len(library))
+        laws = law_candidates(trials, base, near, views, len(library), candidates)
         for candidate in ranked(laws):
             on_candidate(candidate)
         candidates = _compared(trials, (*candidates, *laws), decisive, seed, compared)

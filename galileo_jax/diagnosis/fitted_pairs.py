@@ -57,6 +57,8 @@ def pairs_from_base(race: Race, candidates: Sequence[Candidate]) -> list[Candida
     """
     known = {frozenset(c.effects): c for c in candidates}
     sets = pairs_from_scratch(candidates)
+    if not sets:  # a library of one effect
+        return []
     made = race([race.base] * len(sets), sets)
     olds = [known.get(frozenset(new.effects)) for new in made]
     return [

@@ -23,11 +23,26 @@ from galileo_jax.inference.result import error_of
 
 
 def law_candidates(
-    trials: JointProblem, base: Hypothesis, views: Sequence[View], num_effects: int
+    trials: JointProblem,
+    base: Hypothesis,
+    near: Hypothesis,
+    views: Sequence[View],
+    num_effects: int,
+    fitted: Sequence[Candidate],
 ) -> list[Candidate]:
-    """Formulas that the missing force suggests, fitted in the model."""
+    """Formulas that the missing force suggests, fitted in the model.
+
+    Args:
+      trials: what was diagnosed.
+      base: the model without effects, fitted to them, from which evidence counts.
+      near: no effects, all else as in `views`' hypothesis.
+      views: of each clip.
+      num_effects: in the library.
+      fitted: ranked; the formula of the best form is tried, too, with its constants free.
+    """
     made = []
-    for law in fitted_laws(trials, base, views):
+    families = [c.family for c in fitted[:1] if c.family is not None]
+    for law in fitted_laws(trials, near, views, families):
         fit, own = law.hypothesis.fit, law.hypothesis.of(trials)
         values = {name: f"{value:.4g}" for name, value in law.constants().items()}
         made.append(

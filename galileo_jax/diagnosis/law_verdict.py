@@ -57,8 +57,22 @@ def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive
 
 
 def other_formulas(law: Candidate, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
-    """The candidates without those that are the law's formula in another way."""
-    return tuple(c for c in candidates if c.effects == law.effects or c.family != law.family)
+    """The candidates without those that are the law's formula in another way.
+
+    So is the law times a factor more if that is no more probable: the factor does nothing here.
+    """
+    return tuple(
+        c
+        for c in candidates
+        if c.effects == law.effects
+        or not (c.family == law.family or (_has_factors_of(law, c) and c.log_odds <= law.log_odds))
+    )
+
+
+def _has_factors_of(law: Candidate, other: Candidate) -> bool:
+    """Whether a formula has all factors of a law, and more."""
+    own, others = (set((c.family or "").split("*")) for c in (law, other))
+    return own < others
 
 
 def law_verdict(candidates: Sequence[Candidate], decisive: float) -> Verdict | None:

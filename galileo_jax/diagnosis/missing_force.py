@@ -24,7 +24,7 @@ from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.diagnosis.formula import NOT_SIMPLE, Formula, Sight, find_formula
 from galileo_jax.inference.free_force.along_path import along_path
-from galileo_jax.inference.free_force.free_fit import FreeFit, free_fit
+from galileo_jax.inference.free_force.free_fit import FreeFit, embedded, free_fit
 from galileo_jax.inference.free_force.spans import MOVES_M_S
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
@@ -52,7 +52,7 @@ def infer_missing_force(
       trials: whose models have the hypothesis' effects.
       hypothesis: fitted to them.
       seed: of the posterior's draws.
-      views: from `views_of`, where they are there already.
+      views: from `views_of`, where they are there already, of whatever hypothesis.
 
     Returns:
       The first clip's, NaN where an object is at rest or not seen. Its zero is the hypothesis
@@ -62,6 +62,10 @@ def infer_missing_force(
       away.
     """
     views = views or views_of(trials, hypothesis)
+    alone = JointProblem((trials.problems[0],))
+    column, fit = trials.columns_of(0), hypothesis.fit
+    before = embedded(alone, views[0].trials, fit.z[column], fit.free[column])
+    views = [replace(views[0], before=np.nan_to_num(before)), *views[1:]]
     count = len(views[0].path_m)
     formulas = [find_formula([_sight(view, i) for view in views]) for i in range(count)]
     first = views[0]

@@ -108,6 +108,11 @@ def sentence_of(best: Expected, about: str | None = None) -> str:
     if about is not None:
         narrower = math.exp(best.gain_nats)
         return f"{where}: the interval of {about} becomes {narrower:.1f} times narrower"
+    if math.isinf(best.lead_nats):
+        return (
+            "only one hypothesis is open of those that can be rehearsed (a law is not): ask about "
+            "a parameter (--about)"
+        )
     if best.gain_nats < LITTLE:
         return (
             f"no setting is expected to tell more: at best {best.gain_nats:.2f} nats, with {where}"

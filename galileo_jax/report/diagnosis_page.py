@@ -201,12 +201,14 @@ def _missing(report: DiagnosisReport, names: Sequence[str]) -> str:
         share = missing.share_explained[i]
         explains = f" (explains {100 * share:.0f} % of what is missing)" if share > 0 else ""
         formulas.append(f"{name}: {missing.formula[i]}{explains}")
+    law = report.diagnosis.verdict.law
+    found = "; ".join(formulas) if law is None else f"the law {law.text}"
     return chart_section(
         "The missing force",
         "The acceleration along the path that the model lacks, in m/s², with its 95 % band, "
         "inferred without assuming a formula. The simplest formula that fits, with q the position "
         "in m past the foot, v the speed in m/s and t the time in s since the release: "
-        f"{'; '.join(formulas)}.",
+        f"{found}.",
         charts,
     )
 

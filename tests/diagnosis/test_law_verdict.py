@@ -145,3 +145,14 @@ def test_formulas_are_tried_where_nothing_explains_or_only_what_could_explain_mu
 def test_a_second_factor_makes_a_formula_a_tenth_as_probable():
     assert law_odds(1) == pytest.approx(UNNAMED_ODDS)
     assert law_odds(2) == pytest.approx(UNNAMED_ODDS / 10)
+
+
+@pytest.mark.parametrize(("ahead", "expected"), [(0.0, "law"), (-EDGE, "law"), (EDGE, None)])
+def test_a_factor_more_that_does_nothing_is_no_rival(ahead, expected):
+    longer = law(50.0 + ahead, family="linear_q*power_v", name="law_2")
+    found = status(law(50.0), longer)
+    assert found == expected
+
+
+def test_a_longer_formula_of_other_factors_is_a_rival():
+    assert status(law(50.0), law(49.0, family="linear_q*power_t", name="law_2")) is None

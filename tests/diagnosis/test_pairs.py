@@ -1,10 +1,14 @@
 """Which pairs are tried, and what a second effect promises beside a fit that is bent already."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis.fitted_pairs import pairs_from_base
 from galileo_jax.diagnosis.pairs import pairs_from_scratch
 from galileo_jax.diagnosis.score_tests import best_gains
 from galileo_jax.diagnosis.verdict import ranked
@@ -37,6 +41,11 @@ def test_pairs_from_scratch_are_the_best_so_far_and_those_of_the_best_singles():
     found = {frozenset(pair) for pair in pairs_from_scratch(table)}
     expected = {"ab", "xy", "xz", "ac", "ad", "bc", "bd", "cd"}
     assert found == {frozenset(pair) for pair in expected}
+
+
+def test_a_library_of_one_effect_has_no_pairs():
+    nothing: Any = SimpleNamespace(base=None)  # what is called, fails
+    assert pairs_from_base(nothing, ranked([candidate("a", 9.0)])) == []
 
 
 def test_a_nuisance_far_out_promises_its_own_to_the_effect_that_it_stands_for(

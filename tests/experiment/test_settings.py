@@ -1,7 +1,10 @@
 """What a lab can set: how it is written, what is refused, which settings are looked at."""
 
+import math
+
 import pytest
 
+from galileo_jax.experiment.choose import Expected, sentence_of
 from galileo_jax.experiment.settings import (
     KNOWN,
     MOST_SETTINGS,
@@ -77,3 +80,9 @@ def test_a_setting_in_words():
     assert text_of({"height_m": 0.15, "fps": 60.0, "swap": 1.0, "colour": "red"}) == (
         "release object 1 from 0.15 m, 60 frames per second, objects swapped, colour red"
     )
+
+
+def test_with_one_hypothesis_there_is_nothing_to_tell():
+    only = Expected({"height": 0.2}, 0.0, 1.0, math.inf, None)
+    assert "only one hypothesis is open" in sentence_of(only)
+    assert "k2 becomes 1.0 times narrower" in sentence_of(only, "k2")

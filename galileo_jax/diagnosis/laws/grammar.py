@@ -17,6 +17,9 @@ from galileo_jax.model.parameters import LogNormal, Normal, Prior, Uniform
 
 Variable = str  # "t", "q" or "v"
 
+VARIETIES = {"far_q": "pulse_q", "slope_q": "pull_q"}
+"""Shapes that differ in their tails only: near a place, and to or from a place."""
+
 
 @dataclass(frozen=True)
 class Constant:
@@ -55,6 +58,11 @@ class Factor:
     def label(self) -> str:
         """`power_v`."""
         return f"{self.name}_{self.variable}"
+
+    @property
+    def kind(self) -> str:
+        """The label of the shape that this one is a variety of, its own as a rule."""
+        return VARIETIES.get(self.label, self.label)
 
     def value(self, t: Any, q: Any, v: Any, xp: Any, constants: Sequence[Any]) -> Any:
         """The shape, with its constants by their order; `xp` is NumPy or JAX."""
@@ -207,9 +215,9 @@ class Structure:
         """What makes two formulas the same: `power_v`.
 
         Left out is what a passage in one direction does not tell: a push from a change of
-        friction, and often on whom it acts.
+        friction, and often on whom it acts; and the tails of a shape.
         """
-        return "*".join(sorted(factor.label for factor in self.factors))
+        return "*".join(sorted(factor.kind for factor in self.factors))
 
     @property
     def constants(self) -> dict[str, tuple[Factor, Constant]]:

@@ -1,6 +1,6 @@
 """Suggested formulas as effects, fitted to the track in the model with all else free."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
@@ -59,22 +59,28 @@ class FittedLaw:
         return text.replace("= -c ", "= c ").replace("= c ", f"= {sign:.3g} ", 1)
 
 
-def fitted_laws(trials: JointProblem, base: Hypothesis, views: Sequence[View]) -> list[FittedLaw]:
+def fitted_laws(
+    trials: JointProblem,
+    near: Hypothesis,
+    views: Sequence[View],
+    families: Collection[str] = (),
+) -> list[FittedLaw]:
     """The best few formulas, fitted; the most evident first.
 
     If the best has two factors, it is tried without either, too: one may do nothing.
 
     Args:
       trials: what was diagnosed.
-      base: the model without effects, fitted to them.
+      near: no effects, all else from where fits start.
       views: of each clip, from `missing_force.views_of`.
+      families: that are tried whatever the screening says of them.
     """
-    made = _fitted(trials, base, suggestions(views), views)
+    made = _fitted(trials, near, suggestions(views, families), views)
     known = {name_of(law.structure) for law in made}
     simpler = (
         [one for one in _simpler(made[0]) if name_of(one.structure) not in known] if made else []
     )
-    made += _fitted(trials, base, simpler, views)
+    made += _fitted(trials, near, simpler, views)
     return sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence)
 
 
@@ -85,7 +91,7 @@ def _simpler(law: FittedLaw) -> list[Suggestion]:
 
 
 def _fitted(
-    trials: JointProblem, base: Hypothesis, found: Sequence[Suggestion], views: Sequence[View]
+    trials: JointProblem, near: Hypothesis, found: Sequence[Suggestion], views: Sequence[View]
 ) -> list[FittedLaw]:
     """Suggestions as laws in the model, fitted; the most evident first."""
     if not found:
@@ -96,8 +102,8 @@ def _fitted(
     where = [extended.names.index(name) if name in extended.names else -1 for name in trials.names]
     z = np.zeros(len(extended.names))
     for old, new in enumerate(where):
-        if new >= 0 and base.fit.free[old]:
-            z[new] = base.fit.z[old]
+        if new >= 0 and near.fit.free[old]:
+            z[new] = near.fit.z[old]
     starts, free, owner = [], [], []
     for i, one in enumerate(found):
         is_free = extended.free([name_of(one.structure)])[:count]
@@ -143,7 +149,7 @@ def _with_laws(
 def _starts(
     extended: JointProblem, z: np.ndarray, one: Suggestion, views: Sequence[View]
 ) -> list[np.ndarray]:
-    """Starts in z: constants of the screening; all else as without effects, or as goes with it."""
+    """Starts in z: constants of the screening; all else as given, or as goes with it."""
     name, found = name_of(one.structure), []
     for constants, strength in zip(one.starts, one.strengths, strict=True):
         values = {f"{name}_{key}": value for key, value in constants.items()}

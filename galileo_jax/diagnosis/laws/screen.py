@@ -4,24 +4,34 @@
 
 with everything that friction, masses and nuisances can do made part of the noise, as in `formula`.
 The response was computed by rollouts round a fit with a free acceleration, so that the data are
-explained, not the smooth curve. Constants are tried on grids; what is asked of a formula is
+explained, not the smooth curve. What is asked of a formula is
 
     gain in chi2 / 2  -  log(n) / 2 for each number  -  log(10) for a second factor.
+
+Constants are tried on grids, and from the best point of a grid on by Nelder and Mead's simplex
+(1965, 10.1093/comjnl/7.4.308): where a thousand nats are to be explained, a place that is half a
+grid step off costs dozens.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import log
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.optimize import minimize
 
 from galileo_jax.diagnosis.laws.grammar import Structure, structures
+from galileo_jax.diagnosis.laws.sight import Sight
 from galileo_jax.diagnosis.missing_force import View
 
 LENGTH_NATS = log(10.0)  # a second factor makes a formula a tenth as probable
 NUM_LAWS, NUM_OF_FAMILY, NUM_STARTS = 8, 2, 3
-BEHIND = 40.0  # nats: what is further behind the best formula is not fitted
+BEHIND = 40.0  # nats: what is further behind the best formula is not fitted, and
+BEHIND_SHARE = 0.1  # of its score: so wrong is a linear model of large changes
+NUM_SINGLE = 4  # of NUM_LAWS, at least, have one factor: two fit anything in a linear model
+SAME = 0.5  # nats: formulas of a family and nature that differ less do not differ here
+APART = 0.2  # of a grid: starts that are nearer come to the same end
+MOST_TRIES = 150  # of the simplex
 SHOWS = 1e-6  # of the largest column: what is less does not show
 
 
@@ -31,7 +41,7 @@ class Suggestion:
 
     Attributes:
       structure: of the formula.
-      starts: constants by name, the best first.
+      starts: constants by name, the best first, none near another.
       strengths: c of each start, of the first object; of a friction c times its coefficient.
       score: nats, see above.
     """
@@ -42,82 +52,51 @@ class Suggestion:
     score: float
 
 
-@dataclass(frozen=True)
-class Sight:
-    """One clip's target and responses, all else made part of the noise.
+def suggestions(views: Sequence[View], families: Collection[str] = ()) -> list[Suggestion]:
+    """The formulas that promise most, best first.
 
-    Attributes:
-      view: the clip's.
-      target: `[value]`.
-      responses: of each object `[value, time]`.
-      masses: of the objects, kg.
+    Args:
+      views: of each clip.
+      families: that are to be among them.
     """
-
-    view: View
-    target: np.ndarray
-    responses: tuple[np.ndarray, ...]
-    masses: np.ndarray
-
-    @classmethod
-    def of(cls, view: View) -> "Sight":
-        """From a view."""
-        target = view.target()
-        rest = view.fit.jacobian[:, view.others()]
-        lower = np.linalg.cholesky(np.eye(len(target)) + rest @ rest.T)
-        white = solve_triangular(lower, target, lower=True)
-        responses = []
-        for i in range(len(view.path_m)):
-            shown = np.zeros((len(target), len(view.time_s)))
-            if view.moves[i].any():
-                shown[:, view.moves[i]] = solve_triangular(lower, view.shows(i), lower=True)[
-                    :, view.moves[i]
-                ]
-            responses.append(shown)
-        theta = view.trials.theta(view.fit.z, view.fit.free)
-        named = view.model.by_name(view.trials.of_clip(theta, 0))
-        masses = [float(named[f"m{i + 1}"]) for i in range(len(view.path_m))]
-        return cls(view, white, tuple(responses), np.array(masses))
-
-    def columns(self, structure: Structure, grid: Mapping[str, np.ndarray]) -> np.ndarray:
-        """How the formula with a strength of 1 shows, `[object, value, point of the grid]`."""
-        view, found = self.view, []
-        scene = view.model.scene.surroundings
-        constants = {name: values[:, None] for name, values in grid.items()}
-        for i, response in enumerate(self.responses):
-            if i > 0 and not structure.is_on_all:
-                continue
-            q, v = view.path_m[i], view.speed_m_s[i]
-            size = len(next(iter(grid.values()))) if grid else 1
-            f = np.broadcast_to(
-                structure.value(view.time_s, q, v, constants), (size, len(view.time_s))
-            )
-            if structure.nature != "push":
-                f = -np.sign(v) * f
-            if structure.nature == "friction":
-                f = f * scene.gravity * np.where(q < 0, np.cos(scene.angle_rad), 1.0)
-            if structure.nature == "drag_force":
-                f = f * self.masses[0] / self.masses[i]
-            found.append(response @ f.T)
-        return np.stack(found)
-
-
-def suggestions(views: Sequence[View]) -> list[Suggestion]:
-    """The formulas that promise most, best first."""
     sights = [Sight.of(view) for view in views]
     scene = views[0].model.scene.surroundings
     ranges = _ranges(views)
     found = [
         one
         for structure in structures(scene.has_surface, len(scene.names))
-        if (one := _suggestion(sights, structure, ranges)) is not None
+        if (one := suggestion_of(sights, structure, ranges)) is not None
     ]
-    found.sort(key=lambda one: -one.score)
-    chosen: list[Suggestion] = []
+    return chosen(found, families)
+
+
+def chosen(found: Sequence[Suggestion], wanted: Collection[str] = ()) -> list[Suggestion]:
+    """Of all formulas those that are to be fitted, best first.
+
+    The best of families that are wanted come first, then the best single factors; of each family
+    the second must differ from the best.
+    """
+    found = sorted(found, key=lambda one: -one.score)
+    best_score = found[0].score if found else 0.0
+    least = max(best_score - max(BEHIND, BEHIND_SHARE * best_score), 0.0)
+    families: dict[str, list[Suggestion]] = {}
     for one in found:
-        alike = [c for c in chosen if c.structure.family == one.structure.family]
-        if len(alike) < NUM_OF_FAMILY and one.score > max(found[0].score - BEHIND, 0.0):
-            chosen.append(one)
-    return chosen[:NUM_LAWS]
+        alike = families.setdefault(one.structure.family, [])
+        is_new = all(
+            one.structure.nature != other.structure.nature or other.score - one.score > SAME
+            for other in alike
+        )
+        is_wanted = one.structure.family in wanted and not alike
+        if (one.score > least and is_new and len(alike) < NUM_OF_FAMILY) or is_wanted:
+            alike.append(one)
+    best = [alike[0] for alike in families.values() if alike]
+    best.sort(key=lambda one: one.structure.family not in wanted)
+    single = [one for one in best if len(one.structure.factors) == 1][:NUM_SINGLE]
+    second = [one for alike in families.values() for one in alike[1:]]
+    others = sorted(
+        [*(one for one in best if one not in single), *second], key=lambda one: -one.score
+    )
+    return sorted([*single, *others][:NUM_LAWS], key=lambda one: -one.score)
 
 
 def _ranges(views: Sequence[View]) -> dict[str, tuple[float, float]]:
@@ -151,11 +130,57 @@ def _grid(structure: Structure, ranges: Mapping[str, tuple[float, float]]) -> di
     return {name: point.ravel() for name, point in zip(structure.constants, points, strict=True)}
 
 
-def _suggestion(
+def suggestion_of(
     sights: Sequence[Sight], structure: Structure, ranges: Mapping[str, tuple[float, float]]
 ) -> Suggestion | None:
-    """The best constants of a formula; None where it does not show."""
+    """The best constants of a formula; None where it does not show.
+
+    Args:
+      sights: of each clip.
+      structure: of the formula.
+      ranges: of time and place, by variable.
+    """
     grid = _grid(structure, ranges)
+    gain, strength = _gains(sights, structure, grid)
+    if not gain.size:
+        return None
+    best = _apart(gain, grid)
+    starts = [{name: float(values[i]) for name, values in grid.items()} for i in best]
+    strengths, highest = [float(strength[i]) for i in best], float(gain[best[0]])
+    if grid:
+        better = _refined(sights, structure, grid, starts[0])
+        gain, strength = _gains(sights, structure, {k: np.array([v]) for k, v in better.items()})
+        if gain.size and gain[0] > highest:
+            starts[0], strengths[0], highest = better, float(strength[0]), float(gain[0])
+    numbers = 1 + len(structure.constants)
+    if structure.nature == "friction":  # the strength times each object's own coefficient
+        numbers += (len(sights[0].responses) - 1) * structure.is_on_all
+    price = 0.5 * numbers * log(sum(np.count_nonzero(sight.target) for sight in sights))
+    price += LENGTH_NATS * (len(structure.factors) - 1)
+    return Suggestion(structure, tuple(starts), tuple(strengths), highest - price)
+
+
+def _apart(gain: np.ndarray, grid: Mapping[str, np.ndarray]) -> list[int]:
+    """The best points of a grid, the best first, none beside another."""
+    found: list[int] = []
+    if not grid:
+        return [0]
+    unit = np.stack([(values - values.min()) / np.ptp(values) for values in grid.values()], axis=1)
+    for i in np.argsort(-gain):
+        if all(np.abs(unit[i] - unit[j]).max() > APART for j in found):
+            found.append(int(i))
+        if len(found) == NUM_STARTS:
+            break
+    return found
+
+
+def _gains(
+    sights: Sequence[Sight], structure: Structure, grid: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Half of what chi2 falls by, and the first object's strength, `[point of the grid]`.
+
+    Both are empty where the formula shows nowhere.
+    """
     columns = np.concatenate([sight.columns(structure, grid) for sight in sights], axis=1)
     if structure.nature != "friction":
         columns = columns.sum(axis=0, keepdims=True)
@@ -164,18 +189,36 @@ def _suggestion(
     along = np.einsum("ovg,v->go", columns, target)
     size = np.trace(power, axis1=1, axis2=2)
     if not size.max() > SHOWS:
-        return None
+        return np.empty(0), np.empty(0)
     # Strengths of unit size are what the priors expect.
     power = power + 0.1 * np.eye(power.shape[-1])
     strength = np.linalg.solve(power, along[..., None])[..., 0]
     gain = 0.5 * np.einsum("go,go->g", along, strength)
-    numbers = columns.shape[0] + len(structure.constants)
-    price = 0.5 * numbers * log(np.count_nonzero(target))
-    price += LENGTH_NATS * (len(structure.factors) - 1)
-    best = np.argsort(-gain)[:NUM_STARTS]
-    return Suggestion(
-        structure,
-        tuple({name: float(values[i]) for name, values in grid.items()} for i in best),
-        tuple(float(strength[i, 0]) for i in best),
-        float(gain[best[0]]) - price,
-    )
+    if structure.nature == "friction":
+        for sight in sights:
+            gain = np.where(sight.is_possible(structure, grid, strength), gain, 0.0)
+    return gain, strength[:, 0]
+
+
+def _refined(
+    sights: Sequence[Sight],
+    structure: Structure,
+    grid: Mapping[str, np.ndarray],
+    start: Mapping[str, float],
+) -> dict[str, float]:
+    """The constants that explain most, from the best point of the grid on, within the grid."""
+    low, high = (np.array([f(values) for values in grid.values()]) for f in (np.min, np.max))
+
+    def without(unit: np.ndarray) -> float:
+        values = low + unit * (high - low)
+        point = {name: values[i : i + 1] for i, name in enumerate(grid)}
+        gain, _ = _gains(sights, structure, point)
+        return -float(gain[0]) if gain.size else 0.0
+
+    at = (np.array(list(start.values())) - low) / (high - low)
+    steps = [0.5 / max(len(np.unique(values)) - 1, 1) for values in grid.values()]
+    simplex = np.vstack([at, at + np.diag(np.where(at < 0.5, steps, np.negative(steps)))])
+    options = {"initial_simplex": simplex, "maxfev": MOST_TRIES, "xatol": 1e-3, "fatol": 0.1}
+    bounds = [(0.0, 1.0)] * len(at)
+    found = minimize(without, at, method="Nelder-Mead", bounds=bounds, options=options)
+    return dict(zip(grid, (low + found.x * (high - low)).tolist(), strict=True))

@@ -90,7 +90,7 @@ def free_fit(
             spans = spans_of(problem, extended.of_clip(theta, clip))
             problems.append(with_free_acceleration(problem, spans))
         extended = JointProblem(tuple(problems))
-        found = _fitted(extended, [_embedded(trials, extended, z, free)])
+        found = _fitted(extended, [embedded(trials, extended, z, free)])
         theta = extended.theta(found.z, found.free)
     return found
 
@@ -113,7 +113,7 @@ def resized(found: FreeFit, sizes_m_s2: Sequence[float]) -> FreeFit:
     return _fitted(extended, [found.start, z], found.free)
 
 
-def _embedded(
+def embedded(
     trials: JointProblem, extended: JointProblem, z: np.ndarray, free: np.ndarray
 ) -> np.ndarray:
     """A hypothesis' z among the parameters of the extended trials; NaN where it pins one."""

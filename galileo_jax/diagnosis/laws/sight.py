@@ -1,0 +1,98 @@
+"""How a formula shows in one clip, with everything that friction and masses can do made noise."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from galileo_jax.diagnosis.laws.grammar import Structure
+from galileo_jax.diagnosis.missing_force import View
+
+LEAST_FRICTION = -0.05  # that a coefficient may come to, beyond minus itself: it may be wrong
+
+
+@dataclass(frozen=True)
+class Sight:
+    """One clip's target and responses, all else made part of the noise.
+
+    Attributes:
+      view: the clip's.
+      target: `[value]`.
+      responses: of each object `[value, time]`.
+      masses: of the objects, kg.
+      frictions: their coefficients.
+    """
+
+    view: View
+    target: np.ndarray
+    responses: tuple[np.ndarray, ...]
+    masses: np.ndarray
+    frictions: np.ndarray
+
+    @classmethod
+    def of(cls, view: View) -> "Sight":
+        """From a view."""
+        target = view.target()
+        rest = view.fit.jacobian[:, view.others()]
+        lower = np.linalg.cholesky(np.eye(len(target)) + rest @ rest.T)
+        white = solve_triangular(lower, target, lower=True)
+        responses = []
+        for i in range(len(view.path_m)):
+            shown = np.zeros((len(target), len(view.time_s)))
+            if view.moves[i].any():
+                shown[:, view.moves[i]] = solve_triangular(lower, view.shows(i), lower=True)[
+                    :, view.moves[i]
+                ]
+            responses.append(shown)
+        theta = view.trials.theta(view.fit.z, view.fit.free)
+        named = view.model.by_name(view.trials.of_clip(theta, 0))
+        masses, frictions = (
+            np.array([float(named.get(f"{name}{i + 1}", 0.0)) for i in range(len(view.path_m))])
+            for name in ("m", "k")
+        )
+        return cls(view, white, tuple(responses), masses, frictions)
+
+    def _values(self, structure: Structure, grid: Mapping[str, np.ndarray], i: int) -> np.ndarray:
+        """The formula on the way of object i, `[point of the grid, time]`."""
+        view, size = self.view, len(next(iter(grid.values()))) if grid else 1
+        constants = {name: values[:, None] for name, values in grid.items()}
+        q, v = view.path_m[i], view.speed_m_s[i]
+        f = structure.value(view.time_s, q, v, constants)
+        return np.broadcast_to(f, (size, len(view.time_s)))
+
+    def is_possible(
+        self, structure: Structure, grid: Mapping[str, np.ndarray], strength: np.ndarray
+    ) -> np.ndarray:
+        """Whether no friction would have to be negative, `[point of the grid]`.
+
+        Args:
+          structure: of a friction.
+          grid: of its constants.
+          strength: `[point of the grid, object]`, c times the coefficients.
+        """
+        found = np.ones(len(strength), bool)
+        for i in range(strength.shape[1]):
+            if self.view.moves[i].any():
+                f = self._values(structure, grid, i)[:, self.view.moves[i]]
+                change = (strength[:, i : i + 1] * f).min(axis=1)
+                found &= change >= LEAST_FRICTION - 2 * self.frictions[i]
+        return found
+
+    def columns(self, structure: Structure, grid: Mapping[str, np.ndarray]) -> np.ndarray:
+        """How the formula with a strength of 1 shows, `[object, value, point of the grid]`."""
+        view, found = self.view, []
+        scene = view.model.scene.surroundings
+        for i, response in enumerate(self.responses):
+            if i > 0 and not structure.is_on_all:
+                continue
+            q, v = view.path_m[i], view.speed_m_s[i]
+            f = self._values(structure, grid, i)
+            if structure.nature != "push":
+                f = -np.sign(v) * f
+            if structure.nature == "friction":
+                f = f * scene.gravity * np.where(q < 0, np.cos(scene.angle_rad), 1.0)
+            if structure.nature == "drag_force":
+                f = f * self.masses[0] / self.masses[i]
+            found.append(response @ f.T)
+        return np.stack(found)
