@@ -41,9 +41,9 @@ from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.commands import command
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.density import Part, Rolled, parts_of
+from galileo_jax.inference.fits.fitted_clip import FittedClip
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
 from galileo_jax.inference.fits.programs import white_of
-from galileo_jax.inference.fits.fitted_clip import FittedClip
 from galileo_jax.inference.fits.starts import absent_z, scattered_starts
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.model.effects.registry import make_effects
