@@ -1,11 +1,11 @@
 """The table of the hypotheses fitted so far, to which every race of candidates adds."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
+from galileo_jax.diagnosis.candidates import NO_MORE, Hypothesis, fit_candidates
 from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.diagnosis.mended_evidence import mended
 from galileo_jax.diagnosis.score_tests import score_tests
@@ -47,9 +47,18 @@ class Race:
         self._made: dict[tuple[str, ...], Candidate] = {}
 
     def __call__(
-        self, starts: Sequence[Hypothesis], sets: Sequence[tuple[str, ...]]
+        self,
+        starts: Sequence[Hypothesis],
+        sets: Sequence[tuple[str, ...]],
+        also: Mapping[tuple[str, ...], np.ndarray] = NO_MORE,
     ) -> list[Candidate]:
-        """Fits sets of effects, each from the fit of all but its last; not ranked yet."""
+        """Fits sets of effects, each from the fit of all but its last; not ranked yet.
+
+        Args:
+          starts: of each the fit of all but its last.
+          sets: names of the effects of each.
+          also: one more start of some, `[model parameter]`, z.
+        """
         best = max((c.log_odds for c in self._made.values()), default=-np.inf)
         decisive = decisive_margin(self.is_adequate)
 
@@ -84,7 +93,9 @@ class Race:
             table = ranked(self._made.values())
             self._on_candidate(next(c for c in table if c.effects == made.effects))
 
-        found = fit_candidates(self.fitter, starts, sets, self.seed, matters, on_fit, needs_mending)
+        found = fit_candidates(
+            self.fitter, starts, sets, self.seed, matters, on_fit, needs_mending, also
+        )
         return [
             made if (made := self._made[one.effects]).hypothesis.is_same(one) else make(one)
             for one in found
