@@ -18,7 +18,7 @@ every parameter, according to how much of its prior the data exclude.
        rollouts round the valleys that were found (`inference/fits/weighed.py`).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -33,7 +33,6 @@ from galileo_jax.inference.joint_problem import JointProblem
 
 NUM_REFITTED, OUT_OF_THE_RACE = 6, 100.0  # candidates, unless so many nats behind the best
 NUM_AT_ONCE = 6  # refined in one batch: the sooner the first can be shown
-NO_MORE: Mapping[tuple[str, ...], np.ndarray] = {}
 MAY_STILL_GAIN = 5.0  # nats that a valley with more cost in the search may yet have the better of
 
 
@@ -101,7 +100,7 @@ def fit_candidates(
     matters: Callable[[Sequence[Hypothesis]], np.ndarray] = not_far_behind,
     on_fit: Callable[[Hypothesis], None] = lambda _: None,
     needs_mending: Callable[[Sequence[Hypothesis]], np.ndarray] = none_of,
-    also: Mapping[tuple[str, ...], np.ndarray] = NO_MORE,
+    starts: Sequence[np.ndarray] | None = None,
 ) -> list[Hypothesis]:
     """Fits every candidate (a set of effects), all in one race.
 
@@ -115,24 +114,22 @@ def fit_candidates(
         one whose slope explains most is fitted from there and shown before the race, and again in
         its turn.
       needs_mending: `[hypothesis]`, of which Laplace's evidence will not do.
-      also: one more start of some candidates, `[model parameter]`, z.
+      starts: of each candidate `[start, model parameter]`, z; None: scattered and matched ones.
     """
     trials = fitter.trials
     count = len(trials.model_parameters)
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
     from_fits = [base.fit for base in bases]
-    matching, gains = matched(fitter, from_fits, candidates, seed)
-    if len(candidates) > NUM_AT_ONCE:
-        best = int(np.argmax(gains))
-        [fit] = fitter.fit_from(matching[best][:1], free[[best]], np.zeros(1, int))
-        on_fit(Hypothesis(tuple(candidates[best]), fit))
-    starts = zip(scattered(fitter, from_fits, free, seed), matching, strict=True)
-    own_starts = [
-        np.concatenate([*pair, *([also[effects][None]] if effects in also else [])])
-        for effects, pair in zip(candidates, starts, strict=True)
-    ]
-    of = np.repeat(np.arange(len(candidates)), [len(own) for own in own_starts])
-    found = fitter.race(np.concatenate(own_starts), free[of], of)
+    if starts is None:
+        matching, gains = matched(fitter, from_fits, candidates, seed)
+        if len(candidates) > NUM_AT_ONCE:
+            best = int(np.argmax(gains))
+            [fit] = fitter.fit_from(matching[best][:1], free[[best]], np.zeros(1, int))
+            on_fit(Hypothesis(tuple(candidates[best]), fit))
+        both = zip(scattered(fitter, from_fits, free, seed), matching, strict=True)
+        starts = [np.concatenate(pair) for pair in both]
+    of = np.repeat(np.arange(len(candidates)), [len(own) for own in starts])
+    found = fitter.race(np.concatenate(starts), free[of], of)
     ends = [valleys(found.best, _left(found, of == i)) for i in range(len(candidates))]
     first = np.array([rows[0] for rows in ends])
     fits: dict[int, GradientFit] = {}

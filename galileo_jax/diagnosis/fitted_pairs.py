@@ -12,7 +12,7 @@ from galileo_jax.diagnosis.score_tests import best_gains
 from galileo_jax.diagnosis.short_search import short_search
 from galileo_jax.diagnosis.verdict import NUM_JOINED, ranked
 
-NUM_ROUNDS = 3  # as long as what could be confused with the best pair is better than that
+NUM_ROUNDS = 2  # the second where what could be confused with the best pair is better than that
 
 
 def fitted_pairs(
@@ -69,8 +69,7 @@ def _alike(
     near = most_alike(costs, lowest)
     if not near.size:
         return []
-    alike = [sets[i] for i in near]
-    return race([starts[i] for i in near], alike, dict(zip(alike, z[near], strict=True)))
+    return race([starts[i] for i in near], [sets[i] for i in near], list(z[near, None]))
 
 
 def pairs_from_base(race: Race, candidates: Sequence[Candidate]) -> list[Candidate]:

@@ -1,11 +1,11 @@
 """The table of the hypotheses fitted so far, to which every race of candidates adds."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.diagnosis.candidates import NO_MORE, Hypothesis, fit_candidates
+from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
 from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.diagnosis.mended_evidence import mended
 from galileo_jax.diagnosis.score_tests import score_tests
@@ -48,16 +48,16 @@ class Race:
 
     def __call__(
         self,
-        starts: Sequence[Hypothesis],
+        bases: Sequence[Hypothesis],
         sets: Sequence[tuple[str, ...]],
-        also: Mapping[tuple[str, ...], np.ndarray] = NO_MORE,
+        starts: Sequence[np.ndarray] | None = None,
     ) -> list[Candidate]:
         """Fits sets of effects, each from the fit of all but its last; not ranked yet.
 
         Args:
-          starts: of each the fit of all but its last.
+          bases: of each the fit of all but its last.
           sets: names of the effects of each.
-          also: one more start of some, `[model parameter]`, z.
+          starts: of each `[start, model parameter]`, z; None: scattered and matched ones.
         """
         best = max((c.log_odds for c in self._made.values()), default=-np.inf)
         decisive = decisive_margin(self.is_adequate)
@@ -79,9 +79,9 @@ class Race:
 
         trials = self.fitter.trials
         scores = dict.fromkeys(sets, 0.0)
-        for start in {id(start): start for start in starts}.values():
-            own = [e for e, other in zip(sets, starts, strict=True) if other is start]
-            scores |= dict(zip(own, score_tests(trials, start.fit, own).tolist(), strict=True))
+        for base in {id(base): base for base in bases}.values():
+            own = [e for e, other in zip(sets, bases, strict=True) if other is base]
+            scores |= dict(zip(own, score_tests(trials, base.fit, own).tolist(), strict=True))
 
         def make(hypothesis: Hypothesis) -> Candidate:
             made = self._candidate(hypothesis, scores[hypothesis.effects])
@@ -94,7 +94,7 @@ class Race:
             self._on_candidate(next(c for c in table if c.effects == made.effects))
 
         found = fit_candidates(
-            self.fitter, starts, sets, self.seed, matters, on_fit, needs_mending, also
+            self.fitter, bases, sets, self.seed, matters, on_fit, needs_mending, starts
         )
         return [
             made if (made := self._made[one.effects]).hypothesis.is_same(one) else make(one)
