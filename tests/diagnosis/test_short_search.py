@@ -1,11 +1,14 @@
 """What could be confused with a pair: found by a short search, where slopes mean nothing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis import fitted_pairs as pairs_module
 from galileo_jax.diagnosis.candidates import Hypothesis, reduced
 from galileo_jax.diagnosis.score_tests import best_gains
 from galileo_jax.diagnosis.short_search import short_search
@@ -13,6 +16,7 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.registry import make_effects
+from tests.diagnosis.test_verdict import candidate
 from tests.precision import in_64_bit
 
 TRUTH, RIVAL = ("release_delay", "rolling"), ("release_delay", "frame_rate")
@@ -58,3 +62,38 @@ def test_a_short_search_finds_what_slopes_do_not(late_and_rolling):
     assert costs.min() < lowest
     np.testing.assert_allclose(there, costs, rtol=1e-6)
     assert pairs[int(np.argmax(gains))][1] not in near
+
+
+def test_what_could_be_confused_with_a_better_pair_is_searched_for_once_more(monkeypatch):
+    """From the best pair so far; a pair that was searched for is not searched for again."""
+    odds = {"a+b": 50.0, "b+c": 60.0, "c+d": 70.0, "d+e": 80.0}
+    searched, started = [], []
+
+    def search(fitter, bases, pairs, seed, lowest):
+        searched.append({frozenset(pair) for pair in pairs})
+        costs = [
+            0.0 if {"+".join(pair), "+".join(pair[::-1])} & odds.keys() else 99.0 for pair in pairs
+        ]
+        return np.arange(float(len(pairs)))[:, None], np.array(costs)
+
+    def race(bases, sets, starts=None):
+        started.append((sets, starts))
+        return [
+            candidate("+".join(sorted(pair)), odds.get("+".join(sorted(pair)), 1.0))
+            for pair in sets
+        ]
+
+    race.seed = 0
+    race.fitter = SimpleNamespace(
+        trials=SimpleNamespace(model_parameters=()), search_costs=lambda z, free: np.zeros(1)
+    )
+    monkeypatch.setattr(pairs_module, "best_gains", lambda *_: np.array([0, 9, 0, 0, 0.0]))
+    monkeypatch.setattr(pairs_module, "reduced", lambda trials, best, kept: best)
+    monkeypatch.setattr(pairs_module, "short_search", search)
+    monkeypatch.setattr(pairs_module, "pairs_to_try", lambda *_: [[("a", "b")]])
+    found = pairs_module.fitted_pairs(race, [candidate("a", 40.0)], list("abcde"))
+    assert [one.name for one in found] == ["c+d", "b+c", "a+b"]
+    assert frozenset("bc") in searched[0] and frozenset("cd") in searched[1]
+    assert len(searched) == 2 and not searched[0] & searched[1]
+    sets, starts = started[1]
+    assert [tuple(pair) for pair in sets] == [("b", "c")] and starts[0].shape == (1, 1)
