@@ -1,6 +1,8 @@
 """What could be confused with a pair: found by a short search, where slopes mean nothing."""
 
 from types import SimpleNamespace
+from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -83,15 +85,15 @@ def test_what_could_be_confused_with_a_better_pair_is_searched_for_once_more(mon
             for pair in sets
         ]
 
-    race.seed = 0
-    race.fitter = SimpleNamespace(
+    fitter = SimpleNamespace(
         trials=SimpleNamespace(model_parameters=()), search_costs=lambda z, free: np.zeros(1)
     )
+    stub: Any = MagicMock(side_effect=race, seed=0, fitter=fitter)
     monkeypatch.setattr(pairs_module, "best_gains", lambda *_: np.array([0, 9, 0, 0, 0.0]))
     monkeypatch.setattr(pairs_module, "reduced", lambda trials, best, kept: best)
     monkeypatch.setattr(pairs_module, "short_search", search)
     monkeypatch.setattr(pairs_module, "pairs_to_try", lambda *_: [[("a", "b")]])
-    found = pairs_module.fitted_pairs(race, [candidate("a", 40.0)], list("abcde"))
+    found = pairs_module.fitted_pairs(stub, [candidate("a", 40.0)], list("abcde"))
     assert [one.name for one in found] == ["c+d", "b+c", "a+b"]
     assert frozenset("bc") in searched[0] and frozenset("cd") in searched[1]
     assert len(searched) == 2 and not searched[0] & searched[1]
