@@ -100,6 +100,7 @@ def fit_candidates(
     matters: Callable[[Sequence[Hypothesis]], np.ndarray] = not_far_behind,
     on_fit: Callable[[Hypothesis], None] = lambda _: None,
     needs_mending: Callable[[Sequence[Hypothesis]], np.ndarray] = none_of,
+    starts: Sequence[np.ndarray] | None = None,
 ) -> list[Hypothesis]:
     """Fits every candidate (a set of effects), all in one race.
 
@@ -113,20 +114,22 @@ def fit_candidates(
         one whose slope explains most is fitted from there and shown before the race, and again in
         its turn.
       needs_mending: `[hypothesis]`, of which Laplace's evidence will not do.
+      starts: of each candidate `[start, model parameter]`, z; None: scattered and matched ones.
     """
     trials = fitter.trials
     count = len(trials.model_parameters)
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
     from_fits = [base.fit for base in bases]
-    matching, gains = matched(fitter, from_fits, candidates, seed)
-    if len(candidates) > NUM_AT_ONCE:
-        best = int(np.argmax(gains))
-        [fit] = fitter.fit_from(matching[best][:1], free[[best]], np.zeros(1, int))
-        on_fit(Hypothesis(tuple(candidates[best]), fit))
-    starts = zip(scattered(fitter, from_fits, free, seed), matching, strict=True)
-    own_starts = [np.concatenate(pair) for pair in starts]
-    of = np.repeat(np.arange(len(candidates)), [len(own) for own in own_starts])
-    found = fitter.race(np.concatenate(own_starts), free[of], of)
+    if starts is None:
+        matching, gains = matched(fitter, from_fits, candidates, seed)
+        if len(candidates) > NUM_AT_ONCE:
+            best = int(np.argmax(gains))
+            [fit] = fitter.fit_from(matching[best][:1], free[[best]], np.zeros(1, int))
+            on_fit(Hypothesis(tuple(candidates[best]), fit))
+        both = zip(scattered(fitter, from_fits, free, seed), matching, strict=True)
+        starts = [np.concatenate(pair) for pair in both]
+    of = np.repeat(np.arange(len(candidates)), [len(own) for own in starts])
+    found = fitter.race(np.concatenate(starts), free[of], of)
     ends = [valleys(found.best, _left(found, of == i)) for i in range(len(candidates))]
     first = np.array([rows[0] for rows in ends])
     fits: dict[int, GradientFit] = {}

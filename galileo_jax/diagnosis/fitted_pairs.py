@@ -9,7 +9,10 @@ from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_from_scratch, pairs_to_try
 from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.score_tests import best_gains
+from galileo_jax.diagnosis.short_search import short_search
 from galileo_jax.diagnosis.verdict import NUM_JOINED, ranked
+
+NUM_ROUNDS = 2  # the second where what could be confused with the best pair is better than that
 
 
 def fitted_pairs(
@@ -35,18 +38,38 @@ def fitted_pairs(
     if not sets:
         return ()
     made = race(starts, sets)
-    best = ranked(made)[0]
-    sets, starts = [], []
-    for kept in best.effects:
-        start = reduced(trials, best.hypothesis, [kept])
-        if others := not_tried(kept, library, made):
-            gains = best_gains(trials, start.fit, others, seed)
-            alike = most_alike(others, gains)
-            sets += alike
-            starts += [start] * len(alike)
-    if sets:
-        made += race(starts, sets)
+    searched = {frozenset(c.effects) for c in made}
+    for _ in range(NUM_ROUNDS):
+        best = ranked(made)[0]
+        made += _alike(race, best, library, searched)
+        if ranked(made)[0].effects == best.effects:
+            break
     return ranked(made)
+
+
+def _alike(
+    race: Race, best: Candidate, library: Sequence[str], searched: set[frozenset[str]]
+) -> list[Candidate]:
+    """Pairs of either effect of the best pair and one that does what the other does, fitted.
+
+    Which these are a short search for them all tells: without one of its effects the best pair is
+    so far from the data that slopes mean nothing there. Those searched for are added to `searched`.
+    """
+    fitter, sets, starts = race.fitter, [], []
+    for kept in best.effects:
+        others = not_tried(kept, library, searched)
+        sets += others
+        starts += [reduced(fitter.trials, best.hypothesis, [kept])] * len(others)
+    if not sets:
+        return []
+    searched.update(frozenset(pair) for pair in sets)
+    fit, count = best.hypothesis.fit, len(fitter.trials.model_parameters)
+    lowest = float(fitter.search_costs(fit.z[None, :count], fit.free[None, :count])[0])
+    z, costs = short_search(fitter, [one.fit for one in starts], sets, race.seed, lowest)
+    near = most_alike(costs, lowest)
+    if not near.size:
+        return []
+    return race([starts[i] for i in near], [sets[i] for i in near], list(z[near, None]))
 
 
 def pairs_from_base(race: Race, candidates: Sequence[Candidate]) -> list[Candidate]:

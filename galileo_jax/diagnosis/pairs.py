@@ -7,6 +7,7 @@ import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.diagnosis.verdict import NUM_CROSSED, NUM_JOINED, NUM_PAIRS, NUM_SWAPPED
+from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH
 
 
 def pairs_to_try(
@@ -45,18 +46,22 @@ def pairs_from_scratch(candidates: Sequence[Candidate]) -> list[tuple[str, ...]]
 
 
 def not_tried(
-    kept: str, library: Sequence[str], tried: Collection[Candidate]
+    kept: str, library: Sequence[str], tried: Collection[frozenset[str]]
 ) -> list[tuple[str, str]]:
     """An effect joined with each of the library that it was not tried with."""
-    known = {frozenset((kept,)), *(frozenset(c.effects) for c in tried)}
-    return [(kept, name) for name in library if frozenset((kept, name)) not in known]
+    return [
+        (kept, name) for name in library if name != kept and frozenset((kept, name)) not in tried
+    ]
 
 
-def most_alike(pairs: Sequence[tuple[str, str]], gains: np.ndarray) -> list[tuple[str, str]]:
-    """The `NUM_SWAPPED` pairs whose second effect best explains what is left without it.
+def most_alike(costs: np.ndarray, lowest: float) -> np.ndarray:
+    """Which pairs come near the best, the nearest first: at most `NUM_SWAPPED`, indices.
+
+    Who is too far behind at the search's noise is farther behind by the clip's own.
 
     Args:
-      pairs: from `not_tried`.
-      gains: `[pair]`, nats, from `score_tests.best_gains`.
+      costs: `[pair]`, nats, that a short search came to.
+      lowest: cost of the best pair so far.
     """
-    return [pairs[i] for i in np.argsort(-gains)[:NUM_SWAPPED]]
+    order = np.argsort(costs, kind="stable")[:NUM_SWAPPED]
+    return order[costs[order] < min(lowest, float(costs.min())) + BEHIND_IN_SEARCH]

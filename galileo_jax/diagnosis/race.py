@@ -47,9 +47,18 @@ class Race:
         self._made: dict[tuple[str, ...], Candidate] = {}
 
     def __call__(
-        self, starts: Sequence[Hypothesis], sets: Sequence[tuple[str, ...]]
+        self,
+        bases: Sequence[Hypothesis],
+        sets: Sequence[tuple[str, ...]],
+        starts: Sequence[np.ndarray] | None = None,
     ) -> list[Candidate]:
-        """Fits sets of effects, each from the fit of all but its last; not ranked yet."""
+        """Fits sets of effects, each from the fit of all but its last; not ranked yet.
+
+        Args:
+          bases: of each the fit of all but its last.
+          sets: names of the effects of each.
+          starts: of each `[start, model parameter]`, z; None: scattered and matched ones.
+        """
         best = max((c.log_odds for c in self._made.values()), default=-np.inf)
         decisive = decisive_margin(self.is_adequate)
 
@@ -70,9 +79,9 @@ class Race:
 
         trials = self.fitter.trials
         scores = dict.fromkeys(sets, 0.0)
-        for start in {id(start): start for start in starts}.values():
-            own = [e for e, other in zip(sets, starts, strict=True) if other is start]
-            scores |= dict(zip(own, score_tests(trials, start.fit, own).tolist(), strict=True))
+        for base in {id(base): base for base in bases}.values():
+            own = [e for e, other in zip(sets, bases, strict=True) if other is base]
+            scores |= dict(zip(own, score_tests(trials, base.fit, own).tolist(), strict=True))
 
         def make(hypothesis: Hypothesis) -> Candidate:
             made = self._candidate(hypothesis, scores[hypothesis.effects])
@@ -84,7 +93,9 @@ class Race:
             table = ranked(self._made.values())
             self._on_candidate(next(c for c in table if c.effects == made.effects))
 
-        found = fit_candidates(self.fitter, starts, sets, self.seed, matters, on_fit, needs_mending)
+        found = fit_candidates(
+            self.fitter, bases, sets, self.seed, matters, on_fit, needs_mending, starts
+        )
         return [
             made if (made := self._made[one.effects]).hypothesis.is_same(one) else make(one)
             for one in found

@@ -36,8 +36,8 @@ SECOND_EFFECT_ODDS = 0.1
 # Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
 # Of the best single effects so many are joined with others, to so many pairs in all. Then either
-# effect of the best pair is kept, and joined with so many that may explain what the other does.
-NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 3
+# effect of the best pair is kept and joined with what explains what the other does: so many pairs.
+NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 6
 # Where no pair explains the data, the best pairs and all of so many single effects are fitted from
 # the fit without effects.
 NUM_CROSSED = 4

@@ -318,15 +318,22 @@ def test_six_pairs_are_tried():
 
 
 def test_either_effect_of_the_best_pair_is_joined_with_what_it_was_not_tried_with():
-    tried = [candidate("stribeck+air_drag", 40.0), candidate("rolling+stribeck", 30.0)]
+    tried = {frozenset(("stribeck", "air_drag")), frozenset(("rolling", "stribeck"))}
     assert not_tried("air_drag", LIBRARY, tried) == [("air_drag", "rolling")]
     assert not_tried("stribeck", LIBRARY, tried) == []
 
 
-def test_three_that_explain_best_what_the_other_does_are_tried():
-    pairs = [("air_drag", f"effect{i}") for i in range(5)]
-    found = most_alike(pairs, np.array([1.0, 5.0, 3.0, 0.0, 4.0]))
-    assert [name for _, name in found] == ["effect1", "effect4", "effect2"]
+@pytest.mark.parametrize(
+    ("costs", "lowest", "expected"),
+    [
+        ([9.0, 5.0, 7.0], 5.0, [1, 2, 0]),
+        ([30.0, 25.0 - EDGE, 25.0], 5.0, [1]),
+        ([30.0, 25.0, 5.0 + EDGE, 4.0], 90.0, [3, 2]),
+        (list(range(9, 0, -1)), 0.0, [8, 7, 6, 5, 4, 3]),
+    ],
+)
+def test_up_to_six_that_a_short_search_finds_near_the_best_pair_are_fitted(costs, lowest, expected):
+    assert most_alike(np.array(costs, float), lowest).tolist() == expected
 
 
 # Which are compared, and which cannot be told apart.
