@@ -92,6 +92,25 @@ def cuts_of(measured: Sequence[Any]) -> dict[str, Any]:
     return {"cuts": found} if found else {}
 
 
+def to_last_cut(observation: Observation, cuts: Sequence[Cut]) -> Observation:
+    """The observation without the frames that a cut leaves out at its end, which cost only time.
+
+    Those before the first are as they were: frames are counted from the clip's beginning.
+    """
+    if not any(each.side == "after" for each in cuts):
+        return observation
+    count = int(np.flatnonzero(observation.mask.any(axis=0))[-1]) + 1
+    modes = observation.modes_m
+    return replace(
+        observation,
+        times_s=observation.times_s[:count],
+        position_m=observation.position_m[..., :count],
+        covariance_m2=observation.covariance_m2[..., :count],
+        mask=observation.mask[:, :count],
+        modes_m=None if modes is None else modes[..., :count],
+    )
+
+
 def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
     """What may end the motion of the scene."""
     if is_board(clip) or (clip.scenario == "fall" and not clip.has_floor):
