@@ -13,7 +13,7 @@ from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import make_effects
 from galileo_jax.model.effects.air import AIR_KG_M3
 from galileo_jax.model.effects.library.added_mass import PRIOR
-from galileo_jax.model.parameters import absent
+from galileo_jax.model.parameters import LogNormal, absent
 from tests.clip.test_pendulum import angles, closed_form
 from tests.precision import in_64_bit
 
@@ -102,6 +102,7 @@ def test_of_a_ball_of_known_size_and_mass_it_is_known(tmp_path):
     known = problem_of(tmp_path, "fall", f"[{size}]", str(mass)).model.scene.surroundings
     (parameter,) = effect.parameters(known)
     displaced = AIR_KG_M3 * 4 / 3 * math.pi * size**3
+    assert isinstance(parameter.prior, LogNormal)
     assert parameter.prior.median == pytest.approx(displaced / 2 / mass)
     (parameter,) = effect.parameters(problem_of(tmp_path, "fall").model.scene.surroundings)
     assert parameter.prior == PRIOR
