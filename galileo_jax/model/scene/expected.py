@@ -103,8 +103,8 @@ def _declared(clip: Clip) -> dict[str, tuple[float, float]]:
 def _carried_air(clip: Clip) -> dict[str, tuple[float, float]]:
     """The air that a ball of declared size and mass carries along; nothing of others."""
     size_m, mass_kg = clip.objects[0].size_m, clip.objects[0].mass_kg
-    is_ball = clip.objects[0].shape == "sphere" and size_m is not None
-    if not is_ball or mass_kg is None or clip.scenario == "liquid":
+    is_ball = clip.objects[0].shape == "sphere"
+    if not is_ball or size_m is None or mass_kg is None or clip.scenario == "liquid":
         return {}
     return expected_added_mass(size_m[0], mass_kg)
 
