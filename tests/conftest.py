@@ -7,12 +7,14 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from galileo_jax.runtime.compilation_cache import cache_folder
+from galileo_jax.runtime.jax_setup import compile_loops_whole
 from tests.missing import find_shared_data
 
 # Before anything imports jax; the commands' own subprocesses inherit it.
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 # Small matrices: BLAS's threads wait for each other longer than they compute.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+compile_loops_whole()  # as under the public functions, also in tests that call no such one
 if folder := cache_folder():
     os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(folder))
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.5")

@@ -18,7 +18,7 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
-NUM_STEPS = 2
+NUM_STEPS = 4
 
 
 def whitened(trials: JointProblem, theta: np.ndarray, noise_scale: np.ndarray) -> list[np.ndarray]:

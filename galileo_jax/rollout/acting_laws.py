@@ -1,8 +1,8 @@
-"""Which laws act in a rollout: programs without the others are up to twice as fast.
+"""Which laws act in a rollout: the others are not computed.
 
-Most hypotheses have one effect of twenty; the others are pinned where they do nothing. Effects
-without a force or a friction law of their own cost little and are in every program. Those with a
-force, and those with a friction law, are left out where none of them acts: four programs in all.
+Most hypotheses have one effect of twenty; the others are pinned where they do nothing. Rollouts in
+which no force and no friction law acts have a program without any, in which the motion between
+events is known in closed form. All others share one, which is told which laws act in its batch.
 Where a law is none of the package's its programs cannot be kept (`trace_cache`), and are made anew
 in every process: then there is one for all.
 """
@@ -11,13 +11,32 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.model import Model
 
-FORCES, FRICTIONS = 1, 2
+STEADY, WITH_LAWS = 0, 1  # kinds of rollouts
 PACKAGE = f"{__name__.split('.')[0]}."
-FEW = 16  # rollouts: fewer are not worth a program of their own
+
+
+@dataclass(frozen=True)
+class Law:
+    """An effect with a force or a friction law of its own.
+
+    Attributes:
+      effect: it.
+      columns: of its parameters in the model.
+      absent: their values where it does nothing.
+    """
+
+    effect: Effect
+    columns: np.ndarray
+    absent: np.ndarray
+
+    def acts(self, theta: np.ndarray) -> np.ndarray:
+        """Whether it acts in each of `theta` `[batch, parameter]`: `[batch]`."""
+        return (theta[:, self.columns] != self.absent).any(axis=1)
 
 
 @dataclass(frozen=True)
@@ -28,15 +47,24 @@ class Share:
       effects: that may act, nuisances among them.
       names: of their parameters.
       columns: where these stand among the model's.
+      laws: those of `effects` that do not act in every rollout.
     """
 
     effects: tuple[Effect, ...]
     names: tuple[str, ...]
     columns: tuple[int, ...]
+    laws: tuple[Law, ...] = ()
 
     def of(self, theta: np.ndarray) -> np.ndarray:
         """Of `theta` `[batch, parameter]` the columns of `names`."""
         return theta[:, self.columns]
+
+    def acts(self, theta: np.ndarray) -> np.ndarray | None:
+        """Which of `effects` act in any of `theta`, `[effect]`; None: all, in every rollout."""
+        if not self.laws:
+            return None
+        idle = [law.effect for law in self.laws if not law.acts(theta).any()]
+        return np.array([effect not in idle for effect in self.effects])
 
 
 class ActingLaws:
@@ -45,54 +73,49 @@ class ActingLaws:
     def __init__(self, model: Model):
         self._model = model
         self._share = functools.cache(self._share_of)
-        self._table: list[tuple[int, np.ndarray, np.ndarray]] = []
-        if not all(type(effect).__module__.startswith(PACKAGE) for effect in model.effects):
-            return
-        for effect in model.effects:
-            columns = self._columns(effect)
-            if _law(effect) and columns.size:
-                absent = np.array([model.parameters[i].absent for i in columns])
-                self._table.append((_law(effect), columns, absent))
+        found = [e for e in model.effects if _has_law(e) and self._columns(e).size]
+        self._laws = tuple(Law(e, self._columns(e), self._absent(e)) for e in found)
+        self._is_ours = all(type(e).__module__.startswith(PACKAGE) for e in model.effects)
 
-    def in_each(self, theta: np.ndarray) -> np.ndarray:
-        """What acts in each of `theta` `[batch, parameter]`: the sum of `FORCES`, `FRICTIONS`.
+    def shares(self, theta: np.ndarray) -> list[tuple[Share, np.ndarray]]:
+        """Divides `theta` `[batch, parameter]` among parts of the model.
 
-        Where few rollouts have the same, they have what acts in any.
+        Returns:
+          parts, and the rows of each: those with the same laws side by side.
         """
-        found = self.acting(theta)
-        kinds, where, count = np.unique(found, return_inverse=True, return_counts=True)
-        few = count < FEW
-        if len(kinds) > 1 and few.any():
-            found[few[where]] = np.bitwise_or.reduce(found)
-        return found
+        acts = np.array([law.acts(theta) for law in self._laws], bool)
+        acts = acts.reshape(len(self._laws), len(theta))
+        kinds = self._kinds(acts)
+        order = np.lexsort((*acts, kinds))
+        return [(self._share(int(k)), order[kinds[order] == k]) for k in np.unique(kinds)]
 
-    def acting(self, theta: np.ndarray) -> np.ndarray:
-        """As `in_each`, of each rollout by itself."""
-        found = np.full(len(theta), 0 if self._table else FORCES | FRICTIONS)
-        for law, columns, absent in self._table:
-            acts = (theta[:, columns] != absent).any(axis=1)
-            found |= np.where(acts, law, 0)
-        return found
+    def _kinds(self, acts: Bool[np.ndarray, "law batch"]) -> np.ndarray:
+        """Which program each rollout has, `[batch]`."""
+        if not self._is_ours:
+            return np.full(acts.shape[1], WITH_LAWS)
+        return np.where(acts.any(axis=0), WITH_LAWS, STEADY)
 
-    def share(self, laws: int) -> Share:
-        """The part of the model in which these act: a sum of `FORCES` and `FRICTIONS`."""
-        return self._share(laws)
+    def _share_of(self, kind: int) -> Share:
+        laws = self._laws if kind == WITH_LAWS else ()
+        return self._without([law.effect for law in self._laws if law not in laws], laws)
 
-    def _share_of(self, laws: int) -> Share:
+    def _without(self, left_out: list[Effect], laws: tuple[Law, ...] = ()) -> Share:
         model = self._model
-        left_out = [e for e in model.effects if _law(e) & ~laws]
         gone = {int(i) for effect in left_out for i in self._columns(effect)}
         columns = tuple(i for i in range(len(model.names)) if i not in gone)
         effects = tuple(e for e in model.effects if e not in left_out) + model.nuisances
-        return Share(effects, tuple(model.names[i] for i in columns), columns)
+        return Share(effects, tuple(model.names[i] for i in columns), columns, laws)
 
     def _columns(self, effect: Effect) -> np.ndarray:
         parameters = effect.parameters(self._model.scene.surroundings)
         return np.array([self._model.index(p.name) for p in parameters], int)
 
+    def _absent(self, effect: Effect) -> np.ndarray:
+        return np.array([self._model.parameters[i].absent for i in self._columns(effect)])
 
-def _law(effect: Effect) -> int:
+
+def _has_law(effect: Effect) -> bool:
     own = type(effect)
-    forces = own.force is not Effect.force or own.push is not Effect.push
-    frictions = own.friction is not Effect.friction
-    return FORCES * forces + FRICTIONS * frictions
+    return any(
+        getattr(own, hook) is not getattr(Effect, hook) for hook in ("force", "push", "friction")
+    )

@@ -55,13 +55,14 @@ def roll_out(
     theta: jax.Array,
     scene: Surroundings,
     count: jax.Array | None = None,
+    acts: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array]:
     """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
 
     Of records beyond the first `count` the centres are as in the last of these.
     """
     named = {name: theta[i] for i, name in enumerate(names)}
-    law = dynamics(effects, scene, named, jnp)
+    law = dynamics(effects, scene, named, jnp, acts)
     start = jnp.asarray(scene.start_m)[0]
     tangent = _along(law, scene, jnp)
     floor = floor_of(effects, named, scene)

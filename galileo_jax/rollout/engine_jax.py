@@ -28,8 +28,8 @@ class EngineJax:
     """Simulates batches of parameter vectors; compiled once for all clips of a kind.
 
     Attributes:
-      roll_out: `(effects, names, num_records, dt_s, theta, scene, count)`, theta `[parameter]`,
-        to centres and velocities, each `[object, 2, record]`.
+      roll_out: `(effects, names, num_records, dt_s, theta, scene, count, acts)`, theta
+        `[parameter]`, to centres and velocities, each `[object, 2, record]`.
     """
 
     name = "rigid"
@@ -59,21 +59,17 @@ class EngineJax:
           until_s: when somebody looks for the last time: later, objects may be anywhere.
         """
         theta = np.asarray(theta)
-        acting = self._laws.in_each(theta)
-        kinds = np.unique(acting)
-        rows = [np.flatnonzero(acting == own) for own in kinds]
+        shares = self._laws.shares(theta)
         motions = [
             in_chunks(
                 MOTIONS,
-                functools.partial(self._as_long_as_needed, self._laws.share(int(own))),
-                theta[some],
-                until_s[some],
+                functools.partial(self._as_long_as_needed, share),
+                theta[rows],
+                until_s[rows],
             )
-            for own, some in zip(kinds, rows, strict=True)
+            for share, rows in shares
         ]
-        if len(motions) == 1:
-            return motions[0]
-        back = np.argsort(np.concatenate(rows))
+        back = np.argsort(np.concatenate([rows for _, rows in shares]))
         position, velocity = (np.concatenate(own)[back] for own in zip(*motions, strict=True))
         return position, velocity
 
@@ -92,6 +88,7 @@ class EngineJax:
             share.of(theta),
             model.scene.surroundings,
             np.asarray(count),
+            share.acts(theta),
         )
 
     def traceable(self, theta: Float[jax.Array, "batch parameter"]) -> Motion:
@@ -124,8 +121,9 @@ def _roll_out_batch(
     theta: jax.Array,
     scene: Surroundings,
     count: Any = None,
+    acts: Any = None,
 ) -> Motion:
-    def one(theta: jax.Array, shared: tuple[Surroundings, Any]) -> Motion:
+    def one(theta: jax.Array, shared: tuple[Surroundings, Any, Any]) -> Motion:
         return roll_out(effects, names, num_records, dt_s, theta, *shared)
 
-    return over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, (scene, count))
+    return over_devices(jax.vmap(one, (0, None)), theta.shape[0])(theta, (scene, count, acts))

@@ -75,6 +75,7 @@ def roll_out(
     theta: jax.Array,
     scene: Surroundings,
     count: jax.Array | None = None,
+    acts: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array]:
     """One rollout: `[parameter]` to centres and velocities, each `[object, axis, record]`.
 
@@ -82,7 +83,7 @@ def roll_out(
     `count` places are as in the last of these.
     """
     named = {name: theta[i] for i, name in enumerate(names)}
-    law = dynamics(effects, scene, named, jnp)
+    law = dynamics(effects, scene, named, jnp, acts)
     rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
     velocity = start_velocity(effects, named, scene)
     assert velocity is not None  # the pucks' law gives one

@@ -57,13 +57,17 @@ class Swing(NamedTuple):
 
 
 def make_pendulum(
-    effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings, xp: Any
+    effects: Sequence[Effect],
+    theta: Mapping[str, Any],
+    scene: Surroundings,
+    xp: Any,
+    acts: Any = None,
 ) -> Pendulum:
     """Puts parameters (numbers) and effects together."""
     length = theta[LENGTH]
     given = [s for e in effects if (s := e.stretch(theta, scene)) is not None]
     rubs = any(e.friction(theta, scene) is not None for e in effects)
-    law = dynamics(effects, scene, theta, xp)
+    law = dynamics(effects, scene, theta, xp, acts)
     return Pendulum(law, length, sum(given, 0.0 * length), rubs)
 
 
@@ -126,13 +130,14 @@ def roll_out(
     theta: jax.Array,
     scene: Surroundings,
     count: jax.Array | None = None,
+    acts: jax.Array | None = None,
 ) -> tuple[Float[jax.Array, "object 2 record"], Float[jax.Array, "object 2 record"]]:
     """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
 
     Of records beyond the first `count` the centres are as in the last of these.
     """
     named = {name: theta[i] for i, name in enumerate(names)}
-    pendulum = make_pendulum(effects, named, scene, jnp)
+    pendulum = make_pendulum(effects, named, scene, jnp, acts)
     first = start(named, pendulum)
 
     def step(swing: Swing, index: jax.Array) -> Swing:

@@ -18,50 +18,25 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import recorded, step_by_events
+from galileo_jax.rollout.event_loop import PART, recorded, recorded_in_parts, step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at, to_plane
+from galileo_jax.rollout.rigid_bodies import (
+    TOUCH_M,
+    Bodies,
+    Links,
+    Number,
+    Numbers,
+    apart,
+    of_group,
+    with_link,
+)
 
 MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few bounces
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
-TOUCH_M, TOUCH_M_S = 1e-9, 1e-9
 PAST_FOOT_M = 1e-12
-
-
-class Bodies(NamedTuple):
-    """All bodies of one rollout.
-
-    Attributes:
-      path_m, speed_m_s: `[object]`, of the centres.
-      rim_m_s: `[object]`, angular velocity times radius; 0 of what does not roll. None where
-        nothing does.
-    """
-
-    path_m: Float[jax.Array, " object"]
-    speed_m_s: Float[jax.Array, " object"]
-    rim_m_s: Float[jax.Array, " object"] | None = None
-
-    @property
-    def slip_m_s(self) -> jax.Array:
-        """How fast each slides over its surface, `[object]`."""
-        return self.speed_m_s if self.rim_m_s is None else self.speed_m_s - self.rim_m_s
-
-    def gap_m(self, law: Dynamics, scene: Surroundings) -> jax.Array:
-        """Between the faces of neighbours, `[object - 1]`."""
-        x = self.path_m + jnp.asarray(scene.corner_m)
-        half = jnp.asarray(scene.half_length_m)
-        apart = x[1:] - x[:-1] - half[1:] - half[:-1]
-        # What stands in the way moves once it was hit.
-        has_met = self.path_m[1:] > law.start_m[1:] + TOUCH_M
-        return jnp.maximum(apart - jnp.where(has_met, law.overlap_m, 0.0), 0.0)
-
-    def touches(self, law: Dynamics, scene: Surroundings) -> jax.Array:
-        """Whether neighbours rest against each other or move as one, `[object - 1]`."""
-        apart = jnp.abs(self.speed_m_s[1:] - self.speed_m_s[:-1])
-        return (self.gap_m(law, scene) < TOUCH_M) & (apart < TOUCH_M_S)
 
 
 def roll_out(
@@ -72,20 +47,33 @@ def roll_out(
     theta: jax.Array,
     scene: Surroundings,
     count: jax.Array | None = None,
+    acts: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array]:
     """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
 
-    Of records beyond the first `count` the centres are as in the last of these.
+    Of records beyond the first `count` the centres are as in the last of these. `acts` `[effect]`
+    as in `dynamics`.
     """
-    law = dynamics(effects, scene, {name: theta[i] for i, name in enumerate(names)}, jnp)
-
-    def step(bodies: Bodies, index: jax.Array) -> Bodies:
-        return _step(bodies, index * dt_s, dt_s, law, scene)
-
+    named = {name: theta[i] for i, name in enumerate(names)}
+    law = dynamics(effects, scene, named, jnp, acts)
+    objects = range(len(scene.names))
+    speed = tuple(law.start_speed_m_s[i] for i in objects)
     # What is pushed rolls from the hand.
-    rim = law.start_speed_m_s * jnp.asarray(scene.rolls) if any(scene.rolls) else None
-    start = Bodies(law.start_m, law.start_speed_m_s, rim)
-    path, speed, _ = recorded(step, start, num_records, count)
+    rim = tuple(v if _rolls(scene, i) else jnp.zeros_like(v) for i, v in enumerate(speed))
+    start = Bodies(tuple(law.start_m[i] for i in objects), speed, rim)
+    if law.is_steady:
+
+        def part(bodies: Bodies, first: jax.Array) -> tuple[Bodies, Bodies]:
+            return _exact_part(bodies, first * dt_s, dt_s, law, scene)
+
+        found = recorded_in_parts(part, start, num_records, count)
+    else:
+
+        def step(bodies: Bodies, index: jax.Array) -> Bodies:
+            return _step(bodies, index * dt_s, dt_s, law, scene)
+
+        found = recorded(step, start, num_records, count)
+    path, speed = (jnp.stack(own, axis=-1) for own in (found.path_m, found.speed_m_s))
     position, velocity = to_plane(path, speed, law.ramp_rad, law.table_rad, scene)
     return jnp.moveaxis(position, 0, -1), jnp.moveaxis(velocity, 0, -1)
 
@@ -96,9 +84,40 @@ def _step(
     """One recorded step, event by event."""
 
     def advance(bodies: Bodies, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
-        return _to_next_event(bodies, time_s, left_s, is_last, law, scene)
+        after, t, _ = _to_next_event(bodies, time_s, left_s, is_last, law, scene)
+        return after, t
 
     return step_by_events(advance, bodies, time_s, dt_s, MAX_EVENTS)
+
+
+def _exact_part(
+    bodies: Bodies, time_s: jax.Array, dt_s: float, law: Dynamics, scene: Surroundings
+) -> tuple[Bodies, Bodies]:
+    """`PART` records at once: between events accelerations are constant.
+
+    Returns:
+      the bodies at the end, and at every record: leaves `[record]`.
+    """
+    whole_s = PART * dt_s
+    since_s = jnp.arange(PART) * dt_s
+
+    def advance(carry: _Seen, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
+        bodies, seen = carry
+        after, t, a = _to_next_event(bodies, time_s, left_s, is_last, law, scene)
+        passed = since_s - (whole_s - left_s)  # since this phase began
+        moved = _after(bodies, a, passed)
+        seen = jax.tree.map(lambda new, old: jnp.where(passed >= 0, new, old), moved, seen)
+        return _Seen(after, seen), t
+
+    unseen = jax.tree.map(lambda number: jnp.broadcast_to(number, since_s.shape), bodies)
+    start = _Seen(bodies, unseen)
+    end = step_by_events(advance, start, time_s, whole_s, PART * MAX_EVENTS)
+    return end.now, end.at_records
+
+
+class _Seen(NamedTuple):
+    now: Bodies
+    at_records: Bodies
 
 
 def _to_next_event(
@@ -108,202 +127,244 @@ def _to_next_event(
     is_last: jax.Array,
     law: Dynamics,
     scene: Surroundings,
-) -> tuple[Bodies, jax.Array]:
-    """Moves on to the next event, or by `left_s`; returns the bodies and the time it took.
+) -> tuple[Bodies, jax.Array, "_Accelerations"]:
+    """Moves on to the next event, or by `left_s`; returns the bodies, the time it took, and how.
 
     When `is_last`, by `left_s` in any case: where events never end (an object in a corner from
     which both sides lead up) what is slow waits, and the others go on.
     """
     touches = bodies.touches(law, scene)
-    at_start = _accelerations(bodies, bodies, touches, time_s, law, scene)
-    half = 0.5 * _event_times(bodies, touches, at_start, left_s, law, scene).soonest
-    middle = _after(bodies, at_start, half)
-    a = _accelerations(bodies, middle, touches, time_s + half, law, scene)
+    a = _accelerations(bodies, bodies, touches, time_s, law, scene)
     events = _event_times(bodies, touches, a, left_s, law, scene)
+    if not law.is_steady:
+        half = 0.5 * events.soonest
+        middle = _after(bodies, a, half)
+        a = _accelerations(bodies, middle, touches, time_s + half, law, scene)
+        events = _event_times(bodies, touches, a, left_s, law, scene)
     t = jnp.where(is_last, left_s, events.soonest)
-    q, v, u = _after(bodies, a, t)
-    holds = events.grip <= t
-    if u is not None:
-        u = jnp.where(holds & jnp.asarray(scene.rolls), v, u)
-    v = jnp.where(holds, 0.0 if u is None else u, v)
+    moved = _after(bodies, a, t)
+    q, v, u = (list(numbers) for numbers in moved)
+    for i in range(len(v)):
+        holds = events.grip[i] <= t
+        if _rolls(scene, i):
+            u[i] = jnp.where(holds, v[i], u[i])
+        else:
+            v[i] = jnp.where(holds, 0.0, v[i])
     if scene.has_table:
-        arrives = events.foot <= t
+        arrives = [foot <= t for foot in events.foot]
         v, u = _past_foot(v, u, arrives, time_s + t, law, scene)
-        q = jnp.where(arrives, jnp.where(v < 0, -PAST_FOOT_M, 0.0), q)
+        edge = [jnp.where(one < 0, -PAST_FOOT_M, 0.0) for one in v]
+        q = [jnp.where(*of) for of in zip(arrives, edge, q, strict=True)]
     if len(scene.names) > 1:
-        v = _after_hits(Bodies(q, v, u), events.hit <= t, law, scene)
-    waits = is_last & (t > events.soonest) & (jnp.abs(bodies.speed_m_s) < PLASTIC_M_S)
-    rests = Bodies(bodies.path_m, jnp.zeros_like(v), None if u is None else jnp.zeros_like(u))
-    return jax.tree.map(functools.partial(jnp.where, waits), rests, Bodies(q, v, u)), t
+        met = Bodies(tuple(q), tuple(v), tuple(u))
+        v = _after_hits(met, [hit <= t for hit in events.hit], law, scene)
+    for i, before in enumerate(bodies.speed_m_s):
+        waits = is_last & (t > events.soonest) & (jnp.abs(before) < PLASTIC_M_S)
+        q[i] = jnp.where(waits, bodies.path_m[i], q[i])
+        v = [*v[:i], jnp.where(waits, 0.0, v[i]), *v[i + 1 :]]
+        u[i] = jnp.where(waits, 0.0, u[i]) if _rolls(scene, i) else u[i]
+    return Bodies(tuple(q), tuple(v), tuple(u)), t, a
 
 
 class _Accelerations(NamedTuple):
-    centre: jax.Array
-    rim: jax.Array | None
+    centre: Numbers
+    rim: Numbers
 
 
 def _after(bodies: Bodies, a: _Accelerations, t: jax.Array) -> Bodies:
     q, v, u = bodies
-    rim = None if u is None or a.rim is None else u + a.rim * t
-    return Bodies(q + v * t + 0.5 * a.centre * t**2, v + a.centre * t, rim)
+    return Bodies(
+        tuple(q + v * t + 0.5 * a * t**2 for q, v, a in zip(q, v, a.centre, strict=True)),
+        tuple(v + a * t for v, a in zip(v, a.centre, strict=True)),
+        tuple(u + a * t for u, a in zip(u, a.rim, strict=True)),
+    )
+
+
+def _rolls(scene: Surroundings, i: int) -> bool:
+    return bool(scene.rolls) and scene.rolls[i]
 
 
 def _accelerations(
     bodies: Bodies,
     at: Bodies,
-    touches: jax.Array,
+    touches: Links,
     time_s: jax.Array,
     law: Dynamics,
     scene: Surroundings,
 ) -> _Accelerations:
-    """Accelerations, each `[object]`, with the forces that act `at` a place and speed.
+    """Accelerations, with the forces that act `at` a place and speed.
 
     Bodies that touch move as one where the rear one would otherwise be faster: groups are
     merged, each with the sum of its members' forces and masses. Of a group's members those
     that slip are braked by all their friction; those at rest hold it with up to theirs; and
     those that roll turn with it, each as long as its friction can turn it so fast.
     """
-    drive = law.drive(state_at(at.path_m, at.speed_m_s, time_s, scene))
-    brake = law.brake(state_at(at.path_m, at.slip_m_s, time_s, scene))
     count = len(scene.names)
-    direction = jnp.sign(bodies.slip_m_s)
-    sticks = direction == 0
-    rolls = sticks & jnp.asarray(scene.rolls or (False,) * count)
-    pull = drive - direction * brake
-    rest = jnp.where(sticks & ~rolls, brake, 0.0)
-    turning = 1 / jnp.where(law.rim > 0, law.rim, 1.0)  # the inertia that rolling adds
+    drive = law.drive(at.state(at.speed_m_s, time_s, scene))
+    brake = law.brake(at.state(at.slip_m_s, time_s, scene))
+    direction = [jnp.sign(slip) for slip in bodies.slip_m_s]
+    sticks = [one == 0 for one in direction]
+    pull = [drive[i] - direction[i] * brake[i] for i in range(count)]
+    inertia = [law.inertia[i] for i in range(count)]
+    rolling = [i for i in range(count) if _rolls(scene, i)]
+    rest = [
+        jnp.zeros_like(pull[i]) if i in rolling else jnp.where(sticks[i], brake[i], 0.0)
+        for i in range(count)
+    ]
+    turning = {i: 1 / law.rim[i] for i in rolling}  # the inertia that rolling adds
 
-    def each(together: jax.Array) -> tuple[jax.Array, jax.Array]:
+    def each(links: Links) -> tuple[list[Number], dict[int, Number]]:
         """Accelerations, and the way those that should roll slip all the same."""
-        force, held = _sums(together, pull), _sums(together, rest)
-        left = force - jnp.clip(force, -held, held)
-        inertia, slips = _sums(together, law.inertia), jnp.zeros_like(direction)
-        if not any(scene.rolls):
-            return left / inertia, slips
-        a = left / (inertia + _sums(together, rolls * turning))
-        for _ in range(sum(scene.rolls)):
-            fails = rolls & (jnp.abs(a) * turning > brake)
-            slips = jnp.where(fails, jnp.sign(left), slips)
-            grips = rolls & (slips == 0)
-            rubbed, turned = _sums(together, slips * brake), _sums(together, grips * turning)
-            a = (left - rubbed) / (inertia + turned)
+        pulls, holds = of_group(pull, links), of_group(rest, links)
+        left = [
+            force - jnp.clip(force, -held, held) for force, held in zip(pulls, holds, strict=True)
+        ]
+        masses = of_group(inertia, links)
+        slips = {i: jnp.zeros_like(direction[i]) for i in rolling}
+
+        def with_grip() -> list[Number]:
+            grips = {i: sticks[i] & (slips[i] == 0) for i in rolling}
+            rubs = [
+                slips[i] * brake[i] if i in rolling else jnp.zeros_like(pull[i])
+                for i in range(count)
+            ]
+            turns = [
+                jnp.where(grips[i], turning[i], 0.0) if i in rolling else jnp.zeros_like(pull[i])
+                for i in range(count)
+            ]
+            rubbed, turned = of_group(rubs, links), of_group(turns, links)
+            return [(left[i] - rubbed[i]) / (masses[i] + turned[i]) for i in range(count)]
+
+        if not rolling:
+            return [force / mass for force, mass in zip(left, masses, strict=True)], slips
+        a = with_grip()
+        for _ in rolling:
+            for i in rolling:
+                fails = sticks[i] & (jnp.abs(a[i]) * turning[i] > brake[i])
+                slips[i] = jnp.where(fails, jnp.sign(left[i]), slips[i])
+            a = with_grip()
         return a, slips
 
-    together = jnp.eye(count, dtype=bool)
-    a, slips = each(together)
+    links = apart(count)
+    a, slips = each(links)
     for _ in range(count - 1):
         for i in range(count - 1):
-            presses = touches[i] & (a[i] > a[i + 1])
-            together = _merged(together, i, presses)
-            a, slips = each(together)
-    if not any(scene.rolls):
-        return _Accelerations(a, None)
-    turned = (direction + slips) * brake * law.rim
-    return _Accelerations(a, jnp.where(rolls & (slips == 0), a, turned))
-
-
-def _sums(together: jax.Array, values: jax.Array) -> jax.Array:
-    """Of each group's values `[object]`; a matrix product would be a call for every rollout."""
-    return jnp.sum(jnp.where(together, values, 0.0), axis=-1)
-
-
-def _merged(together: jax.Array, i: int, when: jax.Array) -> jax.Array:
-    """The groups `[object, object]` with those of neighbours i and i + 1 made one."""
-    union = together[i] | together[i + 1]
-    return jnp.where(when & union[:, None], union, together)
+            links = with_link(links, i, touches[i] & (a[i] > a[i + 1]))
+            a, slips = each(links)
+    rim = [jnp.zeros_like(one) for one in a]
+    for i in rolling:
+        turned = (direction[i] + slips[i]) * brake[i] * law.rim[i]
+        rim[i] = jnp.where(sticks[i] & (slips[i] == 0), a[i], turned)
+    return _Accelerations(tuple(a), tuple(rim))
 
 
 class _Events(NamedTuple):
-    grip: jax.Array
-    foot: jax.Array
-    hit: jax.Array
+    grip: Numbers
+    foot: Numbers
+    hit: Numbers
     soonest: jax.Array
 
 
 def _event_times(
     bodies: Bodies,
-    touches: jax.Array,
+    touches: Links,
     by: _Accelerations,
     left_s: jax.Array,
     law: Dynamics,
     scene: Surroundings,
 ) -> _Events:
     """When each event comes at constant accelerations, s; inf where it does not."""
+    grip, foot, hit = [], [], []
     q, v, a = bodies.path_m, bodies.speed_m_s, by.centre
-    slip, change = bodies.slip_m_s, a if by.rim is None else a - by.rim
-    ends = slip * change < 0
-    grip = jnp.where(ends, -slip / jnp.where(ends, change, 1.0), jnp.inf)
-    foot = jnp.full_like(q, jnp.inf)
-    if scene.has_table:
-        toward = jnp.where(q < 0, 1.0, -1.0)
-        foot = _reaches(jnp.abs(q), toward * v, toward * a)
-        foot = jnp.where(jnp.abs(q) > PAST_FOOT_M, foot, jnp.inf)
-    hit = jnp.full(len(scene.names) - 1, jnp.inf)
-    if len(scene.names) > 1:
-        hit = _reaches(bodies.gap_m(law, scene), v[:-1] - v[1:], a[:-1] - a[1:])
-        hit = jnp.where(touches, jnp.inf, hit)
-    soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([grip, foot, hit])))
-    return _Events(grip, foot, hit, soonest)
+    for i, slip in enumerate(bodies.slip_m_s):
+        change = a[i] - by.rim[i] if _rolls(scene, i) else a[i]
+        ends = slip * change < 0
+        grip.append(jnp.where(ends, -slip / jnp.where(ends, change, 1.0), jnp.inf))
+        if scene.has_table:
+            toward = jnp.where(q[i] < 0, 1.0, -1.0)
+            far = jnp.abs(q[i])
+            comes = _reaches(far, toward * v[i], toward * a[i])
+            foot.append(jnp.where(far > PAST_FOOT_M, comes, jnp.inf))
+    for i, gap in enumerate(bodies.gap_m(law, scene)):
+        meets = _reaches(gap, v[i] - v[i + 1], a[i] - a[i + 1])
+        hit.append(jnp.where(touches[i], jnp.inf, meets))
+    soonest = functools.reduce(jnp.minimum, (*grip, *foot, *hit), left_s)
+    return _Events(tuple(grip), tuple(foot), tuple(hit), soonest)
 
 
 def _reaches(distance: jax.Array, v: jax.Array, a: jax.Array) -> jax.Array:
-    """The first time t > 0 at which v t + a t^2 / 2 = distance >= 0; inf if never."""
+    """The first time t >= 0 at which v t + a t^2 / 2 >= `distance` on the way there; inf if never.
+
+    Where the distance is negative: as soon as the speed is not.
+    """
     under_root = v**2 + 2 * a * distance
-    forward = (v > 0) & (under_root > 0)
-    turning = (v <= 0) & (a > 0) & (under_root > 0)
-    root = jnp.sqrt(jnp.where(forward | turning, under_root, 1.0))
+    forward = (v > 0) & ((under_root > 0) | (distance <= 0))
+    turning = (v <= 0) & (a > 0)
+    is_real = under_root > 0
+    root = jnp.where(is_real, jnp.sqrt(jnp.where(is_real, under_root, 1.0)), 0.0)
     # For v > 0 the usual formula times its conjugate: no cancellation, and a may be zero.
-    at_once = 2 * distance / jnp.where(forward, v + root, 1.0)
+    at_once = 2 * jnp.maximum(distance, 0.0) / jnp.where(forward, v + root, 1.0)
     later = (root - v) / jnp.where(turning, a, 1.0)
     return jnp.where(forward, at_once, jnp.where(turning, later, jnp.inf))
 
 
 def _past_foot(
-    v: jax.Array,
-    u: jax.Array | None,
-    arrives: jax.Array,
+    v: list[Number],
+    u: list[Number],
+    arrives: list[jax.Array],
     time_s: jax.Array,
     law: Dynamics,
     scene: Surroundings,
-) -> tuple[jax.Array, jax.Array | None]:
+) -> tuple[list[Number], list[Number]]:
     """Speeds of centres and rims after the impulse that turns those that arrive at the foot.
 
     Its friction is k times as large, or what ends the slip.
     """
     cos, sin = law.turn
-    rim = jnp.zeros_like(v) if u is None else u
-    along, lever = v * cos, law.inertia * law.rim
-    at_foot = state_at(jnp.zeros_like(v), v - rim, time_s, scene)
-    most = law.coefficient(at_foot) * jnp.abs(v * sin)
-    slip = along - rim
-    ends = most * (1 + lever) >= jnp.abs(slip)
-    rubbed = jnp.where(ends, slip / (1 + lever), jnp.sign(slip) * most)
-    turned = rim + lever * rubbed
-    v = jnp.where(arrives, jnp.where(ends, turned, along - rubbed) * law.foot, v)
-    return v, None if u is None else jnp.where(arrives, turned * law.foot, u)
+    slips = jnp.stack([one - rim for one, rim in zip(v, u, strict=True)])
+    k = law.coefficient(state_at(jnp.zeros_like(slips), slips, time_s, scene))
+    speeds, rims = [], []
+    for i, rim in enumerate(u):
+        along, lever = v[i] * cos, law.inertia[i] * law.rim[i]
+        most = k[i] * jnp.abs(v[i] * sin)
+        slip = along - rim
+        ends = most * (1 + lever) >= jnp.abs(slip)
+        rubbed = jnp.where(ends, slip / (1 + lever), jnp.sign(slip) * most)
+        turned = rim + lever * rubbed
+        after = jnp.where(ends, turned, along - rubbed) * law.foot
+        speeds.append(jnp.where(arrives[i], after, v[i]))
+        rims.append(jnp.where(arrives[i], turned * law.foot, rim) if _rolls(scene, i) else rim)
+    return speeds, rims
 
 
-def _after_hits(bodies: Bodies, hits: jax.Array, law: Dynamics, scene: Surroundings) -> jax.Array:
-    """Speeds `[object]` after the neighbours that `hits` `[object - 1]` names knock together.
+def _after_hits(
+    bodies: Bodies, hits: list[jax.Array], law: Dynamics, scene: Surroundings
+) -> list[Number]:
+    """Speeds after the neighbours that `hits` names knock together.
 
     Impulses only push, and neighbours part at least e times as fast as they met: of all such
     speeds the nearest in kinetic energy, found by merging as in `_accelerations`. So what stands
     against a body that is hit is pushed on at once. Faces are smooth: rims keep their speeds.
     """
     v = bodies.speed_m_s
-    meets = hits | (bodies.gap_m(law, scene) < TOUCH_M)
-    approach = v[:-1] - v[1:]
-    e = jnp.where(approach > PLASTIC_M_S, law.restitution, 0.0)
-    parting = jnp.cumsum(jnp.where(meets, e * approach, 0.0))
-    ahead = jnp.concatenate([jnp.zeros(1), parting])
-    count = len(scene.names)
-    together, common = jnp.eye(count, dtype=bool), v - ahead
+    count = len(v)
+    ahead, meets = [jnp.zeros_like(v[0])], []
+    for i, gap in enumerate(bodies.gap_m(law, scene)):
+        meets.append(hits[i] | (gap < TOUCH_M))
+        approach = v[i] - v[i + 1]
+        e = jnp.where(approach > PLASTIC_M_S, law.restitution, 0.0)
+        ahead.append(ahead[-1] + jnp.where(meets[i], e * approach, 0.0))
+    inertia = [law.inertia[i] for i in range(count)]
+    behind = [v[i] - ahead[i] for i in range(count)]
+    links, common = apart(count), behind
     for _ in range(count - 1):
         for i in range(count - 1):
-            together = _merged(together, i, meets[i] & (common[i] > common[i + 1]))
-            momentum = _sums(together, law.inertia * (v - ahead))
-            common = momentum / _sums(together, law.inertia)
-    return jnp.where(jnp.any(hits), common + ahead, v)
+            links = with_link(links, i, meets[i] & (common[i] > common[i + 1]))
+            momentum = of_group([m * w for m, w in zip(inertia, behind, strict=True)], links)
+            masses = of_group(inertia, links)
+            common = [p / m for p, m in zip(momentum, masses, strict=True)]
+    any_hits = functools.reduce(jnp.logical_or, hits)
+    return [jnp.where(any_hits, common[i] + ahead[i], v[i]) for i in range(count)]
 
 
 class EngineRigid(EngineJax):

@@ -27,25 +27,50 @@ def recorded(
       count: of records that are wanted; beyond, bodies stay where they are then. None: all.
     """
 
-    def record(bodies: Bodies, index: jax.Array) -> tuple[Bodies, Bodies]:
-        return step(bodies, index), bodies
+    def part(bodies: Bodies, first: jax.Array) -> tuple[Bodies, Bodies]:
+        def record(bodies: Bodies, index: jax.Array) -> tuple[Bodies, Bodies]:
+            return step(bodies, index), bodies
 
-    if count is None or num_records % PART:
-        return jax.lax.scan(record, bodies, jnp.arange(num_records))[1]
+        return jax.lax.scan(record, bodies, first + jnp.arange(PART))
 
-    def part(i: jax.Array, carry: tuple[Bodies, Bodies]) -> tuple[Bodies, Bodies]:
+    return recorded_in_parts(part, bodies, num_records, count)
+
+
+def recorded_in_parts(
+    part: Callable[[Bodies, jax.Array], tuple[Bodies, Bodies]],
+    bodies: Bodies,
+    num_records: int,
+    count: jax.Array | None = None,
+) -> Bodies:
+    """As `recorded`, of bodies that are moved on by `PART` records at once.
+
+    Args:
+      part: bodies at a record and its index to those after the part, and to those at its records,
+        leaves `[record, ...]`.
+      bodies: at the first.
+      num_records: as of `recorded`.
+      count: as of `recorded`.
+    """
+    num_parts = -(-num_records // PART)
+    if count is None:
+        firsts = PART * jnp.arange(num_parts)
+        made = jax.lax.scan(part, bodies, firsts)[1]
+        return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[:num_records], made)
+
+    def one(i: jax.Array, carry: tuple[Bodies, Bodies]) -> tuple[Bodies, Bodies]:
         bodies, made = carry
-        bodies, own = jax.lax.scan(record, bodies, i * PART + jnp.arange(PART))
+        bodies, own = part(bodies, i * PART)
         put = functools.partial(jax.lax.dynamic_update_slice_in_dim, start_index=i * PART, axis=0)
         return bodies, jax.tree.map(put, made, own)
 
-    empty = jax.tree.map(lambda leaf: jnp.zeros((num_records, *leaf.shape), leaf.dtype), bodies)
-    made = jax.lax.fori_loop(0, -(-count // PART), part, (bodies, empty))[1]
-    is_over = jnp.arange(num_records) >= count
+    padded = num_parts * PART
+    empty = jax.tree.map(lambda leaf: jnp.zeros((padded, *leaf.shape), leaf.dtype), bodies)
+    made = jax.lax.fori_loop(0, -(-count // PART), one, (bodies, empty))[1]
+    is_over = jnp.arange(padded) >= count
 
     def held(leaf: jax.Array) -> jax.Array:
         over = is_over.reshape(-1, *[1] * (leaf.ndim - 1))
-        return jnp.where(over, leaf[count - 1], leaf)
+        return jnp.where(over, leaf[count - 1], leaf)[:num_records]
 
     return jax.tree.map(held, made)
 

@@ -9,9 +9,18 @@ import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import jax
 from jaxtyping import Float
 
-from galileo_jax.model.effects.effect import Effect, Push, State, Surroundings, true_surroundings
+from galileo_jax.model.effects.effect import (
+    Effect,
+    Force,
+    Friction,
+    Push,
+    State,
+    Surroundings,
+    true_surroundings,
+)
 
 # NumPy or JAX arrays alike; the leading axes are the batch's.
 Array = Float[Any, "..."]
@@ -47,6 +56,7 @@ class Dynamics(NamedTuple):
       drive: `State` to forces along the path but friction, `[..., object]`, N.
       brake: `State` to friction's size `[..., object]`, N.
       gravity: `[...]` or a number, m/s^2.
+      is_steady: whether drive and brake are constant on either side of the foot.
       pushes: forces with directions of their own on one free body, see `Effect.push`.
     """
 
@@ -66,13 +76,27 @@ class Dynamics(NamedTuple):
     drive: Callable[[State], PerObject]
     brake: Callable[[State], PerObject]
     gravity: Array
+    is_steady: bool
     pushes: tuple[Push, ...] = ()
 
 
 def dynamics(
-    effects: Sequence[Effect], scene: Surroundings, theta: Mapping[str, Array], xp: Any
+    effects: Sequence[Effect],
+    scene: Surroundings,
+    theta: Mapping[str, Array],
+    xp: Any,
+    acts: Array | None = None,
 ) -> Dynamics:
-    """Puts parameters (each `[...]`) and effects together."""
+    """Puts parameters (each `[...]`) and effects together.
+
+    Args:
+      effects: all that may act.
+      scene: as declared.
+      theta: parameters by name.
+      xp: NumPy or JAX.
+      acts: `[effect]`, in JAX: forces and friction laws of others are not computed at all, where
+        the same holds for all of a batch. None: all act.
+    """
     scene = true_surroundings(effects, theta, scene)
     count = len(scene.names)
     mass = xp.stack([theta[f"m{i + 1}"] for i in range(count)], axis=-1)
@@ -98,8 +122,10 @@ def dynamics(
     for effect in effects:
         if (factor := effect.foot(theta, scene)) is not None:
             foot = foot * factor
-    laws = [law for e in effects if (law := e.friction(theta, scene)) is not None]
-    forces = [force for e in effects if (force := e.force(theta, scene)) is not None]
+    laws = [_if_acts(acts, i, e.friction(theta, scene)) for i, e in enumerate(effects)]
+    laws = [law for law in laws if law is not None]
+    adds = [_if_acts(acts, i, _added(e.force(theta, scene))) for i, e in enumerate(effects)]
+    adds = [add for add in adds if add is not None]
 
     def coefficient(state: State) -> PerObject:
         return functools.reduce(lambda k, law: law(state, k), laws, friction)
@@ -113,7 +139,7 @@ def dynamics(
 
     def drive(state: State) -> PerObject:
         pull = xp.where(state.is_on_ramp, *pulls)
-        return functools.reduce(operator.add, (force(state) for force in forces), pull)
+        return functools.reduce(lambda sum_, add: add(state, sum_), adds, pull)
 
     def brake(state: State) -> PerObject:
         return coefficient(state) * xp.where(state.is_on_ramp, *normals)
@@ -135,7 +161,22 @@ def dynamics(
         drive=drive,
         brake=brake,
         gravity=scene.gravity,
+        is_steady=not laws and not adds,
         pushes=tuple(push for e in effects if (push := e.push(theta, scene)) is not None),
+    )
+
+
+def _added(force: Force | None) -> Friction | None:
+    """A force as what it makes of the sum of those before it."""
+    return None if force is None else lambda state, total: total + force(state)
+
+
+def _if_acts(acts: Array | None, i: int, law: Friction | None) -> Friction | None:
+    """`law`, left out where effect `i` does not act."""
+    if acts is None or law is None:
+        return law
+    return lambda state, value: jax.lax.cond(
+        acts[i], lambda value: law(state, value), lambda value: value, value
     )
 
 
@@ -169,13 +210,17 @@ def to_plane(
       positions (m) and velocities (m/s), each `[..., object, 2]`.
     """
     xp = path_m.__array_namespace__()
+
+    def along(slope: Array) -> OfCentres:
+        return xp.stack([xp.cos(slope), -xp.sin(slope)], axis=-1)[..., None, :]
+
+    # Sines of two slopes, not of every place's.
+    tangent = along(ramp_rad)
     if scene.has_table:
-        slope = xp.where(path_m < 0, ramp_rad[..., None], table_rad[..., None])
+        tangent = xp.where(path_m[..., None] < 0, tangent, along(table_rad))
         origin = xp.stack([xp.asarray(scene.corner_m), xp.asarray(scene.half_height_m)], axis=-1)
     else:
-        slope = ramp_rad[..., None] + xp.zeros(path_m.shape)
         origin = xp.asarray(scene.start_m)
-    tangent = xp.stack([xp.cos(slope), -xp.sin(slope)], axis=-1)
     return origin + path_m[..., None] * tangent, speed_m_s[..., None] * tangent
 
 

@@ -1,5 +1,6 @@
 """Batches and lengths of any size through programs compiled for a few."""
 
+import functools
 import os
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -57,9 +58,14 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
     if len(cuts) == 1:
         return jax.tree.map(np.array, part(*cuts[0]))  # JAX's own cannot be written to
     # XLA runs small operations, one after the other, on a single core.
-    with ThreadPoolExecutor(num_cores()) as pool:
-        parts = list(pool.map(lambda cut: part(*cut), cuts))
+    parts = list(_pool(os.getpid()).map(lambda cut: part(*cut), cuts))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)
+
+
+@functools.cache
+def _pool(process: int) -> ThreadPoolExecutor:
+    """Threads for parts of batches: starting them anew takes as long as some parts do."""
+    return ThreadPoolExecutor(num_cores())
 
 
 def one_at_a_time(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,5 +1,6 @@
 """Proposed formulas as numbers: the same motion as their classes, and no program of their own."""
 
+from collections import OrderedDict
 from dataclasses import replace
 from typing import Any
 
@@ -81,7 +82,8 @@ def motions_of(*names: str):
 
 
 @in_float64
-def test_rollouts_are_the_same_and_other_formulas_compile_nothing():
+def test_rollouts_are_the_same_and_other_formulas_compile_nothing(monkeypatch):
+    monkeypatch.setattr(_roll_out_batch, "_programs", OrderedDict())
     first = ("law_push_decay_t", "law_friction_power_t_all", "law_drag_force_power_v_all")
     for own, as_numbers in zip(*motions_of(*first), strict=True):
         np.testing.assert_allclose(as_numbers, own, atol=1e-12)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.model.effects.registry import make_effects
-from galileo_jax.rollout.acting_laws import FEW, FORCES, FRICTIONS, ActingLaws
+from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT, make_model, make_theta
@@ -34,26 +34,46 @@ def thetas(model, count, **values):
     return np.tile(theta, (count, 1))
 
 
-def test_each_rollout_has_the_laws_that_act_in_it(model):
-    parts = [{}, {"air_drag": 0.3}, {"friction_patch": 0.1}, {"restitution": 0.3}]
-    theta = np.concatenate([thetas(model, FEW, **values) for values in parts])
-    acting = ActingLaws(model).in_each(theta)
-    assert acting[::FEW].tolist() == [0, FORCES, FRICTIONS, 0]
-    few = ActingLaws(model).in_each(theta[: 2 * FEW + 1])
-    assert few[[0, FEW, -1]].tolist() == [0, FORCES, FORCES | FRICTIONS]
+def test_rollouts_without_laws_have_a_program_of_their_own(model):
+    parts = [
+        {},
+        {"air_drag": 0.3},
+        {"friction_patch": 0.1},
+        {"restitution": 0.3},
+        {"air_drag": 0.1},
+    ]
+    theta = np.concatenate([thetas(model, 2, **values) for values in parts])
+    (steady, first), (whole, others) = ActingLaws(model).shares(theta)
+    assert sorted(first) == [0, 1, 6, 7]
+    assert sorted(others) == [2, 3, 4, 5, 8, 9]
+    assert {"air_drag", "friction_patch"}.isdisjoint(effect.name for effect in steady.effects)
+    assert "friction_patch_start" not in steady.names and "restitution" in steady.names
+    assert steady.names == tuple(np.array(model.names)[list(steady.columns)])
+    assert whole.effects == model.effects + model.nuisances and whole.names == model.names
 
 
-def test_a_law_that_acts_is_in_the_share_and_others_are_not(model):
-    share = ActingLaws(model).share(FRICTIONS)
-    names = {effect.name for effect in share.effects}
-    assert {"friction_patch", "restitution"} <= names and "air_drag" not in names
-    assert share.names == tuple(np.array(model.names)[list(share.columns)])
-    assert "friction_patch_start" in share.names and "air_drag" not in share.names
+def test_rollouts_with_the_same_laws_are_side_by_side(model):
+    drag, patch = thetas(model, 1, air_drag=0.3), thetas(model, 1, friction_patch=0.1)
+    ((_, rows),) = ActingLaws(model).shares(np.concatenate([drag, patch] * 3))
+    assert sorted(rows[:3] % 2) in ([0, 0, 0], [1, 1, 1])
+
+
+def test_only_laws_that_act_in_the_batch_do(model):
+    ((share, _),) = ActingLaws(model).shares(thetas(model, 2, air_drag=0.3))
+
+    def idle(theta) -> set[str]:
+        acts = share.acts(theta)
+        assert acts is not None
+        return {effect.name for effect, one in zip(share.effects, acts, strict=True) if not one}
+
+    assert idle(thetas(model, 2)) == {"air_drag", "friction_patch"}
+    both = np.concatenate([thetas(model, 1, air_drag=0.3), thetas(model, 1)])
+    assert idle(both) == {"friction_patch"}
 
 
 def test_rollouts_are_those_of_the_whole_model(model):
     values = [{}, {"air_drag": 0.3}, {"friction_patch": 0.1}]
-    theta = np.concatenate([thetas(model, FEW, **own) for own in values])
+    theta = np.concatenate([thetas(model, 16, **own) for own in values])
     theta = theta[np.random.default_rng(1).permutation(len(theta))]
     engine = EngineRigid(model)
     whole = jax.jit(engine.traceable)(theta)

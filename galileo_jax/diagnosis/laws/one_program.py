@@ -25,14 +25,14 @@ from galileo_jax.model.effects.effect import (
 from galileo_jax.model.effects.law import against_motion, changed_friction
 from galileo_jax.model.model import Model
 from galileo_jax.model.parameters import Normal, Parameter
-from galileo_jax.rollout.acting_laws import FORCES, FRICTIONS, ActingLaws, Share
+from galileo_jax.rollout.acting_laws import STEADY, WITH_LAWS, ActingLaws, Share
 
 STRENGTH, IS_ON_ALL, NATURE = "law", "law_is_on_all", "law_nature"
 FIRST, SECOND = ("law_1", "law_1_a", "law_1_b"), ("law_2", "law_2_a", "law_2_b")
 NAMES = (STRENGTH, IS_ON_ALL, NATURE, *FIRST, *SECOND)
 NATURES = ("push", "drag", "drag_force", "friction")
 MOST_NUMBERS = 5  # of a formula: the strength and the constants of two factors
-TOGETHER = FORCES | FRICTIONS | 4  # of rollouts in which several formulas act
+TOGETHER = 2  # kind of rollouts in which several formulas act
 
 
 class LawAsForce(Effect):
@@ -109,20 +109,28 @@ class OneLaw(Share):
     """Part of a model: without its formulas, but with the one that acts in each rollout.
 
     Attributes:
-      acting: by formula, where its strength and constants stand, and its numbers.
+      formulas: of each, where its strength and constants stand, and its numbers.
     """
 
-    acting: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...] = ()
+    formulas: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...] = ()
 
     def of(self, theta: np.ndarray) -> np.ndarray:
         """Of `theta` `[batch, parameter]` the columns of `names`."""
         numbers = np.ones((len(theta), len(NAMES)))
         numbers[:, 0] = 0.0
-        for columns, codes, slots in self.acting:
+        for columns, codes, slots in self.formulas:
             acts = np.flatnonzero(theta[:, columns[0]])
             numbers[acts] = codes
             numbers[np.ix_(acts, slots)] = theta[np.ix_(acts, columns)]
         return np.concatenate([super().of(theta), numbers], axis=1)
+
+    def acts(self, theta: np.ndarray) -> np.ndarray:
+        """Whether a force, and whether a friction law acts in any; nuisances do."""
+        nature = self.of(theta)[:, -len(NAMES) + NAMES.index(NATURE)]
+        is_friction = nature == NATURES.index("friction")
+        return np.array(
+            [not is_friction.all(), is_friction.any(), *[True] * (len(self.effects) - 2)]
+        )
 
 
 class ActingFormulas(ActingLaws):
@@ -135,36 +143,26 @@ class ActingFormulas(ActingLaws):
 
     def __init__(self, model: Model, structures: Mapping[str, Structure]):
         super().__init__(model)
-        found = {}
-        for effect in model.effects:
-            columns = self._columns(effect)
-            if effect.name in structures and columns.size:
-                structure = structures[effect.name]
-                kind = FRICTIONS if structure.nature == "friction" else FORCES
-                found[effect.name] = kind, (columns, *codes_of(structure))
-        self._formulas = found
+        self._formulas = tuple(
+            (law.columns, *codes_of(structures[law.effect.name]))
+            for law in self._laws
+            if law.effect.name in structures
+        )
 
-    def acting(self, theta: np.ndarray) -> np.ndarray:
-        """As in a rollout of codes; `TOGETHER` where several formulas act."""
-        found, count = np.zeros(len(theta), int), np.zeros(len(theta), int)
-        for kind, (columns, *_) in self._formulas.values():
-            acts = theta[:, columns[0]] != 0
-            found |= np.where(acts, kind, 0)
-            count += acts
-        return np.where(count > 1, TOGETHER, found)
+    def _kinds(self, acts: np.ndarray) -> np.ndarray:
+        return np.minimum(acts.sum(axis=0), TOGETHER)
 
-    def _share_of(self, laws: int) -> Share:
-        if laws & TOGETHER == TOGETHER:
-            return super()._share_of(FORCES | FRICTIONS)
-        model = self._model
-        gone = {int(i) for effect in model.effects for i in self._columns(effect)}
-        columns = tuple(i for i in range(len(model.names)) if i not in gone)
-        acting = (LawAsForce(),) * bool(laws & FORCES) + (LawAsFriction(),) * bool(laws & FRICTIONS)
+    def _share_of(self, kind: int) -> Share:
+        if kind == TOGETHER:
+            return super()._share_of(WITH_LAWS)
+        without = self._without(list(self._model.effects))
+        if kind == STEADY:
+            return without
         return OneLaw(
-            acting + model.nuisances,
-            (*(model.names[i] for i in columns), *NAMES),
-            columns,
-            tuple(formula for _, formula in self._formulas.values()),
+            (LawAsForce(), LawAsFriction(), *without.effects),
+            (*without.names, *NAMES),
+            without.columns,
+            formulas=self._formulas,
         )
 
 
