@@ -41,7 +41,7 @@ CLIPS = (1, 2, 4, 8, 16, 32, 64)
 CELLS = (100, 1000)
 BATCHES = (1, 4, 16, 64, 256, 1024, 4096)
 BARS = {"marginal_s": 3.0, "memory_ratio": 1.2}
-HEAVY = ("_roll_out_batch", "jacobian_batch", "solve", "white_batch", "_seen_batch")
+HEAVY = ("_roll_out_batch", "seen_slopes_batch", "solve", "white_batch", "_seen_batch")
 LOGGING = ("dispatch", "compiler", "interpreters.pxla")  # JAX's modules that tell of compilations
 PARTS = ("clips", "workers", "rollouts", "memory", "video")
 

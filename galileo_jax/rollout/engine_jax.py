@@ -69,8 +69,11 @@ class EngineJax:
             )
             for share, rows in shares
         ]
-        back = np.argsort(np.concatenate([rows for _, rows in shares]))
-        position, velocity = (np.concatenate(own)[back] for own in zip(*motions, strict=True))
+        if len(shares) == 1 and (np.diff(shares[0][1]) == 1).all():
+            return motions[0]  # nothing was moved, and nothing need be copied
+        position, velocity = (np.empty((len(theta), *own.shape[1:])) for own in motions[0])
+        for (_, rows), motion in zip(shares, motions, strict=True):
+            position[rows], velocity[rows] = motion
         return position, velocity
 
     def _as_long_as_needed(self, share: Share, theta: np.ndarray, until_s: np.ndarray) -> Motion:

@@ -89,31 +89,24 @@ def white_batch(kind: Kind, theta, position, velocity, noise, data, scene):
     )
 
 
-def _white_near(kind: Kind, u, z, free, index, noise, motion, clip: ClipArrays):
-    """Residuals at z + u, with the motion linear in u `[free parameter]`; z of all clips."""
-    moved = z.at[index].add(u, mode="drop")
-    own = moved[clip.column]
-    theta = jnp.where(free[clip.column], clip.priors.forward(own), clip.absent)
-    position, velocity, position_slope, velocity_slope = motion
-    position = position + jnp.tensordot(u, position_slope, axes=1)
-    velocity = velocity + jnp.tensordot(u, velocity_slope, axes=1)
-    return white_of(kind, theta, position, velocity, noise, clip.data, clip.scene)
-
-
 @trace_cached(num_static=1)
-def jacobian_batch(kind: Kind, z, free, noise, index, p, v, dp, dv, clip):
-    """Residuals `[point, value]` and their slopes `[point, value, free parameter]`."""
+def seen_slopes_batch(kind: Kind, z, free, noise, index, position, velocity, clip: ClipArrays):
+    """Residuals of motions `[point, value]`, and their slopes `[point, value, parameter]`.
 
-    def one(z, free, noise, index, *motion):
+    In the parameters of `index` `[point, parameter]`, which change what is seen of a motion, not
+    the motion: clock and camera. `z` of all clips.
+    """
+
+    def one(z, free, noise, index, position, velocity):
         def residuals(u):
-            return _white_near(kind, u, z, free, index, noise, motion, clip)
+            own = z.at[index].add(u, mode="drop")[clip.column]
+            theta = jnp.where(free[clip.column], clip.priors.forward(own), clip.absent)
+            return white_of(kind, theta, position, velocity, noise, clip.data, clip.scene)
 
         zero = jnp.zeros(index.shape[0])
-        jacobian = jax.jacfwd(residuals)(zero)
-        # A dummy entry of the index moves nothing; its column must not look like one that does.
-        return residuals(zero), jnp.where(index < z.shape[0], jacobian, 0.0)
+        return residuals(zero), jax.jacfwd(residuals)(zero)
 
-    return jax.vmap(one)(z, free, noise, index, p, v, dp, dv)
+    return jax.vmap(one)(z, free, noise, index, position, velocity)
 
 
 @trace_cached(num_static=0)

@@ -12,7 +12,7 @@ from galileo_jax.inference.fits.programs import (
     Kind,
     Padded,
     Quadratic,
-    jacobian_batch,
+    seen_slopes_batch,
     white_batch,
 )
 from galileo_jax.inference.joint_problem import JointProblem, in_units
@@ -174,11 +174,7 @@ class Residuals:
     def whites_of(self, points: Batch, motions: Motions) -> list[Float[np.ndarray, "point value"]]:
         """Whitened residuals, `[point, value]`, clip by clip, of points that were rolled out."""
         return [
-            in_chunks(
-                MOTIONS,
-                lambda *rows, clip=clip: white_batch(clip.kind, *rows, clip.data, clip.scene),
-                *(*motion, points.noise[:, c]),
-            )
+            _white(clip, motion, points.noise[:, c])
             for c, (clip, motion) in enumerate(zip(self.clips, motions, strict=True))
         ]
 
@@ -189,7 +185,7 @@ class Residuals:
         is_central: bool,
         motions: Motions | None = None,
     ) -> Slopes:
-        """By differences: of motions by rollouts, of clock and camera by JAX.
+        """By differences, where the motion changes; in parameters of clock and camera by JAX.
 
         Args:
           points: where.
@@ -200,58 +196,85 @@ class Residuals:
         index = _free_index(points.free)
         jacobians, whites = [], []
         for c, clip in enumerate(self.clips):
-            motion = self._differences(c, points, index, steps, is_central, motions)
-            white, jacobian = in_chunks(
-                POINTS,
-                lambda *rows, clip=clip: jacobian_batch(clip.kind, *rows, clip.arrays),
-                *(points.z, points.free, points.noise[:, c], index, *motion),
-            )
+            moves = self._moves(clip, index, steps, is_central)
+            first = 0 if motions else len(points.z)  # of the points themselves
+            owner = np.concatenate([np.arange(first), moves.point])
+            moved = points.z[owner]
+            moved[np.arange(first, len(moved)), moves.which] += moves.step
+            made = self._simulate(clip, moved, points.free[owner])
+            motion = motions[c] if motions else tuple(values[:first] for values in made)
+            white, jacobian = self._seen_slopes(c, points, index, motion)
+            aside = _white(clip, [v[first:] for v in made], points.noise[moves.point, c])
+            change = (aside - white[moves.point]) / moves.step[:, None]
+            one, two = np.split(np.arange(len(change)), [len(change) // moves.sides])
+            mean = 0.5 * (change[one] + change[two]) if is_central else change
+            jacobian[moves.point[one], :, moves.slot[one]] = mean
             whites.append(white)
             jacobians.append(jacobian)
         return Slopes(jacobians, whites, index, self._count)
 
-    def _differences(
-        self,
-        c: int,
-        points: Batch,
-        index: np.ndarray,
-        steps: np.ndarray,
-        is_central: bool,
-        motions: Motions | None,
-    ) -> tuple[np.ndarray, ...]:
-        """A clip's motions and their slopes; arguments as of `slopes`, `index` as of `Slopes`."""
-        clip = self.clips[c]
+    def _moves(
+        self, clip: FittedClip, index: np.ndarray, steps: np.ndarray, is_central: bool
+    ) -> "_Moves":
+        """Rollouts for differences; `index` as of `Slopes`, other arguments as of `slopes`."""
         padded = np.pad(self._is_simulated, (0, 1))
-        signs = (1.0, -1.0) if is_central else (1.0,)
         own = np.pad(np.isin(np.arange(self._count), clip.column), (0, 1))
         point, slot = np.nonzero(padded[index] & own[index])
         which = index[point, slot]
-        h = steps[point, which]
-        offsets = np.zeros((len(point), self._count))
-        offsets[np.arange(len(point)), which] = h
-        first = 0 if motions else len(points.z)  # of the points themselves
-        owner = np.concatenate([np.arange(first), *([point] * len(signs))])
-        moved = points.z[owner]
-        moved[first:] += np.concatenate([s * offsets for s in signs])
-        _, *out = self._simulate(clip, moved, points.free[owner])
-        bases = motions[c][1:] if motions else [values[:first] for values in out]
-        slopes = []
-        for values, base in zip(out, bases, strict=True):
-            rest = values[first:]
-            low = rest[len(point) :] if is_central else base[point]
-            width = (2 * h if is_central else h)[:, None, None, None]
-            slope = np.zeros((*index.shape, *base.shape[1:]))
-            # A proposal whose motion overflows costs too much to be taken, whatever its slopes.
-            with np.errstate(invalid="ignore"):
-                slope[point, slot] = (rest[: len(point)] - low) / width
-            slopes.append(slope)
-        return (*bases, *slopes)
+        step = steps[point, which]
+        sides = 2 if is_central else 1
+        signed = np.concatenate([step, -step][:sides])
+        point, slot, which = (np.tile(values, sides) for values in (point, slot, which))
+        return _Moves(point, slot, which, signed, sides)
+
+    def _seen_slopes(
+        self, c: int, points: Batch, index: np.ndarray, motion: tuple[np.ndarray, ...]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals of a clip's points, and slopes as of `Slopes` in clock and camera; others 0."""
+        clip = self.clips[c]
+        seen = _free_index(points.free & ~self._is_simulated)
+        white, slopes = in_chunks(
+            POINTS,
+            lambda *rows: seen_slopes_batch(clip.kind, *rows, clip.arrays),
+            *(points.z, points.free, points.noise[:, c], seen, *motion[1:]),
+        )
+        jacobian = np.zeros((*white.shape, index.shape[1]))
+        point, column = np.nonzero(seen < self._count)
+        slot = np.argmax(index[point] == seen[point, column][:, None], axis=1)
+        jacobian[point, :, slot] = slopes[point, :, column]
+        return white, jacobian
 
     def _simulate(self, clip: FittedClip, z: np.ndarray, free: np.ndarray):
         """`[point, ...]`: parameters in their units, centres and velocities."""
         self.num_rollouts += len(z)
         theta = clip.theta(z, free)
         return theta, *clip.problem.motion(theta)
+
+
+class _Moves(NamedTuple):
+    """What slopes are differences of; of both sides first all of one, then all of the other.
+
+    Attributes:
+      point, slot, which: `[rollout]`, whose point, which of its free parameters, and which that is
+        among the models'.
+      step: `[rollout]`, in z.
+      sides: 1 or 2.
+    """
+
+    point: np.ndarray
+    slot: np.ndarray
+    which: np.ndarray
+    step: np.ndarray
+    sides: int
+
+
+def _white(
+    clip: FittedClip, motion: Sequence[np.ndarray], noise: np.ndarray
+) -> Float[np.ndarray, "point value"]:
+    """Whitened residuals of a clip's motions."""
+    return in_chunks(
+        MOTIONS, lambda *rows: white_batch(clip.kind, *rows, clip.data, clip.scene), *motion, noise
+    )
 
 
 def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
@@ -274,7 +297,7 @@ def quadratic(slopes: Slopes, z: np.ndarray) -> Quadratic:
 
 def _free_index(free: np.ndarray) -> np.ndarray:
     """Where each point's free parameters stand, `[point, free]`; the count of all = none."""
-    width = rounded_up(int(free.sum(axis=1).max()), FREE)
+    width = rounded_up(max(int(free.sum(axis=1).max()), 1), FREE)
     index = np.full((len(free), width), free.shape[1])
     for row, own in zip(index, free, strict=True):
         found = np.flatnonzero(own)
