@@ -3,7 +3,8 @@
 Real clips show more than their scene: the hand that lets go, the stop at the end of a board, a
 blow by something that is no partner. What lies beyond is left out, and a `Cut` says where and why.
 
-    board without a table    from where the hand is off; to a stop or a blow
+    board without a table    from the rest after which it comes down, and from where the hand is
+                             off; to a stop, a blow, or the rest after which it is carried away
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
     toss                     to the first impact
     from_above               to a quarter of a second after everything has come to rest
@@ -20,6 +21,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.find_blow import blow_frame, goes_on
 from galileo_jax.measurement.find_hand import hand_frame
+from galileo_jax.measurement.find_placed import placed_frames
 from galileo_jax.measurement.find_rest import rest_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
 from galileo_jax.measurement.toss_flight import last_free_frame
@@ -29,6 +31,8 @@ STOPPED = "is stopped by something that is not in the scene"
 STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
 LANDED = "comes down on the table"
 RESTS = "is at rest, as is all that is still seen"
+PLACED = "is put into its place by a hand until then"
+TAKEN = "is taken away by a hand from then on"
 HELD = "is moved by a hand until then: it accelerates otherwise than on its way"
 
 
@@ -61,9 +65,10 @@ def is_board(clip: Clip) -> bool:
 
 def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:
     """The observation with what is not of the scene masked, and where and why, in time's order."""
-    cuts = []
     if SCENARIOS[clip.scenario].is_level:
         return _to_rest(clip, observation)
+    is_let_go = is_board(clip) and not clip.starts_moving
+    observation, cuts = _left_to_itself(observation) if is_let_go else (observation, [])
     ends = [
         (frame, why)
         for frame, why in ((find(observation), why) for find, why in _ends(clip))
@@ -76,12 +81,13 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
         # Of a video: the hit falls into an exposure, whose frame shows neither.
         last -= SMEARED_FRAMES if clip.video is not None else 0
         observation = _without(observation, slice(last + 1, None))
+        cuts = [each for each in cuts if each.side == "before"]
         cuts.append(Cut(observation.names[0], float(observation.times_s[last]), "after", why))
-    is_let_go = is_board(clip) and not clip.starts_moving
     first = hand_frame(observation) if is_let_go else None
     if first is not None:
         observation = _without(observation, slice(None, first))
         time_s = float(observation.times_s[first])
+        cuts = [each for each in cuts if each.side == "after"]
         cuts.insert(0, Cut(observation.names[0], time_s, "before", HELD))
     return observation, tuple(cuts)
 
@@ -90,6 +96,25 @@ def cuts_of(measured: Sequence[Any]) -> dict[str, Any]:
     """For a result's document: `{"cuts": {clip: [{name, time_s, side, why}]}}`, or nothing."""
     found = {one.name: [asdict(each) for each in one.cuts] for one in measured if one.cuts}
     return {"cuts": found} if found else {}
+
+
+def to_last_cut(observation: Observation, cuts: Sequence[Cut]) -> Observation:
+    """The observation without the frames that a cut leaves out at its end, which cost only time.
+
+    Those before the first are as they were: frames are counted from the clip's beginning.
+    """
+    if not any(each.side == "after" for each in cuts):
+        return observation
+    count = int(np.flatnonzero(observation.mask.any(axis=0))[-1]) + 1
+    modes = observation.modes_m
+    return replace(
+        observation,
+        times_s=observation.times_s[:count],
+        position_m=observation.position_m[..., :count],
+        covariance_m2=observation.covariance_m2[..., :count],
+        mask=observation.mask[:, :count],
+        modes_m=None if modes is None else modes[..., :count],
+    )
 
 
 def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
@@ -102,6 +127,19 @@ def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
     if clip.scenario == "flight" and not clip.has_floor:
         return [(blow_frame, STRUCK)]
     return []
+
+
+def _left_to_itself(observation: Observation) -> tuple[Observation, list[Cut]]:
+    """Without what a hand does before the object lies where it begins, and after it has ended."""
+    first, last = placed_frames(observation)
+    found, name, times = [], observation.names[0], observation.times_s
+    if first is not None:
+        observation = _without(observation, slice(None, first))
+        found.append(Cut(name, float(times[first]), "before", PLACED))
+    if last is not None:
+        observation = _without(observation, slice(last + 1, None))
+        found.append(Cut(name, float(times[last]), "after", TAKEN))
+    return observation, found
 
 
 def _to_rest(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:

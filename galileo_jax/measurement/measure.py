@@ -13,7 +13,7 @@ from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.measurement.astray import Astray, find_astray
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
-from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of
+from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_radii import from_first_common_frame, is_level, told_by_hit
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
@@ -104,7 +104,7 @@ def measure(clip: Clip) -> Measurement:
     )
     return replace(
         measured,
-        observation=observation,
+        observation=to_last_cut(observation, cuts),
         inferred={**found, **measured.inferred},
         cuts=cuts,
         astray=astray,

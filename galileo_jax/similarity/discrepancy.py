@@ -14,7 +14,7 @@ import numpy as np
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.hit_discrepancy import after_hits
-from galileo_jax.similarity.random_patterns import random_patterns
+from galileo_jax.similarity.random_patterns import SMALLEST, random_patterns
 
 POINT_SD_M = 0.003  # how far a marked point is from the centre
 OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table
@@ -53,11 +53,14 @@ def offsets(observation: Observation) -> list[np.ndarray]:
 
 
 def wander(
-    observation: Observation, sd_m: float = WANDER_SD_M, lasts_s: float = WANDER_S
+    observation: Observation,
+    sd_m: float = WANDER_SD_M,
+    lasts_s: float = WANDER_S,
+    smallest: float = SMALLEST,
 ) -> list[np.ndarray]:
     """For each object and axis of a track a slow wander (Ornstein-Uhlenbeck)."""
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    patterns = random_patterns(sd_m**2 * np.exp(-apart / lasts_s))
+    patterns = random_patterns(sd_m**2 * np.exp(-apart / lasts_s), smallest)
     count, axes, _ = observation.position_m.shape
     found = []
     for i in range(count):

@@ -21,6 +21,7 @@ from galileo_jax.similarity.discrepancy import crossings, modes, offsets, wander
 from galileo_jax.similarity.level_discrepancy import level_modes
 
 NoiseModel = Literal["camera", "bodies", "tracker"]
+IDLE = 1e-3  # a gain that changes a residual by less than a millionth
 Places = Float[jax.Array, "object 2 frame"]
 Batch = Float[np.ndarray, "*batch object 2 frame"]
 Values = Float[np.ndarray, "*batch value"]
@@ -81,6 +82,8 @@ class GaussianLikelihood:
         patterns = np.einsum("oijt,mojt->moit", inverse_root, patterns)
         flat = patterns.reshape(len(patterns), -1)
         _, gain, basis = np.linalg.svd(flat, full_matrices=False)
+        if scene.is_level:  # long tracks, most of whose patterns are alike
+            gain, basis = gain[gain > IDLE], basis[gain > IDLE]
         return Whitening(
             np.where(mask[:, None], observation.position_m, 0.0),
             inverse_root,

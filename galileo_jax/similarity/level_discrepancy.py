@@ -2,7 +2,8 @@
 
 Offsets of each puck and axis; what camera and tracker do, which wander by tenths of a pixel; a real
 hit's duration; and, where the turning is known, a followed point that is not the centre, which goes
-round it.
+round it. All of the wander counts: at hundreds of frames per second even its fast part is as large
+as the scatter, and neighbouring errors of what lies still go together.
 """
 
 from itertools import combinations
@@ -33,7 +34,7 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
             own = np.zeros_like(position)
             own[:, :2] = pattern[:, :2]
             found.append(own)
-        found.extend(wander(observation, WOBBLE_SD_M, WOBBLE_S))
+        found.extend(wander(observation, WOBBLE_SD_M, WOBBLE_S, smallest=0.0))
     for i, j in combinations(range(len(position)), 2):
         both = observation.mask[i] & observation.mask[j]
         apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)

@@ -8,11 +8,12 @@ SMALLEST = 1e-3  # of the largest pattern's variance; what is smaller is left ou
 
 def random_patterns(
     covariance: Float[np.ndarray, "frame frame"],
+    smallest: float = SMALLEST,
 ) -> Float[np.ndarray, "pattern frame"]:
     """The patterns of a covariance, each times the standard deviation of its amplitude.
 
     Source: Karhunen and Loeve; Rasmussen and Williams (2006), Gaussian Processes, section 4.3.
     """
     values, vectors = np.linalg.eigh(covariance)
-    large = values > SMALLEST * values[-1]
+    large = values > smallest * values[-1]
     return (np.sqrt(values[large]) * vectors[:, large]).T

@@ -13,6 +13,7 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipObject
+from galileo_jax.model.effects.air import expected_added_mass
 from galileo_jax.model.effects.effect import PENDULUM, Effect, Surroundings
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.laws.liquid import ADDED_MASS
@@ -87,8 +88,16 @@ class FreeTruth:
             has_surface=False,
             moves_in_plane=scenario.moves_in_plane,
             laws=(*scenario.laws, *(("floor",) if has_floor else ())),
-            expected=dict.fromkeys(NAMES, (0.0, 1.0)),
+            expected=dict.fromkeys(NAMES, (0.0, 1.0)) | self._carried_air,
         )
+
+    @property
+    def _carried_air(self) -> dict[str, tuple]:
+        """As the clip's yaml, with size and mass, will tell it; of a ball in a liquid nothing."""
+        size_m = self.thing.size_m
+        if self.scenario == "liquid" or size_m is None:
+            return {}
+        return expected_added_mass(size_m[0], self.values["m1"])
 
 
 NAMES = (*PLANE, *PATH, LENGTH, ANGLE, "rest", "period", "density_ratio", "floor_height")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import LENS_SD, WOBBLE_SD_M, modes
+from galileo_jax.similarity.discrepancy import LENS_SD, WOBBLE_S, WOBBLE_SD_M, modes
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from galileo_jax.similarity.hit_discrepancy import (
     CLOSE_M,
@@ -15,6 +15,7 @@ from galileo_jax.similarity.hit_discrepancy import (
     _pushes,
     _speeds_at,
 )
+from galileo_jax.similarity.level_discrepancy import level_modes
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
@@ -199,3 +200,20 @@ def test_bodies_that_close_in_by_more_than_that_in_one_frame_do_not_push():
     assert hit is not None
     seen.position_m[1, 0, hit.both[0]] += 2 * CLOSE_M
     assert _pushes(hit, seen.position_m, seen) == []
+
+
+def test_pucks_wander_in_full_however_fast():
+    """Between neighbouring frames, too, the wander changes as much as it says."""
+    count, fps = 200, 240.0
+    still = Observation(
+        ("object1",),
+        np.arange(count) / fps,
+        np.zeros((1, 2, count)),
+        np.broadcast_to(1e-8 * np.eye(2)[None, :, :, None], (1, 2, 2, count)),
+        np.ones((1, count), bool),
+    )
+    scene = replace(SCENE, names=("object1",), half_length_m=(0.02,))
+    x = level_modes(still, scene, is_filmed=True)[:, 0, 0]
+    step = np.diff(x, axis=1)
+    expected = 2 * WOBBLE_SD_M**2 * (1 - np.exp(-1 / fps / WOBBLE_S))
+    assert np.sum(step**2, axis=0) == pytest.approx(np.full(count - 1, expected), rel=0.01)

@@ -87,6 +87,8 @@ def _padded(problem: Problem) -> Padded:
     frames = rounded_up(len(times), FRAMES) - len(times)
     # A wobble has as many modes as frames; the others are fewer than those to spare.
     usual = len(data.observed_m) * (len(times) + frames) + SPARE_MODES
+    if problem.model.scene.surroundings.is_level:
+        usual = SPARE_MODES
     modes = max(rounded_up(len(data.gain), FRAMES), usual) - len(data.gain)
     whitening = Whitening(
         np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),

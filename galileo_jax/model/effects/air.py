@@ -17,6 +17,7 @@ from galileo_jax.model.parameters import LogNormal
 
 AIR_KG_M3 = 1.2
 DRAG_COEFFICIENT = (0.4, 0.5)  # middle, and the width of its logarithm
+CARRIED_SD = 0.1  # of its logarithm, as size, mass and the air's density are known
 EXPECTED_ODDS = 30.0  # of a drag of this size against any other effect of the library
 
 
@@ -26,6 +27,12 @@ def expected_drags(radius_m: float, length_m: float, gravity: float) -> dict[str
     quadratic = middle * AIR_KG_M3 * math.pi * radius_m**2 / 2
     linear = quadratic * math.sqrt(gravity * length_m)
     return {"air_drag": (quadratic, width), "viscous_drag": (linear, width)}
+
+
+def expected_added_mass(radius_m: float, mass_kg: float) -> dict[str, tuple]:
+    """The air that a ball carries along over its mass: half of what it displaces."""
+    displaced = AIR_KG_M3 * 4.0 / 3.0 * math.pi * radius_m**3
+    return {"added_mass": (displaced / 2.0 / mass_kg, CARRIED_SD)}
 
 
 def expected_odds(name: str, theta: Theta, scene: Surroundings, prior: LogNormal) -> float:

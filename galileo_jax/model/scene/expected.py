@@ -13,7 +13,7 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.model.effects.air import expected_drags
+from galileo_jax.model.effects.air import expected_added_mass, expected_drags
 from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN, PENDULUM, SPIN
 from galileo_jax.model.effects.laws.start_velocity import LAUNCH
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
@@ -85,7 +85,10 @@ def expected(
 
 
 def _declared(clip: Clip) -> dict[str, tuple[float, float]]:
-    """How well angle, scale and origin are known; nothing of what is taken at its word."""
+    """How well angle, scale and origin are known, and the air that comes along.
+
+    Nothing of what is taken at its word.
+    """
     in_plane = SCENARIOS[clip.scenario].moves_in_plane
     angle_sd_deg = clip.vertical_sd_deg if in_plane else clip.ramp_angle_sd_deg
     scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
@@ -94,7 +97,16 @@ def _declared(clip: Clip) -> dict[str, tuple[float, float]]:
         DeclaredScale.name: clip.pixels_per_metre_sd / scale,
         ORIGIN: clip.origin_sd_px / scale,
     }
-    return {name: (0.0, sd) for name, sd in sds.items() if sd}
+    return {name: (0.0, sd) for name, sd in sds.items() if sd} | _carried_air(clip)
+
+
+def _carried_air(clip: Clip) -> dict[str, tuple[float, float]]:
+    """The air that a ball of declared size and mass carries along; nothing of others."""
+    size_m, mass_kg = clip.objects[0].size_m, clip.objects[0].mass_kg
+    is_ball = clip.objects[0].shape == "sphere"
+    if not is_ball or size_m is None or mass_kg is None or clip.scenario == "liquid":
+        return {}
+    return expected_added_mass(size_m[0], mass_kg)
 
 
 def _spin(clip: Clip) -> dict[str, tuple[float, float]]:

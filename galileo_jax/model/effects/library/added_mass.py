@@ -1,0 +1,88 @@
+"""Added mass: what a body moves through is pushed aside, and some of it comes along.
+
+    m (1 + a) q'' = F + 2 a m g (upward),    a: the fluid carried along over the body's mass
+
+Half of the displaced fluid moves with a sphere, and all of what is displaced lifts it: hence 2 a.
+In air a is 0.0003 for a steel ball, 0.007 for one of table tennis and 0.3 for a balloon. In the
+scenario `liquid`, whose own law holds a sphere's share and the lift, it is what other shapes carry
+beyond that, and lifts nothing. The vertical is the picture's; flow that lags behind is left out.
+
+Closed form: a fall, or a flight, with gravity g (1 - 2 a) / (1 + a); a pendulum as slow as there.
+
+Source: Bessel (1828), on the length of the simple pendulum; Poisson (1831); Batchelor, An
+Introduction to Fluid Dynamics (1967), section 6.8.
+Confused with: scale_error, frame_rate: each of them acts like another gravity; rod_mass.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import (
+    PENDULUM,
+    Array,
+    Effect,
+    Force,
+    Push,
+    State,
+    Surroundings,
+    Theta,
+)
+from galileo_jax.model.effects.laws.liquid import Liquid
+from galileo_jax.model.effects.laws.pendulum import LENGTH
+from galileo_jax.model.effects.laws.spring import Spring
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import LogNormal, Parameter
+
+PRIOR = LogNormal(median=0.01, sd=1.2)  # of balls in air; where size and mass are declared, those
+LIQUID_PRIOR = LogNormal(median=0.2, sd=0.7)
+LIFT = 2.0  # what is displaced over what a sphere carries along
+
+
+@register
+class AddedMass(Effect):
+    """The fluid that a body carries along and displaces."""
+
+    name: ClassVar[str] = "added_mass"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The fluid's share; none on a surface or a spring, whose masses do not show."""
+        if not _has_place(scene):
+            return ()
+        prior = LIQUID_PRIOR if Liquid.name in scene.laws else PRIOR
+        if self.name in scene.expected:
+            prior = LogNormal(*scene.expected[self.name])
+        return (Parameter("added_mass", "1", prior, 0.0, "effect", 0.1),)
+
+    def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+        """The lift, on a straight path and on a pendulum's circle."""
+        if not _has_place(scene) or Liquid.name in scene.laws or scene.is_thrown:
+            return None
+        lift = (LIFT * theta["added_mass"] * theta["m1"] * scene.gravity)[..., None]
+        if PENDULUM not in scene.laws:
+            return lambda state: -lift
+        length = theta[LENGTH][..., None]
+
+        def push(state: State):
+            return lift * lift.__array_namespace__().sin(state.path_m / length)
+
+        return push
+
+    def push(self, theta: Theta, scene: Surroundings) -> Push | None:
+        """The lift of what flies, and the weight that its inertia does not share."""
+        if not _has_place(scene) or not scene.is_thrown:
+            return None
+        # The engine adds gravity to forces over the inertia: what is carried along weighs nothing.
+        upward = (LIFT + 1.0) * theta["added_mass"] * theta["m1"] * scene.gravity
+
+        def lift(velocity_m_s: Array, time_s: Array) -> Array:
+            xp = velocity_m_s.__array_namespace__()
+            return upward * xp.asarray([axis == 1 for axis in range(scene.num_axes)])
+
+        return lift
+
+    def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """The fluid's that comes along."""
+        return theta["added_mass"][..., None] if _has_place(scene) else None
+
+
+def _has_place(scene: Surroundings) -> bool:
+    return not scene.has_surface and Spring.name not in scene.laws
