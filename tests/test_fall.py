@@ -22,6 +22,7 @@ from tests.precision import in_64_bit
 G, MASS_KG, RELEASE_S, TOP_M = 9.81, 0.05, 0.1, 3.0
 FPS, FRAMES, NOISE_M = 30, 50, 0.003
 HAS_A_PLACE = {
+    "added_mass",
     "air_drag",
     "constant_force",
     "frame_rate",

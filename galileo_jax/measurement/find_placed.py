@@ -27,6 +27,8 @@ def placed_frames(observation: Observation) -> tuple[int | None, int | None]:
     if len(seen) < 2 * FEWEST:
         return None, None
     size = max(FEWEST, round(REST_S / float(np.median(np.diff(times_s)))))
+    if len(seen) < size:
+        return None, None
     rests = _stretches(_is_still(observation, seen, size))
     if not rests:
         return None, None

@@ -163,7 +163,7 @@ def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--add", "nonsense"], "known: auto, none, air_drag"),
+        (["--add", "nonsense"], "known: auto, none, added_mass, air_drag"),
         (["--effects-from", "missing.py"], "missing.py: no such file"),
         (["--engine", "foo"], "--engine: invalid choice: 'foo'"),
         (["--seed", "-1"], "'-1' is no whole number"),
