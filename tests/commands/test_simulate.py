@@ -177,7 +177,10 @@ def test_free_motion_of_what_meets_squarely_is_planar():
         (["--out", "clip.mp4", "--size", "640"], "'640' is no size"),
         (["--out", "clip.mp4", "--size", "641x360"], "even numbers"),
         (["--out", "clip.mp4", "--scenario", "rmap"], "rmap"),
-        (["--out", "clip.mp4", "--effect", "drag"], "unknown effect 'drag'; known: added_mass, air_drag"),
+        (
+            ["--out", "clip.mp4", "--effect", "drag"],
+            "unknown effect 'drag'; known: added_mass, air_drag",
+        ),
         (["--out", "clip.mp4", "--effect", "air_drag:c=1"], "no parameter 'c'; known: air_drag"),
         (["--out", "clip.mp4", "--effect", "air_drag:air_drag=x"], "is not PARAMETER=NUMBER"),
         (["--out", "clip.mp4", "--effect", "rolling", "--effect", "rolling"], "named twice"),
