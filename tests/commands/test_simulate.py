@@ -179,7 +179,7 @@ def test_free_motion_of_what_meets_squarely_is_planar():
         (["--out", "clip.mp4", "--scenario", "rmap"], "rmap"),
         (
             ["--out", "clip.mp4", "--effect", "drag"],
-            "unknown effect 'drag'; known: added_mass, air_drag",
+            "unknown effect 'drag'; known: added_mass",
         ),
         (["--out", "clip.mp4", "--effect", "air_drag:c=1"], "no parameter 'c'; known: air_drag"),
         (["--out", "clip.mp4", "--effect", "air_drag:air_drag=x"], "is not PARAMETER=NUMBER"),

@@ -133,7 +133,7 @@ def test_goes_on_where_it_was_stopped(tmp_path, clips, calls, monkeypatch, capsy
 def test_a_wrong_call_is_one_line_and_nothing_is_computed(tmp_path, clips, calls, capsys):
     wrong = {
         "common: {seed: -1}": "plan.yaml: common.seed: ",
-        "common: {effects: [air_drga]}": "effects: unknown 'air_drga'; known: added_mass, air_drag, ",
+        "common: {effects: [air_drga]}": "effects: unknown 'air_drga'; known: added_mass, ",
         "list: [{method: diagnose, add: glue}]": "effects: unknown 'glue'",
     }
     for text, line in wrong.items():
