@@ -13,11 +13,7 @@ from galileo_jax.inference.fits.programs import (
     white_batch,
 )
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.runtime.batching import (
-    MOTIONS,
-    in_chunks,
-    rounded_up,
-)
+from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
 
 Motions = list[tuple[np.ndarray, ...]]
 """For each clip parameters in their units, and centres and velocities `[point, ...]`."""
@@ -129,9 +125,8 @@ class Residuals:
             white, jacobian = self._seen_slopes(c, points, index, motion)
             aside = _white(clip, [v[first:] for v in made], points.noise[moves.point, c])
             change = (aside - white[moves.point]) / moves.step[:, None]
-            one, two = np.split(np.arange(len(change)), [len(change) // moves.sides])
-            mean = 0.5 * (change[one] + change[two]) if is_central else change
-            jacobian[moves.point[one], :, moves.slot[one]] = mean
+            mean = change.reshape(moves.sides, -1, change.shape[1]).mean(axis=0)
+            jacobian[moves.point[: len(mean)], :, moves.slot[: len(mean)]] = mean
             whites.append(white)
             jacobians.append(jacobian)
         return Slopes(jacobians, whites, index, self._count)
