@@ -1,8 +1,10 @@
-"""Right and confidently wrong of `discover`, over labs that hide an effect of the library.
+"""Right and confidently wrong of `discover`, over labs that hide an effect, or a law.
 
     python benchmarks/discover.py --out DIR --budget 16 --first 100 --seeds 1
+    python benchmarks/discover.py --out DIR --effects hidden_heating,hidden_gust
 
 Each effect (and none) is hidden `--seeds` times in new objects; a lab can vary height and angle.
+`hidden_NAME` is a law of `hidden_laws.py`, right as in `laws.py`. What is interrupted goes on.
 `--noise speed`: a velocity is known to 7.5 % of the range of the speed (as in NewtonBench);
 `--noise px`: 0.3 px at 900 px/m. What is finished stays in DIR and is not done again. Seeds below
 100 were looked at during development. The last line is JSON.

@@ -6,11 +6,13 @@ For every pair of docs/reference/effects.md that is easily confused, the first e
 lab. Both ways begin with the same clip (the middle of what the lab allows); then one asks
 `next_experiment`, the other draws a setting, and all clips are diagnosed together until the effect
 is named, or `--most` clips are made. A lab whose first clip names the effect already says nothing
-here and is left out. What is finished stays in DIR. The last line is JSON.
+here and is left out. What is finished stays in DIR, every clip and verdict for itself, so that what
+is interrupted goes on. The last line is JSON.
 """
 
 import argparse
 import json
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,7 +25,7 @@ import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.experiment.measured import write_clip
 from galileo_jax.experiment.plan import middle
-from galileo_jax.experiment.settings import Range
+from galileo_jax.experiment.settings import Can, Range
 from galileo_jax.runtime.atomic_write import write_json
 
 PAIRS = (
@@ -70,47 +72,63 @@ def main(argv: Sequence[str]) -> int | None:
 
 def _race(call: argparse.Namespace, effect: str, seed: int) -> dict[str, Any]:
     folder: Path = call.out / f"{effect}_{seed}"
-    done = folder / "row.json"
-    if done.is_file():
-        return json.loads(done.read_text())
     (folder / "lab").mkdir(parents=True, exist_ok=True)
     lab = labs.SimulatedLab(folder / "lab", effect, seed, call.noise)
-    can = lab.describe().can
-    first = _clip(lab, folder, "first", middle(can))
-    found = gx.diagnose([first], seed=seed, add="none")
-    row: dict[str, Any] = {"hidden": effect, "seed": seed}
-    row["first"] = [found.verdict.status, *found.verdict.effects]
-    generator = np.random.default_rng(seed)
+    first = _step(folder, lab, (), middle(lab.describe().can), call.most)
+    row: dict[str, Any] = {"hidden": effect, "seed": seed, "first": first["says"]}
     for way in WAYS:
-        clips, at = [first], found
+        steps = [first]
         # One more than allowed stands for "not named within them".
-        while not _is_named(at, effect) and len(clips) <= call.most:
-            if way == "next":
-                setting = gx.next_experiment(at, can=labs.SETTINGS, seed=seed).best
-            else:
-                setting = {
-                    name: float(generator.uniform(kind.low, kind.high))
-                    if isinstance(kind, Range)
-                    else kind.values[int(generator.integers(len(kind.values)))]
-                    for name, kind in can.items()
-                }
-            clips.append(_clip(lab, folder, f"{way}{len(clips) + 1}", setting))
-            if len(clips) <= call.most:
-                at = gx.diagnose(clips, seed=seed, add="none")
-        row[way] = len(clips)
-        row[f"{way}_says"] = [at.verdict.status, *at.verdict.effects]
-    write_json(done, row)
+        while steps[-1]["says"] != ["named", effect] and len(steps) < call.most:
+            setting = steps[-1]["next"]
+            if way == "random":
+                setting = _drawn(lab.describe().can, seed, len(steps))
+            steps.append(_step(folder, lab, [one["clip"] for one in steps], setting, call.most))
+        is_named = steps[-1]["says"] == ["named", effect]
+        row[way] = len(steps) if is_named else call.most + 1
+        row[f"{way}_says"] = steps[-1]["says"]
     return row
 
 
-def _is_named(found: gx.Diagnosis, effect: str) -> bool:
-    return found.verdict.status == "named" and found.verdict.effects == (effect,)
+def _step(
+    folder: Path,
+    lab: labs.SimulatedLab,
+    before: Sequence[str],
+    setting: Mapping[str, Any],
+    most: int,
+) -> dict[str, Any]:
+    """One more clip, the verdict of all, and where to measure next; done once, then on disk.
+
+    The same clips are the same step, whichever way asks for it.
+    """
+    text = json.dumps([*before, setting], sort_keys=True)
+    name = f"c{len(before) + 1}_{zlib.crc32(text.encode()):08x}"
+    done = folder / f"{name}.json"
+    if done.is_file():
+        return json.loads(done.read_text())
+    clip = folder / f"{name}.csv"
+    if not clip.is_file():
+        write_clip(clip, lab.measure(setting), lab.describe().clip, setting)
+    clips = [folder / each for each in (*before, clip.name)]
+    found = gx.diagnose(clips, seed=lab.seed, add="none")
+    says = [found.verdict.status, *found.verdict.effects]
+    ahead = None
+    if says != ["named", lab.effect] and len(clips) < most:
+        ahead = dict(gx.next_experiment(found, can=labs.SETTINGS, seed=lab.seed).best)
+    step = {"clip": clip.name, "setting": dict(setting), "says": says, "next": ahead}
+    write_json(done, step)
+    return step
 
 
-def _clip(lab: labs.SimulatedLab, folder: Path, name: str, setting: Mapping[str, Any]) -> Path:
-    path = folder / f"{name}.csv"
-    write_clip(path, lab.measure(setting), lab.describe().clip, setting)
-    return path
+def _drawn(can: Can, seed: int, number: int) -> dict[str, Any]:
+    """A setting at random."""
+    generator = np.random.default_rng([seed, number])
+    return {
+        name: float(generator.uniform(kind.low, kind.high))
+        if isinstance(kind, Range)
+        else kind.values[int(generator.integers(len(kind.values)))]
+        for name, kind in can.items()
+    }
 
 
 def _parser() -> command.Parser:

@@ -12,7 +12,7 @@ from galileo_jax.api.next_experiment import rehearsed
 from galileo_jax.experiment.choose import LITTLE
 from galileo_jax.experiment.journal import Journal, open_journal
 from galileo_jax.experiment.lab import Described, Lab, LabError, program_of
-from galileo_jax.experiment.measured import same_as, write_clip
+from galileo_jax.experiment.measured import write_clip
 from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
 from galileo_jax.experiment.settings import Can
 from galileo_jax.runtime import progress
@@ -211,12 +211,8 @@ class _Loop:
         path = journal.folder / "clips" / f"e{row['number']:03}.csv"
         try:
             text = self._lab.measure(row["settings"])
-            write_clip(path, text, self._described.clip, row["settings"])
-            others = journal.tracks
-            same = same_as(path, [journal.folder / one["clip"] for one in others])
-            if same is not None:
-                _remove(path)
-                raise LabError(f"the same track as in experiment {others[same]['number']}")
+            others = {one["number"]: journal.folder / one["clip"] for one in journal.tracks}
+            write_clip(path, text, self._described.clip, row["settings"], others)
         except Cancelled:
             raise
         except Exception as error:  # whatever a lab does must cost one experiment
@@ -313,8 +309,3 @@ class _Loop:
 
 def _line(error: Exception) -> str:
     return " ".join(str(error).split())[:200] or type(error).__name__
-
-
-def _remove(path: Path) -> None:
-    path.unlink(missing_ok=True)
-    path.with_suffix(".yaml").unlink(missing_ok=True)

@@ -89,8 +89,11 @@ class Program:
         text = self._run([DESCRIBE], "")
         try:
             return described(json.loads(text))
-        except (ValueError, InputError) as error:
+        except InputError as error:
             raise LabError(f"{DESCRIBE}: {_line(str(error))}") from error
+        except ValueError as error:
+            said = f"it printed {_line(text)!r}" if text.strip() else "it printed nothing"
+            raise LabError(f"{DESCRIBE}: a JSON object expected; {said}") from error
 
     def measure(self, settings: Mapping[str, Any]) -> str:
         """The track that the program writes."""

@@ -1,6 +1,6 @@
 """From what a lab answered to a clip, or to a line that says why it is none."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,11 @@ MOST_NOISE_M = 0.05  # of a coordinate: no camera is so bad, and random numbers 
 
 
 def write_clip(
-    path: Path, text: str, declared: Mapping[str, Any], settings: Mapping[str, Any]
+    path: Path,
+    text: str,
+    declared: Mapping[str, Any],
+    settings: Mapping[str, Any],
+    others: Mapping[int, Path] | None = None,
 ) -> Clip:
     """Writes a track and the yaml beside it.
 
@@ -33,9 +37,10 @@ def write_clip(
       text: that the lab answered.
       declared: of a clip's yaml.
       settings: of the experiment; angle and frame rate are declared, too.
+      others: the tracks before it by the number of their experiment, of which it may be none.
 
     Raises:
-      LabError: it is no track, or no clip; nothing is left of it then.
+      LabError: it is no track, no clip, or the same as before; nothing is left of it then.
     """
     update = {
         DECLARED[known_as(name)]: value
@@ -53,6 +58,8 @@ def write_clip(
     yaml = path.with_suffix(".yaml")
     try:
         _check(path)
+        # Before the clip is: at another angle the same track has no place.
+        _check_new(path, others or {})
         check_clip(yaml, content)
         write_text(yaml, yaml_text(content))
         return load_clip(yaml)
@@ -63,13 +70,12 @@ def write_clip(
         raise LabError(" ".join(said.split())) from error
 
 
-def same_as(path: Path, others: Sequence[Path]) -> int | None:
-    """Which of some tracks is the same to the last digit; None where none is."""
+def _check_new(path: Path, others: Mapping[int, Path]) -> None:
+    """Raises `InputError` where a track is the same as another to the last digit."""
     own = digest(read_observation_csv(path))
-    for i, other in enumerate(others):
+    for number, other in others.items():
         if digest(read_observation_csv(other)) == own:
-            return i
-    return None
+            raise InputError(f"{path}: the same track as in experiment {number}")
 
 
 def _check(path: Path) -> None:

@@ -71,7 +71,8 @@ def test_one_that_hangs_is_ended_with_what_it_started(tmp_path):
 @pytest.mark.parametrize(
     ("says", "line"),
     [
-        ("nothing", "--describe: "),
+        ("ready", "--describe: a JSON object expected; it printed 'ready'"),
+        ("", "--describe: a JSON object expected; it printed nothing"),
         (json.dumps([]), "--describe: a JSON object expected"),
         (json.dumps({"settings": {"fps": 30}}), "--describe: clip: missing"),
         (json.dumps({"settings": {}, "clip": {}}), "--describe: settings: empty"),
