@@ -12,7 +12,6 @@ import json
 import math
 import sys
 import tempfile
-import zlib
 from pathlib import Path
 
 import galileo_jax as gx
@@ -47,7 +46,7 @@ def describe() -> dict:
 
 
 def measure(settings: dict) -> str:
-    """The track of one experiment; the noise is another one at every setting."""
+    """The track of one experiment; the noise is another one each time, at the same setting, too."""
     for name, value in settings.items():
         known = SETTINGS.get(name, {})
         is_there = value in known.get("choices", ()) or (
@@ -56,6 +55,8 @@ def measure(settings: dict) -> str:
         if not is_there:
             print(f"{name}: {value} cannot be set here", file=sys.stderr)
             sys.exit(2)
+    asked = SEALED.with_name("asked.jsonl")  # every experiment, one line each
+    before = asked.read_text().count("\n") if asked.is_file() else 0
     with tempfile.TemporaryDirectory() as folder:
         track = Path(folder) / "track.csv"
         gx.simulate(
@@ -64,10 +65,12 @@ def measure(settings: dict) -> str:
             release=settings["height_m"] / math.sin(math.radians(settings["angle_deg"])),
             angle=settings["angle_deg"],
             fps=settings["fps"],
-            seed=zlib.crc32(json.dumps(settings, sort_keys=True).encode()),
+            seed=before,
             track_only=True,
             track_noise=NOISE_M,
         )
+        with asked.open("a") as file:
+            file.write(json.dumps(settings) + "\n")
         return track.read_text(encoding="utf-8")
 
 

@@ -20,6 +20,7 @@ from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.diagnosis.verdict import log_prior, looked_at_again, within_luck
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
+from galileo_jax.model.effects.forms import FORM_SHAPES
 
 
 def law_candidates(
@@ -41,8 +42,8 @@ def law_candidates(
       fitted: ranked; the formula of the best form is tried, too, with its constants free.
     """
     made = []
-    families = [c.family for c in fitted[:1] if c.family is not None]
-    for law in fitted_laws(trials, near, views, families):
+    wanted = [FORM_SHAPES[c.effects[0]] for c in fitted[:1] if c.family is not None]
+    for law in fitted_laws(trials, near, views, wanted):
         fit, own = law.hypothesis.fit, law.hypothesis.of(trials)
         values = {name: f"{value:.4g}" for name, value in law.constants().items()}
         made.append(

@@ -90,6 +90,7 @@ def options_without_part(settings: Settings) -> Iterator[tuple[tuple[str, ...], 
         yield ("release",), "drawn for every trial of a --series"
     if not settings.effects:
         yield ("strength",), "of what? name an effect with --effect NAME"
+    if not settings.effects and settings.like is None:  # what is hidden there may be of the file
         yield ("effects_from",), "nothing of it is used without --effect"
     if settings.motion != "free":
         yield ("z2",), "of --motion free only"

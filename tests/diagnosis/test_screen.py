@@ -106,5 +106,24 @@ def test_the_family_of_a_form_that_fits_has_a_place():
     found = [made(label, 90.0) for label in ("pulse_t", "wave_t", "step_t", "decay_t")]
     found += [made("power_t", 20.0, "friction"), made("power_t", 10.0)]
     assert "power_t" not in [one.structure.family for one in chosen(found)]
-    kept = [one for one in chosen(found, {"power_t"}) if one.structure.family == "power_t"]
+    kept = [
+        one
+        for one in chosen(found, [("power_t", "friction", True)])
+        if one.structure.family == "power_t"
+    ]
     assert [one.structure.nature for one in kept] == ["friction"]
+
+
+def test_the_nature_of_a_form_that_fits_has_a_place():
+    """A push of the same family may explain more in a linear model, of friction that doubles."""
+    found = [made(label, 90.0) for label in ("pulse_t", "wave_t", "step_t", "decay_t")]
+    found += [made("power_t", 80.0), made("power_t", 20.0, "friction")]
+    found.append(made("power_t", 10.0, "friction", is_on_all=True))
+    kept = [one for one in chosen(found, [("power_t", "friction", True)]) if is_power(one)]
+    natures = [(one.structure.nature, one.structure.is_on_all) for one in kept]
+    assert ("friction", True) in natures and ("friction", False) not in natures
+    assert {one.structure.nature for one in chosen(found) if is_power(one)} == {"push"}
+
+
+def is_power(one: Suggestion) -> bool:
+    return one.structure.family == "power_t"

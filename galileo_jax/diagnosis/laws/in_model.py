@@ -9,7 +9,7 @@ import numpy as np
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.laws.grammar import Structure, without_one_factor
 from galileo_jax.diagnosis.laws.one_program import MOST_NUMBERS, ActingFormulas, Spare
-from galileo_jax.diagnosis.laws.screen import NUM_LAWS, Suggestion, suggestions
+from galileo_jax.diagnosis.laws.screen import NUM_LAWS, Shape, Suggestion, suggestions
 from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.inference.fits.gradient import GradientFitter
@@ -63,7 +63,7 @@ def fitted_laws(
     trials: JointProblem,
     near: Hypothesis,
     views: Sequence[View],
-    families: Collection[str] = (),
+    wanted: Collection[Shape] = (),
 ) -> list[FittedLaw]:
     """The best few formulas, fitted; the most evident first.
 
@@ -73,9 +73,9 @@ def fitted_laws(
       trials: what was diagnosed.
       near: no effects, all else from where fits start.
       views: of each clip, from `missing_force.views_of`.
-      families: that are tried whatever the screening says of them.
+      wanted: what is tried whatever the screening says of them.
     """
-    made = _fitted(trials, near, suggestions(views, families), views)
+    made = _fitted(trials, near, suggestions(views, wanted), views)
     known = {name_of(law.structure) for law in made}
     simpler = (
         [one for one in _simpler(made[0]) if name_of(one.structure) not in known] if made else []

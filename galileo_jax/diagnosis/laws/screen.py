@@ -35,6 +35,10 @@ MOST_TRIES = 150  # of the simplex
 SHOWS = 1e-6  # of the largest column: what is less does not show
 
 
+Shape = tuple[str, str, bool]
+"""Family, nature, and whether it acts on all objects."""
+
+
 @dataclass(frozen=True)
 class Suggestion:
     """A formula that is worth a fit.
@@ -52,12 +56,12 @@ class Suggestion:
     score: float
 
 
-def suggestions(views: Sequence[View], families: Collection[str] = ()) -> list[Suggestion]:
+def suggestions(views: Sequence[View], wanted: Collection[Shape] = ()) -> list[Suggestion]:
     """The formulas that promise most, best first.
 
     Args:
       views: of each clip.
-      families: that are to be among them.
+      wanted: what is to be among them.
     """
     sights = [Sight.of(view) for view in views]
     scene = views[0].model.scene.surroundings
@@ -67,16 +71,19 @@ def suggestions(views: Sequence[View], families: Collection[str] = ()) -> list[S
         for structure in structures(scene.has_surface, len(scene.names))
         if (one := suggestion_of(sights, structure, ranges)) is not None
     ]
-    return chosen(found, families)
+    return chosen(found, wanted)
 
 
-def chosen(found: Sequence[Suggestion], wanted: Collection[str] = ()) -> list[Suggestion]:
+def chosen(found: Sequence[Suggestion], wanted: Collection[Shape] = ()) -> list[Suggestion]:
     """Of all formulas those that are to be fitted, best first.
 
-    The best of families that are wanted come first, then the best single factors; of each family
-    the second must differ from the best.
+    The best of what is wanted come first, then the best single factors; of each family the second
+    must differ from the best.
     """
     found = sorted(found, key=lambda one: -one.score)
+    # By nature and by whom it acts on, too: where friction is much changed, a push of the same
+    # family may be the better one in a linear model, and far behind in a fit.
+    first = [one for shape in wanted for one in _best_of(found, shape)]
     best_score = found[0].score if found else 0.0
     least = max(best_score - max(BEHIND, BEHIND_SHARE * best_score), 0.0)
     families: dict[str, list[Suggestion]] = {}
@@ -86,17 +93,27 @@ def chosen(found: Sequence[Suggestion], wanted: Collection[str] = ()) -> list[Su
             one.structure.nature != other.structure.nature or other.score - one.score > SAME
             for other in alike
         )
-        is_wanted = one.structure.family in wanted and not alike
-        if (one.score > least and is_new and len(alike) < NUM_OF_FAMILY) or is_wanted:
+        if one.score > least and is_new and len(alike) < NUM_OF_FAMILY:
             alike.append(one)
     best = [alike[0] for alike in families.values() if alike]
-    best.sort(key=lambda one: one.structure.family not in wanted)
-    single = [one for one in best if len(one.structure.factors) == 1][:NUM_SINGLE]
+    single = [one for one in best if len(one.structure.factors) == 1 and one not in first]
+    single = [*first, *single][:NUM_SINGLE]
     second = [one for alike in families.values() for one in alike[1:]]
     others = sorted(
-        [*(one for one in best if one not in single), *second], key=lambda one: -one.score
+        (one for one in [*best, *second] if one not in single), key=lambda one: -one.score
     )
     return sorted([*single, *others][:NUM_LAWS], key=lambda one: -one.score)
+
+
+def _best_of(found: Sequence[Suggestion], shape: Shape) -> list[Suggestion]:
+    """The best formula of a shape, of ranked ones; a drag is one of force or of acceleration."""
+    family, nature, is_on_all = shape
+    alike = [
+        one
+        for one in found
+        if one.structure.family == family and one.structure.nature.startswith(nature)
+    ]
+    return sorted(alike, key=lambda one: one.structure.is_on_all != is_on_all)[:1]
 
 
 def _ranges(views: Sequence[View]) -> dict[str, tuple[float, float]]:

@@ -38,4 +38,5 @@ FORMS: tuple[Form, ...] = (
 
 FORM_NAMES = tuple(form.name for form in FORMS)
 FORM_FAMILIES = {form.name: form.family for form in FORMS}
+FORM_SHAPES = {form.name: (form.family, form.nature, form.is_on_all) for form in FORMS}
 FORM_MEANINGS = {form.name: form.meaning for form in FORMS}

@@ -23,6 +23,7 @@ class DragOfAPower(Form):
     name: ClassVar[str] = "drag_of_a_power"
     meaning: ClassVar[str] = "a drag that grows with another power of the speed"
     family: ClassVar[str] = "power_v"
+    nature: ClassVar[str] = "drag"
     how_likely: ClassVar[float] = 0.05  # drags are well known: nearly all have a power with a name
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:

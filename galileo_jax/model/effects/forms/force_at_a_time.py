@@ -22,6 +22,8 @@ class ForceAtATime(Form):
     name: ClassVar[str] = "force_at_a_time"
     meaning: ClassVar[str] = "a push or pull on object 1 at one moment"
     family: ClassVar[str] = "pulse_t"
+    nature: ClassVar[str] = "push"
+    is_on_all: ClassVar[bool] = False
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """How strong, when, and how long."""

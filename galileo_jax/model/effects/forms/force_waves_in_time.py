@@ -23,6 +23,7 @@ class ForceWavesInTime(Form):
     name: ClassVar[str] = "force_waves_in_time"
     meaning: ClassVar[str] = "a force that comes and goes with time"
     family: ClassVar[str] = "wave_t"
+    nature: ClassVar[str] = "push"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """Two strengths, a quarter of a period apart, and the period."""

@@ -14,6 +14,10 @@ class Form(Effect):
     meaning: ClassVar[str]
     family: ClassVar[str]
     """The shape of its formula, as `diagnosis.laws` calls it; a law of that shape is the same."""
+    nature: ClassVar[str] = "friction"
+    """What has that shape: friction, a drag or a push, as in `model.effects.law`."""
+    is_on_all: ClassVar[bool] = True
+    """Else on object 1 alone."""
     how_likely: ClassVar[float] = UNNAMED_ODDS
     """Before the data, against an effect with a name."""
 

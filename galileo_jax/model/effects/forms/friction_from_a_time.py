@@ -24,6 +24,7 @@ class FrictionFromATime(Form):
     name: ClassVar[str] = "friction_from_a_time"
     meaning: ClassVar[str] = "friction of object 1 that changes at one moment"
     family: ClassVar[str] = "step_t"
+    is_on_all: ClassVar[bool] = False
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """By how much, and when; none in a fall."""
