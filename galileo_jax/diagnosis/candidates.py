@@ -169,7 +169,7 @@ def _left(found: Descended, is_own: np.ndarray) -> np.ndarray:
 
 
 def _by_promise(found: Descended, rows: np.ndarray) -> list[np.ndarray]:
-    """Candidates by the evidence that their ends promise, `[part][candidate]`: a few, then the rest.
+    """Candidates by the evidence that their ends promise, `[part][candidate]`: a few, the others.
 
     A part takes as many steps as its slowest candidate, so that many parts would take many.
     """

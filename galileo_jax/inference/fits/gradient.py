@@ -57,7 +57,7 @@ class Settings:
       search_sd_m: noise assumed on the way to the fit: a camera that sees hundredths of a
         millimetre makes valleys too narrow to be met by scattered starts.
       max_steps: of Levenberg-Marquardt from one start.
-      max_race_steps: the same in a race: the polish takes stragglers on from there, with the others.
+      max_race_steps: the same in a race; the polish takes stragglers on from there.
       max_polish_steps: in a round with fitted noise scales.
       enough: the search stops where a step promises to lower chi2 / 2 by less.
       settled: converged where a new round with fitted noise scales lowers chi2 / 2 by no more.
