@@ -87,6 +87,17 @@ def test_shows_the_pictures_of_a_video(run, tmp_path, browser):
     assert complaints == []
 
 
+def test_a_figure_saves_itself_as_svg(run, page, browser):
+    with opened(browser, run.folder / "report.html") as (shown, complaints):
+        chart = shown.locator(".chart").first
+        chart.hover()
+        with shown.expect_download() as saved:
+            chart.locator(".modebar-btn").click()
+        assert saved.value.suggested_filename == f"{chart.get_attribute('aria-label')}.svg"
+        assert Path(saved.value.path()).read_text(encoding="utf-8").startswith("<svg")
+    assert complaints == []
+
+
 def filmed(clip: Clip, path: Path) -> Clip:
     """The clip as if it had been filmed: frames that grow brighter, by 4 each."""
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (160, 120))
