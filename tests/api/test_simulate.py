@@ -203,3 +203,36 @@ def test_cancelled_it_leaves_nothing(tmp_path):
     with pytest.raises(Cancelled):
         simulate(tmp_path / "c.mp4", **SMALL, on_progress=on_progress, cancel=cancel)
     assert list(tmp_path.iterdir()) == []
+
+
+EFFECT_FILE = '''
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Effect
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import Normal, Parameter
+
+
+@register
+class Steady(Effect):
+    """A steady force on object 1."""
+
+    name: ClassVar[str] = "steady_of_a_file"
+
+    def parameters(self, scene):
+        return (Parameter(self.name, "N", Normal(0.0, 0.2), 0.0, "effect"),)
+
+    def force(self, theta, scene):
+        size = scene.only(theta[self.name], 0)
+        return lambda state: size + 0.0 * state.path_m
+'''
+
+
+def test_like_takes_the_file_of_the_effect_that_is_hidden_there(tmp_path, effects_restored):
+    file, sealed = tmp_path / "steady.py", tmp_path / "sealed.csv"
+    file.write_text(EFFECT_FILE)
+    hidden = {"steady_of_a_file": {}}
+    gx.simulate(sealed, effects=hidden, effects_from=file, track_only=True)
+    like = sealed.with_suffix(".truth.json")
+    made = gx.simulate(tmp_path / "again.csv", like=like, effects_from=file, track_only=True)
+    assert made.truths[0]["effect"] == "steady_of_a_file"
