@@ -134,6 +134,14 @@ def test_what_a_lab_does_wrong_costs_one_experiment_and_a_line(answer, line, ver
     assert again[1] not in again[2:], "not where it failed"
 
 
+def test_one_that_repeats_itself_at_another_angle_is_said_to(verdicts):
+    """Not that its objects hang above the ramp, though at that angle they do."""
+    settings = {"height_m": {"low": 0.29, "high": 0.31}, "angle_deg": {"low": 10, "high": 30}}
+    found = gx.discover(Lab(track(1), track(1), settings=settings), budget=2)
+    assert found.document["experiments"][1]["settings"]["angle_deg"] != 20
+    assert found.document["experiments"][1]["line"] == "the same track as in experiment 1"
+
+
 def test_a_track_that_cannot_be_diagnosed_costs_one_experiment(verdicts):
     verdicts.statuses = ["ambiguous", np.linalg.LinAlgError("Singular matrix"), "named", "named"]
     found = gx.discover(Lab())

@@ -232,7 +232,7 @@ def test_like_takes_the_file_of_the_effect_that_is_hidden_there(tmp_path, effect
     file, sealed = tmp_path / "steady.py", tmp_path / "sealed.csv"
     file.write_text(EFFECT_FILE)
     hidden = {"steady_of_a_file": {}}
-    gx.simulate(sealed, effects=hidden, effects_from=file, track_only=True)
+    simulate(sealed, effects=hidden, effects_from=file, track_only=True)
     like = sealed.with_suffix(".truth.json")
-    made = gx.simulate(tmp_path / "again.csv", like=like, effects_from=file, track_only=True)
+    made = simulate(tmp_path / "again.csv", like=like, effects_from=file, track_only=True)
     assert made.truths[0]["effect"] == "steady_of_a_file"
