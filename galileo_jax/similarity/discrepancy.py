@@ -112,10 +112,10 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
 
 
 def camera(position: np.ndarray, observation: Observation, scene: Surroundings) -> list[np.ndarray]:
-    """What is declared of it, or keystone about either axis, the lens and scale; of all objects."""
-    found = [] if observation.modes_m is None else list(observation.modes_m)
+    """Keystone about either axis, the lens and scale, of all objects; none where declared."""
     if observation.is_squared:
-        return found
+        return []
+    found = []
     x, y = position[:, 0], position[:, 1]
     if scene.has_surface:
         found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))
