@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 from scipy.special import logsumexp
 
 from galileo_jax.comparison.bootstrap import whitened
@@ -28,7 +29,7 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.random_patterns import random_patterns
+from galileo_jax.observation.random_patterns import random_patterns
 
 SIZES = (0.35, 0.7, 1.4)  # times what is stated of a point
 LENGTHS = (0.05, 0.1, 0.2)  # of the time that an object is seen: at least `LEAST_ROWS` rows
@@ -93,25 +94,42 @@ def _beside(trials: JointProblem, fit: GradientFit) -> SlowErrors:
     scales = theta[len(trials.model_parameters) :]
     residual = np.concatenate(whitened(trials, theta[None], scales), axis=1)[0]
     free = fit.free[: fit.jacobian.shape[1]]
-    count = int(free.sum())
-    basis, _ = np.linalg.qr(np.vstack([fit.jacobian[:, free], np.eye(count)]))
-    whole = np.append(residual, fit.z[: len(free)][free])
-    left = whole - basis @ (basis.T @ whole)
+    jacobian, z = fit.jacobian[:, free], fit.z[: len(free)][free]
     log_odds, sizes, lasts = [], [], []
     for length in LENGTHS:
         patterns, lasts_s = _whitened_patterns(trials, scales, length)
-        patterns = np.pad(patterns, [(0, count), (0, 0)])
-        patterns -= basis @ (basis.T @ patterns)
-        values, vectors = np.linalg.eigh(patterns.T @ patterns)
-        along = vectors.T @ (patterns.T @ left)
-        for size in SIZES:
-            gain = 1.0 + size**2 * np.maximum(values, 0.0)
-            log_odds.append(0.5 * float(np.sum(size**2 * along**2 / gain - np.log(gain))))
-            sizes.append(size)
-            lasts.append(lasts_s)
+        log_odds.extend(evidence_added(residual, jacobian, z, patterns))
+        sizes.extend(SIZES)
+        lasts.extend([lasts_s] * len(SIZES))
     best = int(np.argmax(log_odds))
     adds = float(logsumexp(log_odds)) - np.log(len(log_odds)) + np.log(UNNAMED_ODDS)
     return SlowErrors(adds, sizes[best], lasts[best])
+
+
+def evidence_added(
+    residual: Float[np.ndarray, " value"],
+    jacobian: Float[np.ndarray, "value parameter"],
+    z: Float[np.ndarray, " parameter"],
+    patterns: Float[np.ndarray, "value pattern"],
+) -> list[float]:
+    """Log evidence that errors of these patterns add, for each of `SIZES`, nats.
+
+    Args:
+      residual: whitened, at the fit.
+      jacobian: its slopes there.
+      z: the fit, in units of the priors.
+      patterns: whitened, of unit size.
+    """
+    count = len(z)
+    basis, _ = np.linalg.qr(np.vstack([jacobian, np.eye(count)]))
+    whole = np.append(residual, z)
+    left = whole - basis @ (basis.T @ whole)
+    patterns = np.pad(patterns, [(0, count), (0, 0)])
+    patterns -= basis @ (basis.T @ patterns)
+    values, vectors = np.linalg.eigh(patterns.T @ patterns)
+    along2 = (vectors.T @ (patterns.T @ left)) ** 2
+    gains = [(size**2, 1.0 + size**2 * np.maximum(values, 0.0)) for size in SIZES]
+    return [0.5 * float(np.sum(s2 * along2 / gain - np.log(gain))) for s2, gain in gains]
 
 
 def _whitened_patterns(

@@ -27,9 +27,10 @@ from scipy.special import logsumexp
 
 from galileo_jax.clip.plane_noise import position_noise_m
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.random_patterns import random_patterns
+from galileo_jax.observation.random_patterns import random_patterns
 
-CONVINCING = 2.0  # nats by which they explain the track better: 300 independent tracks reached 1.9
+# Nats a piece, by which they must explain a track better: 300 independent ones reached 1.9.
+CONVINCING = 2.0
 PIECE, LEAST_ROWS, MOST_PIECES = 48, 16, 6
 # Smoother than a tenth of what is stated: made without errors, or nobody can tell.
 LEAST_ROUGHNESS = 0.1
@@ -102,10 +103,16 @@ def _shared_errors(
     pieces = np.array_split(np.arange(len(values)), count)
     if count > MOST_PIECES:
         pieces = [pieces[j] for j in np.linspace(0, count - 1, MOST_PIECES).astype(int)]
-    evidence = sum(_evidence(times_s[rows], values[rows], step_s) for rows in pieces)
-    independent = logsumexp(evidence[0]) - np.log(len(SCALES))
-    correlated = logsumexp(evidence[1:]) - np.log(evidence[1:].size)
-    if correlated - independent < CONVINCING:
+    each = [_evidence(times_s[rows], values[rows], step_s) for rows in pieces]
+    halves = (
+        [sum(each[: len(each) // 2]), sum(each[len(each) // 2 :])]
+        if len(each) > 1
+        else [_evidence(times_s[r], values[r], step_s) for r in np.array_split(pieces[0], 2)]
+    )
+    evidence = sum(each)
+    is_convincing = _lead(evidence) >= CONVINCING * len(each)
+    # What happens once, as a motion that begins, is no error: those are alike in both halves.
+    if not is_convincing or min(map(_lead, halves)) < 0:
         return None
     weight = np.exp(evidence[1:] - logsumexp(evidence[1:])) @ SCALES**2  # [kernel and share]
     weight = weight.reshape(len(ROWS), len(SHARES))
@@ -139,6 +146,12 @@ def _evidence(
     log_density = -diagonal[..., None] - (size - 3) * np.log(SCALES)
     log_density = log_density - square[..., None] / (2 * SCALES**2)
     return np.asarray(logsumexp(log_density, axis=1)) - np.log(len(PATHS))
+
+
+def _lead(evidence: np.ndarray) -> float:
+    """By how many nats correlated errors explain better what `_evidence` is of."""
+    correlated = logsumexp(evidence[1:]) - np.log(evidence[1:].size)
+    return float(correlated - logsumexp(evidence[0]) + np.log(len(SCALES)))
 
 
 def _kernels(times_s: np.ndarray, step_s: float) -> Float[np.ndarray, "kernel row row"]:

@@ -13,8 +13,8 @@ import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.random_patterns import SMALLEST, random_patterns
 from galileo_jax.similarity.hit_discrepancy import after_hits
-from galileo_jax.similarity.random_patterns import SMALLEST, random_patterns
 
 POINT_SD_M = 0.003  # how far a marked point is from the centre
 OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table
