@@ -14,12 +14,12 @@ is averaged over size and length. Sizes are those of the stated errors: what a f
 track beyond that, slow errors cannot.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.diagnosis import reasons
@@ -102,7 +102,7 @@ def _beside(trials: JointProblem, fit: GradientFit) -> SlowErrors:
         sizes.extend(SIZES)
         lasts.extend([lasts_s] * len(SIZES))
     best = int(np.argmax(log_odds))
-    adds = float(logsumexp(log_odds)) - np.log(len(log_odds)) + np.log(UNNAMED_ODDS)
+    adds = float(np.logaddexp.reduce(log_odds)) + math.log(UNNAMED_ODDS / len(log_odds))
     return SlowErrors(adds, sizes[best], lasts[best])
 
 

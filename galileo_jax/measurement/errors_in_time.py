@@ -104,15 +104,15 @@ def _shared_errors(
     if count > MOST_PIECES:
         pieces = [pieces[j] for j in np.linspace(0, count - 1, MOST_PIECES).astype(int)]
     each = [_evidence(times_s[rows], values[rows], step_s) for rows in pieces]
-    halves = (
-        [sum(each[: len(each) // 2]), sum(each[len(each) // 2 :])]
-        if len(each) > 1
-        else [_evidence(times_s[r], values[r], step_s) for r in np.array_split(pieces[0], 2)]
-    )
-    evidence = sum(each)
+    half = len(each) // 2
+    by_half = [each[:half], each[half:]]
+    if not half:
+        parts = np.array_split(pieces[0], 2)
+        by_half = [[_evidence(times_s[rows], values[rows], step_s)] for rows in parts]
+    evidence = np.sum(each, axis=0)
     is_convincing = _lead(evidence) >= CONVINCING * len(each)
     # What happens once, as a motion that begins, is no error: those are alike in both halves.
-    if not is_convincing or min(map(_lead, halves)) < 0:
+    if not is_convincing or min(_lead(np.sum(own, axis=0)) for own in by_half) < 0:
         return None
     weight = np.exp(evidence[1:] - logsumexp(evidence[1:])) @ SCALES**2  # [kernel and share]
     weight = weight.reshape(len(ROWS), len(SHARES))
