@@ -6,7 +6,6 @@
 row), or smooth over two rows (`smooth`). Nothing is hidden, or a drag of `--drag` kg/m.
 """
 
-import argparse
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
