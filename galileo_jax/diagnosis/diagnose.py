@@ -33,6 +33,7 @@ from galileo_jax.diagnosis.law_verdict import needs_laws
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.race import Race
+from galileo_jax.diagnosis.slow_errors import unless_slow_errors
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
     best_named,
@@ -145,6 +146,7 @@ def diagnose(
             on_candidate(candidate)
         candidates = _compared(trials, (*candidates, *laws), decisive, seed, compared)
         verdict = law_or(trials, verdict, candidates, decisive)
+        verdict = unless_slow_errors(trials, base, verdict, candidates, decisive)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
