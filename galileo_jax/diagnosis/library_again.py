@@ -12,10 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from galileo_jax.diagnosis.candidate_starts import matched, scattered
 from galileo_jax.diagnosis.candidates import Hypothesis, reduced
 from galileo_jax.diagnosis.diagnosis import Candidate
+from galileo_jax.diagnosis.pairs import most_alike
 from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.verdict import LAPLACE_NATS, NUM_JOINED
+from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 
 
@@ -61,10 +64,32 @@ def singles_beside(race: Race, law: Candidate, candidates: Sequence[Candidate]) 
       law: a formula that explains the data.
       candidates: ranked.
     """
-    trials = race.fitter.trials
+    fitter, trials = race.fitter, race.fitter.trials
+    count = len(trials.model_parameters)
     beside = _without(trials, race.base, law.hypothesis)
-    singles = [c.effects for c in candidates if len(c.effects) == 1 and c.law is None]
-    return _better(race([beside] * len(singles), singles), candidates)
+    sets = [c.effects for c in candidates if len(c.effects) == 1 and c.law is None]
+    free = np.stack([trials.free(effects)[:count] for effects in sets])
+    bases = [beside.fit] * len(sets)
+    matching, _ = matched(fitter, bases, sets, race.seed)
+    both = zip(matching, scattered(fitter, bases, free, race.seed), strict=True)
+    starts = [np.concatenate([by_slope[:1], others]) for by_slope, others in both]
+    of = np.repeat(np.arange(len(sets)), [len(own) for own in starts])
+    lowest = _search_cost(law.hypothesis.of(trials), law.hypothesis)
+    found = fitter.race(np.concatenate(starts), free[of], of, lowest).best
+    ends = [np.flatnonzero(of == i) for i in range(len(sets))]
+    best = np.array([own[np.argmin(found.cost[own])] for own in ends])
+    near = most_alike(found.cost[best], lowest)
+    if not near.size:
+        return []
+    z = list(found.z[best[near], None])
+    return _better(race([beside] * len(near), [sets[i] for i in near], z), candidates)
+
+
+def _search_cost(trials: JointProblem, hypothesis: Hypothesis) -> float:
+    """Nats, at the search's noise."""
+    fit, count = hypothesis.fit, len(trials.model_parameters)
+    z, free = fit.z[None, :count], fit.free[None, :count]
+    return float(GradientFitter(trials).search_costs(z, free)[0])
 
 
 def _better(made: Sequence[Candidate], candidates: Sequence[Candidate]) -> list[Candidate]:
