@@ -72,7 +72,8 @@ def singles_beside(race: Race, law: Candidate, candidates: Sequence[Candidate]) 
     bases = [beside.fit] * len(sets)
     matching, _ = matched(fitter, bases, sets, race.seed)
     both = zip(matching, scattered(fitter, bases, free, race.seed), strict=True)
-    starts = [np.concatenate([by_slope[:1], others]) for by_slope, others in both]
+    # Of the scattered starts the first is the best of those that leave all else where it is.
+    starts = [np.concatenate([by_slope[:1], others[:1]]) for by_slope, others in both]
     of = np.repeat(np.arange(len(sets)), [len(own) for own in starts])
     lowest = _search_cost(law.hypothesis.of(trials), law.hypothesis)
     found = fitter.race(np.concatenate(starts), free[of], of, lowest).best
