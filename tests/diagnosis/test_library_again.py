@@ -9,6 +9,7 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis import race as race_module
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Candidate
@@ -92,3 +93,23 @@ def test_from_a_pair_that_has_it(rubs_at_low_speed):
     assert [c.name for c in found] == ["stribeck"]
     assert found[0].log_evidence > known.log_evidence - LAPLACE_NATS
     assert again == []
+
+
+@pytest.mark.parametrize("is_explained", [True, False])
+def test_while_no_fit_is_explained_by_noise_any_may_matter(
+    rubs_at_low_speed, monkeypatch, is_explained
+):
+    race, (first, other), _ = rubs_at_low_speed
+    asked = []
+
+    def capture(fitter, bases, sets, seed, matters, *rest):
+        asked.append(matters)
+        return []
+
+    monkeypatch.setattr(race_module, "fit_candidates", capture)
+    monkeypatch.setattr(GradientFitter, "is_explained", lambda *_: is_explained)
+    with in_64_bit():
+        Race(race.fitter, race.base, False, 0, lambda _: None)([race.base], [("stribeck",)])
+    fit = first.hypothesis.fit
+    ahead = replace(first.hypothesis, fit=replace(fit, log_evidence=fit.log_evidence + 1000.0))
+    assert asked[0]([ahead, other.hypothesis]).tolist() == [True, not is_explained]
