@@ -7,10 +7,19 @@ from typing import Literal
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.same_objects import check_scale
 from galileo_jax.measurement.measure import measure
-from galileo_jax.results.export import FORMATS, export_run, export_tracks
+from galileo_jax.results.export import (
+    FORMATS,
+    clip_folders,
+    export_run,
+    export_tracks,
+    outputs,
+)
+from galileo_jax.results.run import load_run, read_result
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
+
+SVG = "svg"
 
 
 @dataclass(frozen=True)
@@ -30,18 +39,18 @@ class Exported:
 def export(
     source: str | Path,
     *,
-    to: Literal["csv", "parquet", "netcdf"],
+    to: Literal["csv", "parquet", "netcdf", "svg"],
     fitted: bool = False,
     out: str | Path | None = None,
 ) -> Exported:
     """Writes the track of a clip, or tracks, parameters and draws of a run.
 
     csv and parquet are the tables track, parameters and draws; netCDF is one file that ArviZ and
-    xarray read. Lengths in m, times in s.
+    xarray read; svg are the figures of a fit's page, one file each. Lengths in m, times in s.
 
     Args:
       source: the folder that a fit was saved to, or a clip.
-      to: "csv", "parquet" or "netcdf".
+      to: "csv", "parquet", "netcdf" or, of a run, "svg".
       fitted: of a run: also where the fitted model has the objects, at the posterior's mean.
       out: folder; None: RUN/export, or CLIP_export.
 
@@ -55,9 +64,11 @@ def export(
       ['track.csv']
     """
     source = Path(source)
-    check_known("--to", "format", to, FORMATS)
+    check_known("--to", "format", to, (*FORMATS, SVG))
     if not source.exists():
         raise InputError(f"{source}: no such file or folder")
+    if to == SVG:
+        return Exported(tuple(_plots(source, Path(out or source / "export"))))
     if source.is_dir():
         return Exported(tuple(export_run(source, Path(out or source / "export"), to, fitted)))
     if fitted:
@@ -68,3 +79,16 @@ def export(
     folder = Path(out or f"{measured.name}_export")
     paths = export_tracks({measured.name: measured.observation}, folder, to)
     return Exported(tuple(paths), clip.warnings)
+
+
+def _plots(folder: Path, out: Path) -> list[Path]:
+    from galileo_jax.report.fit_plots import write_fit_plots  # imports Matplotlib
+
+    if not folder.is_dir():
+        raise InputError(f"--to {SVG}: of a folder written by `galileo fit`, not of {folder}")
+    folders = clip_folders(folder, read_result(folder))
+    written = []
+    for name, one in folders.items():
+        with outputs(out):
+            written += write_fit_plots(load_run(one), out / name if len(folders) > 1 else out)
+    return written

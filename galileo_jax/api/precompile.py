@@ -18,7 +18,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
 
 START_M, APART_M, SD_M = -0.3, 0.3, 1e-4  # on the ramp; between objects; of the track
-NEEDED_LATER = ("galileo_jax.report.fit_page", "matplotlib.figure", "h5netcdf")
+NEEDED_LATER = ("galileo_jax.report.fit_page", "h5netcdf")
 
 Compile = Callable[[Sequence[Clip], Sequence[Observation]], None]
 

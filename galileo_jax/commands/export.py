@@ -20,10 +20,11 @@ def _parser() -> command.Parser:
     parser = command.Parser(
         prog="galileo export",
         description="Tracks and fits for other programs: csv and parquet as the tables track,\n"
-        "parameters and draws; netCDF as one file that ArviZ and xarray read.",
+        "parameters and draws; netCDF as one file that ArviZ and xarray read; figures as svg.",
     )
     parser.examples(
         "galileo export runs/clip --to netcdf",
+        "galileo export runs/clip --to svg --out figures",
         "galileo export clip.mp4 --to csv --out tables",
     )
     parser.add_argument("source", metavar="RUN|CLIP", help="the folder that fit wrote, or a clip")

@@ -169,10 +169,13 @@ def _left(found: Descended, is_own: np.ndarray) -> np.ndarray:
 
 
 def _by_promise(found: Descended, rows: np.ndarray) -> list[np.ndarray]:
-    """Candidates in parts, by the evidence that their ends promise, `[part][candidate]`."""
+    """Candidates by the evidence that their ends promise, `[part][candidate]`: a few, the others.
+
+    A part takes as many steps as its slowest candidate, so that many parts would take many.
+    """
     volume = -0.5 * np.linalg.slogdet(found.best.normal[rows])[1]
     order = np.argsort(found.best.cost[rows] - volume, kind="stable")
-    return np.split(order, range(NUM_AT_ONCE, len(order), NUM_AT_ONCE))
+    return [part for part in np.split(order, [NUM_AT_ONCE]) if part.size]
 
 
 def _second(

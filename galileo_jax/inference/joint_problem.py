@@ -20,7 +20,6 @@ import numpy as np
 
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import LogNormal, Parameter, PriorTable
-from galileo_jax.runtime.trace_cache import trace_cached
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
@@ -152,7 +151,7 @@ class JointProblem:
 
     def theta(self, z: np.ndarray, free: np.ndarray | None = None) -> np.ndarray:
         """Parameters in their units, `[..., parameter]`, noise scales last."""
-        theta = np.asarray(in_units(self.priors, jnp.asarray(z)))
+        theta = self.priors.in_units(z)
         return theta if free is None else np.where(free, theta, self.absent)
 
     @cached_property
@@ -195,9 +194,3 @@ class JointProblem:
                 predicted, theta[first_noise + clip], problem.data
             )
         return jnp.where(jnp.isfinite(total), total, -jnp.inf)
-
-
-@trace_cached(num_static=0)
-def in_units(priors: PriorTable, z: jax.Array) -> jax.Array:
-    """`PriorTable.forward`, compiled."""
-    return priors.forward(z)

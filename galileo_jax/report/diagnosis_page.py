@@ -17,12 +17,12 @@ from galileo_jax.report.comparison_charts import before_after_chart
 from galileo_jax.report.comparison_page import cells, failures, motion
 from galileo_jax.report.diagnosis_charts import is_known, missing_force_chart, rounds_chart
 from galileo_jax.report.draw import to_svg
-from galileo_jax.report.fit_page import PLOTS
 from galileo_jax.report.fit_text import number
 from galileo_jax.report.html_page import chart_section, document, header, items, legend, table
 from galileo_jax.report.provenance import provenance
 from galileo_jax.runtime.atomic_write import write_text
 
+PLOTS = "plots"
 NUM_CANDIDATES = 8
 ONLY_WIDE = ("", "log evidence", "log prior", "chi2 per dof", "p")  # of the candidates
 BAR = '<div class="bar"><div style="width:{:.1f}%"></div></div>'

@@ -1,4 +1,4 @@
-"""The report of a fit: plots as SVG in DIR/plots, the page in DIR/report.html."""
+"""The page of a fit, DIR/report.html."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -16,7 +16,6 @@ from galileo_jax.prediction.posterior_predictive import (
 from galileo_jax.report import fit_text
 from galileo_jax.report.animation import animation
 from galileo_jax.report.chart import Chart
-from galileo_jax.report.draw import to_svg
 from galileo_jax.report.fit_charts import (
     axes_of,
     failing_interval_of,
@@ -32,13 +31,12 @@ from galileo_jax.results.run import Run
 from galileo_jax.results.shown_parameters import shown_parameters
 from galileo_jax.runtime.atomic_write import write_text
 
-PAGE, PLOTS = "report.html", "plots"
-PLOT_NAMES = ("velocity_", "position_", "residuals_", "pairs", "trace")  # they begin so
+PAGE = "report.html"
 HEADLINES = re.compile(r"gravity|k\d+|mass_ratio(_\d+_\d+)?")
 
 
 def write_report(run: Run, page: Path | None = None) -> Path:
-    """Writes a finished fit's page, and its plots (SVG) beside it; returns the page's path.
+    """Writes a finished fit's page; returns its path.
 
     Args:
       run: the fit.
@@ -46,19 +44,12 @@ def write_report(run: Run, page: Path | None = None) -> Path:
     """
     page = page or run.folder / PAGE
     fitted = posterior_predictive(run, seed=int(run.result["seed"]))
-    charts = _charts(run, fitted)
-    files = {chart.name: to_svg(chart) for some in charts.values() for chart in some}
-    for name, svg in files.items():
-        write_text(page.parent / PLOTS / f"{name}.svg", svg)
-    for path in (page.parent / PLOTS).glob("*.svg"):
-        if path.stem.startswith(PLOT_NAMES) and path.stem not in files:  # of an earlier fit
-            path.unlink()
-    write_text(page, _render(run, fitted, charts))
+    write_text(page, _render(run, fitted, fit_charts(run, fitted)))
     return page
 
 
-def _charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
-    """By section of the page."""
+def fit_charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
+    """The figures of a fit, by section of the page."""
     objects, clip = range(len(fitted.observation.names)), run.problem.name
     main = [p.name for p in run.problem.parameters if p.role != "nuisance"]
     shown = shown_parameters(run.result)

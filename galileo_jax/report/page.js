@@ -45,7 +45,13 @@
     box.plot.className = "plot";
     box.append(box.plot);
     const { data, layout } = figureOf(box);
-    Plotly.newPlot(box.plot, data, layout, { displayModeBar: false, responsive: false });
+    Plotly.newPlot(box.plot, data, layout, {
+      responsive: false,
+      displayModeBar: isTouch ? false : "hover",
+      displaylogo: false,
+      modeBarButtons: [["toImage"]],
+      toImageButtonOptions: { format: "svg", filename: box.getAttribute("aria-label") },
+    });
     const clip = box.dataset.clip;
     if (clip === undefined) return;
     box.playhead = document.createElement("div");

@@ -41,7 +41,7 @@ def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path
       InputError: it is no finished run, or a file cannot be written.
     """
     result = read_result(folder)
-    folders = _clip_folders(folder, result)
+    folders = clip_folders(folder, result)
     tracks = {name: read_observation_csv(one / OBSERVATION) for name, one in folders.items()}
     fitted = {name: _fitted_m(one) for name, one in folders.items()} if with_fitted else {}
     posterior = folder / POSTERIOR
@@ -49,7 +49,7 @@ def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path
         raise InputError(f"{posterior}: no such file; a folder written by `galileo fit` expected")
     if to == "netcdf":
         path = out / f"{folder.resolve().name}.nc"
-        with _outputs(out), replacing(path) as temporary:
+        with outputs(out), replacing(path) as temporary:
             shutil.copyfile(posterior, temporary)
             for name, observation in tracks.items():
                 group = "observed_data" if len(tracks) == 1 else f"observed_data/{name}"
@@ -72,7 +72,7 @@ def export_tracks(tracks: Mapping[str, Observation], out: Path, to: str) -> list
     written = []
     for name, observation in tracks.items():
         path = out / f"{name}.nc"
-        with _outputs(out), replacing(path) as temporary:
+        with outputs(out), replacing(path) as temporary:
             _dataset(observation, None).to_netcdf(
                 temporary, mode="w", group="observed_data", engine="h5netcdf"
             )
@@ -84,22 +84,23 @@ def _write(tables: Mapping[str, "pd.DataFrame"], out: Path, to: str) -> list[Pat
     written = []
     for name, table in tables.items():
         path = out / f"{name}.{to}"
-        with _outputs(out):
+        with outputs(out):
             write_table(path, table)
         written.append(path)
     return written
 
 
 @contextmanager
-def _outputs(out: Path) -> Iterator[None]:
+def outputs(out: Path) -> Iterator[None]:
+    """Turns what goes wrong with writing to `out` into one line that names it."""
     try:
         yield
     except OSError as error:
         raise InputError(f"--out: {out}: {error.strerror or error}") from error
 
 
-def _clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
-    """Name and folder of every clip; of several clips each has a folder of its own."""
+def clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
+    """Name and folder of every clip of a run; of several clips each has a folder of its own."""
     if (folder / OBSERVATION).is_file():
         return {Path(result["clips"][0]).stem: folder}
     return {path.parent.name: path.parent for path in sorted(folder.glob(f"*/{OBSERVATION}"))}

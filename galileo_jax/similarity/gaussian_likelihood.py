@@ -151,9 +151,10 @@ class GaussianLikelihood:
 
     @staticmethod
     def log_determinant(noise_scale: Any, data: Whitening) -> Any:
-        """Of the covariance, up to the constant of the tracker's own."""
-        gain = jnp.log1p((data.gain / noise_scale) ** 2)
-        return data.num_values * jnp.log(noise_scale**2) + jnp.sum(gain)
+        """Of the covariance, up to the constant of the tracker's own; NumPy's of NumPy's arrays."""
+        gain = data.gain / noise_scale
+        xp = gain.__array_namespace__()
+        return data.num_values * xp.log(noise_scale**2) + xp.sum(xp.log1p(gain**2))
 
 
 def _with_modes_times(

@@ -10,7 +10,6 @@ from galileo_jax.api.fit import FitOptions, checkpoint_identity
 from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.measurement.measure import measure
-from galileo_jax.model.effects import registry
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import build_good_track
 
@@ -26,12 +25,7 @@ class {name}(Effect):
 """
 
 
-@pytest.fixture(autouse=True)
-def forgotten(monkeypatch):
-    """What a test registers is gone after it."""
-    entries = {name: registry.effect_registry.get(name) for name in registry.effect_names()}
-    monkeypatch.setattr(registry.effect_registry, "_entries", entries)
-    registry._load_resolved.cache_clear()
+pytestmark = pytest.mark.usefixtures("effects_restored")
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,9 @@ from galileo_jax.commands import export as export_command
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import build_good_track
 from tests.commands.test_export import make_run
+from tests.oracle_run import HIT
+from tests.oracle_run import make_run as make_oracle_run
+from tests.precision import in_64_bit
 
 
 def run(*argv: object) -> int:
@@ -31,6 +34,17 @@ def test_the_function_writes_what_the_command_writes(what, to, tmp_path, capsys)
     assert printed == [str(tmp_path / "command" / path.name) for path in done.paths]
     assert {path.name for path in done.paths} == contents(tmp_path / "function").keys()
     assert contents(tmp_path / "function") == contents(tmp_path / "command")
+
+
+def test_the_figures_of_a_fit(tmp_path, capsys) -> None:
+    with in_64_bit():
+        folder = make_oracle_run(tmp_path, HIT, 0.9).folder
+    done = export(folder, to="svg")
+    assert "velocity_object1_x.svg" in {path.name for path in done.paths}
+    assert {path.parent for path in done.paths} == {folder / "export"}
+    assert all(path.read_text(encoding="utf-8").rstrip().endswith("</svg>") for path in done.paths)
+    assert run(folder, "--to", "svg") == 0
+    assert capsys.readouterr().out.split() == [str(path) for path in done.paths]
 
 
 def test_where_it_is_written_if_nothing_is_said(tmp_path, monkeypatch) -> None:

@@ -9,8 +9,9 @@ import galileo_jax as gx
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.next_experiment import _read
 from galileo_jax.experiment.belief import FILE, Belief, Beliefs, write_beliefs
-from galileo_jax.model.effects import registry
-from tests.precision import in_64_bit
+from galileo_jax.model.effects.registry import effect_names
+
+pytestmark = pytest.mark.usefixtures("effects_restored", "x64")
 
 LAW = '''"""a = c t."""
 
@@ -31,16 +32,6 @@ class ProposedLaw(Law):
 '''
 
 
-@pytest.fixture(autouse=True)
-def forgotten(monkeypatch):
-    """What a test registers is gone after it."""
-    entries = {name: registry.effect_registry.get(name) for name in registry.effect_names()}
-    monkeypatch.setattr(registry.effect_registry, "_entries", entries)
-    registry._load_resolved.cache_clear()
-    with in_64_bit():
-        yield
-
-
 def test_a_law_of_the_last_model_is_no_hypothesis(tmp_path):
     gx.simulate(tmp_path / "a.csv", seed=11, track_only=True)
     fit = gx.fit(tmp_path / "a.csv")
@@ -57,5 +48,5 @@ def test_a_law_of_the_last_model_is_no_hypothesis(tmp_path):
     belief = Belief((), 0.0, np.zeros(count), np.zeros(count, bool), np.eye(count))
     write_beliefs(run / FILE, trials, Beliefs((belief,), 3.0))
     _, read, beliefs, _ = _read(run)
-    assert "law_push_power_t" in registry.effect_names()
+    assert "law_push_power_t" in effect_names()
     assert read.names == trials.names and len(beliefs.of) == 1

@@ -111,7 +111,9 @@ def test_track_of_a_clip(to: Literal["parquet", "netcdf"], name: str, tmp_path: 
 @pytest.mark.parametrize("argv, words", [
     (["none", "--to", "csv"], "none: no such file or folder"),
     (["empty", "--to", "csv"], "empty: no result.json"),
-    (["run", "--to", "xlsx"], "--to: unknown format 'xlsx'; known: csv, parquet, netcdf"),
+    (["run", "--to", "xlsx"], "--to: unknown format 'xlsx'; known: csv, parquet, netcdf, svg"),
+    (["clips/clip.yaml", "--to", "svg"], "--to svg: of a folder written by `galileo fit`"),
+    (["none", "--to", "svg"], "none: no such file or folder"),
     (["clips/clip.yaml", "--to", "csv", "--fitted"], "--fitted: of a folder written by"),
     (["run"], "--to"),
     (["run", "--to", "csv", "--out", "run/result.json"], "--out: run/result.json"),

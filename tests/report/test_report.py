@@ -13,6 +13,7 @@ from galileo_jax.prediction.posterior_predictive import posterior_predictive
 from galileo_jax.report import write_report
 from galileo_jax.report.animation import animation
 from galileo_jax.report.fit_charts import failing_interval_of
+from galileo_jax.report.fit_plots import write_fit_plots
 from galileo_jax.report.fit_text import fit_quality, number, undetermined
 from galileo_jax.report.html_page import document
 from galileo_jax.report.provenance import digest
@@ -86,6 +87,17 @@ def test_shows_the_pictures_of_a_video(run, tmp_path, browser):
     assert complaints == []
 
 
+def test_a_figure_saves_itself_as_svg(run, page, browser):
+    with opened(browser, run.folder / "report.html") as (shown, complaints):
+        chart = shown.locator(".chart").first
+        chart.hover()
+        with shown.expect_download() as saved:
+            chart.locator(".modebar-btn").click()
+        assert saved.value.suggested_filename == f"{chart.get_attribute('aria-label')}.svg"
+        assert Path(saved.value.path()).read_text(encoding="utf-8").startswith("<svg")
+    assert complaints == []
+
+
 def filmed(clip: Clip, path: Path) -> Clip:
     """The clip as if it had been filmed: frames that grow brighter, by 4 each."""
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 30.0, (160, 120))
@@ -128,8 +140,11 @@ def test_states_the_numbers(run, page):
     assert digest(run.clip.track) in page and "mujoco" in page, "inputs and versions"
 
 
-def test_has_every_figure_and_leaves_them_as_files(run, page):
-    names = {path.stem for path in (run.folder / "plots").glob("*.svg")}
+def test_has_every_figure_and_writes_them_as_files_when_asked(run, page, tmp_path):
+    assert not list(run.folder.rglob("*.svg")), "they take as long as a fit"
+    written = write_fit_plots(run, tmp_path / "plots")
+    names = {path.stem for path in written}
+    assert set(written) == set((tmp_path / "plots").glob("*.svg"))
     objects = run.problem.observation.names
     assert names == {
         *(f"{kind}_{o}_{a}" for kind in ("velocity", "position") for o in objects for a in "xy"),
@@ -149,10 +164,9 @@ def test_names_from_outside_are_escaped(run):
     assert "<h1>&lt;b&gt;&amp;.mp4</h1>" in write_report(hostile).read_text(encoding="utf-8")
 
 
-def test_what_an_earlier_fit_left_is_gone_and_the_thesis_is_no_posterior(run):
+def test_the_thesis_is_no_posterior(run):
     thesis = {"method": "grad", "preset": "thesis", "best": {"k1": 0.123}}
     page = write_report(replace(run, result=run.result | thesis)).read_text(encoding="utf-8")
-    assert not (run.folder / "plots" / "trace.svg").exists()
     assert "not a posterior" in page and "k1 = 0.123" in page and "--preset thesis" in page
 
 

@@ -11,7 +11,6 @@ from galileo_jax.api.fit_result import make_fit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.measurement.measure import Measurement
-from galileo_jax.report import write_report
 from galileo_jax.results.run import Run, load_run
 from galileo_jax.results.stale_outputs import (
     TRACKS,
@@ -100,14 +99,3 @@ def test_a_diagnosis_of_another_track_is_told_of(tmp_path):
     assert "diagnosis: made of an earlier track" in told and "galileo diagnose a.csv" in told
     unseen = replace(seen, position_m=np.where(seen.mask[:, None], seen.position_m, np.nan))
     assert digest(unseen) == digest(seen)
-
-
-def test_a_users_own_picture_among_the_plots_stays(tmp_path):
-    run = make_run(tmp_path, HIT, 0.9)
-    plots = run.folder / "plots"
-    plots.mkdir()
-    for name in ("mine.svg", "velocity_object9_x.svg"):
-        (plots / name).write_text("<svg/>")
-    write_report(run)
-    assert (plots / "mine.svg").exists()
-    assert not (plots / "velocity_object9_x.svg").exists(), "of an earlier fit"

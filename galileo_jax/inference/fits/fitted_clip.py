@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.inference.fits.programs import ClipArrays, Kind, Padded
-from galileo_jax.inference.joint_problem import JointProblem, in_units
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.parameters import PriorTable
-from galileo_jax.runtime.batching import FRAMES, MOTIONS, SPARE_MODES, in_chunks, rounded_up
+from galileo_jax.runtime.batching import FRAMES, SPARE_MODES, rounded_up
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 
@@ -62,8 +62,7 @@ class FittedClip:
     def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """`[point, joint parameter]` to this clip's parameters in their units."""
         own, is_free = z[:, self.column], free[:, self.column]
-        theta = in_chunks(MOTIONS, lambda rows: in_units(self.priors, rows), own)
-        return np.where(is_free, theta, self.absent)
+        return np.where(is_free, self.priors.in_units(own), self.absent)
 
     def search_noise(self, search_sd_m: float) -> float:
         """The noise scale at which the tracker's median error is that."""

@@ -57,6 +57,7 @@ class Settings:
       search_sd_m: noise assumed on the way to the fit: a camera that sees hundredths of a
         millimetre makes valleys too narrow to be met by scattered starts.
       max_steps: of Levenberg-Marquardt from one start.
+      max_race_steps: the same in a race; the polish takes stragglers on from there.
       max_polish_steps: in a round with fitted noise scales.
       enough: the search stops where a step promises to lower chi2 / 2 by less.
       settled: converged where a new round with fitted noise scales lowers chi2 / 2 by no more.
@@ -71,6 +72,7 @@ class Settings:
     search_sd_m: float = 0.001
     max_polish_steps: int = 80
     max_steps: int = 80
+    max_race_steps: int = 20
     enough: float = 0.1
     settled: float = 0.05
     settled_if_rough: float = 0.5
@@ -190,7 +192,7 @@ class GradientFitter:
         give_up = GiveUp(owner, BEHIND_IN_SEARCH, 0.0, OUT_OF_THE_RACE, lowest)
         settings = self.settings
         points = self._batch(starts, free)
-        return self._descent(points, settings.enough, settings.max_steps, give_up)
+        return self._descent(points, settings.enough, settings.max_race_steps, give_up)
 
     def polish(
         self,
