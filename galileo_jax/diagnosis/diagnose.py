@@ -13,8 +13,9 @@
 5. Where only a form explains the data, or nothing does, or only what could explain much (two
    effects, or one of many constants), the missing force is inferred without a form
    (`missing_force`). Short formulas that it suggests are fitted in the model (`laws`) and
-   stand in the same table. The verdict is law where one does what a named effect must; else it
-   is unknown.
+   stand in the same table. The verdict is law where one does what a named effect must, and no
+   effect of the library, fitted again from there (`library_again`), says it as well; else it is
+   unknown.
 """
 
 from collections.abc import Callable, Iterable, Sequence
