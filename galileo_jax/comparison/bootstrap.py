@@ -16,7 +16,8 @@ import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.similarity.gaussian_likelihood import Whitening
+from galileo_jax.inference.problem import Problem
+from galileo_jax.similarity.noise_scale import mode_covariance
 
 NUM_STEPS = 4
 
@@ -71,7 +72,7 @@ def replicates(
     noise = generator.standard_normal((count, sum(sizes))) * np.concatenate(masks)
     parts = zip(np.split(noise, ends, axis=1), trials.problems, noise_scale, mode_size, strict=True)
     noise = np.concatenate(
-        [_with_modes(own, problem.data, scale, size) for own, problem, scale, size in parts], axis=1
+        [_with_modes(own, problem, scale, size) for own, problem, scale, size in parts], axis=1
     )
     centre = generator.standard_normal((count, len(free)))
     gain = np.linalg.inv(jacobian.T @ jacobian + np.eye(len(free)))
@@ -94,13 +95,19 @@ def replicates(
 
 
 def _with_modes(
-    white: np.ndarray, data: Whitening, noise_scale: float, mode_size: float
+    white: np.ndarray, problem: Problem, noise_scale: float, mode_size: float
 ) -> np.ndarray:
     """White numbers `[replicate, value]` as whitened errors whose modes are of another size."""
+    data, errors = problem.data, problem.errors_in_time
     variance, gain2 = noise_scale**2, data.gain**2
-    share = np.sqrt((variance + mode_size**2 * gain2) / (variance + gain2))
     basis = data.basis.reshape(len(gain2), -1)
-    return white + ((white @ basis.T) * (share - 1)) @ basis
+    along = white @ basis.T
+    if errors is None:
+        share = np.sqrt((variance + mode_size**2 * gain2) / (variance + gain2))
+        return white + (along * (share - 1)) @ basis
+    root = np.linalg.cholesky(mode_covariance(noise_scale, mode_size, data, errors))
+    drawn = along @ root.T / np.sqrt(variance + gain2)
+    return white + (drawn - along) @ basis
 
 
 def _at(

@@ -116,7 +116,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     scales = np.clip(fitted, *JUDGED_SCALE_RANGE)
     measured = whitened(trials, theta[None], scales)
     sizes = [
-        fitted_mode_size(white[0], scale, problem.data)
+        fitted_mode_size(white[0], scale, problem.data, problem.errors_in_time)
         for white, scale, problem in zip(measured, scales, trials.problems, strict=True)
     ]
     drawn = replicates(trials, fit, scales, sizes, NUM_REPLICATES, seed)

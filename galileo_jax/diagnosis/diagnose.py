@@ -35,6 +35,7 @@ from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.library_again import singles_beside, singles_of_pairs
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.race import Race
+from galileo_jax.diagnosis.slow_errors import unless_slow_errors
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
     best_named,
@@ -152,6 +153,7 @@ def diagnose(
             candidates, verdict = both, law_or(trials, verdict, both, decisive)
         else:
             why = (*why, reasons.library_says_it(best_named(candidates), law))
+        verdict = unless_slow_errors(trials, base, verdict, candidates, decisive)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:

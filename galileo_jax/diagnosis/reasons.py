@@ -260,3 +260,28 @@ def told_apart(best: Candidate, rival: Candidate, expected: float, needed: float
             "least_log_odds": needed,
         },
     )
+
+
+def slow_errors(title: str, lasts_s: float, size: float, rival: Candidate, ahead: float) -> Reason:
+    """Errors of the track that change slowly explain the data about as well as the best, or better.
+
+    Args:
+      title: of the hypothesis that they stand beside.
+      lasts_s: how soon they change, s.
+      size: over what is stated of a point.
+      rival: the most probable without them.
+      ahead: nats by which they are more probable than it; less than 0 where they are less.
+    """
+    times = f"{times_text(ahead)} as" if ahead >= 0 else f"1/{exp(-ahead):.2g} as"
+    return Reason(
+        "slow_errors",
+        f"Errors of the track that change within {lasts_s:.2g} s, {size:.2g} times as large as is "
+        f"stated of a point, beside {title} are {times} probable as {rival.title}.",
+        {
+            "hypothesis": rival.name,
+            "beside": title,
+            "log_odds_ahead": ahead,
+            "lasts_s": lasts_s,
+            "size": size,
+        },
+    )

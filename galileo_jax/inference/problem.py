@@ -81,6 +81,17 @@ class Problem:
         scene = self.model.scene.surroundings
         return GaussianLikelihood.prepare(self.observation, scene, self.noise)
 
+    @cached_property
+    def errors_in_time(self) -> Float[np.ndarray, "mode mode"] | None:
+        """The covariance of errors that follow each other, along the modes of `data`; or None."""
+        count = self.observation.num_errors
+        if not count or self.observation.modes_m is None:
+            return None
+        root, basis = self.data.inverse_root, self.data.basis
+        white = np.einsum("oijt,mojt->moit", root, self.observation.modes_m[-count:])
+        along = basis.reshape(len(basis), -1) @ white.reshape(count, -1).T
+        return along @ along.T
+
     def predict(self, theta: Float[jax.Array, " parameter"]) -> Float[jax.Array, "object 2 frame"]:
         """What the camera would see, in JAX: `[parameter]` to `[object, 2, frame]`, m."""
         position, velocity = in_jax(self.engine)(theta[None])

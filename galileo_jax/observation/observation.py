@@ -26,6 +26,8 @@ class Observation:
       modes_m: `[mode, object, 2, frame]`, m: errors that many frames share, each as one standard
         deviation of it moves the track: a number declared about the camera (corners, lens), the
         shift with which a coder holds what has come to rest; None where there are none.
+      num_errors: how many of `modes_m`, the last, are errors that follow each other in time: unlike
+        imperfections, which a good clip need not have, these are there.
       is_turning: the third axis is how far each object has turned, rad, not a place.
       is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """
@@ -37,6 +39,7 @@ class Observation:
     mask: Bool[np.ndarray, "object frame"]
     modes_m: Float[np.ndarray, "mode object 2 frame"] | None = None
     is_squared: bool = False
+    num_errors: int = 0
     is_turning: bool = False
 
     @property

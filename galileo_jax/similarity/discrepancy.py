@@ -13,8 +13,8 @@ import numpy as np
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.random_patterns import SMALLEST, random_patterns
 from galileo_jax.similarity.hit_discrepancy import after_hits
-from galileo_jax.similarity.random_patterns import SMALLEST, random_patterns
 
 POINT_SD_M = 0.003  # how far a marked point is from the centre
 OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table
@@ -112,10 +112,10 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
 
 
 def camera(position: np.ndarray, observation: Observation, scene: Surroundings) -> list[np.ndarray]:
-    """What is declared of it, or keystone about either axis, the lens and scale; of all objects."""
-    found = [] if observation.modes_m is None else list(observation.modes_m)
+    """Keystone about either axis, the lens and scale, of all objects; none where declared."""
     if observation.is_squared:
-        return found
+        return []
+    found = []
     x, y = position[:, 0], position[:, 1]
     if scene.has_surface:
         found.append(KEYSTONE_SD * np.stack([x * x, x * y], axis=1))

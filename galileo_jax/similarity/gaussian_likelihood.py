@@ -77,6 +77,8 @@ class GaussianLikelihood:
         else:
             patterns = modes(observation, scene, is_filmed=noise == "camera")
             patterns = np.concatenate([patterns, crossings(observation, scene)])
+        if observation.modes_m is not None:
+            patterns = np.concatenate([patterns, observation.modes_m])
         inverse_root = np.linalg.inv(np.linalg.cholesky(covariance)) * mask[..., None, None]
         inverse_root = np.moveaxis(inverse_root, 1, -1)
         patterns = np.einsum("oijt,mojt->moit", inverse_root, patterns)

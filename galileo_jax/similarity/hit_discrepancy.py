@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.random_patterns import random_patterns
+from galileo_jax.observation.random_patterns import random_patterns
 
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
 HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none

@@ -50,7 +50,10 @@ def fitted_noise_scale(
 
 
 def fitted_mode_size(
-    white: Float[np.ndarray, " value"], noise_scale: float, data: Whitening
+    white: Float[np.ndarray, " value"],
+    noise_scale: float,
+    data: Whitening,
+    errors: Float[np.ndarray, "mode mode"] | None = None,
 ) -> float:
     """The most probable common size of the modes' amplitudes over their sd, from 0 to 1.
 
@@ -58,12 +61,32 @@ def fitted_mode_size(
       white: residuals, whitened at `noise_scale`.
       noise_scale: of the tracking errors.
       data: the observation's covariance, decomposed.
+      errors: what of the modes' covariance is there in full, along them; None where nothing is.
     """
     noise2, gain2 = noise_scale**2, data.gain**2
+    if errors is not None:
+        amplitude = (data.basis.reshape(len(gain2), -1) @ white) * np.sqrt(noise2 + gain2)
+        covers = (mode_covariance(noise_scale, size, data, errors) for size in MODE_SIZES)
+        found = [_log_normal(amplitude, cover) for cover in covers]
+        return float(MODE_SIZES[np.argmax(found)])
     amplitude2 = (data.basis.reshape(len(gain2), -1) @ white) ** 2 * (noise2 + gain2)
     variance = noise2 + MODE_SIZES[:, None] ** 2 * gain2
     log_likelihood = -0.5 * np.sum(np.log(variance) + amplitude2 / variance, axis=1)
     return float(MODE_SIZES[np.argmax(log_likelihood)])
+
+
+def mode_covariance(
+    noise_scale: float, mode_size: float, data: Whitening, errors: Float[np.ndarray, "mode mode"]
+) -> Float[np.ndarray, "mode mode"]:
+    """Of what is seen along the modes: noise, imperfections of another size, and errors in full."""
+    imperfect = np.diag(data.gain**2) - errors
+    return noise_scale**2 * np.eye(len(errors)) + mode_size**2 * imperfect + errors
+
+
+def _log_normal(values: np.ndarray, covariance: np.ndarray) -> float:
+    root = np.linalg.cholesky(covariance)
+    white = np.linalg.solve(root, values)
+    return float(-0.5 * white @ white - np.log(np.diag(root)).sum())
 
 
 def errors_at(
