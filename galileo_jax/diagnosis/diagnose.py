@@ -13,11 +13,12 @@
 5. Where only a form explains the data, or nothing does, or only what could explain much (two
    effects, or one of many constants), the missing force is inferred without a form
    (`missing_force`). Short formulas that it suggests are fitted in the model (`laws`) and
-   stand in the same table. The verdict is law where one does what a named effect must; else it
-   is unknown.
+   stand in the same table. The verdict is law where one does what a named effect must, and no
+   effect of the library, fitted again from there (`library_again`), says it as well; else it is
+   unknown.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from galileo_jax.comparison.compare import Comparison, compare
@@ -29,8 +30,9 @@ from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.fitted_pairs import fitted_pairs, pairs_from_base
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
-from galileo_jax.diagnosis.law_verdict import needs_laws
+from galileo_jax.diagnosis.law_verdict import is_law_needed, law_to_doubt, needs_laws
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
+from galileo_jax.diagnosis.library_again import singles_beside, singles_of_pairs
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.slow_errors import unless_slow_errors
@@ -123,17 +125,10 @@ def diagnose(
         if not any(explains(c) for c in candidates):
             on_stage("searching pairs from the fit without effects")
             better = pairs_from_base(race, candidates)
-            for candidate in better:
-                compared.pop(candidate.effects, None)
-            known = {frozenset(c.effects): c for c in (*candidates, *better)}
-            candidates = _compared(trials, known.values(), decisive, seed, compared)
-    verdict = verdict_of(candidates, decisive)
-    if verdict.status == "named":
-        on_stage("looking at what could be confused with it")
-        named = next(c for c in candidates if c.effects == verdict.effects)
-        alike = within_luck(named, candidates, decisive)
-        leads = expected_leads(trials, named, alike)
-        verdict = looked_at_again(verdict, named, list(zip(alike, leads, strict=True)), decisive)
+            candidates = _improved(trials, candidates, better, decisive, seed, compared)
+        better = singles_of_pairs(race, candidates)
+        candidates = _improved(trials, candidates, better, decisive, seed, compared)
+    verdict = _judged(trials, candidates, decisive, on_stage)
     views: list[View] = []
     if needs_laws(verdict, candidates):
         on_stage("inferring the missing force without a form")
@@ -144,8 +139,20 @@ def diagnose(
         laws = law_candidates(trials, base, near, views, len(library), candidates)
         for candidate in ranked(laws):
             on_candidate(candidate)
-        candidates = _compared(trials, (*candidates, *laws), decisive, seed, compared)
-        verdict = law_or(trials, verdict, candidates, decisive)
+        both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
+        law = law_to_doubt(both)
+        better = []
+        if law is not None:
+            on_stage("fitting the library's effects from where the law has all else")
+            better = singles_beside(race, law, candidates)
+        if better:
+            candidates = _improved(trials, candidates, better, decisive, seed, compared)
+            both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
+            verdict = _judged(trials, candidates, decisive, on_stage)
+        if law is None or is_law_needed(verdict, candidates, law, decisive):
+            candidates, verdict = both, law_or(trials, verdict, both, decisive)
+        else:
+            why = (*why, reasons.library_says_it(best_named(candidates), law))
         verdict = unless_slow_errors(trials, base, verdict, candidates, decisive)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
@@ -177,6 +184,40 @@ def diagnose(
 def fitter_of(trials: JointProblem) -> GradientFitter:
     """What fits all hypotheses."""
     return GradientFitter(trials)
+
+
+def _judged(
+    trials: JointProblem,
+    candidates: Sequence[Candidate],
+    decisive: float,
+    on_stage: Callable[[str], None],
+) -> Verdict:
+    """The verdict on a table without laws; what is named was looked at again."""
+    verdict = verdict_of(candidates, decisive)
+    if verdict.status != "named":
+        return verdict
+    on_stage("looking at what could be confused with it")
+    named = next(c for c in candidates if c.effects == verdict.effects)
+    alike = within_luck(named, candidates, decisive)
+    leads = expected_leads(trials, named, alike)
+    return looked_at_again(verdict, named, list(zip(alike, leads, strict=True)), decisive)
+
+
+def _improved(
+    trials: JointProblem,
+    candidates: Sequence[Candidate],
+    better: Sequence[Candidate],
+    decisive: float,
+    seed: int,
+    compared: dict[tuple[str, ...], Comparison],
+) -> tuple[Candidate, ...]:
+    """The table with better fits in place of theirs, and new ones; arguments as `_compared`."""
+    if not better:
+        return tuple(candidates)
+    for candidate in better:
+        compared.pop(candidate.effects, None)
+    known = {frozenset(c.effects): c for c in (*candidates, *better)}
+    return _compared(trials, known.values(), decisive, seed, compared)
 
 
 def _compared(

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason, Verdict
-from galileo_jax.diagnosis.verdict import explains, verdict_of
+from galileo_jax.diagnosis.verdict import best_named, explains, verdict_of
 from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 
 # A formula of two factors is a tenth as probable as one of one factor, which has a form's odds.
@@ -54,6 +54,39 @@ def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive
     if len(own.effects) > 1 or law.log_odds - own.log_odds >= decisive:
         return replace(verdict, status="unknown", effects=())
     return replace(verdict, status="ambiguous", law=law.law)
+
+
+def law_to_doubt(candidates: Sequence[Candidate]) -> Candidate | None:
+    """The best formula that explains the data where no single effect of the library does better.
+
+    An effect of the library may say the same, and its fit have missed it.
+
+    Args:
+      candidates: ranked, formulas among them.
+    """
+    law = next((c for c in candidates if c.law is not None and explains(c)), None)
+    first = best_named([c for c in candidates if len(c.effects) == 1])
+    is_behind = law is not None and (not explains(first) or first.log_odds < law.log_odds)
+    return law if is_behind else None
+
+
+def is_law_needed(
+    verdict: Verdict, candidates: Sequence[Candidate], law: Candidate, decisive: float
+) -> bool:
+    """Whether a formula still says more than the library, whose effects were fitted once more.
+
+    It does not where one effect with few constants explains the data and is not far behind: no
+    formula would have been tried then.
+
+    Args:
+      verdict: of those fits.
+      candidates: of that verdict: ranked, without formulas.
+      law: that explains the data.
+      decisive: nats.
+    """
+    if needs_laws(verdict, candidates):
+        return True
+    return law.log_odds - best_named(candidates).log_odds >= decisive
 
 
 def other_formulas(law: Candidate, candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:

@@ -63,6 +63,9 @@ class Race:
         decisive = decisive_margin(self.is_adequate)
 
         def matters(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
+            known = [*(made.hypothesis for made in self._made.values()), *hypotheses]
+            if not any(self.fitter.is_explained(one.fit) for one in known):
+                return np.ones(len(hypotheses), bool)  # any fit may yet be the one that does
             log_odds = np.array([self._log_odds(one) for one in hypotheses])
             is_form = np.array(
                 [any(name in FORM_NAMES for name in one.effects) for one in hypotheses]

@@ -218,6 +218,25 @@ def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) ->
     )
 
 
+def library_says_it(best: Candidate, law: Candidate) -> Reason:
+    """A formula explains the data, and an effect of the library says the same.
+
+    Args:
+      best: the effect.
+      law: the formula.
+    """
+    return Reason(
+        "library_says_it",
+        f"A formula, {law.title}, explains the data; fitted from there, {best.title} of the "
+        "library explains them as well, and needs no new formula.",
+        {
+            "hypothesis": best.name,
+            "rival": law.name,
+            "log_odds_behind": best.log_odds - law.log_odds,
+        },
+    )
+
+
 def told_apart(best: Candidate, rival: Candidate, expected: float, needed: float) -> Reason:
     """Whether a clip like this one would tell the rival from the hypothesis that is named.
 

@@ -7,8 +7,10 @@ import pytest
 from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
 from galileo_jax.diagnosis.law_verdict import (
     contested_by_law,
+    is_law_needed,
     law_contested,
     law_odds,
+    law_to_doubt,
     law_verdict,
     needs_laws,
     other_formulas,
@@ -156,3 +158,44 @@ def test_a_factor_more_that_does_nothing_is_no_rival(ahead, expected):
 
 def test_a_longer_formula_of_other_factors_is_a_rival():
     assert status(law(50.0), law(49.0, family="linear_q*power_t", name="law_2")) is None
+
+
+# What the library says as well.
+
+
+@pytest.mark.parametrize(
+    ("beside", "is_doubted"),
+    [
+        (candidate("stribeck", 20.0, 1e-6), True),
+        (candidate("stribeck", 50.0 - EDGE), True),
+        (candidate("stribeck", 50.0 + EDGE), False),
+        (candidate("stribeck+air_drag", 60.0), True),  # two effects may say what one would
+        (candidate(FORM_OF_POWER_V, 60.0), True),  # nor has a form a name
+    ],
+)
+def test_a_law_is_doubted_unless_one_effect_is_ahead(beside, is_doubted):
+    best = law(50.0)
+    single = candidate("rolling", 1.0, 1e-9)
+    assert law_to_doubt(ranked([best, beside, single])) == (
+        ranked([best, beside, single])[int(beside.log_odds > 50.0)] if is_doubted else None
+    )
+
+
+def test_what_leaves_more_than_noise_is_not_doubted_but_no_law():
+    assert law_to_doubt(ranked([law(50.0, 1e-6), candidate("rolling", 1.0, 1e-9)])) is None
+
+
+def needs(single: Candidate, is_named: bool = True) -> bool:
+    verdict = Verdict("named", single.effects) if is_named else Verdict("unknown", ())
+    return is_law_needed(verdict, ranked([single]), law(50.0), DECISIVE)
+
+
+def test_a_law_is_not_needed_where_an_effect_says_it_as_well():
+    assert not needs(candidate("stribeck", 50.0 - DECISIVE + EDGE))
+    assert needs(candidate("stribeck", 50.0 - DECISIVE))
+    assert needs(candidate("stribeck", 60.0), is_named=False)
+
+
+@pytest.mark.parametrize(("constants", "is_needed"), [(2, False), (3, True)])
+def test_many_constants_need_the_law_s_word(constants, is_needed):
+    assert needs(replace(candidate("friction_patch", 60.0), num_constants=constants)) == is_needed

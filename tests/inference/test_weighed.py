@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import minimize
 from scipy.special import logsumexp
 
+from galileo_jax.inference.fits import weighed as weighed_module
 from galileo_jax.inference.fits.evidence import Code, GradientFit
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
 from galileo_jax.inference.fits.weighed import weighed
@@ -131,3 +132,11 @@ def test_the_same_seed_gives_the_same_and_few_draws_say_that_they_are_few():
     assert weighed([fit], BENT, 3).is_sure
     narrow = replace(fit, covariance=fit.covariance * 1e-4)
     assert not weighed([narrow], BENT, 3, num=12).is_sure
+
+
+def test_a_draw_from_which_no_map_finds_back_has_the_density_it_was_drawn_with(monkeypatch):
+    # Tails of a valley that bends much are thrown so far that doubles cannot undo it.
+    nowhere = staticmethod(lambda z: np.full(len(z), -np.inf))
+    monkeypatch.setattr(weighed_module._Part, "log_density", nowhere)
+    found = weighed([BENT.best((0.3, 0.1))], BENT, 0, num=4096)
+    assert found.log_evidence == pytest.approx(BENT.exact(), abs=AGREES_NATS)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import jax.numpy as jnp
 import numpy as np
 
+from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.laws.grammar import Structure, without_one_factor
 from galileo_jax.diagnosis.laws.one_program import MOST_NUMBERS, ActingFormulas, Spare
@@ -19,6 +20,7 @@ from galileo_jax.rollout.engines import make_engine
 
 NUM_REFITTED = 3
 MOST_Z = 2.5
+SAME_MOTION_NATS = 0.5  # by which no clip tells two motions apart
 LEAST_FRICTION = 0.05  # a friction's strength is a share of its coefficient
 
 
@@ -81,7 +83,41 @@ def fitted_laws(
         [one for one in _simpler(made[0]) if name_of(one.structure) not in known] if made else []
     )
     made += _fitted(trials, near, simpler, views)
-    return sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence)
+    return without_twins(sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence))
+
+
+def without_twins(laws: Sequence[FittedLaw]) -> list[FittedLaw]:
+    """Laws, of those that say the same of object 1 and of all objects the first only.
+
+    Where the clip shows nothing of the formula on the others, the two are one hypothesis, and would
+    count twice in a table of probabilities. The shorter claim is left.
+    """
+    motions = [_motion(law, laws[0]) for law in laws]
+
+    def is_twin(i: int, j: int) -> bool:
+        a, b = laws[i].structure, laws[j].structure
+        is_same = replace(a, is_on_all=b.is_on_all) == b and a.is_on_all != b.is_on_all
+        return is_same and 0.5 * float(np.sum((motions[i] - motions[j]) ** 2)) < SAME_MOTION_NATS
+
+    return [
+        law
+        for i, law in enumerate(laws)
+        if not (law.structure.is_on_all and any(is_twin(i, j) for j in range(len(laws))))
+    ]
+
+
+def _motion(law: FittedLaw, first: FittedLaw) -> np.ndarray:
+    """What a law's fit leaves of the tracks, `[value]`, in units of the noise of the first's."""
+    (theta, trials), (best, _) = _values(law), _values(first)
+    scale = best[-len(trials.problems) :]
+    return np.concatenate(whitened(trials, theta[None], scale), axis=1)[0]
+
+
+def _values(law: FittedLaw) -> tuple[np.ndarray, JointProblem]:
+    """All parameters, noise scales last, and whose they are."""
+    trials, fit = law.hypothesis.trials, law.hypothesis.fit
+    assert trials is not None
+    return trials.theta(fit.z, fit.free), trials
 
 
 def _simpler(law: FittedLaw) -> list[Suggestion]:

@@ -126,7 +126,7 @@ class GradientFitter:
         ends = self._ends(starts, free, self.settings.num_refined)
         on_stage("refining")
         fit = self._best_valley(ends, free)
-        if ends.num_agreeing >= LEAST_AGREEING and self._is_explained(fit):
+        if ends.num_agreeing >= LEAST_AGREEING and self.is_explained(fit):
             return fit
         on_stage("searching on")
         num = self.settings.num_second_starts
@@ -134,7 +134,7 @@ class GradientFitter:
         starts = np.concatenate([self._starts_by_phases(free, num, seed), scattered])
         ends = self._ends(starts, free, self.settings.num_second_refined)
         fit = max(fit, self._best_valley(ends, free), key=_evidence)
-        if fit.code is Code.CONVERGED and not self._is_explained(fit, NOISE_SCALE_RANGE[1]):
+        if fit.code is Code.CONVERGED and not self.is_explained(fit, NOISE_SCALE_RANGE[1]):
             fit = replace(fit, code=Code.MISFIT)
         return fit
 
@@ -243,6 +243,15 @@ class GradientFitter:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""
         return self._residuals.costs(self._batch(z, free))
 
+    def is_explained(self, fit: GradientFit, noise_scale: float = 1.0) -> bool:
+        """Whether noise of that scale leaves as much at least once in 1 / CHANCE times."""
+        degrees = sum(
+            float(GaussianLikelihood.degrees(1.0, clip.data.whitening))
+            for clip in self._residuals.clips
+        )
+        left = fit.chi2 / noise_scale**2
+        return bool(chdtrc(max(degrees - fit.num_used, 1.0), left) > CHANCE)
+
     def _ends(self, starts: np.ndarray, free: np.ndarray, num_refined: int) -> Ends:
         """Refines the best of some starts."""
         points = self._batch(starts, free)
@@ -288,7 +297,7 @@ class GradientFitter:
         best = self._most_evident(self._variants(z, free), free, num_steps)
         own = np.flatnonzero(self._is_positive_nuisance & free)
         for _ in own if len(own) > 1 else ():
-            if self._is_explained(best):
+            if self.is_explained(best):
                 break
             z, each = best.z[: self._count], np.eye(self._count, dtype=bool)[own]
             alone = [np.where(one, other, z) for one in each for other in VARIANTS_Z]
@@ -316,15 +325,6 @@ class GradientFitter:
         if not positive.any():
             return [z]
         return [z, *(np.where(positive, other, z) for other in VARIANTS_Z)]
-
-    def _is_explained(self, fit: GradientFit, noise_scale: float = 1.0) -> bool:
-        """Whether noise of that scale leaves as much at least once in 1 / CHANCE times."""
-        degrees = sum(
-            float(GaussianLikelihood.degrees(1.0, clip.data.whitening))
-            for clip in self._residuals.clips
-        )
-        left = fit.chi2 / noise_scale**2
-        return bool(chdtrc(max(degrees - fit.num_used, 1.0), left) > CHANCE)
 
     def _batch(self, z: np.ndarray, free: np.ndarray) -> Batch:
         free = np.broadcast_to(free, z.shape)

@@ -73,16 +73,22 @@ class _Part:
     others: np.ndarray  # indices of the others that the hypothesis has
     width: float
 
-    def draw(self, generator: np.random.Generator, num: int) -> np.ndarray:
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
+        """Points, and their log density in this part."""
         u = generator.standard_normal((num, self.valley.root.shape[1]))
         chi = generator.chisquare(DEGREES_OF_FREEDOM, num) / DEGREES_OF_FREEDOM
-        z = np.array(self.valley(self.width * u / np.sqrt(chi)[:, None]))
+        u = u / np.sqrt(chi)[:, None]
+        z = np.array(self.valley(self.width * u))
         z[:, self.others] = generator.standard_normal((num, len(self.others)))
-        return z
+        return z, self._log_density_at(u, z)
 
     def log_density(self, z: np.ndarray) -> np.ndarray:
-        with np.errstate(over="ignore", invalid="ignore"):  # far off, where none is drawn
+        with np.errstate(over="ignore", invalid="ignore"):  # far off, where it draws none
             u = self.valley.inverse(z, self.along) / self.width
+        return self._log_density_at(u, z)
+
+    def _log_density_at(self, u: np.ndarray, z: np.ndarray) -> np.ndarray:
+        with np.errstate(over="ignore", invalid="ignore"):
             far = np.nan_to_num(np.sum(u**2, axis=1), nan=np.inf)
         nu, dim = DEGREES_OF_FREEDOM, u.shape[1]
         constant = gammaln((nu + dim) / 2) - gammaln(nu / 2) - dim / 2 * np.log(np.pi * nu)
@@ -119,13 +125,18 @@ def weighed(
         parts.append(_part(without, fit, residuals, width))
         shares = np.append((1 - SHARE_WITHOUT) * shares, SHARE_WITHOUT)
     counts = np.diff(np.rint(num * np.append(0.0, np.cumsum(shares))).astype(int))
+    of = np.repeat(np.arange(len(parts)), counts)
     # The prior's constant; that of the data is the same for all hypotheses.
     constant = np.sum(fit.free) / 2 * np.log(2 * np.pi)
     modes = np.stack([one.z for one in fits])
     best, better, log_weights, ess = -np.inf, None, np.empty(0), 0.0
     while len(log_weights) < num or (ess < ENOUGH_ESS and len(log_weights) < most):
-        z = np.concatenate([p.draw(generator, n) for p, n in zip(parts, counts, strict=True)])
-        log_q = logsumexp([p.log_density(z) for p in parts], axis=0, b=(counts / num)[:, None])
+        drawn = [p.draw(generator, n) for p, n in zip(parts, counts, strict=True)]
+        z = np.concatenate([own for own, _ in drawn])
+        log_parts = np.stack([p.log_density(z) for p in parts])
+        # A valley that bends much takes a draw so far that no map finds its way back from there.
+        log_parts[of, np.arange(num)] = np.concatenate([density for _, density in drawn])
+        log_q = logsumexp(log_parts, axis=0, b=(counts / num)[:, None])
         both = _log_densities(fit, residuals, np.concatenate([z, modes]))
         log_p, of_modes = both[: len(z)], both[len(z) :].max()
         best = max(best, of_modes + BETTER_NATS)
