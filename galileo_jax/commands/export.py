@@ -25,7 +25,6 @@ def _parser() -> command.Parser:
     parser.examples(
         "galileo export runs/clip --to netcdf",
         "galileo export runs/clip --to svg --out figures",
-        "galileo export clip.mp4 --to csv --out tables",
     )
     parser.add_argument("source", metavar="RUN|CLIP", help="the folder that fit wrote, or a clip")
     add = adder(parser, "export")
