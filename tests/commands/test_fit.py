@@ -5,12 +5,12 @@ import math
 import subprocess
 import sys
 from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from rich.progress import Progress
 
 from galileo_jax import report
 from galileo_jax.api.fit import OFF_THE_PLANE, fit
@@ -18,6 +18,7 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.commands import command
 from galileo_jax.commands import fit as fit_command
+from galileo_jax.commands.progress_display import ProgressDisplay
 from galileo_jax.inference.samplers import driver
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results.run import load_run
@@ -252,6 +253,7 @@ class TestSampling:
 
     @pytest.fixture(autouse=True)
     def short_warmup(self, monkeypatch):
+        import_module("galileo_jax.inference.metropolis")  # needs the class in its annotations
         whole, short = driver.Settings, {"warmup_steps": 25, "stops_early": False}
         monkeypatch.setattr(driver, "Settings", lambda **given: whole(**(given | short)))
 
@@ -261,22 +263,22 @@ class TestSampling:
         assert undisturbed["method"] == "mh"
         assert not undisturbed["converged"], "fifty steps are too few, and it says so"
 
-        update, calls = Progress.update, []
+        shows, blocks = ProgressDisplay.__call__, []
 
-        def stop_at_the_second_block(self, *given, **named):
-            update(self, *given, **named)
-            calls.append(named)
-            if len(calls) == 2:
+        def stop_at_the_second_block(self, stage, *given):
+            shows(self, stage, *given)
+            blocks.extend([stage] * stage.startswith("sampling"))
+            if len(blocks) == 2:
                 raise KeyboardInterrupt
 
         out = tmp_path / "twice"
-        monkeypatch.setattr(Progress, "update", stop_at_the_second_block)
+        monkeypatch.setattr(ProgressDisplay, "__call__", stop_at_the_second_block)
         words = [str(simulated[0]), "--out", str(out), *self.SHORT]
         assert command.run(fit_command.main, words) == 130
         assert "what was finished is kept" in capsys.readouterr().err
         assert not (out / "result.json").exists()
         assert list(out.iterdir()), "the checkpoint"
-        monkeypatch.setattr(Progress, "update", update)
+        monkeypatch.setattr(ProgressDisplay, "__call__", shows)
         resumed = call_fit(simulated[0], out, *self.SHORT)
         assert without_times(resumed) == without_times(undisturbed)
         assert not list(out.glob("*.checkpoint.npz"))
