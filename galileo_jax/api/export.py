@@ -89,6 +89,7 @@ def _plots(folder: Path, out: Path) -> list[Path]:
     folders = clip_folders(folder, read_result(folder))
     written = []
     for name, one in folders.items():
+        run = load_run(one)
         with outputs(out):
-            written += write_fit_plots(load_run(one), out / name if len(folders) > 1 else out)
+            written += write_fit_plots(run, out / name if len(folders) > 1 else out)
     return written

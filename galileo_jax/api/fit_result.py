@@ -210,7 +210,7 @@ class Fit:
 
     @in_float64
     def report(self, path: str | Path) -> tuple[Path, ...]:
-        """Writes the page of the fit (one HTML file, no network needed) and its plots beside it.
+        """Writes the page of the fit (one HTML file, no network needed).
 
         Args:
           path: the page; of several clips each has its own: NAME.html becomes NAME_CLIP.html.
