@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     import plotly.graph_objects as go
 
 DOCUMENT = "diagnosis.json"
+PLOTS = "plots"
 TRACKED, ADVISED = 0.2, 0.97  # share of the work, for progress
 STAGES = {  # how a stage begins, and how much is done by then
     "fitting the model": 0.02,
@@ -224,7 +225,7 @@ class Diagnosis:
 
     @in_float64
     def report(self, path: str | Path) -> Path:
-        """Writes the page (one HTML file, no network needed) and its plots beside it."""
+        """Writes the page (one HTML file, no network needed)."""
         from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
 
         clips = tuple(one.clip for one in self.measurements)
@@ -241,11 +242,16 @@ class Diagnosis:
         write_diagnosis_page(Path(path), title, self.problem, page)
         return Path(path)
 
-    def save(self, folder: str | Path) -> Path:
+    @in_float64
+    def save(self, folder: str | Path, *, svg: bool = False) -> Path:
         """Writes diagnosis.json, report.html and, below model/, the run of the last model.
 
         And hypotheses.npz, of which `next_experiment` is made; where a formula explains the data
         (law, or ambiguous with one), its effect, too: proposed_effect.py, for `--effects-from`.
+
+        Args:
+          folder: made where it is not there.
+          svg: also writes the residuals before and after each effect as SVG, below plots/.
         """
         folder, best = Path(folder), self.best
         proposed = folder / PROPOSED
@@ -259,6 +265,12 @@ class Diagnosis:
         write_json(folder / DOCUMENT, self.document)
         write_beliefs(folder / FILE, self.problem, beliefs_of(self.found))
         self.report(folder / "report.html")
+        if svg:
+            from galileo_jax.report.diagnosis_plots import write_diagnosis_plots  # Matplotlib
+
+            write_diagnosis_plots(
+                folder / PLOTS, self.problem, self.found, int(self.document["seed"])
+            )
         best.save(folder / "model", report=False)
         return folder
 

@@ -1,7 +1,7 @@
-"""Imports JAX and compiles programs on one core while another core tracks the video.
+"""Imports JAX and compiles programs on one core while another core measures the clips.
 
-Programs are compiled for a clip with the expected number of frames, objects and laws. If the
-tracked clip differs (for example because sizes were null), they are compiled again and only time is
+Programs are compiled for a clip with the expected number of frames, objects and laws. If what is
+measured differs (for example because sizes were null), they are compiled again and only time is
 lost.
 """
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.observation.observation import Observation
 
 START_M, APART_M, SD_M = -0.3, 0.3, 1e-4  # on the ramp; between objects; of the track
@@ -46,13 +47,14 @@ def precompile(clips: Sequence[Clip], compile_for: Compile | None) -> threading.
 
 
 def _compile(clips: Sequence[Clip], compile_for: Compile) -> None:
-    filmed = [clip for clip in clips if clip.video is not None]
-    if filmed and all(SCENARIOS[clip.scenario].has_table for clip in filmed):
-        compile_for(filmed, [_likely(clip) for clip in filmed])
+    if all(SCENARIOS[clip.scenario].has_table for clip in clips):
+        compile_for(clips, [_likely(clip) for clip in clips])
 
 
 def _likely(clip: Clip) -> Observation:
-    """Object 1 on the ramp and the others on the table, all at rest."""
+    """The track, where it is one; else object 1 on the ramp and the others on the table at rest."""
+    if clip.track is not None:
+        return read_track(clip.path, clip.track, clip, clip.fps).observation
     count, frames = len(clip.objects), clip.frame_count
     position = np.zeros((count, 2, frames))
     position[:, 0] = (START_M + APART_M * np.arange(count) + APART_M * (np.arange(count) > 0))[

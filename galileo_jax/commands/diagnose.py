@@ -22,6 +22,7 @@ def main(argv: Sequence[str]) -> int | None:
     asked = vars(_parser().parse_args(argv))
     clips = load_clips(asked.pop("tracks"), asked["pixels_per_metre"])
     out = out_folder(asked.pop("out"), clips, "diagnosis")
+    svg = asked.pop("svg")
     hidden = hidden_effect(clips[0])
     from galileo_jax.api.diagnose import diagnose
 
@@ -29,7 +30,7 @@ def main(argv: Sequence[str]) -> int | None:
         found = diagnose(clips, **asked, on_progress=_RoundPrinter(display))
         print("\n".join(_lines(found, hidden, out)))
         display("writing the page", 1.0)
-        found.save(out)
+        found.save(out, svg=svg)
     warn(line for one in found.measurements for line in (*one.remarks, *one.doubts))
     command.say(f"{out}/diagnosis.json, {out}/report.html, {out}/model")
     return None
@@ -120,6 +121,11 @@ def _parser() -> command.Parser:
     parser = command.Parser(prog="galileo diagnose", description=__doc__)
     parser.add_argument("tracks", nargs="+", metavar="CLIP", help="video, its yaml, or a csv track")
     adder(parser, "diagnose")("add", metavar="auto|none|NAME")
+    parser.add_argument(
+        "--svg",
+        action="store_true",
+        help="also write the residuals before and after each effect as SVG (plots/)",
+    )
     add_clip_options(parser, "diagnose", out="folder (default runs/CLIP/diagnosis)")
     parser.examples(
         "galileo diagnose clip.mp4                             what is missing is added",

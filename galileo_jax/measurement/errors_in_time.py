@@ -19,6 +19,7 @@ errors in regression, J. R. Statist. Soc. B 40, 364 (the path); Rasmussen and Wi
 Gaussian Processes for Machine Learning, section 2.7 (the marginal likelihood).
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -103,16 +104,19 @@ def _shared_errors(
     pieces = np.array_split(np.arange(len(values)), count)
     if count > MOST_PIECES:
         pieces = [pieces[j] for j in np.linspace(0, count - 1, MOST_PIECES).astype(int)]
-    each = [_evidence(times_s[rows], values[rows], step_s) for rows in pieces]
-    half = len(each) // 2
-    by_half = [each[:half], each[half:]]
-    if not half:
-        parts = np.array_split(pieces[0], 2)
-        by_half = [[_evidence(times_s[rows], values[rows], step_s)] for rows in parts]
-    evidence = np.sum(each, axis=0)
-    is_convincing = _lead(evidence) >= CONVINCING * len(each)
+    half = len(pieces) // 2
+
+    def evidence_of(some: Sequence[np.ndarray]) -> Float[np.ndarray, "errors scale"]:
+        return np.sum([_evidence(times_s[own], values[own], step_s) for own in some], axis=0)
+
     # What happens once, as a motion that begins, is no error: those are alike in both halves.
-    if not is_convincing or min(_lead(np.sum(own, axis=0)) for own in by_half) < 0:
+    by_half = []
+    for own in (pieces[:half], pieces[half:]) if half else zip(np.array_split(pieces[0], 2)):
+        by_half.append(evidence_of(own))
+        if _lead(by_half[-1]) < 0:
+            return None
+    evidence = np.sum(by_half, axis=0) if half else evidence_of(pieces)
+    if _lead(evidence) < CONVINCING * len(pieces):
         return None
     weight = np.exp(evidence[1:] - logsumexp(evidence[1:])) @ SCALES**2  # [kernel and share]
     weight = weight.reshape(len(ROWS), len(SHARES))

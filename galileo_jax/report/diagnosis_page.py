@@ -16,13 +16,11 @@ from galileo_jax.report.chart import Chart
 from galileo_jax.report.comparison_charts import before_after_chart
 from galileo_jax.report.comparison_page import cells, failures, motion
 from galileo_jax.report.diagnosis_charts import is_known, missing_force_chart, rounds_chart
-from galileo_jax.report.draw import to_svg
 from galileo_jax.report.fit_text import number
 from galileo_jax.report.html_page import chart_section, document, header, items, legend, table
 from galileo_jax.report.provenance import provenance
 from galileo_jax.runtime.atomic_write import write_text
 
-PLOTS = "plots"
 NUM_CANDIDATES = 8
 ONLY_WIDE = ("", "log evidence", "log prior", "chi2 per dof", "p")  # of the candidates
 BAR = '<div class="bar"><div style="width:{:.1f}%"></div></div>'
@@ -54,16 +52,9 @@ class DiagnosisReport:
 def write_diagnosis_page(
     path: Path, title: str, trials: JointProblem, report: DiagnosisReport
 ) -> None:
-    """Writes the page, and the residuals before and after each effect as SVG into plots/."""
+    """Writes the page; each figure in it can be saved as SVG."""
     diagnosis = report.diagnosis
-    shown = [
-        path_residuals(one.hypothesis.of(trials), one.hypothesis.fit, one.comparison, report.seed)
-        for one in diagnosis.rounds
-    ]
-    rounds = list(pairwise(zip(shown, map(_title, diagnosis.rounds), strict=True)))
-    added = [(after[1], _before_after(before, after)) for before, after in rounds]
-    for chart in (chart for _, charts in added for chart in charts):
-        write_text(path.parent / PLOTS / f"{chart.name}.svg", to_svg(chart))
+    shown = _residuals(trials, diagnosis, report.seed)
     sections = [
         _verdict(title, report),
         _reasons(diagnosis.verdict.reasons),
@@ -76,7 +67,7 @@ def write_diagnosis_page(
             {_title(one): one.hypothesis.of(trials) for one in diagnosis.rounds},
         ),
         failures(f"Where the model fails: {_title(diagnosis.rounds[0])}", shown[0]),
-        *(_added(name, charts) for name, charts in added),
+        *(_added(name, charts) for name, charts in _before_after(diagnosis, shown)),
         _missing(report, trials.problems[0].observation.names),
         cells(diagnosis.base, several=len(trials.problems) > 1),
         _each_clip(report.record.get("each_clip")),
@@ -88,6 +79,12 @@ def write_diagnosis_page(
         ),
     ]
     write_text(path, document(f"{title}: diagnosis", [part for part in sections if part]))
+
+
+def before_after_charts(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> list[Chart]:
+    """The residuals before and after each effect that was added, one chart for each object."""
+    shown = _residuals(trials, diagnosis, seed)
+    return [chart for _, charts in _before_after(diagnosis, shown) for chart in charts]
 
 
 def _fitted(trials: JointProblem, diagnosis: Diagnosis) -> dict[str, Any]:
@@ -137,13 +134,30 @@ def _rounds(rounds: Sequence[Round], history: Sequence[Mapping[str, Any]]) -> st
     return f"{charts}\n{table(head, rows)}"
 
 
-def _before_after(
-    before: tuple[Sequence[PathResiduals], str], after: tuple[Sequence[PathResiduals], str]
-) -> list[Chart]:
-    """One chart for each object, of two rounds: the residuals, and the effects of the model."""
+def _residuals(
+    trials: JointProblem, diagnosis: Diagnosis, seed: int
+) -> list[tuple[PathResiduals, ...]]:
+    """Of every round, those of all objects."""
     return [
-        before_after_chart(one, two, (before[1], after[1]))
-        for one, two in zip(before[0], after[0], strict=True)
+        path_residuals(one.hypothesis.of(trials), one.hypothesis.fit, one.comparison, seed)
+        for one in diagnosis.rounds
+    ]
+
+
+def _before_after(
+    diagnosis: Diagnosis, shown: Sequence[Sequence[PathResiduals]]
+) -> list[tuple[str, list[Chart]]]:
+    """For each round after the first the effects of its model, and a chart for each object."""
+    rounds = pairwise(zip(shown, map(_title, diagnosis.rounds), strict=True))
+    return [
+        (
+            after,
+            [
+                before_after_chart(one, two, (before, after))
+                for one, two in zip(shown_before, shown_after, strict=True)
+            ],
+        )
+        for (shown_before, before), (shown_after, after) in rounds
     ]
 
 

@@ -62,6 +62,22 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)
 
 
+def side_by_side(parts: Sequence[Callable[[], Any]]) -> None:
+    """Calls functions of no arguments in threads of their own, and waits for all of them.
+
+    Programs are read from JAX's cache, or compiled, without Python: several at once take as long
+    as one.
+    """
+    is_64_bit = jax.config.read("jax_enable_x64")  # may be the calling thread's own
+
+    def call(part: Callable[[], Any]) -> None:
+        with jax.enable_x64(is_64_bit):
+            part()
+
+    with ThreadPoolExecutor(num_cores()) as pool:
+        list(pool.map(call, parts))
+
+
 @functools.cache
 def _pool(process: int) -> ThreadPoolExecutor:
     """Threads for parts of batches: starting them anew takes as long as some parts do."""

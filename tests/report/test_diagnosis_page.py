@@ -16,6 +16,7 @@ from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.comparison_page import ComparisonReport, write_comparison_page
 from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
+from galileo_jax.report.diagnosis_plots import write_diagnosis_plots
 from galileo_jax.report.provenance import digest
 from tests.found import comparison_of, diagnosis_of, fit_of, make_trials
 from tests.precision import in_64_bit
@@ -77,11 +78,16 @@ def test_tells_the_verdict_and_needs_nothing_from_outside(status, trials, clip, 
     assert ("0.99 sin(6 t)" in page) == (status == "unknown")
     assert ("Added: air_drag" in page) == (status in ("named", "ambiguous"))
     assert AGAIN in page and digest(clip.track) in page
-    plots = sorted(plot.name for plot in tmp_path.glob("plots/*.svg"))
-    added = [f"before_after_oracle_object{i}_air_drag.svg" for i in (1, 2)]
-    assert plots == (added if status in ("named", "ambiguous") else [])
     check_needs_nothing_from_outside(page)
     assert "<h1>&lt;/script&gt;&lt;b&gt;&amp;" in page, "names are escaped"
+
+
+@pytest.mark.parametrize("status", ["named", "unknown"])
+def test_draws_what_each_effect_changed(status, trials, tmp_path):
+    plots = write_diagnosis_plots(tmp_path, trials, diagnosis_of(trials, status), 0)
+    added = [f"before_after_oracle_object{i}_air_drag.svg" for i in (1, 2)]
+    assert [plot.name for plot in plots] == (added if status == "named" else [])
+    assert all("before" in plot.read_text() or "no effects" in plot.read_text() for plot in plots)
 
 
 def test_opens_in_a_browser(trials, clip, tmp_path, browser):

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
-from scipy.optimize import minimize
 
 from galileo_jax.diagnosis.laws.grammar import Structure, structures
 from galileo_jax.diagnosis.laws.sight import Sight
@@ -224,6 +223,8 @@ def _refined(
     start: Mapping[str, float],
 ) -> dict[str, float]:
     """The constants that explain most, from the best point of the grid on, within the grid."""
+    from scipy.optimize import minimize  # a quarter of a second; few diagnoses come here
+
     low, high = (np.array([f(values) for values in grid.values()]) for f in (np.min, np.max))
 
     def without(unit: np.ndarray) -> float:

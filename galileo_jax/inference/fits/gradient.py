@@ -15,8 +15,10 @@ are compared; scattered starting points cost only one batch. Which optimiser, an
 docs/explanation/optimiser.md.
 """
 
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -33,6 +35,7 @@ from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.fits.stages import before_moving
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
+from galileo_jax.runtime.batching import side_by_side
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
@@ -99,11 +102,13 @@ class GradientFitter:
 
     def compile(self) -> None:
         """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
+        one, many = (np.zeros((n, self._count)) for n in (1, self.settings.num_starts))
+        parts: list[Callable[[], Any]] = []
         for effects in dict.fromkeys([(), self.trials.all_effects]):
             free = self.trials.free(effects)[: self._count]
-            self._descent(self._batch(np.zeros((1, self._count)), free), np.inf, 1)
-            z = np.zeros((self.settings.num_starts, self._count))
-            self._residuals.costs(self._batch(z, free))
+            parts.append(functools.partial(self._descent, self._batch(one, free), np.inf, 1))
+            parts.append(functools.partial(self._residuals.costs, self._batch(many, free)))
+        side_by_side(parts)
 
     def fit(
         self,
