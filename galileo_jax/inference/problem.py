@@ -1,8 +1,9 @@
 """The inverse problem of one clip: its data, and a model of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -110,20 +111,37 @@ class Problem:
     ) -> Float[np.ndarray, "batch object 2 frame"]:
         """`simulate` of `[batch, parameter]`: `[batch, object, 2, frame]`."""
         check_cancelled()
-        motion = self.motion(theta)
         times = self.observation.times_s
         frames = np.pad(times, (0, rounded_up(len(times), FRAMES) - len(times)), mode="edge")
         kind, scene = self.kind, self.model.scene.surroundings
-        found = in_chunks(
-            MOTIONS, lambda *rows: _seen_batch(kind, *rows, frames, scene), theta, *motion
-        )
+        found = self.of_motions(theta, lambda *part: _seen_batch(kind, *part, frames, scene))
         return found[..., : len(times)]
 
     def motion(self, theta: Float[np.ndarray, "batch parameter"]) -> Motion:
         """Centres and velocities as long as programs are compiled for, if not as long as seen."""
+        return self.of_motions(theta, lambda _, *motion: motion)
+
+    def of_motions(
+        self,
+        theta: Float[np.ndarray, "batch parameter"],
+        then: Callable[..., Any],
+        *rows: np.ndarray,
+    ) -> Any:
+        """What follows from the motion with each of `theta`.
+
+        Args:
+          theta: as of `simulate_batch`.
+          then: maps parts of the batch, as large as programs are compiled for: `(theta, position,
+            velocity, *rows)`, motions as of `motion`, to a PyTree of arrays `[part, ...]`.
+          *rows: more arguments of `then`, `[batch, ...]`.
+
+        Returns:
+          What `then` of the whole batch would, as NumPy arrays.
+        """
         if isinstance(self.engine, EngineJax):
-            return self.engine.rolled(theta, self.last_seen_s(theta))
-        return padded_motion(*self.engine.simulate(theta))
+            return self.engine.each(theta, self.last_seen_s(theta), then, *rows)
+        motion = padded_motion(*self.engine.simulate(theta))
+        return in_chunks(MOTIONS, then, theta, *motion, *rows)
 
     def last_seen_s(
         self, theta: Float[np.ndarray, "batch parameter"]

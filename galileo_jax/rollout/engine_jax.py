@@ -14,6 +14,7 @@ from galileo_jax.rollout.acting_laws import ActingLaws, Share
 from galileo_jax.rollout.devices import over_devices
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
 from galileo_jax.runtime.batching import RECORDS as LONG
+from galileo_jax.runtime.on_device import OnDevice
 from galileo_jax.runtime.trace_cache import trace_cached
 
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
@@ -38,6 +39,7 @@ class EngineJax:
     def __init__(self, model: Model, laws: ActingLaws | None = None):
         self.model = model
         self._laws = ActingLaws(model) if laws is None else laws
+        self._surroundings = OnDevice(model.scene.surroundings)
 
     def simulate(
         self, theta: Float[np.ndarray, "batch parameter"]
@@ -58,23 +60,51 @@ class EngineJax:
           theta: as of `simulate`.
           until_s: when somebody looks for the last time: later, objects may be anywhere.
         """
+        return self.each(theta, until_s, lambda _, *motion: motion)
+
+    def each(
+        self,
+        theta: Float[np.ndarray, "batch parameter"],
+        until_s: Float[np.ndarray, " batch"],
+        then: Callable[..., Any],
+        *rows: np.ndarray,
+    ) -> Any:
+        """What follows from each motion: motions themselves are large, and stay where they are.
+
+        Args:
+          theta: as of `simulate`.
+          until_s: as of `rolled`.
+          then: maps parts of a batch, `(theta, position, velocity, *rows)`, each `[part, ...]`, to
+            a PyTree of arrays `[part, ...]`.
+          *rows: more arguments of `then`, `[batch, ...]`.
+
+        Returns:
+          What `then` of the whole batch would, as NumPy arrays.
+        """
         theta = np.asarray(theta)
         shares = self._laws.shares(theta)
-        motions = [
+
+        def parts(share: Share, theta: np.ndarray, until_s: np.ndarray, *rows: np.ndarray) -> Any:
+            return then(theta, *self._as_long_as_needed(share, theta, until_s), *rows)
+
+        found = [
             in_chunks(
                 MOTIONS,
-                functools.partial(self._as_long_as_needed, share),
-                theta[rows],
-                until_s[rows],
+                functools.partial(parts, share),
+                *(values[own] for values in (theta, until_s, *rows)),
             )
-            for share, rows in shares
+            for share, own in shares
         ]
         if len(shares) == 1 and (np.diff(shares[0][1]) == 1).all():
-            return motions[0]  # nothing was moved, and nothing need be copied
-        position, velocity = (np.empty((len(theta), *own.shape[1:])) for own in motions[0])
-        for (_, rows), motion in zip(shares, motions, strict=True):
-            position[rows], velocity[rows] = motion
-        return position, velocity
+            return found[0]  # nothing was moved, and nothing need be copied
+
+        def together(*leaves: np.ndarray) -> np.ndarray:
+            whole = np.empty((len(theta), *leaves[0].shape[1:]), leaves[0].dtype)
+            for (_, own), leaf in zip(shares, leaves, strict=True):
+                whole[own] = leaf
+            return whole
+
+        return jax.tree.map(together, *found)
 
     def _as_long_as_needed(self, share: Share, theta: np.ndarray, until_s: np.ndarray) -> Motion:
         """Rolled out until the last time of all that is asked for."""
@@ -89,7 +119,7 @@ class EngineJax:
             rounded_up(most, LONG),
             model.record_dt_s,
             share.of(theta),
-            model.scene.surroundings,
+            self._surroundings(),
             np.asarray(count),
             share.acts(theta),
         )

@@ -7,9 +7,9 @@ import numpy as np
 from galileo_jax.inference.fits.programs import ClipArrays, Kind, Padded
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
-from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.parameters import PriorTable
 from galileo_jax.runtime.batching import FRAMES, SPARE_MODES, rounded_up
+from galileo_jax.runtime.on_device import OnDevice
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 
@@ -23,6 +23,7 @@ class FittedClip:
       priors: of its parameters.
       absent: `[own parameter]`, values in their units where pinned.
       data: padded.
+      on_device: all that its programs need.
     """
 
     problem: Problem
@@ -30,19 +31,18 @@ class FittedClip:
     priors: PriorTable
     absent: np.ndarray
     data: Padded
+    on_device: OnDevice[ClipArrays]
 
     @classmethod
     def of(cls, trials: JointProblem, index: int) -> "FittedClip":
         """The clip of that index."""
         problem, column = trials.problems[index], trials.columns[index]
         parameters = problem.parameters
-        return cls(
-            problem=problem,
-            column=column,
-            priors=PriorTable.of(parameters),
-            absent=np.array([p.absent for p in parameters]),
-            data=_padded(problem),
-        )
+        priors, data = PriorTable.of(parameters), _padded(problem)
+        absent = np.array([p.absent for p in parameters])
+        scene = problem.model.scene.surroundings
+        arrays = OnDevice(ClipArrays(data, scene, priors, absent, column))
+        return cls(problem, column, priors, absent, data, arrays)
 
     @property
     def kind(self) -> Kind:
@@ -50,14 +50,9 @@ class FittedClip:
         return Kind(*self.problem.kind)
 
     @property
-    def scene(self) -> Surroundings:
-        """As its model's."""
-        return self.problem.model.scene.surroundings
-
-    @property
     def arrays(self) -> ClipArrays:
         """All that its programs need."""
-        return ClipArrays(self.data, self.scene, self.priors, self.absent, self.column)
+        return self.on_device()
 
     def theta(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """`[point, joint parameter]` to this clip's parameters in their units."""

@@ -1,6 +1,6 @@
 """Whitened residuals of many hypotheses' points, and their slopes, by batches of rollouts."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,7 +84,10 @@ class Residuals:
 
     def whites(self, points: Batch) -> list[Float[np.ndarray, "point value"]]:
         """Whitened residuals, `[point, value]`, clip by clip."""
-        return self.whites_of(points, self.motions(points))
+        return [
+            self._whites(clip, points.z, points.free, points.noise[:, c])
+            for c, clip in enumerate(self.clips)
+        ]
 
     def motions(self, points: Batch) -> Motions:
         """By rollouts, clip by clip."""
@@ -116,14 +119,8 @@ class Residuals:
         jacobians, whites = [], []
         for c, clip in enumerate(self.clips):
             moves = self._moves(clip, index, steps, is_central)
-            first = 0 if motions else len(points.z)  # of the points themselves
-            owner = np.concatenate([np.arange(first), moves.point])
-            moved = points.z[owner]
-            moved[np.arange(first, len(moved)), moves.which] += moves.step
-            made = self._simulate(clip, moved, points.free[owner])
-            motion = motions[c] if motions else tuple(values[:first] for values in made)
+            aside, motion = self._aside(c, points, moves, None if motions is None else motions[c])
             white, jacobian = self._seen_slopes(c, points, index, motion)
-            aside = _white(clip, [v[first:] for v in made], points.noise[moves.point, c])
             change = (aside - white[moves.point]) / moves.step[:, None]
             mean = change.reshape(moves.sides, -1, change.shape[1]).mean(axis=0)
             jacobian[moves.point[: len(mean)], :, moves.slot[: len(mean)]] = mean
@@ -144,6 +141,26 @@ class Residuals:
         signed = np.concatenate([step, -step][:sides])
         point, slot, which = (np.tile(values, sides) for values in (point, slot, which))
         return _Moves(point, slot, which, signed, sides)
+
+    def _aside(
+        self, c: int, points: Batch, moves: "_Moves", motion: tuple[np.ndarray, ...] | None
+    ) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """A clip's residuals at the rollouts of `moves`, and the points' own motions.
+
+        These are `motion`, or, where that is None, all are rolled out in one batch.
+        """
+        clip, noise = self.clips[c], points.noise[moves.point, c]
+        moved = points.z[moves.point]
+        moved[np.arange(len(moved)), moves.which] += moves.step
+        free = points.free[moves.point]
+        if motion is not None:
+            return self._whites(clip, moved, free, noise), motion
+        first = len(points.z)
+        made = self._simulate(
+            clip, np.concatenate([points.z, moved]), np.concatenate([points.free, free])
+        )
+        white = _white(clip, [values[first:] for values in made], noise)
+        return white, tuple(values[:first] for values in made)
 
     def _seen_slopes(
         self, c: int, points: Batch, index: np.ndarray, motion: tuple[np.ndarray, ...]
@@ -168,6 +185,15 @@ class Residuals:
         theta = clip.theta(z, free)
         return theta, *clip.problem.motion(theta)
 
+    def _whites(
+        self, clip: FittedClip, z: np.ndarray, free: np.ndarray, noise: np.ndarray
+    ) -> Float[np.ndarray, "point value"]:
+        """Whitened residuals of a clip, of points that were not rolled out."""
+        if not len(z):
+            return np.zeros((0, clip.data.whitening.observed_m.size))
+        self.num_rollouts += len(z)
+        return clip.problem.of_motions(clip.theta(z, free), _white_batch_of(clip), noise)
+
 
 class _Moves(NamedTuple):
     """What slopes are differences of; of both sides first all of one, then all of the other.
@@ -190,9 +216,13 @@ def _white(
     clip: FittedClip, motion: Sequence[np.ndarray], noise: np.ndarray
 ) -> Float[np.ndarray, "point value"]:
     """Whitened residuals of a clip's motions."""
-    return in_chunks(
-        MOTIONS, lambda *rows: white_batch(clip.kind, *rows, clip.data, clip.scene), *motion, noise
-    )
+    return in_chunks(MOTIONS, _white_batch_of(clip), *motion, noise)
+
+
+def _white_batch_of(clip: FittedClip) -> Callable[..., Any]:
+    """`(theta, position, velocity, noise)`, each `[point, ...]`, to residuals `[point, value]`."""
+    data, scene, *_ = clip.arrays
+    return lambda *part: white_batch(clip.kind, *part, data, scene)
 
 
 def cost(white: Sequence[np.ndarray], z: np.ndarray) -> np.ndarray:
