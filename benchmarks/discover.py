@@ -17,18 +17,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import hidden_cases
 import labs
 import tables
 
 import galileo_jax as gx
 from galileo_jax.commands import command
-from galileo_jax.model.effects.registry import effect_names
 from galileo_jax.runtime.atomic_write import write_json
 
 
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
-    effects = call.effects.split(",") if call.effects else [labs.NONE, *effect_names()]
+    effects = call.effects.split(",") if call.effects else [labs.NONE, *hidden_cases.ramp_effects()]
     tables.row("lab", ("verdict", "experiments", "right", "wrong", "CPU s"))
     rows = []
     for seed in range(call.first, call.first + call.seeds):

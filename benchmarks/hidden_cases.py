@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import tempfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,10 +11,12 @@ from typing import Any
 
 import yaml
 
+from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.measurement.measure import measure
+from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 
@@ -50,6 +53,15 @@ class Case:
     effect: str
     strength: float | None = None
     recipe: Mapping[str, Any] | None = None
+
+
+def ramp_effects() -> list[str]:
+    """The library's effects that have a place on a ramp: the candidates of its diagnosis."""
+    with tempfile.TemporaryDirectory() as folder:
+        plain = simulate(Path(folder) / "plain.csv", seed=0, track_only=True).paths[0]
+        measured = measure(load_clip(plain))
+        trials = with_library([measured.clip], [measured.observation], "auto")
+    return [name for name in trials.all_effects if name not in FORM_NAMES]
 
 
 def grid(

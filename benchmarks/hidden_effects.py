@@ -28,7 +28,6 @@ import verdicts
 from hidden_cases import Case
 
 from galileo_jax.commands import command
-from galileo_jax.model.effects.registry import effect_names
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 
@@ -39,7 +38,7 @@ BY_COLUMNS = ("cases", "right", "covered", "size", "wrong", "missed", "unknown")
 
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
-    library = effect_names()
+    library = hidden_cases.ramp_effects()
     cases = _cases(call, library)
     kept = _results(call.out / "results.jsonl")
     least = call.least_chi2 if call.least_chi2 is not None else (0.0 if call.folder else 3.0)

@@ -129,6 +129,12 @@ def exam(monkeypatch):
     return module, calls
 
 
+def test_only_what_has_a_place_on_a_ramp_is_hidden_there():
+    names = importlib.import_module("hidden_cases").ramp_effects()
+    assert {"air_drag", "restitution"} < set(names)
+    assert "added_mass" not in names and "force_at_a_time" not in names
+
+
 def test_grid_is_walked_once(exam, tmp_path, capsys, monkeypatch):
     module, calls = exam
     monkeypatch.setattr(module.hidden_cases, "EXOTICS", ())
