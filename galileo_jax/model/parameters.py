@@ -199,7 +199,9 @@ class PriorTable(NamedTuple):
 
 
 def _grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    return median * np.exp(sd * z)
+    # A wild proposal's may be infinite: its rollout fails, and it is refused.
+    with np.errstate(over="ignore"):
+        return median * np.exp(sd * z)
 
 
 def _between(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -104,3 +104,9 @@ def test_the_table_in_numpy_is_the_compiled_one_and_each_priors_own(rows):
     exact = np.asarray(table.forward(jnp.asarray(near)))
     assert table.in_units(near) == pytest.approx(exact, rel=1e-11)
     assert table.in_units(z[0]) == pytest.approx(found[0], rel=1e-15)
+
+
+def test_what_is_out_of_reach_is_infinite_without_a_warning():
+    table = PriorTable.of([Parameter("m1", "kg", LogNormal(0.4, 0.8), 0.0)])
+    z = np.array([1e4])
+    assert table.in_units(z).tolist() == [np.inf] == np.asarray(table.forward(z)).tolist()
