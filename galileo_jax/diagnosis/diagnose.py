@@ -132,9 +132,10 @@ def diagnose(
     views: list[View] = []
     if needs_laws(verdict, candidates):
         on_stage("inferring the missing force without a form")
-        # Where much is missing, friction without it is far from the truth: to 0, say.
+        # Where much is missing, friction without it is far from the truth: to 0, say. Beside a
+        # wrong effect it may be so, too.
         near = reduced(trials, candidates[0].hypothesis, ())
-        views = views_of(trials, near)
+        views = views_of(trials, near, base)
         on_stage("looking for a law")
         laws = law_candidates(trials, base, near, views, len(library), candidates)
         for candidate in ranked(laws):

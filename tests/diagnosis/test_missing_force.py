@@ -108,6 +108,18 @@ def test_of_an_object_that_is_never_seen_nothing_is_said():
     assert np.isfinite(missing.acceleration_m_s2[0]).any()
 
 
+def test_a_start_in_which_nothing_moves_is_left():
+    """A wrong effect may have pushed against so much friction that without it all would rest."""
+    trials = make_trials([HIT])
+    base = Hypothesis((), GradientFitter(trials).fit(seed=0))
+    stuck = base.fit.z.copy()
+    stuck[trials.names.index("k1")] = 4.0
+    rests = Hypothesis((), replace(base.fit, z=stuck))
+    (alone,), (both,) = views_of(trials, rests), views_of(trials, rests, base)
+    assert not alone.moves[0].any() and both.moves[0].any()
+    assert both.fit.gradient.chi2 < 2 * both.fit.gradient.num_values < alone.fit.gradient.chi2
+
+
 @pytest.mark.slow
 def test_ripple_in_the_friction_is_a_law_of_the_place(tmp_path):
     clip = simulated(
