@@ -31,27 +31,26 @@ from galileo_jax.model.model import Model
 from galileo_jax.rollout.motion import dynamics, state_at
 
 NUM_TIMES, NUM_DRAWS = 200, 400
-MOST_LEFT = 2.0  # of chi2 for each value
 
 
 def views_of(trials: JointProblem, *starts: Hypothesis) -> list["View"]:
-    """Each clip fitted with a free acceleration.
+    """Each clip fitted with a free acceleration, from where it comes to the better valley.
+
+    An acceleration of any form leaves little wherever its fit starts, but friction that is far off
+    there may stay so: objects rest that are seen to move, or the acceleration undoes what friction
+    does, and nothing that is linear round such a fit reaches the truth.
 
     Args:
       trials: what was diagnosed.
-      starts: hypotheses of the same effects. A clip's fit starts from the first, and from the next
-        where that leaves far more than noise: an acceleration of any form leaves little, unless
-        friction at the start is so wrong that objects stop where they are seen to move.
+      starts: hypotheses of the same effects.
     """
-    found = []
-    for clip in range(len(trials.problems)):
-        tried: list[View] = []
-        for hypothesis in starts:
-            tried.append(view_of(trials, hypothesis, clip))
-            if tried[-1].fit.gradient.chi2 < MOST_LEFT * tried[-1].fit.gradient.num_values:
-                break
-        found.append(max(tried, key=lambda view: view.fit.gradient.log_evidence))
-    return found
+    return [
+        max(
+            (view_of(trials, hypothesis, clip) for hypothesis in starts),
+            key=lambda view: view.fit.gradient.log_evidence,
+        )
+        for clip in range(len(trials.problems))
+    ]
 
 
 def infer_missing_force(
