@@ -134,7 +134,8 @@ class Diagnosis:
     def missing_force(self) -> "pd.DataFrame | None":
         """Where the verdict is unknown or a law: the missing acceleration itself, else None.
 
-        `object, time_s, path_m, speed_m_s, acceleration_m_s2, sd_m_s2, formula`.
+        `object, time_s, path_m, speed_m_s, acceleration_m_s2, sd_m_s2, formula` (the most
+        probable one that explains the data, or that none does).
         """
         import pandas as pd
 

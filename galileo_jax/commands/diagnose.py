@@ -101,11 +101,8 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
     if hidden is not None:
         lines.append(f"truth: {hidden}")
     lines += [f"why: {why.sentence}" for why in found.verdict.reasons]
-    if diagnosis.missing is not None and found.verdict.status != "law":
-        lines += [
-            f"missing acceleration of {name}: {entry['formula']}"
-            for name, entry in record["missing_force"]["objects"].items()
-        ]
+    if found.verdict.status == "unknown":
+        lines.append(diagnosis_text.formula_text(record))
     if "each_clip" in record:
         lines += diagnosis_text.each_clip(record["each_clip"])
     for row in record.get("left_one_out", []):

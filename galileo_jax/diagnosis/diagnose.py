@@ -30,7 +30,7 @@ from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.fitted_pairs import fitted_pairs, pairs_from_base
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
-from galileo_jax.diagnosis.law_verdict import is_law_needed, law_to_doubt, needs_laws
+from galileo_jax.diagnosis.law_verdict import best_formula, is_law_needed, law_to_doubt, needs_laws
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.library_again import singles_beside, singles_of_pairs
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
@@ -132,9 +132,10 @@ def diagnose(
     views: list[View] = []
     if needs_laws(verdict, candidates):
         on_stage("inferring the missing force without a form")
-        # Where much is missing, friction without it is far from the truth: to 0, say.
+        # Where much is missing, friction without it is far from the truth: to 0, say. Beside a
+        # wrong effect it may be so, too.
         near = reduced(trials, candidates[0].hypothesis, ())
-        views = views_of(trials, near)
+        views = views_of(trials, near, base)
         on_stage("looking for a law")
         laws = law_candidates(trials, base, near, views, len(library), candidates)
         for candidate in ranked(laws):
@@ -166,7 +167,9 @@ def diagnose(
     verdict = replace(verdict, advice=advice(verdict, scene, len(trials.problems)))
     missing = None
     if verdict.status in ("unknown", "law"):
-        missing = infer_missing_force(trials, base, seed, views)
+        formula = best_formula(candidates)
+        around = formula.hypothesis if formula is not None and explains(formula) else base
+        missing = infer_missing_force(trials, around, seed, views)
     left_out: tuple[tuple[str, float, float], ...] = ()
     if len(trials.problems) > 1 and len(rounds) > 1:
         on_stage("predicting each clip from the others")

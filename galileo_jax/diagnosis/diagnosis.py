@@ -147,8 +147,6 @@ class MissingForce:
       time_s: `[time]`, since the release.
       acceleration_m_s2, sd_m_s2: `[object, time]`, along the path.
       path_m, speed_m_s: `[object, time]`, where and how fast the objects are then.
-      formula: the simplest that fits, of each object.
-      share_explained: by the formula, of the acceleration's variance, of each object.
     """
 
     time_s: np.ndarray
@@ -156,8 +154,6 @@ class MissingForce:
     sd_m_s2: np.ndarray
     path_m: np.ndarray
     speed_m_s: np.ndarray
-    formula: tuple[str, ...]
-    share_explained: tuple[float, ...]
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ import numpy as np
 from galileo_jax.comparison.document import comparison_document
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.diagnosis.each_clip import kind_of
+from galileo_jax.diagnosis.law_verdict import best_formula
+from galileo_jax.diagnosis.verdict import explains
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
@@ -21,6 +23,8 @@ from galileo_jax.inference.result import (
     summarise,
     undetermined_by_mass,
 )
+
+NO_FORMULA = "no formula explains it"
 
 
 def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
@@ -49,7 +53,7 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
         "history": [history_row(trials, each, seed) for each in diagnosis.rounds],
     }
     if diagnosis.missing is not None:
-        document["missing_force"] = _missing_force(diagnosis.missing, named)
+        document["missing_force"] = _missing_force(diagnosis, diagnosis.missing, named)
     if diagnosis.left_one_out:
         document["left_one_out"] = [
             {"clip": clip, "rmse_before": before, "rmse_after": after}
@@ -139,18 +143,44 @@ def _candidate(trials: JointProblem, candidate: Candidate, seed: int) -> dict[st
     }
 
 
-def _missing_force(missing: MissingForce, names: Sequence[str]) -> dict[str, Any]:
+def _missing_force(
+    diagnosis: Diagnosis, missing: MissingForce, names: Sequence[str]
+) -> dict[str, Any]:
+    best = best_formula(diagnosis.candidates)
+    is_explained = best is not None and explains(best)
+    text = best.title if best is not None and is_explained else NO_FORMULA
     return {
         "time_s": missing.time_s.tolist(),
+        "best_formula": None if best is None else _formula(best, is_explained),
         "objects": {
             name: {
                 "acceleration_m_s2": missing.acceleration_m_s2[i].tolist(),
                 "sd_m_s2": missing.sd_m_s2[i].tolist(),
                 "path_m": missing.path_m[i].tolist(),
                 "speed_m_s": missing.speed_m_s[i].tolist(),
-                "formula": missing.formula[i],
-                "share_explained": missing.share_explained[i],
+                "formula": text,
+                "share_explained": _share_explained(diagnosis, best),
             }
             for i, name in enumerate(names)
         },
     }
+
+
+def _formula(best: Candidate, is_explained: bool) -> dict[str, Any]:
+    """A formula that was fitted, and what it leaves."""
+    return {
+        "law": best.title,
+        "explains": is_explained,
+        "probability": best.probability,
+        "p_value": best.p_value,
+        "chi2_per_dof": best.error["chi2_per_dof"],
+    }
+
+
+def _share_explained(diagnosis: Diagnosis, best: Candidate | None) -> float:
+    """What of chi2 beyond that of noise a formula takes away."""
+    misfit = diagnosis.base.error["chi2_per_dof"] - 1.0
+    if best is None or misfit <= 0.0:
+        return 0.0
+    left = max(best.error["chi2_per_dof"] - 1.0, 0.0)
+    return max(0.0, 1.0 - left / misfit)

@@ -56,6 +56,18 @@ def contested_by_law(verdict: Verdict, candidates: Sequence[Candidate], decisive
     return replace(verdict, status="ambiguous", law=law.law)
 
 
+def best_formula(candidates: Sequence[Candidate]) -> Candidate | None:
+    """The most probable formula of those that explain the data; if none does, of all.
+
+    None where the missing force suggested none.
+
+    Args:
+      candidates: ranked.
+    """
+    laws = [c for c in candidates if c.law is not None]
+    return next((c for c in laws if explains(c)), laws[0] if laws else None)
+
+
 def law_to_doubt(candidates: Sequence[Candidate]) -> Candidate | None:
     """The best formula that explains the data where no single effect of the library does better.
 
@@ -134,12 +146,11 @@ def law_contested(candidates: Sequence[Candidate], decisive: float) -> tuple[Rea
       candidates: as of `law_verdict`, which found none.
       decisive: nats.
     """
-    laws = [c for c in candidates if c.law is not None]
-    if not laws:
-        return ()
-    best = next((c for c in laws if explains(c)), None)
+    best = best_formula(candidates)
     if best is None:
-        return (reasons.no_law_explains(laws[0]),)
+        return (reasons.no_formula(),)
+    if not explains(best):
+        return (reasons.no_law_explains(best),)
     others = [c for c in other_formulas(best, candidates) if c.effects != best.effects]
     ahead = [c for c in others if best.log_odds - c.log_odds < decisive]
     alike = [c for c in ahead if explains(c)]

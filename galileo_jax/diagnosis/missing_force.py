@@ -6,25 +6,23 @@
        separate the two. Therefore the spline itself is not reported, but the difference between
        the accelerations of the complete model and of the hypothesis' own fit along the fitted
        motion, which the data do determine.
-    3. A formula is sought that together with the hypothesis explains the data (`formula`). If
-       there is one, friction and all else are put where they are with it, and the acceleration
-       is told over these: -0.6 v|v| is then 0 at rest, and not negative or positive by what
-       the hypothesis' friction had made up for.
+    3. The hypothesis is the model without effects, or all that the best formula (`laws`) has
+       beside it, where that explains the data: friction and all else are then where they are
+       with the formula, and an acceleration of -0.6 v|v| is 0 at rest, not what friction without
+       it had made up for.
 
-Clips of a series are taken one by one; the formula is the same in all.
+Clips of a series are taken one by one.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import MissingForce
-from galileo_jax.diagnosis.formula import NOT_SIMPLE, Formula, Sight, find_formula
 from galileo_jax.inference.free_force.along_path import along_path
-from galileo_jax.inference.free_force.free_fit import FreeFit, embedded, free_fit
+from galileo_jax.inference.free_force.free_fit import FreeFit, free_fit
 from galileo_jax.inference.free_force.spans import MOVES_M_S
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
@@ -35,9 +33,24 @@ from galileo_jax.rollout.motion import dynamics, state_at
 NUM_TIMES, NUM_DRAWS = 200, 400
 
 
-def views_of(trials: JointProblem, hypothesis: Hypothesis) -> list["View"]:
-    """Each clip fitted with a free acceleration beside a hypothesis."""
-    return [view_of(trials, hypothesis, clip) for clip in range(len(trials.problems))]
+def views_of(trials: JointProblem, *starts: Hypothesis) -> list["View"]:
+    """Each clip fitted with a free acceleration, from where it comes to the better valley.
+
+    An acceleration of any form leaves little wherever its fit starts, but friction that is far off
+    there may stay so: objects rest that are seen to move, or the acceleration undoes what friction
+    does, and nothing that is linear round such a fit reaches the truth.
+
+    Args:
+      trials: what was diagnosed.
+      starts: hypotheses of the same effects.
+    """
+    return [
+        max(
+            (view_of(trials, hypothesis, clip) for hypothesis in starts),
+            key=lambda view: view.fit.gradient.log_evidence,
+        )
+        for clip in range(len(trials.problems))
+    ]
 
 
 def infer_missing_force(
@@ -46,38 +59,26 @@ def infer_missing_force(
     seed: int,
     views: Sequence["View"] | None = None,
 ) -> MissingForce:
-    """Infers the acceleration along the path that a hypothesis lacks, and a formula for it.
+    """Infers the acceleration along the path that acts beyond what a hypothesis has.
 
     Args:
-      trials: whose models have the hypothesis' effects.
-      hypothesis: fitted to them.
-      seed: of the posterior's draws.
+      trials: what was diagnosed.
+      hypothesis: fitted to them. Its effects, if it has any, count as missing: of a formula that
+        explains the data all else stays.
+      seed: of the posteriors' draws.
       views: from `views_of`, where they are there already, of whatever hypothesis.
 
     Returns:
-      The first clip's, NaN where an object is at rest or not seen. Its zero is the hypothesis
-      with friction, masses and nuisances where the formula has them; where no formula was
-      found for what is missing, the hypothesis' fit itself. The formula is that of all clips,
-      and so is the share it explains: of the misfit that an acceleration of any form takes
-      away.
+      The first clip's, NaN where an object is at rest or not seen.
     """
-    views = views or views_of(trials, hypothesis)
-    alone = JointProblem((trials.problems[0],))
-    column, fit = trials.columns_of(0), hypothesis.fit
-    before = embedded(alone, views[0].trials, fit.z[column], fit.free[column])
-    views = [replace(views[0], before=np.nan_to_num(before)), *views[1:]]
-    count = len(views[0].path_m)
-    formulas = [find_formula([_sight(view, i) for view in views]) for i in range(count)]
-    first = views[0]
-    acceleration, sd = _told(first, formulas, np.random.default_rng([seed, 61]))
+    view = views[0] if views else view_of(trials, hypothesis, 0)
+    acceleration, sd = _beyond(view, trials, hypothesis, np.random.default_rng([seed, 61]))
     return MissingForce(
-        time_s=first.time_s,
-        acceleration_m_s2=np.where(first.moves, acceleration, np.nan),
-        sd_m_s2=np.where(first.moves, sd, np.nan),
-        path_m=first.path_m,
-        speed_m_s=first.speed_m_s,
-        formula=tuple(f"a{i + 1} = {formula.text}" for i, formula in enumerate(formulas)),
-        share_explained=tuple(formula.share_explained for formula in formulas),
+        time_s=view.time_s,
+        acceleration_m_s2=np.where(view.moves, acceleration, np.nan),
+        sd_m_s2=np.where(view.moves, sd, np.nan),
+        path_m=view.path_m,
+        speed_m_s=view.speed_m_s,
     )
 
 
@@ -87,7 +88,6 @@ class View:
 
     Attributes:
       trials: the clip alone, its model with the free acceleration.
-      before: `[parameter]`, z of the hypothesis, no acceleration.
       fit: with the free acceleration.
       effect: the free acceleration.
       time_s: `[time]`.
@@ -96,7 +96,6 @@ class View:
     """
 
     trials: JointProblem
-    before: np.ndarray
     fit: FreeFit
     effect: FreeAcceleration
     time_s: np.ndarray
@@ -155,7 +154,7 @@ def view_of(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> View:
     moves = _seen(problem, time_s) & (np.abs(speed) > MOVES_M_S)
     for i, own in enumerate(effect.spans_s):
         moves[i] &= (time_s >= own[0][0]) & (time_s <= own[-1][1])
-    return View(extended, fit.start, fit, effect, time_s, path, speed, moves)
+    return View(extended, fit, effect, time_s, path, speed, moves)
 
 
 def _motion(
@@ -177,74 +176,38 @@ def _seen(problem: Problem, time_s: np.ndarray) -> np.ndarray:
     )
 
 
-def _sight(view: View, index: int) -> Sight:
-    """What a clip says of one object's acceleration, all that else is unknown taken out.
-
-    The prior of the rest, unit normal in z, makes the target's covariance  S = 1 + N N'.
-    """
-    jacobian = view.fit.jacobian
-    own = view.knots(index)
-    rest = jacobian[:, np.setdiff1d(np.flatnonzero(view.free), own)]
-    target = view.target()
-    lower = np.linalg.cholesky(np.eye(len(target)) + rest @ rest.T)
-    white = solve_triangular(lower, target, lower=True)
-    free = solve_triangular(lower, jacobian[:, own], lower=True)
-    normal = np.eye(len(own)) + free.T @ free
-    pulled = free.T @ white
-    gain = float(pulled @ cho_solve(cho_factor(normal), pulled))
-    inside = view.moves[index]
-    return Sight(
-        time_s=view.time_s[inside],
-        path_m=view.path_m[index, inside],
-        speed_m_s=view.speed_m_s[index, inside],
-        target=white,
-        response=solve_triangular(lower, view.shows(index)[:, inside], lower=True),
-        free_chi2=float(white @ white) - gain,
-        log_evidence=0.5 * (gain - float(np.linalg.slogdet(normal)[1])),
-    )
-
-
-def _told(
-    view: View, formulas: Sequence[Formula], generator: np.random.Generator
+def _beyond(
+    view: View, trials: JointProblem, hypothesis: Hypothesis, generator: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The acceleration over the model that goes with the formulas and its sd, `[object, time]`."""
-    fit, trials = view.fit, view.trials
+    """The acceleration over the hypothesis without its effects, and its sd, `[object, time]`."""
+    fit = view.fit
     with_knots = np.tile(fit.z, (NUM_DRAWS, 1))
     with_knots[:, :-1] = generator.multivariate_normal(
         fit.z[:-1], fit.covariance[:-1, :-1], NUM_DRAWS, method="svd"
     )
-    whole = _accelerations(view, trials.theta(with_knots, fit.free))
-    base = _accelerations(view, trials.theta(_bases(view, formulas, generator), fit.free))
-    held = _accelerations(view, trials.theta(view.before[None], fit.free))
-    is_explained = np.array([formula.text != NOT_SIMPLE for formula in formulas])
-    missing = whole - np.where(is_explained[:, None], base, held)
+    without = _without_effects(view, hypothesis.of(trials), hypothesis, generator)
+    missing = _accelerations(view, view.trials.theta(with_knots, fit.free))
+    missing -= _accelerations(view, view.trials.theta(without, fit.free))
     return missing.mean(axis=0), missing.std(axis=0)
 
 
-def _bases(view: View, formulas: Sequence[Formula], generator: np.random.Generator) -> np.ndarray:
-    """Draws of all but the knots with the formulas in the model, `[draw, parameter]`, z.
+def _without_effects(
+    view: View, own: JointProblem, hypothesis: Hypothesis, generator: np.random.Generator
+) -> np.ndarray:
+    """Draws of the first clip's parameters without effects, `[draw, parameter]`.
 
-    Coefficients of formulas are free. An object without one keeps its free acceleration.
+    Args:
+      view: whose parameters, z.
+      own: whose parameters the hypothesis has.
+      hypothesis: fitted to them.
+      generator: of the draws.
     """
-    jacobian = view.fit.jacobian
-    others = view.others()
-    columns, precision = [-jacobian[:, others]], [np.ones(len(others))]
-    for i, formula in enumerate(formulas):
-        inside = view.moves[i]
-        place = view.time_s[inside], view.path_m[i, inside], view.speed_m_s[i, inside]
-        shows = view.shows(i)[:, inside]
-        for term in formula.terms:
-            columns.append((shows @ term.curve(*place))[:, None])
-            precision.append(np.full(1, 1e-6))
-        if formula.text == NOT_SIMPLE:
-            columns.append(-jacobian[:, view.knots(i)])
-            precision.append(np.ones(columns[-1].shape[1]))
-    design = np.concatenate(columns, axis=1)
-    covariance = np.linalg.inv(design.T @ design + np.diag(np.concatenate(precision)))
-    mean = covariance @ design.T @ view.target()
-    draws = generator.multivariate_normal(mean, covariance, NUM_DRAWS, method="svd")
-    z = np.tile(view.before, (NUM_DRAWS, 1))
-    z[:, others] = draws[:, : len(others)]
+    fit, names = hypothesis.fit, view.trials.names
+    draws = generator.multivariate_normal(fit.z, fit.covariance, NUM_DRAWS, method="svd")
+    z = np.zeros((NUM_DRAWS, len(names)))
+    for at, name in zip(own.columns_of(0), own.alone(0).names, strict=True):
+        if own.free(())[at]:
+            z[:, names.index(name)] = draws[:, at]
     return z
 
 

@@ -8,6 +8,7 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Reason
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
+NOTABLE_NATS = 1.0  # a prior that is more of a lead than this is told
 PLAIN_ODDS = 1000.0  # larger odds are told as a power of ten
 
 
@@ -127,6 +128,11 @@ def no_law_explains(best: Candidate) -> Reason:
     )
 
 
+def no_formula() -> Reason:
+    """The missing force suggested no formula."""
+    return Reason("no_formula", "No short formula promised to explain the missing force.", {})
+
+
 def less_probable_than_none(best: Candidate) -> Reason:
     """What explains the data is less probable than no effect at all."""
     return Reason(
@@ -193,6 +199,12 @@ def contested(best: Candidate, rival: Candidate, needed: float) -> Reason:
     )
 
 
+def _before_the_data(best: Candidate, rival: Candidate) -> str:
+    """How much of a lead is prior; empty where that is little."""
+    ahead = best.log_prior - rival.log_prior
+    return f", and was {times_text(ahead)} before the data" if ahead > NOTABLE_NATS else ""
+
+
 def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) -> Reason:
     """Nothing else comes near the best.
 
@@ -207,12 +219,13 @@ def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) ->
     behind = best.log_odds - others[0].log_odds
     return Reason(
         "decisive",
-        f"{best.title} is {times_text(behind)} as probable as the next, {others[0].title} "
-        f"({times_text(needed)} are needed).",
+        f"{best.title} is {times_text(behind)} as probable as the next, {others[0].title}"
+        f"{_before_the_data(best, others[0])} ({times_text(needed)} are needed).",
         {
             "hypothesis": best.name,
             "rival": others[0].name,
             "log_odds_behind": behind,
+            "log_prior_behind": best.log_prior - others[0].log_prior,
             "least_log_odds": needed,
         },
     )
@@ -249,8 +262,8 @@ def told_apart(best: Candidate, rival: Candidate, expected: float, needed: float
     is_told = expected >= needed
     return Reason(
         "told_apart" if is_told else "not_told_apart",
-        f"If {best.title} is there, a clip like this one makes it {times_text(expected)} as "
-        f"probable as {rival.title}: "
+        f"If {best.title} is there, it is {times_text(expected)} as probable as {rival.title} "
+        f"after a clip like this one{_before_the_data(best, rival)}: "
         + ("enough to tell them apart." if is_told else f"{times_text(needed)} are needed."),
         {
             "hypothesis": best.name,

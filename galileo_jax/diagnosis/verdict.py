@@ -96,16 +96,17 @@ def best_named(candidates: Sequence[Candidate]) -> Candidate:
 def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidate, ...]:
     """The candidates whose fits are to be compared with the data, the best first.
 
-    Always the best, and the best with a name; beyond these what could be confused with the best.
+    Always the best, the best with a name and the best formula; beyond these what could be confused
+    with the best.
 
     Args:
       candidates: ranked.
       margin: difference in log odds, nats, at which one hypothesis rules out another.
     """
-    best, name = candidates[0], best_named(candidates)
-    return tuple(
-        c for c in candidates if c is name or c is best or best.log_odds - c.log_odds < margin
-    )
+    best = candidates[0]
+    law = next((c for c in candidates if c.law is not None), None)
+    always = [id(c) for c in (best, best_named(candidates), law)]
+    return tuple(c for c in candidates if id(c) in always or best.log_odds - c.log_odds < margin)
 
 
 def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]:

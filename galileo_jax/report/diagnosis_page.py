@@ -207,22 +207,17 @@ def _missing(report: DiagnosisReport, names: Sequence[str]) -> str:
     missing = report.diagnosis.missing
     if missing is None:
         return ""
-    charts, formulas = [], []
-    for i, name in enumerate(names):
-        if not is_known(missing, i):
-            continue
-        charts.append(missing_force_chart(missing, i, name))
-        share = missing.share_explained[i]
-        explains = f" (explains {100 * share:.0f} % of what is missing)" if share > 0 else ""
-        formulas.append(f"{name}: {missing.formula[i]}{explains}")
-    law = report.diagnosis.verdict.law
-    found = "; ".join(formulas) if law is None else f"the law {law.text}"
+    charts = [
+        missing_force_chart(missing, i, name)
+        for i, name in enumerate(names)
+        if is_known(missing, i)
+    ]
+    found = diagnosis_text.formula_text(report.record)
     return chart_section(
         "The missing force",
         "The acceleration along the path that the model lacks, in m/s², with its 95 % band, "
-        "inferred without assuming a formula. The simplest formula that fits, with q the position "
-        "in m past the foot, v the speed in m/s and t the time in s since the release: "
-        f"{found}.",
+        f"inferred without assuming a formula. {found} In a formula q is the position in m past "
+        "the foot, v the speed in m/s and t the time in s since the release.",
         charts,
     )
 

@@ -77,6 +77,33 @@ def verdict(diagnosis: Diagnosis) -> str:
     return f"No known effect explains the data{where}."
 
 
+def formula_text(record: Mapping[str, Any]) -> str:
+    """What the best formula says of the missing force, in one sentence.
+
+    Empty where no force is missing, and for a file from before formulas were fitted in the model.
+
+    Args:
+      record: diagnosis.json.
+    """
+    missing = record.get("missing_force") or {}
+    if "best_formula" not in missing:
+        return ""
+    best = missing["best_formula"]
+    if best is None:
+        return "No formula explains the missing force: none promised to."
+    leaves = (
+        f"{p_equals(best['p_value'])}, chi2 per degree of freedom {best['chi2_per_dof']:.2f}, "
+        f"probability {best['probability']:.2g}"
+    )
+    if not best["explains"]:
+        return (
+            "No formula explains the missing force. The best leaves more than noise: "
+            f"{best['law']} ({leaves})."
+        )
+    doubt = "" if record["verdict"]["status"] == "law" else ", but it is not certain (see why)"
+    return f"A formula explains the missing force{doubt}: {best['law']} ({leaves})."
+
+
 CLIPS_KINDS = {
     "shared": "each clip alone agrees with the model: a parameter they share differs between them",
     "some": "some clips alone agree with the model, others do not",

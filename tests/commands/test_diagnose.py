@@ -18,7 +18,7 @@ from galileo_jax.results.run import load_run
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from tests.clip.broken_clips import BROKEN_CLIPS, build_good_track
-from tests.found import diagnosis_of, fit_of, make_trials
+from tests.found import LAW, diagnosis_of, fit_of, make_trials
 from tests.oracle_run import HIT, make_run
 from tests.precision import in_64_bit
 
@@ -78,7 +78,10 @@ def test_the_document_keeps_the_contract(status, trials, tmp_path):
     assert ("missing_force" in document) == (status == "unknown")
     if status == "unknown":
         missing = document["missing_force"]["objects"]["object1"]
-        assert missing["formula"] == "a1 = 0.99 sin(6 t)"
+        assert missing["formula"] == "no formula explains it"
+        best = document["missing_force"]["best_formula"]
+        assert (best["law"], best["explains"], best["p_value"]) == (LAW.text, False, 3e-4)
+        assert missing["share_explained"] == 1.0, "as a share of chi2, all the same"
         assert missing["acceleration_m_s2"][0] is None, "not known before it moves"
         assert len(missing["acceleration_m_s2"]) == len(document["missing_force"]["time_s"])
 

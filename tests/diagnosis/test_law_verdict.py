@@ -6,6 +6,7 @@ import pytest
 
 from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
 from galileo_jax.diagnosis.law_verdict import (
+    best_formula,
     contested_by_law,
     is_law_needed,
     law_contested,
@@ -15,7 +16,7 @@ from galileo_jax.diagnosis.law_verdict import (
     needs_laws,
     other_formulas,
 )
-from galileo_jax.diagnosis.verdict import best_named, looked_at_again, ranked
+from galileo_jax.diagnosis.verdict import best_named, looked_at_again, ranked, to_compare
 from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 from tests.diagnosis.test_verdict import DECISIVE, EDGE, candidate
 
@@ -91,7 +92,26 @@ def test_reasons_say_why_there_is_no_law():
     assert [why.rule for why in law_contested(ahead_but_wrong, DECISIVE)] == [
         "better_but_contradicted"
     ]
-    assert law_contested(ranked([candidate("air_drag", 10.0)]), DECISIVE) == ()
+    none = ranked([candidate("air_drag", 10.0)])
+    assert [why.rule for why in law_contested(none, DECISIVE)] == ["no_formula"]
+
+
+def test_the_best_formula_is_compared_however_far_behind():
+    forms = [candidate(FORM_OF_PULSE_T, 90.0), candidate("air_drag", 80.0)]
+    laws = [law(20.0, None), law(19.9, None, name="law_2")]
+    assert [c.name for c in to_compare([*forms, *laws], DECISIVE)] == [
+        FORM_OF_PULSE_T,
+        "air_drag",
+        "law_1",
+    ]
+
+
+def test_the_best_formula_explains_the_data_if_any_does():
+    first, second = law(50.0, 1e-4), law(45.0, 0.3, name="law_2")
+    named = candidate("air_drag", 60.0)
+    assert best_formula([named, first, second]) is second
+    assert best_formula([named, first, replace(second, p_value=1e-6)]) is first
+    assert best_formula([named]) is None
 
 
 @pytest.mark.parametrize(("expected", "said"), [(DECISIVE, "law"), (DECISIVE - EDGE, "ambiguous")])

@@ -41,6 +41,13 @@ def test_a_drag_of_a_power():
     np.testing.assert_allclose(found, expected, rtol=2e-3)
 
 
+@pytest.mark.parametrize("nature", ["push", "drag", "drag_force", "friction"])
+def test_a_drag_takes_energy(nature):
+    """A push and a change of friction may have either sign."""
+    strength, *_ = effect(Structure(nature, True, (FACTOR["decay_t"],))).parameters(SCENE)
+    assert (float(strength.prior.forward(-3.0)) > 0.0) == nature.startswith("drag")
+
+
 def test_a_drag_of_the_same_force_on_all():
     same = Structure("drag_force", True, (FACTOR["power_v"],))
     found = effect(same).force(theta(same, 0.6, n=2.0), SCENE)(state([-0.1, 0.2], [0.9, 0.9]))

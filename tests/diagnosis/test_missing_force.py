@@ -1,4 +1,4 @@
-"""Truths with a hidden effect, models without: the missing acceleration and its formula."""
+"""Truths with a hidden effect, models without: the missing acceleration."""
 
 import json
 import re
@@ -15,12 +15,13 @@ from benchmarks.hidden_cases import EXOTIC_FILE
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis.candidates import Hypothesis
-from galileo_jax.diagnosis.missing_force import infer_missing_force
+from galileo_jax.diagnosis.missing_force import infer_missing_force, views_of
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.effect import State, Surroundings
 from galileo_jax.model.effects.free_acceleration import FreeAcceleration, splines
+from galileo_jax.model.effects.registry import make_effects
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -37,16 +38,22 @@ def precision():
 
 @pytest.fixture(scope="module")
 def infer(tmp_path_factory):
-    """From a seed and what is hidden to the missing force and the truth."""
+    """From a seed and what is hidden to the missing force and the truth.
+
+    An effect of the library that is hidden is what explains the data; it is missing.
+    """
 
     @cache
     def made(seed: int, *hidden: str):
         folder = Path(tmp_path_factory.mktemp("clip"))
         clip = load_clip(simulated(folder, seed, *hidden))
         assert clip.track is not None
-        trials = make_joint_problem([clip], [read_observation_csv(clip.track)])
-        fit = GradientFitter(trials).fit(seed=0)
-        missing = infer_missing_force(trials, Hypothesis((), fit), seed=0)
+        effects = make_effects(hidden[1:2])
+        trials = make_joint_problem([clip], [read_observation_csv(clip.track)], effects=effects)
+        fitter, names = GradientFitter(trials), tuple(effect.name for effect in effects)
+        base = Hypothesis((), fitter.fit(seed=0, effects=()))
+        around = Hypothesis(names, fitter.fit(seed=0, effects=names)) if names else base
+        missing = infer_missing_force(trials, around, seed=0, views=views_of(trials, base))
         return missing, json.loads((folder / "c.truth.json").read_text())
 
     return made
@@ -68,17 +75,16 @@ def covered(missing, index, true):
     return np.mean(np.abs(off[seen]) < 1.96 * missing.sd_m_s2[index, seen])
 
 
-def test_air_drag_is_found_and_written_down(infer):
+def test_air_drag_is_what_is_missing(infer):
     missing, truth = infer(1, "--effect", "air_drag", "--strength", "0.7")
     constant = truth["effect_parameters"]["air_drag"]
     for i in range(2):
         speed = missing.speed_m_s[i]
         true = -constant / truth[f"m{i + 1}"] * speed * np.abs(speed)
         assert covered(missing, i, true) > LEAST_COVERED
-    found = re.match(r"a1 = (-[\d.]+) v\|v\|($|  or)", missing.formula[0])
-    assert found
-    assert float(found[1]) == pytest.approx(-constant / truth["m1"], rel=0.08)
-    assert missing.share_explained[0] > 0.9
+    seen, speed = np.isfinite(missing.acceleration_m_s2[0]), missing.speed_m_s[0]
+    largest = constant / truth["m1"] * np.nanmax(speed[seen]) ** 2
+    assert np.median(missing.sd_m_s2[0, seen]) < 0.1 * largest, "the band says something"
 
 
 def test_air_drag_shows_only_in_motion(infer):
@@ -98,15 +104,24 @@ def test_of_an_object_that_is_never_seen_nothing_is_said():
     trials = JointProblem((replace(problem, observation=replace(seen, mask=mask)),))
     fit = GradientFitter(trials).fit(seed=0)
     missing = infer_missing_force(trials, Hypothesis((), fit), seed=0)
-    assert missing.formula == ("a1 = nothing", "a2 = nothing")
-    assert missing.share_explained[1] == 0.0
     assert np.isnan(missing.acceleration_m_s2[1]).all() and np.isnan(missing.sd_m_s2[1]).all()
     assert np.isfinite(missing.acceleration_m_s2[0]).any()
 
 
+def test_a_start_in_which_nothing_moves_is_left():
+    """A wrong effect may have pushed against so much friction that without it all would rest."""
+    trials = make_trials([HIT])
+    base = Hypothesis((), GradientFitter(trials).fit(seed=0))
+    stuck = base.fit.z.copy()
+    stuck[trials.names.index("k1")] = 4.0
+    rests = Hypothesis((), replace(base.fit, z=stuck))
+    (alone,), (both,) = views_of(trials, rests), views_of(trials, rests, base)
+    assert not alone.moves[0].any() and both.moves[0].any()
+    assert both.fit.gradient.chi2 < 2 * both.fit.gradient.num_values < alone.fit.gradient.chi2
+
+
 @pytest.mark.slow
 def test_ripple_in_the_friction_is_a_law_of_the_place(tmp_path):
-    # The dictionary of `formula.py` writes this force as one of time; the law search does not.
     clip = simulated(
         tmp_path,
         2,
@@ -130,8 +145,6 @@ def test_ripple_in_the_friction_is_a_law_of_the_place(tmp_path):
 @pytest.mark.slow
 def test_nothing_missing_is_nothing(infer):
     missing, _ = infer(3)
-    assert missing.formula == ("a1 = nothing", "a2 = nothing")
-    assert missing.share_explained == (0.0, 0.0)
     assert covered(missing, 0, 0.0) > LEAST_COVERED
 
 

@@ -68,6 +68,17 @@ def test_no_friction_becomes_negative(k, change):
     assert found.strengths[0] == pytest.approx(change, abs=0.02)
 
 
+@pytest.mark.parametrize(("forward_m_s2", "is_drag"), [(-2.0, True), (2.0, False)])
+def test_what_drives_is_no_drag(forward_m_s2, is_drag):
+    """A drag takes energy; a push may have either sign."""
+    seen = [sight(forward_m_s2 * np.exp(-TIMES / 0.3))]
+    pair = (FACTOR["decay_t"], FACTOR["power_v"])
+    drag = suggestion_of(seen, Structure("drag", False, pair), RANGES)
+    push = suggestion_of(seen, Structure("push", False, pair[:1]), RANGES)
+    assert drag is not None and push is not None and push.score > 100.0
+    assert (drag.score > 100.0) == is_drag
+
+
 def test_two_factors_leave_room_for_one():
     pairs = ["power_t*pulse_q", "decay_t*pulse_q", "pulse_q*power_v", "power_t*linear_q"]
     pairs += ["decay_t*linear_q", "power_t*growth_q", "decay_t*growth_q", "power_t*power_v"]

@@ -18,7 +18,7 @@ from galileo_jax.report.comparison_page import ComparisonReport, write_compariso
 from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
 from galileo_jax.report.diagnosis_plots import write_diagnosis_plots
 from galileo_jax.report.provenance import digest
-from tests.found import comparison_of, diagnosis_of, fit_of, make_trials
+from tests.found import LAW, comparison_of, diagnosis_of, fit_of, make_trials
 from tests.precision import in_64_bit
 from tests.report.browser import opened
 from tests.report.references import check_needs_nothing_from_outside
@@ -30,6 +30,10 @@ SAYS = {
     "ambiguous": "This clip cannot distinguish between air_drag and viscous_drag",
     "unknown": "see the missing force",
 }
+LAW_SAYS = (
+    "No formula explains the missing force. The best leaves more than noise: "
+    f"{LAW.text} (p = 0.0003, chi2 per degree of freedom 1.00, probability 0.01)."
+)
 GO_ON = "galileo fit a.yaml --effects air_drag"
 AGAIN = "galileo diagnose a.yaml --seed 0"
 HOSTILE = '</script><b>&"clip'
@@ -75,7 +79,7 @@ def test_tells_the_verdict_and_needs_nothing_from_outside(status, trials, clip, 
     assert "<h2" in page and "Why" in page and "the model without effects: p" in page
     assert ">none</td>" in page, "no effect is a hypothesis, too"
     assert ("The missing force" in page) == (status == "unknown")
-    assert ("0.99 sin(6 t)" in page) == (status == "unknown")
+    assert (escape(LAW_SAYS) in page) == (status == "unknown")
     assert ("Added: air_drag" in page) == (status in ("named", "ambiguous"))
     assert AGAIN in page and digest(clip.track) in page
     check_needs_nothing_from_outside(page)
@@ -169,6 +173,27 @@ def test_a_formula_that_does_as_well_is_shown(trials, clip, tmp_path):
     report = DiagnosisReport(found, record, GO_ON, None, (clip,), AGAIN, 0)
     write_diagnosis_page(page, "clip", trials, report)
     assert page.read_text(encoding="utf-8").count(escape(law.text)) >= 2  # verdict, candidates
+
+
+def test_what_the_best_formula_says():
+    """Of diagnosis.json: it explains the missing force, or not, or there is none."""
+    leaves = {"p_value": 0.2, "chi2_per_dof": 0.9, "probability": 0.5}
+    best = {"law": LAW.text, "explains": True, **leaves}
+
+    def said(status: str, missing: dict | None) -> str:
+        record: dict = {"verdict": {"status": status}}
+        return diagnosis_text.formula_text(record | ({"missing_force": missing} if missing else {}))
+
+    numbers = "(p = 0.2, chi2 per degree of freedom 0.90, probability 0.5)"
+    assert said("law", {"best_formula": best}) == (
+        f"A formula explains the missing force: {LAW.text} {numbers}."
+    )
+    assert "but it is not certain (see why)" in said("unknown", {"best_formula": best})
+    none = said("unknown", {"best_formula": None})
+    assert none == "No formula explains the missing force: none promised to."
+    assert said("named", None) == ""
+    old = {"objects": {"object1": {"formula": "a1 = 0.8 t"}}}
+    assert said("unknown", old) == "", "no longer believed"
 
 
 def test_how_to_go_on(trials):

@@ -87,6 +87,7 @@ def test_unknown_shows_the_missing_acceleration_and_takes_an_effect_of_ones_own(
         titles = page.locator(".right .js-plotly-plot [class*=xtitle], .right .x2title, .x3title")
         said = " ".join(titles.all_text_contents())
         assert "time" in said and "path" in said and "speed" in said
+        assert "ormula explains the missing force" in page.inner_text(".right")
         own = folder / "my_effect.py"
         hand.click("[data-own] .own")
         page.wait_for_selector("[data-effect]")

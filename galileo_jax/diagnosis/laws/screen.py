@@ -213,6 +213,8 @@ def _gains(
     if structure.nature == "friction":
         for sight in sights:
             gain = np.where(sight.is_possible(structure, grid, strength), gain, 0.0)
+    if structure.nature.startswith("drag"):
+        gain = np.where(strength[:, 0] > 0.0, gain, 0.0)  # what drives is no drag
     return gain, strength[:, 0]
 
 

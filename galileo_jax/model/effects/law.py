@@ -6,7 +6,7 @@
 
 with f a formula of the time t since the release, the place q along the path and the speed v (SI),
 without a dimension, on object 1 or on all; `drag_force` is a drag of the same force on all, as a
-liquid's: the acceleration of object i is m1/mi times that of object 1.
+liquid's: the acceleration of object i is m1/mi times that of object 1. Of a drag c is positive.
 """
 
 from collections.abc import Mapping
@@ -21,11 +21,18 @@ from galileo_jax.model.effects.effect import (
     Surroundings,
     Theta,
 )
-from galileo_jax.model.parameters import Normal, Parameter, Prior
+from galileo_jax.model.parameters import LogNormal, Normal, Parameter, Prior
 
 Nature = Literal["push", "drag", "drag_force", "friction"]
 SLOWEST_M_S = 0.01  # below it a drag's direction fades away, lest it push what rests
-STRENGTH = {"push": 2.0, "drag": 2.0, "drag_force": 2.0, "friction": 1.0}  # the prior's sd
+# A drag takes energy: its strength is positive. Of the size that the library's drags have.
+DRAG = LogNormal(1.0, 1.2)
+STRENGTH: Mapping[Nature, Prior] = {
+    "push": Normal(0.0, 2.0),
+    "drag": DRAG,
+    "drag_force": DRAG,
+    "friction": Normal(0.0, 1.0),
+}
 
 
 def against_motion(size: Array, speed_m_s: Array) -> Array:
@@ -56,8 +63,7 @@ class Law(Effect):
         if self.nature == "friction" and not scene.has_surface:
             return ()
         unit = "1" if self.nature == "friction" else "m/s^2"
-        strength = Normal(0.0, STRENGTH[self.nature])
-        found = [Parameter(self.name, unit, strength, 0.0, "effect", 0.1)]
+        found = [Parameter(self.name, unit, STRENGTH[self.nature], 0.0, "effect", 0.1)]
         for name, (its_unit, prior) in self.constants.items():
             usual = float(prior.forward(0.0))  # pyright: ignore
             own = f"{self.name}_{name}"

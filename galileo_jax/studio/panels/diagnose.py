@@ -138,9 +138,10 @@ def _missing(tab: "Tab", found: Mapping[str, Any]) -> None:
         return
     ui.label("The acceleration that the model lacks").classes("small soft")
     ui.plotly(charts.missing_figure(record, tab.dark)).style("height: 230px; width: 100%")
-    for name, entry in record["objects"].items():
-        if entry.get("formula"):
-            ui.label(f"{name}: {entry['formula']}").classes("code")
+    from galileo_jax.report.diagnosis_text import formula_text
+
+    if text := formula_text(found):
+        ui.label(text).classes("small")
 
 
 def _own(tab: "Tab") -> None:
