@@ -94,7 +94,9 @@ def roll_out(
     start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
     discs = Discs(
         jnp.concatenate([start, jnp.zeros((len(start), 1))], axis=1),
-        jnp.concatenate([velocity[:, :2], (table.radius_m * velocity[:, 2] / ROOT2)[:, None]], axis=1),
+        jnp.concatenate(
+            [velocity[:, :2], (table.radius_m * velocity[:, 2] / ROOT2)[:, None]], axis=1
+        ),
         jnp.zeros(len(scene.names)),
     )
 

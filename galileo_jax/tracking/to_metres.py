@@ -51,8 +51,12 @@ def _turned(track: Track, slope: np.ndarray, mask: np.ndarray) -> np.ndarray:
       mask: `[object, frame]`.
     """
     turned = np.where(mask, np.sign(np.linalg.det(slope)) * track.angle_rad, np.nan)
-    shows = np.array([np.ptp(own[seen]) > 0 if seen.any() else False
-                      for own, seen in zip(turned, mask, strict=True)])
+    shows = np.array(
+        [
+            np.ptp(own[seen]) > 0 if seen.any() else False
+            for own, seen in zip(turned, mask, strict=True)
+        ]
+    )
     return np.where(shows[:, None], turned, np.nan)
 
 

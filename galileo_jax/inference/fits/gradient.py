@@ -294,9 +294,7 @@ class GradientFitter:
         best = _best_of(fits).z[: self._count]
         return [*fits, self._best_variant(best, free, ends.num_steps)]
 
-    def _elsewhere(
-        self, fit: GradientFit, free: np.ndarray, num_steps: int
-    ) -> list[GradientFit]:
+    def _elsewhere(self, fit: GradientFit, free: np.ndarray, num_steps: int) -> list[GradientFit]:
         """Fits where a parameter shows that does not show in this one.
 
         Rims that grip so well that their slip ends do not tell how well: no slope leads from there
@@ -305,9 +303,9 @@ class GradientFitter:
         count = self._count
         z, sd = fit.z[:count], np.sqrt(np.diag(fit.covariance)[:count])
         open_ones = np.flatnonzero(free & self._is_main & (sd > UNTOLD_SD_Z))
-        moved = np.array([
-            np.where(np.arange(count) == i, other, z) for i in open_ones for other in ELSEWHERE_Z
-        ]).reshape(-1, count)
+        moved = np.array(
+            [np.where(np.arange(count) == i, other, z) for i in open_ones for other in ELSEWHERE_Z]
+        ).reshape(-1, count)
         if not len(moved):
             return []
         costs = self._residuals.costs(self._batch(np.stack([z, *moved]), free))

@@ -54,7 +54,9 @@ def _turning(observation: Observation, i: int) -> tuple[float, float] | None:
         return None
     seen = np.flatnonzero(observation.mask[i] & np.isfinite(observation.turned_rad[i]))
     times = observation.times_s
-    last = max(times[seen[0]] + TURNING_S, times[seen[min(FRAMES, len(seen)) - 1]]) if seen.size else 0
+    last = (
+        max(times[seen[0]] + TURNING_S, times[seen[min(FRAMES, len(seen)) - 1]]) if seen.size else 0
+    )
     seen = seen[(times[seen] <= last) & (seen < _first_hit(observation))]
     if len(seen) <= 3:
         return None
