@@ -53,11 +53,9 @@ def _turning(observation: Observation, i: int) -> tuple[float, float] | None:
     if observation.turned_rad is None:
         return None
     seen = np.flatnonzero(observation.mask[i] & np.isfinite(observation.turned_rad[i]))
-    times = observation.times_s
-    last = (
-        max(times[seen[0]] + TURNING_S, times[seen[min(FRAMES, len(seen)) - 1]]) if seen.size else 0
-    )
-    seen = seen[(times[seen] <= last) & (seen < _first_hit(observation))]
+    times, seen = observation.times_s, seen[seen < _first_hit(observation)]
+    is_early = times[seen] <= times[seen[:1]] + TURNING_S
+    seen = seen[is_early | (np.arange(len(seen)) < FRAMES)]
     if len(seen) <= 3:
         return None
     after, turned = times[seen] - times[seen[0]], np.unwrap(observation.turned_rad[i, seen])
