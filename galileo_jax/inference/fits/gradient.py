@@ -33,10 +33,11 @@ from galileo_jax.inference.fits.polish import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.fits.stages import before_moving
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
-from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
 ELSEWHERE_Z = (-2.0, -1.0, 1.0, 2.0)  # of what a fit leaves open: elsewhere it may show
+FAR_SDS = 8.0  # from a fit that tells a parameter: there it should be far worse (32 nats)
 UNTOLD_SD_Z = 0.9  # of the prior's 1: a parameter left so open does not show
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
 LEADS_ON = 1.0  # nats: less is no other valley
@@ -295,22 +296,28 @@ class GradientFitter:
         return [*fits, self._best_variant(best, free, ends.num_steps)]
 
     def _elsewhere(self, fit: GradientFit, free: np.ndarray, num_steps: int) -> list[GradientFit]:
-        """Fits where a parameter shows that does not show in this one.
+        """Fits where a parameter shows that does not show in this one, or the other way round.
 
         Rims that grip so well that their slip ends do not tell how well: no slope leads from there
-        to where they slip. What shows nowhere, as the masses' size, is left alone.
+        to where they slip. A disc that slips for an instant tells its friction; one that never
+        does tells nothing, and moves almost alike. What shows nowhere is left alone.
         """
         count = self._count
         z, sd = fit.z[:count], np.sqrt(np.diag(fit.covariance)[:count])
-        open_ones = np.flatnonzero(free & self._is_main & (sd > UNTOLD_SD_Z))
-        moved = np.array(
-            [np.where(np.arange(count) == i, other, z) for i in open_ones for other in ELSEWHERE_Z]
-        ).reshape(-1, count)
-        if not len(moved):
+        main = np.flatnonzero(free & self._is_main)
+        which, where = np.repeat(main, len(ELSEWHERE_Z)), np.tile(ELSEWHERE_Z, len(main))
+        far = np.abs(where - z[which]) > FAR_SDS * sd[which]
+        is_open = sd[which] > UNTOLD_SD_Z
+        which, where, is_open = (each[far | is_open] for each in (which, where, is_open))
+        if not len(which):
             return []
-        costs = self._residuals.costs(self._batch(np.stack([z, *moved]), free))
-        own = 0.5 * np.sum(np.stack([z, *moved]) ** 2, axis=1)  # the prior's part
-        shows = np.abs((costs - own)[1:] - (costs - own)[0]) > LEADS_ON
+        moved = np.where(np.arange(count) == which[:, None], where[:, None], z)
+        points = np.stack([z, *moved])
+        noise = np.tile(np.exp(NOISE_SD * fit.z[count:]), (len(points), 1))
+        costs = self._residuals.costs(Batch(points, np.tile(free, (len(points), 1)), noise))
+        left = costs - 0.5 * np.sum(points**2, axis=1)  # without the prior's part
+        worse = left[1:] - left[0]
+        shows = np.where(is_open, np.abs(worse) > LEADS_ON, worse < BEHIND_IN_SEARCH)
         if not shows.any():
             return []
         points = self._batch(moved[shows], free)
