@@ -1,6 +1,8 @@
 """Pucks seen from above, from a simulated track to what a fit and a diagnosis say of it."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -102,7 +104,7 @@ def test_a_film_shows_the_pucks_where_the_track_has_them(tmp_path: Path) -> None
     assert np.abs(turned - expected).max() < 0.03
 
 
-def filmed(folder: Path, seed: int) -> tuple[dict, dict[str, float]]:
+def filmed(folder: Path, seed: int) -> tuple[Mapping[str, Any], Mapping[str, float]]:
     path = folder / f"film_{seed}.mp4"
     done = gx.simulate(path, scenario="from_above", seed=seed, fps=60.0, size=(960, 540))
     return gx.fit(path).result, done.truths[0]["parameters"]

@@ -22,9 +22,10 @@ class Plain:
     """Trials whose parameters are their z."""
 
     names = ("restitution", "grip", "place")
-    model_parameters = tuple(
-        Parameter(name, "1", Normal(0.0, 1.0), 0.0, role)
-        for name, role in (("restitution", "main"), ("grip", "main"), ("place", "nuisance"))
+    model_parameters = (
+        Parameter("restitution", "1", Normal(0.0, 1.0), 0.0, "main"),
+        Parameter("grip", "1", Normal(0.0, 1.0), 0.0, "main"),
+        Parameter("place", "1", Normal(0.0, 1.0), 0.0, "nuisance"),
     )
 
     def theta(self, z, free):
