@@ -1,6 +1,8 @@
 """Pucks seen from above, from a simulated track to what a fit and a diagnosis say of it."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -95,6 +97,32 @@ def test_a_film_shows_the_pucks_where_the_track_has_them(tmp_path: Path) -> None
     apart = np.linalg.norm(filmed.position_m[:, :2] - true.position_m[:, :2], axis=1)[filmed.mask]
     assert np.median(apart) < 3e-4
     assert apart.max() < 2e-3  # where the hit falls into an exposure
+    assert filmed.axes == ("x", "y") and filmed.turned_rad is not None
+    turned = np.unwrap(filmed.turned_rad[0][filmed.mask[0]])
+    expected = true.position_m[0, 2][filmed.mask[0]]
+    assert np.ptp(expected) > 0.3
+    assert np.abs(turned - expected).max() < 0.03
+
+
+def filmed(folder: Path, seed: int) -> tuple[Mapping[str, Any], Mapping[str, float]]:
+    path = folder / f"film_{seed}.mp4"
+    done = gx.simulate(path, scenario="from_above", seed=seed, fps=60.0, size=(960, 540))
+    return gx.fit(path).result, done.truths[0]["parameters"]
+
+
+def test_a_puck_that_turns_is_braked_less_along_its_way(tmp_path: Path) -> None:
+    result, true = filmed(tmp_path, 7723)  # turns at 9 rad/s
+    for name in ("k1", "k2", "restitution"):
+        told = result["parameters"][name]
+        assert abs(told["mean"] - true[name]) < 3 * told["sd"], name
+    assert "start_turning1" in result["nuisances"]
+
+
+def test_what_grips_or_slips_is_told_as_two_solutions(tmp_path: Path) -> None:
+    result, true = filmed(tmp_path, 7721)
+    told = result["parameters"]["restitution"]
+    assert told["q025"] < true["restitution"] < told["q975"]
+    assert any("2 solutions" in line and "restitution" in line for line in result["warnings"])
 
 
 @pytest.mark.slow

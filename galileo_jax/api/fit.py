@@ -18,7 +18,7 @@ from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
+from galileo_jax.inference.laplace import laplace_posterior, two_solutions
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.effects.free_quantities import make_free_quantities
@@ -273,8 +273,11 @@ def _fitted(
             }
     timings["fit"] = time.perf_counter() - began
     notes |= extra | {"motion": options.motion}
+    said = [] if gradient is None or options.method == "mh" else [two_solutions(problem, gradient)]
     if options.motion == "planar" and any(item.z_m for clip in clips for item in clip.objects):
-        notes["warnings"] = [OFF_THE_PLANE]
+        said.append(OFF_THE_PLANE)
+    if told := [line for line in said if line is not None]:
+        notes["warnings"] = told
     if options.free:
         notes["free"] = sorted(options.free)
     if options.effects_from:

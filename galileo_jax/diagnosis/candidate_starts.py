@@ -19,13 +19,13 @@ from galileo_jax.diagnosis.score_tests import (
 )
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.model.parameters import inverse
+from galileo_jax.model.parameters import LongTailed, Prior, inverse
 from galileo_jax.runtime.latin_hypercube import latin_hypercube
 
 STARTS_PER_PARAMETER, MOST_STARTS = 32, 96
 NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
 NUM_MATCHED = 3  # shapes kept as starts
-MOST_Z = 2.5  # of a matched strength's prior
+MOST_Z, MOST_FAR_Z = 2.5, 5.0  # of a matched strength's prior; of one with long tails
 NUM_STRENGTHS, NUM_ZOOMS = 15, 4  # a grid over all strengths, then between neighbours of the best
 SPREAD_Z = 0.7  # of starts round the fit without the candidate
 
@@ -93,18 +93,23 @@ def best_strengths(
     fitter: GradientFitter, z: np.ndarray, free: np.ndarray, where: Sequence[np.ndarray]
 ) -> np.ndarray:
     """`z` `[candidate, z]` with the strength of least cost, all else as it is: ever finer grids."""
-    middle, reach = np.zeros(len(z)), MOST_Z
+    priors = [fitter.trials.model_parameters[columns[0]].prior for columns in where]
+    middle, reach = np.zeros(len(z)), np.array([_most_z(prior) for prior in priors])
     for _ in range(NUM_ZOOMS):
         tried = np.repeat(z[:, None], NUM_STRENGTHS, axis=1)
-        steps = np.linspace(-reach, reach, NUM_STRENGTHS)
-        for own, columns, centre in zip(tried, where, middle, strict=True):
-            own[:, columns] = (centre + steps)[:, None]
+        steps = np.linspace(-reach, reach, NUM_STRENGTHS, axis=-1)
+        for own, columns, centre, step in zip(tried, where, middle, steps, strict=True):
+            own[:, columns] = (centre + step)[:, None]
         of = np.repeat(np.arange(len(z)), NUM_STRENGTHS)
         costs = fitter.search_costs(tried.reshape(len(of), -1), free[of]).reshape(len(z), -1)
         best = np.argmin(costs, axis=1)
-        middle = middle + steps[best]
-        reach = steps[1] - steps[0]
+        middle = middle + np.take_along_axis(steps, best[:, None], axis=1)[:, 0]
+        reach = steps[:, 1] - steps[:, 0]
     return tried[np.arange(len(z)), best]
+
+
+def _most_z(prior: Prior) -> float:
+    return MOST_FAR_Z if isinstance(prior, LongTailed) else MOST_Z
 
 
 def _matched_shapes(
@@ -129,8 +134,8 @@ def _matched_shapes(
         wanted[:, where] = (-along / np.maximum(power, SHOWS))[best, None] * size
         priors = [trials.model_parameters[i].prior for i in where]
         for column, prior in zip(where, priors, strict=True):
-            own = prior.inverse(wanted[:, column])
-            z[best, column] = np.clip(np.nan_to_num(own, nan=-MOST_Z), -MOST_Z, MOST_Z)
+            own, most = prior.inverse(wanted[:, column]), _most_z(prior)
+            z[best, column] = np.clip(np.nan_to_num(own, nan=-most), -most, most)
         free = trials.free(effects)[: len(trials.model_parameters)]
         starts.append((np.where(free, z[best, : len(free)], 0.0), float(gains[best[0]])))
     return starts

@@ -1,6 +1,7 @@
 """From a gradient fit to a posterior: draws of the normal approximation in z."""
 
 import numpy as np
+from scipy.special import softmax
 
 from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
@@ -12,14 +13,22 @@ NUM_DRAWS = 4000
 def laplace_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterior:
     """Draws of N(mode, (J^T J + 1)^-1) in z, mapped to the parameters' units.
 
-    Symmetric in z, hence inside the parameters' bounds. It knows nothing of skewness or of a
-    second mode: compare with `--method mh` where that matters.
+    Where other valleys explain the data about as well (`GradientFit.beside`) each has its share of
+    the draws, by its evidence. Symmetric in z, hence inside the parameters' bounds. It knows
+    nothing of skewness: compare with `--method mh` where that matters.
     """
     generator = np.random.default_rng(seed)
-    root = root_of(fit.covariance[np.ix_(fit.free, fit.free)])
-    normal = generator.standard_normal((NUM_DRAWS, len(root)))
+    count = int(fit.free.sum())
+    normal = generator.standard_normal((NUM_DRAWS, count))
     z = np.tile(fit.z, (NUM_DRAWS, 1))
-    z[:, fit.free] += normal @ root.T
+    ends = np.rint(NUM_DRAWS * np.cumsum(shares(fit))).astype(int)
+    for one, begin, end in zip((fit, *fit.beside), [0, *ends], ends, strict=False):
+        z[begin:end] = one.z
+        root = root_of(one.covariance[np.ix_(fit.free, fit.free)])
+        z[begin:end, fit.free] += normal[begin:end] @ root.T
+    if fit.beside:  # who takes every tenth draw takes of every valley
+        order = generator.permutation(NUM_DRAWS)
+        z, normal = z[order], normal[order]
     return Posterior(
         names=trials.names,
         draws=trials.theta(z, fit.free)[None],
@@ -28,6 +37,35 @@ def laplace_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Post
         stats=fit.stats,
         provenance={"method": "grad", "seed": seed, "code": fit.code.name},
     )
+
+
+def two_solutions(trials: JointProblem, fit: GradientFit) -> str | None:
+    """One line where several valleys share the posterior: what differs most; None where one has it.
+
+    That is counted in standard deviations of the more certain of both.
+    """
+    if not fit.beside:
+        return None
+    every, count = (fit, *fit.beside), len(fit.steps)
+    z = np.stack([one.z[:count] for one in every])
+    sds = np.stack([np.sqrt(np.diag(one.covariance)[:count]) for one in every])
+    is_asked = np.array([p.role in ("main", "effect") for p in trials.model_parameters])
+    wanted = is_asked & fit.free[:count]
+    far = np.where(wanted, np.ptp(z, axis=0) / np.maximum(sds.min(axis=0), 1e-9), 0.0)
+    i = int(np.argmax(far))
+    values = [trials.theta(one.z, one.free)[i] for one in every]
+    told = " or ".join(
+        f"{value:.3g} ({share:.0%})" for value, share in zip(values, shares(fit), strict=True)
+    )
+    return (
+        f"{len(every)} solutions explain the clip about as well: {trials.names[i]} {told}; the "
+        "intervals hold them all"
+    )
+
+
+def shares(fit: GradientFit) -> np.ndarray:
+    """The probability of a fit's own valley and of each beside it, `[valley]`; they sum to 1."""
+    return softmax([one.log_evidence for one in (fit, *fit.beside)])
 
 
 def root_of(covariance: np.ndarray) -> np.ndarray:

@@ -106,7 +106,7 @@ def to_last_cut(observation: Observation, cuts: Sequence[Cut]) -> Observation:
     if not any(each.side == "after" for each in cuts):
         return observation
     count = int(np.flatnonzero(observation.mask.any(axis=0))[-1]) + 1
-    modes = observation.modes_m
+    modes, turned = observation.modes_m, observation.turned_rad
     return replace(
         observation,
         times_s=observation.times_s[:count],
@@ -114,6 +114,7 @@ def to_last_cut(observation: Observation, cuts: Sequence[Cut]) -> Observation:
         covariance_m2=observation.covariance_m2[..., :count],
         mask=observation.mask[:, :count],
         modes_m=None if modes is None else modes[..., :count],
+        turned_rad=None if turned is None else turned[:, :count],
     )
 
 

@@ -29,6 +29,9 @@ class Observation:
       num_errors: how many of `modes_m`, the last, are errors that follow each other in time: unlike
         imperfections, which a good clip need not have, these are there.
       is_turning: the third axis is how far each object has turned, rad, not a place.
+      turned_rad: `[object, frame]`, how far each puck has turned by its picture, counter-clockwise:
+        to know how it starts, not to be fitted; NaN where nothing shows it, None where nobody
+        looked.
       is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """
 
@@ -41,6 +44,7 @@ class Observation:
     is_squared: bool = False
     num_errors: int = 0
     is_turning: bool = False
+    turned_rad: Float[np.ndarray, "object frame"] | None = None
 
     @property
     def axes(self) -> tuple[str, ...]:

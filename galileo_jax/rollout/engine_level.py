@@ -92,10 +92,11 @@ def roll_out(
     table = Table(law, rims, jnp.asarray(scene.half_length_m))
     # Starts and turning as the camera's scale will show them.
     start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
-    turning = velocity[:, 2] if scene.num_axes == 3 else jnp.zeros(len(scene.names))
     discs = Discs(
         jnp.concatenate([start, jnp.zeros((len(start), 1))], axis=1),
-        jnp.concatenate([velocity[:, :2], (table.radius_m * turning / ROOT2)[:, None]], axis=1),
+        jnp.concatenate(
+            [velocity[:, :2], (table.radius_m * velocity[:, 2] / ROOT2)[:, None]], axis=1
+        ),
         jnp.zeros(len(scene.names)),
     )
 

@@ -123,10 +123,11 @@ class Store:
             clip = Clip.model_validate(json.loads(str(file["clip"])))
             notes = json.loads(str(file["notes"]))
             picture = file["thumbnail"].tobytes()
-            modes = file.get("modes_m")
+            modes, turned = file.get("modes_m"), file.get("turned_rad")
         seen = replace(
             Observation(names=names, **arrays),
             modes_m=modes,
+            turned_rad=turned,
             is_squared=bool(notes.get("is_squared", False)),
             is_turning=bool(notes.get("is_turning", False)),
             num_errors=int(notes.get("num_errors", 0)),
@@ -149,6 +150,8 @@ class Store:
         arrays = {name: getattr(seen, name) for name in ARRAYS}
         if seen.modes_m is not None:
             arrays["modes_m"] = seen.modes_m
+        if seen.turned_rad is not None:
+            arrays["turned_rad"] = seen.turned_rad
         with replacing(self._clip(key)) as path:
             np.savez_compressed(
                 path,

@@ -115,6 +115,8 @@ def outline_of(clip: Clip, item: ClipObject) -> Outline:
             return Outline((item.size_m[0] * scale, item.size_m[2] * scale), angle)
         case "sphere":
             side = 2 * item.size_m[0]
+        case "cylinder" if SCENARIOS[clip.scenario].is_level:
+            side = 2 * item.size_m[0]  # a puck lies flat, and is seen from above
         case "cylinder":
             side = min(2 * item.size_m[0], item.size_m[1])
         case "torus":

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from galileo_jax.clip.picture_plane import picture_plane
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
@@ -37,7 +38,26 @@ def observe(clip: Clip, track: Track) -> Observation:
         position_m=np.moveaxis(position, 1, 2),
         covariance_m2=np.moveaxis(covariance, 1, -1),
         mask=mask,
+        turned_rad=_turned(track, slope, mask) if SCENARIOS[clip.scenario].is_level else None,
     )
+
+
+def _turned(track: Track, slope: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """How far objects have turned, `[object, frame]`, rad; NaN of one that looks alike all round.
+
+    Args:
+      track: its angles are clockwise in the picture.
+      slope: `[object, frame, 2, 2]`, metres per pixel; its sign tells whether that is mirrored.
+      mask: `[object, frame]`.
+    """
+    turned = np.where(mask, np.sign(np.linalg.det(slope)) * track.angle_rad, np.nan)
+    shows = np.array(
+        [
+            np.ptp(own[seen]) > 0 if seen.any() else False
+            for own, seen in zip(turned, mask, strict=True)
+        ]
+    )
+    return np.where(shows[:, None], turned, np.nan)
 
 
 def origin_of(clip: Clip, track: Track) -> Sequence[float]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.diagnosis.candidates import Hypothesis
-from galileo_jax.diagnosis.mended_evidence import apart
+from galileo_jax.inference.fits.apart import apart
 from galileo_jax.inference.fits.evidence import Code, GradientFit
 from galileo_jax.inference.fits.weighed import Weighed
 

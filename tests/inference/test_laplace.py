@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from galileo_jax.inference.laplace import root_of
+from galileo_jax.inference.fits.evidence import Code, GradientFit
+from galileo_jax.inference.laplace import laplace_posterior, root_of, two_solutions
+from galileo_jax.model.parameters import Normal, Parameter
 
 TURN = np.linalg.qr(np.random.default_rng(0).normal(size=(4, 4)))[0]
 
@@ -14,3 +16,46 @@ def test_the_root_of_what_is_hardly_positive(least):
     root = root_of(covariance)
     assert np.isfinite(root).all()
     np.testing.assert_allclose(root @ root.T, covariance, atol=1e-15)
+
+
+class Plain:
+    """Trials whose parameters are their z."""
+
+    names = ("restitution", "grip", "place")
+    model_parameters = (
+        Parameter("restitution", "1", Normal(0.0, 1.0), 0.0, "main"),
+        Parameter("grip", "1", Normal(0.0, 1.0), 0.0, "main"),
+        Parameter("place", "1", Normal(0.0, 1.0), 0.0, "nuisance"),
+    )
+
+    def theta(self, z, free):
+        return np.where(free, z, 0.0)
+
+
+def fit_at(z, sd, log_evidence, **more) -> GradientFit:
+    return GradientFit(
+        z=np.array(z), free=np.ones(3, bool), covariance=np.diag(np.square(sd)), chi2=9.0,
+        log_evidence=log_evidence, num_values=9, steps=np.ones(3), jacobian=np.zeros((9, 3)),
+        code=Code.CONVERGED, stats={}, pull=0.0, num_pulled=0.0, **more,
+    )  # fmt: skip
+
+
+def test_two_valleys_share_the_draws_by_their_evidence():
+    other = fit_at([0.8, 0.1, 0.0], [0.06, 0.1, 1.0], -np.log(3.0))
+    found = fit_at([0.94, 0.5, 5.0], [0.01, 1.0, 1.0], 0.0, beside=(other,))
+    draws = laplace_posterior(Plain(), found, 0)["restitution"].ravel()  # pyright: ignore
+    is_other = draws < 0.87
+    assert is_other.mean() == pytest.approx(0.25, abs=0.04)
+    assert draws[is_other].std() > 4 * draws[~is_other].std()
+    assert is_other[:400].mean() == pytest.approx(0.25, abs=0.08)  # whichever are taken
+    said = two_solutions(Plain(), found)  # pyright: ignore
+    assert (
+        said is not None and "2 solutions" in said and "restitution 0.94 (75%) or 0.8 (25%)" in said
+    )
+
+
+def test_one_valley_has_all_draws():
+    found = fit_at([0.94, 0.5, 5.0], [0.01, 1.0, 1.0], 0.0)
+    draws = laplace_posterior(Plain(), found, 0)["restitution"].ravel()  # pyright: ignore
+    assert draws.mean() == pytest.approx(0.94, abs=0.001)
+    assert two_solutions(Plain(), found) is None  # pyright: ignore

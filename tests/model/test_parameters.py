@@ -10,6 +10,7 @@ from scipy import stats
 from galileo_jax.model.parameters import (
     HalfNormal,
     LogNormal,
+    LongTailed,
     Normal,
     Parameter,
     PriorTable,
@@ -19,10 +20,25 @@ from galileo_jax.model.parameters import (
     inverse,
 )
 
+
+class Grown:
+    """The distribution of a median times e to the power of a variate of another distribution."""
+
+    def __init__(self, median, power):
+        self.median, self.power = median, power
+
+    def cdf(self, value):
+        return self.power.cdf(np.log(value / self.median))
+
+    def ppf(self, share):
+        return self.median * np.exp(self.power.ppf(share))
+
+
 # Each with its distribution as scipy has it.
 PRIORS = {
     "normal": (Normal(0.3, 0.05), stats.norm(0.3, 0.05)),
     "log_normal": (LogNormal(0.4, 0.7), stats.lognorm(0.7, scale=0.4)),
+    "long_tailed": (LongTailed(0.01, 0.1), Grown(0.01, stats.johnsonsu(0.0, 1.0, scale=0.1))),
     "uniform": (Uniform(0.1, 0.9), stats.uniform(0.1, 0.8)),
     "half_normal": (HalfNormal(0.2), stats.halfnorm(scale=0.2)),
 }
@@ -91,7 +107,7 @@ def test_vectors_keep_order_and_leading_axes():
 
 
 @settings(max_examples=40)
-@given(st.lists(st.lists(st.floats(-9, 9), min_size=4, max_size=4), min_size=1, max_size=3))
+@given(st.lists(st.lists(st.floats(-9, 9), min_size=5, max_size=5), min_size=1, max_size=3))
 def test_the_table_in_numpy_is_the_compiled_one_and_each_priors_own(rows):
     parameters = [Parameter(name, "1", prior, 0.0) for name, (prior, _) in PRIORS.items()]
     table, z = PriorTable.of(parameters), np.array(rows)

@@ -43,6 +43,7 @@ class GradientFit:
       pull: how far the nuisances are from what is expected: the sum of the squares of their
         `prior_deviations`.
       num_pulled: how many numbers' worth of the data the nuisances were fitted with.
+      beside: fits in other valleys that explain the data about as well; they share the posterior.
     """
 
     z: Float[np.ndarray, " parameter"]
@@ -57,6 +58,7 @@ class GradientFit:
     stats: dict[str, float]
     pull: float
     num_pulled: float
+    beside: tuple["GradientFit", ...] = ()
 
     @property
     def num_fitted(self) -> float:

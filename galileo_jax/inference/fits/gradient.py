@@ -24,6 +24,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.special import chdtrc
 
+from galileo_jax.inference.fits.apart import apart
 from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
 from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH, Ends
 from galileo_jax.inference.fits.evidence import Code as Code
@@ -34,10 +35,13 @@ from galileo_jax.inference.fits.polish import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.fits.stages import before_moving
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
-from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
 from galileo_jax.runtime.batching import side_by_side
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
+ELSEWHERE_Z = (-2.0, -1.0, 1.0, 2.0)  # of what a fit leaves open: elsewhere it may show
+FAR_SDS = 8.0  # from a fit that tells a parameter: there it should be far worse (32 nats)
+UNTOLD_SD_Z = 0.9  # of the prior's 1: a parameter left so open does not show
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
 LEADS_ON = 1.0  # nats: less is no other valley
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
@@ -93,6 +97,7 @@ class GradientFitter:
         self._settled = settings.settled if is_smooth else settings.settled_if_rough
         parameters = trials.model_parameters
         is_nuisance = np.array([p.role == "nuisance" for p in parameters])
+        self._is_main = np.array([p.role == "main" for p in parameters])
         self._is_positive_nuisance = is_nuisance & [p.is_positive for p in parameters]
 
     @property
@@ -130,15 +135,15 @@ class GradientFitter:
         starts = scattered_starts(self.trials, free, self.settings.num_starts, seed)
         ends = self._ends(starts, free, self.settings.num_refined)
         on_stage("refining")
-        fit = self._best_valley(ends, free)
-        if ends.num_agreeing >= LEAST_AGREEING and self.is_explained(fit):
-            return fit
+        fits = self._in_valleys(ends, free)
+        if ends.num_agreeing >= LEAST_AGREEING and self.is_explained(_best_of(fits)):
+            return _with_beside(fits)
         on_stage("searching on")
         num = self.settings.num_second_starts
         scattered = scattered_starts(self.trials, free, num, seed + 1)
         starts = np.concatenate([self._starts_by_phases(free, num, seed), scattered])
         ends = self._ends(starts, free, self.settings.num_second_refined)
-        fit = max(fit, self._best_valley(ends, free), key=_evidence)
+        fit = _with_beside([*fits, *self._in_valleys(ends, free)])
         if fit.code is Code.CONVERGED and not self.is_explained(fit, NOISE_SCALE_RANGE[1]):
             fit = replace(fit, code=Code.MISFIT)
         return fit
@@ -280,18 +285,48 @@ class GradientFitter:
             centres, is_open = ends.best.z, is_main & (variance > OPEN_SD_Z**2)
         return scattered_round(self.trials, centres, is_open, num, seed)
 
-    def _best_valley(self, ends: Ends, free: np.ndarray) -> GradientFit:
-        """Polishes the best of every valley and its variants; the most evident fit.
+    def _in_valleys(self, ends: Ends, free: np.ndarray) -> list[GradientFit]:
+        """Polishes the best of every valley and variants of the most evident; all fits.
 
         Variants are of what is polished: at the noise of a search, which is more than the
         clip's, the other parameters stand where the valleys beside are not yet told apart.
         """
         points = self._batch(ends.best.z, free)
-        fits = self._polish(points, np.zeros(len(points.z), int), ends.num_steps)
-        best = max(fits.values(), key=_evidence)
+        own = self._polish(points, np.zeros(len(points.z), int), ends.num_steps)
+        fits = list(own.values())
+        fits += self._elsewhere(_best_of(fits), free, ends.num_steps)
         if not (self._is_positive_nuisance & free).any():
-            return best
-        return self._best_variant(best.z[: self._count], free, ends.num_steps)
+            return fits
+        best = _best_of(fits).z[: self._count]
+        return [*fits, self._best_variant(best, free, ends.num_steps)]
+
+    def _elsewhere(self, fit: GradientFit, free: np.ndarray, num_steps: int) -> list[GradientFit]:
+        """Fits where a parameter shows that does not show in this one, or the other way round.
+
+        Rims that grip so well that their slip ends do not tell how well: no slope leads from there
+        to where they slip. A disc that slips for an instant tells its friction; one that never
+        does tells nothing, and moves almost alike. What shows nowhere is left alone.
+        """
+        count = self._count
+        z, sd = fit.z[:count], np.sqrt(np.diag(fit.covariance)[:count])
+        main = np.flatnonzero(free & self._is_main)
+        which, where = np.repeat(main, len(ELSEWHERE_Z)), np.tile(ELSEWHERE_Z, len(main))
+        far = np.abs(where - z[which]) > FAR_SDS * sd[which]
+        is_open = sd[which] > UNTOLD_SD_Z
+        which, where, is_open = (each[far | is_open] for each in (which, where, is_open))
+        if not len(which):
+            return []
+        moved = np.where(np.arange(count) == which[:, None], where[:, None], z)
+        points = np.stack([z, *moved])
+        noise = np.tile(np.exp(NOISE_SD * fit.z[count:]), (len(points), 1))
+        costs = self._residuals.costs(Batch(points, np.tile(free, (len(points), 1)), noise))
+        left = costs - 0.5 * np.sum(points**2, axis=1)  # without the prior's part
+        worse = left[1:] - left[0]
+        shows = np.where(is_open, np.abs(worse) > LEADS_ON, worse < BEHIND_IN_SEARCH)
+        if not shows.any():
+            return []
+        points = self._batch(moved[shows], free)
+        return list(self._polish(points, np.zeros(len(points.z), int), num_steps).values())
 
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
         """Polishes z and variants of it; the most evident fit.
@@ -358,6 +393,18 @@ class GradientFitter:
         stats: dict[str, float] = {"num_steps": num_steps + found.num_steps}
         fits = laplace_fits(self.trials, self._residuals, found, stats)
         return dict(zip(found.rows.tolist(), fits, strict=True)), found.lowest
+
+
+def _best_of(fits: Sequence[GradientFit]) -> GradientFit:
+    return max(fits, key=_evidence)
+
+
+def _with_beside(fits: Sequence[GradientFit]) -> GradientFit:
+    """The most evident fit, with those of other valleys that count beside it."""
+    best = _best_of(fits)
+    sound = [fit for fit in fits if fit.code is Code.CONVERGED and fit is not best]
+    _, *others = apart([best, *sound])
+    return replace(best, beside=tuple(others))
 
 
 def _evidence(fit: GradientFit) -> float:

@@ -48,6 +48,21 @@ def expected_odds(name: str, theta: Theta, scene: Surroundings, prior: LogNormal
     return 1.0 + EXPECTED_ODDS * math.exp(log_ratio)
 
 
+def undeclared_odds(name: str, theta: Theta, scene: Surroundings, prior: LogNormal) -> float:
+    """1 + p(strength | prior) / p(strength | air); 1 where nothing is expected.
+
+    With the evidence under the long tails of what air does it makes the sum of both: of air, and
+    of what `prior` allows for where nothing is known.
+    """
+    strength = float(theta[name])
+    if name not in scene.expected or strength <= 0:
+        return 1.0
+    middle, width = scene.expected[name]
+    far = math.asinh(math.log(strength / middle) / width)
+    log_air = -0.5 * far**2 - math.log(width * math.cosh(far))
+    return 1.0 + math.exp(_log_normal(strength, prior.median, prior.sd) - log_air)
+
+
 def _log_normal(value: float, median: float, sd: float) -> float:
     """The logarithm of the density of log(value), up to a constant."""
     return -0.5 * (math.log(value / median) / sd) ** 2 - math.log(sd)

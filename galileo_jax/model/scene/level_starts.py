@@ -1,6 +1,7 @@
 """How pucks seen from above move when they are first seen: priors of their start velocities."""
 
 import math
+from itertools import combinations
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from galileo_jax.observation.observation import Observation
 FRAMES = 8  # through which a straight line is laid
 MOVES_SD = 5.0  # of that line's slope: what is slower rests
 SHARE, LEAST_M_S, LEAST_RAD_S = 0.3, 0.05, 1.0  # widths of the priors
+# Of a puck whose turning is seen and not fitted: that long, and how well its picture shows it.
+TURNING_S, TURNING_SD, TURNED_SD_RAD = 0.1, (0.05, 0.02), 2e-3  # rad/s and a share, rad
 OFFSET_SHARE = 0.1  # of a radius: a point that was marked is the centre within this
 
 
@@ -37,4 +40,42 @@ def level_starts(observation: Observation, radius_m: float) -> dict[str, tuple[f
         for axis, name in enumerate(START[: len(place)]):
             width = widths[axis] + (SHARE * abs(speed[axis]) if axis == 2 else 0.0)
             found[f"{name}{i + 1}"] = float(speed[axis]), float(width)
+        if (turning := _turning(observation, i)) is not None:
+            found[f"{START[2]}{i + 1}"] = turning
     return found
+
+
+def _turning(observation: Observation, i: int) -> tuple[float, float] | None:
+    """How fast a puck turns at the start by its picture, and sd, rad/s; None where unknown.
+
+    Friction acts against sliding and turning together: who turns slides farther.
+    """
+    if observation.turned_rad is None:
+        return None
+    seen = np.flatnonzero(observation.mask[i] & np.isfinite(observation.turned_rad[i]))
+    times, seen = observation.times_s, seen[seen < _first_hit(observation)]
+    is_early = times[seen] <= times[seen[:1]] + TURNING_S
+    seen = seen[is_early | (np.arange(len(seen)) < FRAMES)]
+    if len(seen) <= 3:
+        return None
+    after, turned = times[seen] - times[seen[0]], np.unwrap(observation.turned_rad[i, seen])
+    design = np.vander(after, 3)
+    solution = np.linalg.lstsq(design, turned, rcond=None)[0]
+    scatter = np.sum((turned - design @ solution) ** 2) / (len(seen) - 3)
+    variance = max(float(scatter), TURNED_SD_RAD**2) * np.linalg.inv(design.T @ design)[1, 1]
+    speed, (least, share) = float(solution[1]), TURNING_SD
+    return speed, math.hypot(math.sqrt(variance), least + share * abs(speed))
+
+
+def _first_hit(observation: Observation) -> int:
+    """The frame in which two pucks are nearest to each other; behind the last where there is one.
+
+    After it another turning may have begun.
+    """
+    place, mask = observation.position_m[:, :2], observation.mask
+    nearest = [len(observation.times_s)]
+    for i, j in combinations(range(len(place)), 2):
+        apart = np.linalg.norm(place[j] - place[i], axis=0)
+        if (both := mask[i] & mask[j]).any():
+            nearest.append(int(np.argmin(np.where(both, apart, np.inf))))
+    return min(nearest)

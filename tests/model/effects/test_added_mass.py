@@ -6,14 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
+import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import make_effects
 from galileo_jax.model.effects.air import AIR_KG_M3
 from galileo_jax.model.effects.library.added_mass import PRIOR
-from galileo_jax.model.parameters import LogNormal, absent
+from galileo_jax.model.parameters import LongTailed, absent
 from tests.clip.test_pendulum import angles, closed_form
 from tests.precision import in_64_bit
 
@@ -102,7 +104,36 @@ def test_of_a_ball_of_known_size_and_mass_it_is_known(tmp_path):
     known = problem_of(tmp_path, "fall", f"[{size}]", str(mass)).model.scene.surroundings
     (parameter,) = effect.parameters(known)
     displaced = AIR_KG_M3 * 4 / 3 * math.pi * size**3
-    assert isinstance(parameter.prior, LogNormal)
+    assert isinstance(parameter.prior, LongTailed)
     assert parameter.prior.median == pytest.approx(displaced / 2 / mass)
     (parameter,) = effect.parameters(problem_of(tmp_path, "fall").model.scene.surroundings)
     assert parameter.prior == PRIOR
+
+
+def test_a_fluid_that_nobody_declared_is_as_likely_as_if_nothing_had_been(tmp_path):
+    (effect,) = make_effects(("added_mass",))
+    known = problem_of(tmp_path, "fall", "[0.02]", "0.0027").model.scene.surroundings
+    unknown = problem_of(tmp_path, "fall").model.scene.surroundings
+
+    def density(scene, value: float) -> float:
+        """Of the logarithm, as a verdict counts it: the prior's, times the odds."""
+        (parameter,) = effect.parameters(scene)
+        ends = parameter.prior.inverse(value * np.exp([-1e-4, 1e-4]))
+        slope = np.diff(ends)[0] / 2e-4
+        return stats.norm.pdf(ends.mean()) * slope * effect.odds({"added_mass": value}, scene)
+
+    air = known.expected["added_mass"][0]
+    assert effect.odds({"added_mass": air}, known) == pytest.approx(1.0, abs=0.1)
+    assert density(known, 0.15) == pytest.approx(density(unknown, 0.15), rel=0.05)
+    assert density(known, air) > 5 * density(unknown, air)
+    assert effect.odds({"added_mass": 0.15}, unknown) == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario, share", [("fall", 0.15), ("flight", 0.15), ("pendulum", 0.1)])
+def test_more_than_air_is_not_named_something_else(tmp_path, scenario, share):
+    path, hidden = tmp_path / "clip.csv", {"added_mass": {"added_mass": share}}
+    gx.simulate(path, scenario=scenario, seed=8, effects=hidden, track_only=True)
+    assert gx.load(path).objects[0].mass_kg is not None
+    verdict = gx.diagnose(path).document["verdict"]
+    assert "added_mass" in verdict["effects"], verdict

@@ -88,3 +88,9 @@ def test_a_straight_path_has_no_shape(tmp_path):
     measured = measure(load_clip(path))
     problem = make_problem(measured.clip, measured.observation)
     assert not [name for name in problem.model.names if name.startswith("board_slope")]
+
+
+def test_what_never_slips_does_not_tell_its_friction(tmp_path):
+    """A side valley, where it slips for an instant at the release, would tell it to a per cent."""
+    told = fit(load_clip(write(tmp_path)), seed=0).result["parameters"]["k1"]
+    assert not told["identified"] and told["q975"] > 0.3

@@ -24,7 +24,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Effect, Rims, Surroundings, Theta
-from galileo_jax.model.parameters import Normal, Parameter, Uniform
+from galileo_jax.model.parameters import Normal, Parameter, Role, Uniform
 
 OFFSET = (
     "hit_offset"  # in `Surroundings.expected`: how well places relative to each other are known
@@ -41,11 +41,13 @@ class Pucks(Effect):
         """Of what moves when it is first seen its velocities; of several pucks what a hit does."""
         if self.name not in scene.laws:
             return ()
-        units = ("m/s", "m/s", "rad/s")[: scene.num_axes]
+        units = ("m/s", "m/s", "rad/s")
+        # Turning that is not in the track is known from the picture, and no result of the fit.
+        roles: tuple[Role, ...] = ("main", "main", "main" if scene.num_axes == 3 else "nuisance")
         found = [
-            Parameter(name, unit, Normal(*scene.expected[name]), 0.0, "main", 0.05, per_clip=True)
+            Parameter(name, unit, Normal(*scene.expected[name]), 0.0, role, 0.05, per_clip=True)
             for i in range(len(scene.names))
-            for name, unit in zip(_starts(scene, i), units, strict=True)
+            for name, unit, role in zip(_starts(i), units, roles, strict=True)
             if name in scene.expected
         ]
         if len(scene.names) > 1:
@@ -62,12 +64,12 @@ class Pucks(Effect):
         return tuple(found)
 
     def start_velocity(self, theta: Theta, scene: Surroundings) -> Array | None:
-        """Of every puck; 0 of those that rest."""
+        """Of every puck, the turning too; 0 of those that rest."""
         if self.name not in scene.laws:
             return None
         zero = 0.0 * theta["m1"]
         rows = [
-            [theta[name] if name in scene.expected else zero for name in _starts(scene, i)]
+            [theta[name] if name in scene.expected else zero for name in _starts(i)]
             for i in range(len(scene.names))
         ]
         xp = zero.__array_namespace__()
@@ -99,6 +101,6 @@ class Pucks(Effect):
         }
 
 
-def _starts(scene: Surroundings, i: int) -> tuple[str, ...]:
-    """Names of a puck's start velocity, as many as the track has axes."""
-    return tuple(f"{name}{i + 1}" for name in START[: scene.num_axes])
+def _starts(i: int) -> tuple[str, ...]:
+    """Names of a puck's start velocity and turning."""
+    return tuple(f"{name}{i + 1}" for name in START)

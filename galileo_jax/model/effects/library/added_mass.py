@@ -16,6 +16,7 @@ Confused with: scale_error, frame_rate: each of them acts like another gravity; 
 
 from typing import ClassVar
 
+from galileo_jax.model.effects.air import undeclared_odds
 from galileo_jax.model.effects.effect import (
     PENDULUM,
     Array,
@@ -30,9 +31,9 @@ from galileo_jax.model.effects.laws.liquid import Liquid
 from galileo_jax.model.effects.laws.pendulum import LENGTH
 from galileo_jax.model.effects.laws.spring import Spring
 from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.parameters import LogNormal, LongTailed, Parameter
 
-PRIOR = LogNormal(median=0.01, sd=1.2)  # of balls in air; where size and mass are declared, those
+PRIOR = LogNormal(median=0.01, sd=1.2)  # of balls in air; where size and mass are declared: theirs
 LIQUID_PRIOR = LogNormal(median=0.2, sd=0.7)
 LIFT = 2.0  # what is displaced over what a sphere carries along
 
@@ -49,8 +50,15 @@ class AddedMass(Effect):
             return ()
         prior = LIQUID_PRIOR if Liquid.name in scene.laws else PRIOR
         if self.name in scene.expected:
-            prior = LogNormal(*scene.expected[self.name])
+            prior = LongTailed(*scene.expected[self.name])
         return (Parameter("added_mass", "1", prior, 0.0, "effect", 0.1),)
+
+    def odds(self, theta: Theta, scene: Surroundings) -> float:
+        """High where more is found than a ball of known size and mass carries along in air.
+
+        A fluid that nobody declared is as likely as if nothing had been.
+        """
+        return undeclared_odds(self.name, theta, scene, PRIOR)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force | None:
         """The lift, on a straight path and on a pendulum's circle."""
