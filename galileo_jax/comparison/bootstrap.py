@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.similarity.noise_scale import mode_covariance
@@ -75,7 +76,7 @@ def replicates(
         [_with_modes(own, problem, scale, size) for own, problem, scale, size in parts], axis=1
     )
     centre = generator.standard_normal((count, len(free)))
-    gain = np.linalg.inv(jacobian.T @ jacobian + np.eye(len(free)))
+    gain = inverse(jacobian.T @ jacobian + np.eye(len(free)))
     base = np.concatenate(_at(trials, fit, fit.z[None], noise_scale), axis=1)
 
     moved = np.zeros((count, len(free)))
