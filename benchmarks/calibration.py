@@ -33,6 +33,7 @@ from galileo_jax.api.fit_result import Fit
 from galileo_jax.api.track import Track, track
 from galileo_jax.clip.schema import Clip
 from galileo_jax.commands import command
+from galileo_jax.measurement.cuts import cut, to_last_cut
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import compile_scene
@@ -156,7 +157,8 @@ def seen(truth: Truth, position_m: np.ndarray, fps: float, noise_m: float) -> Tr
         objects=truth.objects,
         frame_count=frames,
     )
-    return Track(clip, None, Measurement(clip, observation, observation))
+    used, cuts = cut(clip, observation)
+    return Track(clip, None, Measurement(clip, to_last_cut(used, cuts), observation, cuts=cuts))
 
 
 def in_mujoco(truth: Truth, times_s: np.ndarray) -> np.ndarray:

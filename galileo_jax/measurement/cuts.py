@@ -7,6 +7,7 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
                              off; to a stop, a blow, or the rest after which it is carried away
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
     toss                     to the first impact
+    ramp                     to where a box tips over
     from_above               to a quarter of a second after everything has come to rest
 """
 
@@ -24,6 +25,7 @@ from galileo_jax.measurement.find_hand import hand_frame
 from galileo_jax.measurement.find_placed import placed_frames
 from galileo_jax.measurement.find_rest import rest_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
+from galileo_jax.measurement.find_tip import tip
 from galileo_jax.measurement.toss_flight import last_free_frame
 from galileo_jax.observation.observation import Observation
 
@@ -33,6 +35,7 @@ LANDED = "comes down on the table"
 RESTS = "is at rest, as is all that is still seen"
 PLACED = "is put into its place by a hand until then"
 TAKEN = "is taken away by a hand from then on"
+TIPS_OVER = "tips over, and goes on on another face"
 HELD = "is moved by a hand until then: it accelerates otherwise than on its way"
 
 
@@ -67,6 +70,8 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
     """The observation with what is not of the scene masked, and where and why, in time's order."""
     if SCENARIOS[clip.scenario].is_level:
         return _to_rest(clip, observation)
+    if SCENARIOS[clip.scenario].has_table:
+        return _to_tip(clip, observation)
     is_let_go = is_board(clip) and not clip.starts_moving
     observation, cuts = _left_to_itself(observation) if is_let_go else (observation, [])
     ends = [
@@ -150,6 +155,16 @@ def _to_rest(clip: Clip, observation: Observation) -> tuple[Observation, tuple[C
     rests = int(np.argmax(observation.mask[:, last]))  # one that is still seen
     found = Cut(observation.names[rests], float(observation.times_s[last]), "after", RESTS)
     return _without(observation, slice(last + 1, None), slice(None)), (found,)
+
+
+def _to_tip(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:
+    found = tip(clip, observation)
+    if found is None:
+        return observation, ()
+    which, last = found
+    name, time_s = observation.names[which], float(observation.times_s[last])
+    left = _without(observation, slice(last + 1, None), slice(None))
+    return left, (Cut(name, time_s, "after", TIPS_OVER),)
 
 
 def _without(observation: Observation, frames: slice, objects: slice | int = 0) -> Observation:
