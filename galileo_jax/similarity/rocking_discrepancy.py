@@ -82,9 +82,7 @@ def rocking_steps(
     for frames, rise in when:
         step = np.zeros_like(position)
         done = np.arange(position.shape[-1]) - frames.start + 1
-        step[i, 0] = _ahead(rise, scene, i) * np.clip(
-            done / (frames.stop - frames.start), 0.0, 1.0
-        )
+        step[i, 0] = _ahead(rise, scene, i) * np.clip(done / (frames.stop - frames.start), 0.0, 1.0)
         found.append(step)
     return found
 
