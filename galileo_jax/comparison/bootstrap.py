@@ -89,7 +89,8 @@ def replicates(
         z[:, free] += moved
         true = np.concatenate(_at(trials, fit, z, noise_scale), axis=1)
         residual = noise + true - base
-        now = np.sum(residual**2, axis=1) + np.sum((moved - centre) ** 2, axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # gone beyond all numbers: no better
+            now = np.sum(residual**2, axis=1) + np.sum((moved - centre) ** 2, axis=1)
         improves = now < cost
         best, cost = np.where(improves[:, None], residual, best), np.where(improves, now, cost)
     return np.split(best, ends, axis=1)

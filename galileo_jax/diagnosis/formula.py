@@ -105,7 +105,7 @@ def find_formula(sights: Sequence[Sight]) -> Formula:
     target = np.concatenate([sight.target for sight in sights])
     nothing = float(target @ target)
     to_explain = nothing - sum(sight.free_chi2 for sight in sights)
-    price = max(float(np.log(np.count_nonzero(target))), WORTH * to_explain)
+    price = max(float(np.log(max(np.count_nonzero(target), 1))), WORTH * to_explain)
     log_evidence = sum(sight.log_evidence for sight in sights)
     without = NOT_SIMPLE if log_evidence > CERTAIN else NOTHING
     # An acceleration that is never at work, or never shows, has no formula.

@@ -199,7 +199,8 @@ class PriorTable(NamedTuple):
 
 
 def _grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    return median * np.exp(sd * z)
+    with np.errstate(over="ignore"):  # inf, as `forward` has it: no rollout from there succeeds
+        return median * np.exp(sd * z)
 
 
 def _between(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

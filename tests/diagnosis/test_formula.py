@@ -119,3 +119,10 @@ def test_matching_pursuit_takes_what_explains_most_of_what_is_left():
     target = -3.0 * columns[:, 5] + 2.0 * columns[:, 1] + columns[:, 8]
     assert _matching_pursuit(columns, target) == [[5], [1, 5], [1, 5, 8]]
     assert _matching_pursuit(columns[:, :1], columns[:, 0]) == [[0]]
+
+
+def test_rows_that_stand_still_have_no_formula():
+    """Nothing at all is left to explain."""
+    made = sight(lambda t, q, v: 0 * t)
+    still = replace(made, target=np.zeros(NUM_TIMES), free_chi2=0.0, log_evidence=-40.0)
+    assert find_formula([still]).text == NOTHING

@@ -104,3 +104,11 @@ def test_the_table_in_numpy_is_the_compiled_one_and_each_priors_own(rows):
     exact = np.asarray(table.forward(jnp.asarray(near)))
     assert table.in_units(near) == pytest.approx(exact, rel=1e-11)
     assert table.in_units(z[0]) == pytest.approx(found[0], rel=1e-15)
+
+
+def test_far_out_both_maps_say_the_same():
+    """Beyond all numbers is infinite, without a word on standard error."""
+    table = PriorTable.of([Parameter("c", "", LogNormal(0.4, 0.7), 0.0, "effect", 0.05)])
+    z = np.array([[2000.0]])
+    np.testing.assert_array_equal(table.in_units(z), np.asarray(table.forward(z)))
+    assert np.isinf(table.in_units(z)).all()
