@@ -52,6 +52,7 @@ from galileo_jax.diagnosis.verdict import (
     verdict_of,
     within_luck,
 )
+from galileo_jax.diagnosis.wide_search import widely_searched
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.forms import FORM_NAMES
@@ -125,6 +126,10 @@ def diagnose(
         if not any(explains(c) for c in candidates):
             on_stage("searching pairs from the fit without effects")
             better = pairs_from_base(race, candidates)
+            candidates = _improved(trials, candidates, better, decisive, seed, compared)
+        if not any(explains(c) for c in candidates):
+            on_stage("searching the best pairs from more starts")
+            better = widely_searched(race, candidates)
             candidates = _improved(trials, candidates, better, decisive, seed, compared)
         better = singles_of_pairs(race, candidates)
         candidates = _improved(trials, candidates, better, decisive, seed, compared)
