@@ -129,8 +129,11 @@ def diagnose(
             candidates = _improved(trials, candidates, better, decisive, seed, compared)
         if not any(explains(c) for c in candidates):
             on_stage("searching the best pairs from more starts")
-            better = widely_searched(race, candidates)
-            candidates = _improved(trials, candidates, better, decisive, seed, compared)
+            better, tried = widely_searched(race, candidates), dict(compared)
+            wider = _improved(trials, candidates, better, decisive, seed, tried)
+            # Else formulas would be looked for beside a pair that is wrong in another way.
+            if any(explains(c) for c in wider):
+                candidates, compared = wider, tried
         better = singles_of_pairs(race, candidates)
         candidates = _improved(trials, candidates, better, decisive, seed, compared)
     verdict = _judged(trials, candidates, decisive, on_stage)
