@@ -15,6 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.similarity.noise_scale import mode_covariance
@@ -75,7 +76,7 @@ def replicates(
         [_with_modes(own, problem, scale, size) for own, problem, scale, size in parts], axis=1
     )
     centre = generator.standard_normal((count, len(free)))
-    gain = np.linalg.inv(jacobian.T @ jacobian + np.eye(len(free)))
+    gain = inverse(jacobian.T @ jacobian + np.eye(len(free)))
     base = np.concatenate(_at(trials, fit, fit.z[None], noise_scale), axis=1)
 
     moved = np.zeros((count, len(free)))
@@ -88,7 +89,8 @@ def replicates(
         z[:, free] += moved
         true = np.concatenate(_at(trials, fit, z, noise_scale), axis=1)
         residual = noise + true - base
-        now = np.sum(residual**2, axis=1) + np.sum((moved - centre) ** 2, axis=1)
+        with np.errstate(over="ignore", invalid="ignore"):  # gone beyond all numbers: no better
+            now = np.sum(residual**2, axis=1) + np.sum((moved - centre) ** 2, axis=1)
         improves = now < cost
         best, cost = np.where(improves[:, None], residual, best), np.where(improves, now, cost)
     return np.split(best, ends, axis=1)

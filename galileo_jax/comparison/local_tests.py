@@ -89,5 +89,7 @@ def statistics(white: np.ndarray, cell: Cell, least: float) -> np.ndarray:
     slowness = np.cbrt(np.mean(spectrum**2, axis=1))
     neighbours = np.sum(values[:, 1:] * values[:, :-1], axis=1)
     squares = np.sum(values**2, axis=1)
-    whiteness = neighbours / np.where(neighbours > 0, np.maximum(squares, least), squares)
+    # Residuals that are all exactly 0 (rows that stand still) follow nothing.
+    whole = np.where(neighbours > 0, np.maximum(squares, least), squares)
+    whiteness = neighbours / np.where(whole > 0, whole, 1.0)
     return np.stack([power, slowness, whiteness], axis=1)

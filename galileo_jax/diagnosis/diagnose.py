@@ -52,6 +52,7 @@ from galileo_jax.diagnosis.verdict import (
     verdict_of,
     within_luck,
 )
+from galileo_jax.diagnosis.wide_search import widely_searched
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.forms import FORM_NAMES
@@ -126,6 +127,13 @@ def diagnose(
             on_stage("searching pairs from the fit without effects")
             better = pairs_from_base(race, candidates)
             candidates = _improved(trials, candidates, better, decisive, seed, compared)
+        if not any(explains(c) for c in candidates):
+            on_stage("searching the best pairs from more starts")
+            better, tried = widely_searched(race, candidates), dict(compared)
+            wider = _improved(trials, candidates, better, decisive, seed, tried)
+            # Else formulas would be looked for beside a pair that is wrong in another way.
+            if any(explains(c) for c in wider):
+                candidates, compared = wider, tried
         better = singles_of_pairs(race, candidates)
         candidates = _improved(trials, candidates, better, decisive, seed, compared)
     verdict = _judged(trials, candidates, decisive, on_stage)

@@ -7,6 +7,7 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
                              off; to a stop, a blow, or the rest after which it is carried away
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
     toss                     to the first impact
+    ramp                     to where a box tips over, or two that touch turn aside
     from_above               to a quarter of a second after everything has come to rest
 """
 
@@ -20,10 +21,12 @@ from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.find_blow import blow_frame, goes_on
+from galileo_jax.measurement.find_fold import fold_frame
 from galileo_jax.measurement.find_hand import hand_frame
 from galileo_jax.measurement.find_placed import placed_frames
 from galileo_jax.measurement.find_rest import rest_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
+from galileo_jax.measurement.find_tip import tip
 from galileo_jax.measurement.toss_flight import last_free_frame
 from galileo_jax.observation.observation import Observation
 
@@ -33,6 +36,8 @@ LANDED = "comes down on the table"
 RESTS = "is at rest, as is all that is still seen"
 PLACED = "is put into its place by a hand until then"
 TAKEN = "is taken away by a hand from then on"
+TIPS_OVER = "tips over, and goes on on another face"
+FOLDS = "turns aside and slides past what it pushes: their centres come closer than when they hit"
 HELD = "is moved by a hand until then: it accelerates otherwise than on its way"
 
 
@@ -67,6 +72,8 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
     """The observation with what is not of the scene masked, and where and why, in time's order."""
     if SCENARIOS[clip.scenario].is_level:
         return _to_rest(clip, observation)
+    if SCENARIOS[clip.scenario].has_table:
+        return _of_a_ramp(clip, observation)
     is_let_go = is_board(clip) and not clip.starts_moving
     observation, cuts = _left_to_itself(observation) if is_let_go else (observation, [])
     ends = [
@@ -150,6 +157,20 @@ def _to_rest(clip: Clip, observation: Observation) -> tuple[Observation, tuple[C
         return observation, ()
     rests = int(np.argmax(observation.mask[:, last]))  # one that is still seen
     found = Cut(observation.names[rests], float(observation.times_s[last]), "after", RESTS)
+    return _without(observation, slice(last + 1, None), slice(None)), (found,)
+
+
+def _of_a_ramp(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:
+    over = tip(clip, observation)
+    ends = [] if over is None else [(over[1], over[0], TIPS_OVER)]
+    for front in range(1, len(observation.names)):
+        last = fold_frame(clip, observation, front)
+        if last is not None:
+            ends.append((last, front - 1, FOLDS))
+    if not ends:
+        return observation, ()
+    last, which, why = min(ends)
+    found = Cut(observation.names[which], float(observation.times_s[last]), "after", why)
     return _without(observation, slice(last + 1, None), slice(None)), (found,)
 
 

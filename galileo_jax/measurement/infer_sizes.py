@@ -50,7 +50,7 @@ def infer_sizes(clip: Clip, observation: Observation) -> Mapping[str, tuple[floa
         extents(item)[0] if item.size_m else None for item in clip.objects
     ]  # half, as `heights`
     for k in range(len(lengths) - 1):
-        apart = _distance_at_hit(observation, k)
+        apart = distance_at_hit(observation, k)
         pair = lengths[k], lengths[k + 1]
         if apart is None or None not in pair:
             continue
@@ -74,7 +74,7 @@ def _height(observation: Observation, k: int, angle: float) -> float:
     return float(np.clip(height, MIN_SIZE_M / 2, MAX_SIZE_M / 2))
 
 
-def _distance_at_hit(observation: Observation, k: int) -> float | None:
+def distance_at_hit(observation: Observation, k: int) -> float | None:
     """Between the centres of objects k and k + 1 when the one hits the other, m; None if never."""
     both = observation.mask[k] & observation.mask[k + 1]
     first, second = observation.position_m[k, 0, both], observation.position_m[k + 1, 0, both]

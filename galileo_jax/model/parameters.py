@@ -239,7 +239,8 @@ def _grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
 
 
 def _far_grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    return median * np.exp(sd * _stretched(z))
+    with np.errstate(over="ignore"):
+        return median * np.exp(sd * _stretched(z))
 
 
 def _between(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:

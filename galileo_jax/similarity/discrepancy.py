@@ -15,6 +15,7 @@ from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.observation.random_patterns import SMALLEST, random_patterns
 from galileo_jax.similarity.hit_discrepancy import after_hits
+from galileo_jax.similarity.rocking_discrepancy import rocking, rocking_frames, rocking_steps
 
 POINT_SD_M = 0.003  # how far a marked point is from the centre
 OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table
@@ -108,6 +109,8 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
     elif not scene.moves_in_plane:
         found.extend(_aside(position))
     found.extend(after_hits(position, observation, is_filmed))
+    for i in range(count):
+        found.extend(rocking_steps(position, scene, i, _rocks(position, observation, scene, i)))
     return np.stack(found)
 
 
@@ -214,7 +217,22 @@ def crossings(observation: Observation, scene: Surroundings) -> np.ndarray:
             for axis in range(2):
                 own[axis, np.arange(len(frames)), i, axis, frames] = size
             found.extend(own)
+        alone = rocking_frames(position, scene, i, _rocks(position, observation, scene, i))
+        if alone:
+            found.append(np.stack(alone))
     return np.concatenate(found)
+
+
+def _rocks(
+    position: np.ndarray, observation: Observation, scene: Surroundings, i: int
+) -> list[tuple[slice, float]]:
+    """When object i rocks, once it is past the foot, and how high."""
+    if not scene.has_table:
+        return []
+    past = np.ones(position.shape[-1], bool)
+    if scene.comes_down[i]:
+        past = _share_past_foot(position[i, 0], scene, i) == 1
+    return rocking(position, observation, scene, i, past)
 
 
 def _share_past_foot(x: np.ndarray, scene: Surroundings, i: int) -> np.ndarray:

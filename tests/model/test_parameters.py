@@ -122,7 +122,8 @@ def test_the_table_in_numpy_is_the_compiled_one_and_each_priors_own(rows):
     assert table.in_units(z[0]) == pytest.approx(found[0], rel=1e-15)
 
 
-def test_what_is_out_of_reach_is_infinite_without_a_warning():
-    table = PriorTable.of([Parameter("m1", "kg", LogNormal(0.4, 0.8), 0.0)])
+@pytest.mark.parametrize("prior", [LogNormal(0.4, 0.7), LongTailed(0.4, 0.7)])
+def test_what_is_out_of_reach_is_infinite_without_a_warning(prior):
+    table = PriorTable.of([Parameter("m1", "kg", prior, 0.0)])
     z = np.array([1e4])
     assert table.in_units(z).tolist() == [np.inf] == np.asarray(table.forward(z)).tolist()

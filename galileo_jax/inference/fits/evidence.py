@@ -6,6 +6,7 @@ from enum import StrEnum
 import numpy as np
 from jaxtyping import Bool, Float
 
+from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.polish import Polished
 from galileo_jax.inference.fits.programs import FAILED
 from galileo_jax.inference.fits.residuals import Residuals, Slopes, cost, quadratic
@@ -138,7 +139,7 @@ def _covariance(
     """Of z, noise scales last; 0 where pinned."""
     count, own = len(free), np.flatnonzero(free)
     whole = np.zeros((count + len(scale),) * 2)
-    whole[np.ix_(own, own)] = np.linalg.inv(normal[np.ix_(own, own)])
+    whole[np.ix_(own, own)] = inverse(normal[np.ix_(own, own)])
     for c, (clip, s) in enumerate(zip(residuals.clips, scale, strict=True)):
         information = float(GaussianLikelihood.information(s, clip.data.whitening))
         whole[count + c, count + c] = 1 / (1 + information * NOISE_SD**2)

@@ -30,6 +30,7 @@ from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH, Ends
 from galileo_jax.inference.fits.evidence import Code as Code
 from galileo_jax.inference.fits.evidence import GradientFit as GradientFit
 from galileo_jax.inference.fits.evidence import laplace_fits
+from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.polish import BEHIND as BEHIND
 from galileo_jax.inference.fits.polish import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
@@ -281,7 +282,7 @@ class GradientFitter:
             starts = scattered_round(short, centres, is_open, self.settings.num_starts, seed)
             ends = phase._ends(starts, free, self.settings.num_refined)
             self._residuals.num_rollouts += phase._residuals.num_rollouts
-            variance = np.diagonal(np.linalg.inv(ends.best.normal), axis1=1, axis2=2)
+            variance = np.diagonal(inverse(ends.best.normal), axis1=1, axis2=2)
             centres, is_open = ends.best.z, is_main & (variance > OPEN_SD_Z**2)
         return scattered_round(self.trials, centres, is_open, num, seed)
 

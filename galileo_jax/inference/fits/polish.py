@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from galileo_jax.inference.fits.descent import CATCHES_UP, Descent, GiveUp
+from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.similarity.noise_scale import fitted_noise_scale
@@ -66,7 +67,7 @@ def polish(
     num_values = np.array([clip.data.whitening.num_values for clip in descent.residuals.clips])
     for _ in range(MAX_ROUNDS):
         here = Batch(z, points.free, noise).take(active)
-        used = size - np.trace(np.linalg.inv(normal[active]), axis1=1, axis2=2)
+        used = size - np.trace(inverse(normal[active]), axis1=1, axis2=2)
         scales = noise_scales(descent.residuals, here, used)
         drifts = np.abs(scales / noise[active] - 1).max(axis=1) > DRIFT
         noise[active] = scales
