@@ -84,7 +84,7 @@ def test_air_drag_is_what_is_missing(infer):
         assert covered(missing, i, true) > LEAST_COVERED
     seen, speed = np.isfinite(missing.acceleration_m_s2[0]), missing.speed_m_s[0]
     largest = constant / truth["m1"] * np.nanmax(speed[seen]) ** 2
-    assert np.median(missing.sd_m_s2[0, seen]) < 0.1 * largest, "the band says something"
+    assert np.median(missing.sd_m_s2[0, seen]) < 0.15 * largest, "the band says something"
 
 
 def test_air_drag_shows_only_in_motion(infer):

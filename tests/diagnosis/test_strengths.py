@@ -1,5 +1,6 @@
 """The best of all strengths is found where a little more changes everything."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from galileo_jax.diagnosis.candidate_starts import best_strengths
+from galileo_jax.model.parameters import Normal, Parameter
 
 HELD = 1e6  # chi2 / 2 of a body that never sets off
 
@@ -16,7 +18,8 @@ class Cliff:
     """Cost falls up to an edge, past which the body is held for ever."""
 
     def __init__(self, edge: float):
-        self.edge = edge
+        parameters = [Parameter(name, "1", Normal(0.0, 1.0), 0.0) for name in ("k1", "strength")]
+        self.edge, self.trials = edge, SimpleNamespace(model_parameters=parameters)
 
     def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         assert len(free) == len(z)
