@@ -7,10 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from galileo_jax.inference.fits import gradient
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import inverse
+from galileo_jax.rollout.engines import make_engine
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -136,3 +139,15 @@ def test_the_evidence_prefers_the_simpler_of_two_that_fit(library, pinned):
     with_drag = fit(library, effects=("air_drag",))
     assert with_drag.free.all()
     assert pinned.log_evidence > with_drag.log_evidence
+
+
+@pytest.mark.parametrize("engine", ["rigid", "c"])
+def test_only_engines_in_jax_are_called_side_by_side(engine, monkeypatch):
+    """MuJoCo's keep one set of simulations for all batches of a size: two threads would mix."""
+    (problem,) = make_trials([HIT]).problems
+    model = problem.model
+    trials = JointProblem((replace(problem, engine=make_engine(engine, model)),))
+    at_once = []
+    monkeypatch.setattr(gradient, "side_by_side", at_once.extend)
+    GradientFitter(trials).compile()
+    assert len(at_once) == (2 if engine == "rigid" else 0)

@@ -114,7 +114,11 @@ class GradientFitter:
             free = self.trials.free(effects)[: self._count]
             parts.append(functools.partial(self._descent, self._batch(one, free), np.inf, 1))
             parts.append(functools.partial(self._residuals.costs, self._batch(many, free)))
-        side_by_side(parts)
+        if self._descent.is_smooth:
+            side_by_side(parts)
+        else:  # MuJoCo's engines keep one set of simulations for all batches of a size
+            for part in parts:
+                part()
 
     def fit(
         self,
