@@ -239,8 +239,7 @@ def _grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
 
 
 def _far_grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    with np.errstate(over="ignore"):
-        return median * np.exp(sd * _stretched(z))
+    return _grown(_stretched(z), median, sd)
 
 
 def _between(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
