@@ -9,6 +9,7 @@ import galileo_jax
 from galileo_jax import __version__
 from galileo_jax.commands import command
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.jax_import import without_search_for_rocm
 from galileo_jax.runtime.known_names import did_you_mean
 
 VERBS = (
@@ -50,6 +51,7 @@ def main(argv: Sequence[str]) -> int | None:
         return 0
     # Read when NumPy is imported. Matrices here are small: its threads would wait for each other.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    without_search_for_rocm()
     if verb not in dict(VERBS):
         hint = did_you_mean(verb, dict(VERBS)) or ";"
         raise InputError(f"unknown verb {verb!r}{hint} {_known()}")
