@@ -95,6 +95,13 @@ class SimulatedLab:
         self._simulate(path, **options, track_noise=noise_m)
         return path.read_text()
 
+    def is_right(self, law: Mapping[str, Any]) -> bool:
+        """Whether a formula (of discover.json) is that of the hidden law; see `laws.py`."""
+        if not self._is_law:
+            return False
+        name = self.effect.removeprefix(HIDDEN)
+        return _process().submit(_judged, name, law["family"], law["constants"]).result()
+
     @property
     def _is_law(self) -> bool:
         return self.effect.startswith(HIDDEN)
@@ -115,3 +122,9 @@ def _process() -> ProcessPoolExecutor:
 
 def _with_laws(path: Path, options: Mapping[str, Any]) -> gx.Simulated:
     return gx.simulate(path, **options, effects_from=[LAWS_FILE])
+
+
+def _judged(name: str, family: str, constants: Mapping[str, Any]) -> bool:
+    from laws import is_right  # registers the laws, which only this process may know
+
+    return is_right(name, family, constants)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from galileo_jax.api.diagnose import Diagnosis, diagnose
 from galileo_jax.api.next_experiment import rehearsed
 from galileo_jax.experiment.choose import LITTLE
-from galileo_jax.experiment.journal import Journal, open_journal
+from galileo_jax.experiment.journal import Journal, law_row, open_journal
 from galileo_jax.experiment.lab import Described, Lab, LabError, program_of
 from galileo_jax.experiment.measured import write_clip
 from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
@@ -44,7 +44,7 @@ class Discovery:
 
     @property
     def status(self) -> str | None:
-        """Of the last verdict: none, named, ambiguous, unknown; None without any."""
+        """Of the last verdict: none, named, ambiguous, law, unknown; None without any."""
         rounds = self.document["rounds"]
         return rounds[-1]["status"] if rounds else None
 
@@ -71,7 +71,7 @@ class Discovery:
 
     @property
     def rounds(self) -> "pd.DataFrame":
-        """One row per verdict: `clips, status, effects, form, sentence, hypotheses`."""
+        """One row per verdict: `clips, status, effects, form, law, sentence, hypotheses`."""
         import pandas as pd
 
         return pd.DataFrame(self.document["rounds"])
@@ -246,6 +246,7 @@ class _Loop:
             "status": verdict.status,
             "effects": list(verdict.effects),
             "form": verdict.form,
+            "law": None if verdict.law is None else law_row(verdict.law),
             "sentence": found.sentence,
             "p_value": found.document["p_value"],
         }
