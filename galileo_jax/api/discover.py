@@ -155,6 +155,9 @@ def discover(
         journal.held = held
         loop = _Loop(lab, described, can, journal, budget, tuple(map(str, effects_from)))
         found = loop.run()
+        if found is None and journal.rounds and not (folder / DIAGNOSIS).is_dir():
+            with progress.part(MOST_SHARE, 0.99):  # broken off before it was saved
+                found = loop.diagnosed_again()
         made = Discovery(journal.document, found, None if out is None else folder)
         if out is not None:
             progress.report("writing the pages", 0.99)
@@ -255,6 +258,10 @@ class _Loop:
         progress.report("diagnosed", share, {"round": row})
         return found
 
+    def diagnosed_again(self) -> Diagnosis:
+        """The diagnosis of all tracks, of which the journal has the verdict only."""
+        return self._diagnosed([one["clip"] for one in self._journal.tracks])
+
     def _diagnosed(self, clips: Sequence[str]) -> Diagnosis:
         return diagnose(
             [self._journal.folder / clip for clip in clips],
@@ -290,7 +297,7 @@ class _Loop:
                 "no track yet: as different as can be from what came to nothing"
             )
         if found is None:  # begun again after the budget was spent
-            found = self._diagnosed([one["clip"] for one in journal.tracks])
+            found = self.diagnosed_again()
         try:
             with progress.part(self._share(DIAGNOSED), self._share(1.0)):
                 ahead = rehearsed(found, settings, journal.seed)

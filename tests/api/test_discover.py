@@ -73,7 +73,7 @@ def verdicts(monkeypatch):
             verdict=Verdict(status, effects, law=law),
             sentence=f"it is {status}",
             document={"p_value": 0.5},
-            save=lambda folder: None,
+            save=lambda folder: folder.mkdir(exist_ok=True),
         )
 
     def rehearsed(found, settings, seed):
@@ -208,6 +208,18 @@ def test_interrupted_it_goes_on_where_it_was(where, verdicts, tmp_path):
     third = Lab()
     done = gx.discover(third, out=tmp_path)
     assert third.asked == [] and done.document["rounds"] == found.document["rounds"]
+
+
+def test_broken_off_before_it_was_saved_the_diagnosis_is_made_again(verdicts, tmp_path):
+    verdicts.statuses = ["named", "named", "named"]
+    gx.discover(Lab(), out=tmp_path)
+    (tmp_path / "diagnosis").rmdir()
+    lab = Lab()
+    gx.discover(lab, out=tmp_path)
+    assert (tmp_path / "diagnosis").is_dir() and lab.asked == []
+    assert verdicts.clips[2] == verdicts.clips[1], "of the same clips"
+    gx.discover(lab, out=tmp_path)
+    assert len(verdicts.clips) == 3, "once"
 
 
 def test_what_cannot_be_rehearsed_is_tried_all_the_same(verdicts, monkeypatch):
