@@ -54,8 +54,8 @@ def farthest(
 def stands(rounds: Sequence[Mapping[str, Any]]) -> bool:
     """Whether the last verdict has stood for long enough to be believed.
 
-    A law stands by its formula: whether it is a force or an acceleration, of one object or of all,
-    may change from clip to clip without the formula being another.
+    A law stands by its formula, as a push or as a change of friction: whether it is a force or an
+    acceleration, of one object or of all, may change from clip to clip without its being another.
     """
     if not rounds:
         return False
@@ -69,7 +69,12 @@ def stands(rounds: Sequence[Mapping[str, Any]]) -> bool:
 def _says(one: Mapping[str, Any]) -> tuple[str, Any]:
     """What a verdict is and what it is about."""
     law = one.get("law") if one["status"] == "law" else None
-    return one["status"], one["effects"] if law is None else law["family"]
+    if law is None:
+        return one["status"], one["effects"]
+    # What a formula changes stands in its effect's name (`laws.source.name_of`). One passage does
+    # not tell a push from a change of friction; passages at several slopes do.
+    is_friction = [name.startswith("law_friction_") for name in one["effects"]]
+    return one["status"], (law["family"], is_friction)
 
 
 def _unit(can: Can, settings: Sequence[Mapping[str, Any]]) -> np.ndarray:

@@ -10,6 +10,7 @@ def law(effect: str, family: str) -> dict:
 
 
 PUSH, FORCE = law("law_drag_power_v_all", "power_v"), law("law_drag_force_power_v_all", "power_v")
+RUBS = law("law_friction_power_v_all", "power_v")
 OTHER = law("law_push_power_t", "power_t")
 NAMED = {"status": "named", "effects": ["air_drag"], "law": None}
 BRAKED = {"status": "named", "effects": ["magnetic_brake"], "law": None}
@@ -31,6 +32,7 @@ OLD = {"status": "law", "effects": ["law_push_power_t"]}
         ([PUSH, PUSH], True),
         ([PUSH, FORCE], True),  # one formula, of an acceleration and of a force
         ([PUSH, OTHER], False),
+        ([PUSH, RUBS], False),
         ([OPEN] * 9, False),
         ([OLD, OLD], True),  # of a journal before formulas stood there
     ],
