@@ -54,10 +54,12 @@ def _lab(call: argparse.Namespace, effect: str, seed: int) -> dict[str, Any]:
     found = gx.discover(lab, budget=call.budget, out=folder / "run", seed=seed)
     says = "+".join(found.effects) or str(found.status)
     is_settled = found.status in ("named", "none", "law")
-    is_right = is_settled and says == effect
+    law = found.document["rounds"][-1]["law"] if found.status == "law" else None
+    is_right = is_settled and (says == effect if law is None else lab.is_right(law))
     row = {
         "lab": f"{effect} {seed}",
         "verdict": says if found.status != "ambiguous" else "ambiguous",
+        "law": None if law is None else law["text"],
         "experiments": len(found.experiments),
         "is_right": is_right,
         "is_wrong": is_settled and not is_right,

@@ -11,7 +11,7 @@ finished stays in DIR/results.jsonl. The last line is JSON.
 import argparse
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
 from galileo_jax.diagnosis.diagnose import diagnose
-from galileo_jax.diagnosis.diagnosis import Diagnosis
+from galileo_jax.diagnosis.diagnosis import Diagnosis, Law
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects.forms import FORMS
@@ -132,16 +132,20 @@ def _one(call: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:
         "chi2_after": found.rounds[-1].comparison.error["chi2_per_dof"],
     }
     row["best_right"] = best is not None and _is_right(name, best.law)
-    row["right"] = found.verdict.law is not None and _is_right(name, found.verdict.law)
+    row["right"] = _is_right(name, found.verdict.law)
     row["pysindy"], row["pysindy_right"] = _by_pysindy(name, found)
     return row
 
 
-def _is_right(name: str, law: Any) -> bool:
+def _is_right(name: str, law: Law | None) -> bool:
+    return law is not None and is_right(name, law.family, law.constants)
+
+
+def is_right(name: str, family_name: str, constants: Mapping[str, Any]) -> bool:
     """Whether a formula has the right variables, and the right exponent of a power."""
     if name not in LAWS:
         return False
-    truth, family = LAWS[name], law.family.split("*")
+    truth, family = LAWS[name], family_name.split("*")
     if sorted(each[-1] for each in family) != sorted(truth.variables):
         return False
     if truth.power is None:
@@ -150,7 +154,7 @@ def _is_right(name: str, law: Any) -> bool:
         return abs(truth.power - 1.0) <= EXPONENT
     if not family[0].startswith("power"):
         return False
-    power = law.constants.get("n", law.constants.get("p"))
+    power = constants.get("n", constants.get("p"))
     return abs(float(power) - truth.power) <= EXPONENT
 
 

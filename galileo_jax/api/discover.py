@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from galileo_jax.api.diagnose import Diagnosis, diagnose
 from galileo_jax.api.next_experiment import rehearsed
 from galileo_jax.experiment.choose import LITTLE
-from galileo_jax.experiment.journal import Journal, open_journal
+from galileo_jax.experiment.journal import Journal, law_row, open_journal
 from galileo_jax.experiment.lab import Described, Lab, LabError, program_of
 from galileo_jax.experiment.measured import write_clip
 from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
@@ -44,7 +44,7 @@ class Discovery:
 
     @property
     def status(self) -> str | None:
-        """Of the last verdict: none, named, ambiguous, unknown; None without any."""
+        """Of the last verdict: none, named, ambiguous, law, unknown; None without any."""
         rounds = self.document["rounds"]
         return rounds[-1]["status"] if rounds else None
 
@@ -71,7 +71,7 @@ class Discovery:
 
     @property
     def rounds(self) -> "pd.DataFrame":
-        """One row per verdict: `clips, status, effects, form, sentence, hypotheses`."""
+        """One row per verdict: `clips, status, effects, form, law, sentence, hypotheses`."""
         import pandas as pd
 
         return pd.DataFrame(self.document["rounds"])
@@ -155,6 +155,9 @@ def discover(
         journal.held = held
         loop = _Loop(lab, described, can, journal, budget, tuple(map(str, effects_from)))
         found = loop.run()
+        if found is None and journal.rounds and not (folder / DIAGNOSIS).is_dir():
+            with progress.part(MOST_SHARE, 0.99):  # broken off before it was saved
+                found = loop.diagnosed_again()
         made = Discovery(journal.document, found, None if out is None else folder)
         if out is not None:
             progress.report("writing the pages", 0.99)
@@ -246,6 +249,7 @@ class _Loop:
             "status": verdict.status,
             "effects": list(verdict.effects),
             "form": verdict.form,
+            "law": None if verdict.law is None else law_row(verdict.law),
             "sentence": found.sentence,
             "p_value": found.document["p_value"],
         }
@@ -253,6 +257,10 @@ class _Loop:
         journal.write()
         progress.report("diagnosed", share, {"round": row})
         return found
+
+    def diagnosed_again(self) -> Diagnosis:
+        """The diagnosis of all tracks, of which the journal has the verdict only."""
+        return self._diagnosed([one["clip"] for one in self._journal.tracks])
 
     def _diagnosed(self, clips: Sequence[str]) -> Diagnosis:
         return diagnose(
@@ -289,7 +297,7 @@ class _Loop:
                 "no track yet: as different as can be from what came to nothing"
             )
         if found is None:  # begun again after the budget was spent
-            found = self._diagnosed([one["clip"] for one in journal.tracks])
+            found = self.diagnosed_again()
         try:
             with progress.part(self._share(DIAGNOSED), self._share(1.0)):
                 ahead = rehearsed(found, settings, journal.seed)

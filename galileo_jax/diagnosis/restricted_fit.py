@@ -33,4 +33,5 @@ def restricted_fit(fit: GradientFit, whole: JointProblem, part: JointProblem) ->
         covariance=fit.covariance[np.ix_(columns, columns)],
         steps=fit.steps[model],
         jacobian=fit.jacobian[:, model],
+        beside=tuple(restricted_fit(one, whole, part) for one in fit.beside),
     )

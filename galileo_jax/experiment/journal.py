@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.diagnosis.diagnosis import Law
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 
@@ -24,7 +25,7 @@ class Journal:
       lab: of the lab: `{"settings": ..., "clip": ...}`, as it describes itself.
       experiments: `{number, settings, reason, outcome, line, clip}` each; outcome: None while it
         is being made, "track", or "lost" with the line that says why.
-      rounds: a verdict each: `{clips, status, effects, form, sentence, hypotheses}`.
+      rounds: a verdict each: `{clips, status, effects, form, law, sentence, hypotheses}`.
       held: settings that are left alone, by name.
       ended: why nothing more is done; None while something is.
     """
@@ -69,6 +70,12 @@ class Journal:
     def write(self) -> None:
         """Writes discover.json."""
         write_json(self.folder / FILE, self.document)
+
+
+def law_row(law: Law) -> dict[str, Any]:
+    """A formula as a round has it: its text, its shape and its constants."""
+    constants = {name: float(value) for name, value in law.constants.items()}
+    return {"text": law.text, "family": law.family, "constants": constants}
 
 
 def open_journal(folder: Path, lab: dict[str, Any], seed: int) -> Journal:

@@ -52,17 +52,29 @@ def farthest(
 
 
 def stands(rounds: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether the last verdict has stood for long enough to be believed."""
+    """Whether the last verdict has stood for long enough to be believed.
+
+    A law stands by its formula, as a push or as a change of friction: whether it is a force or an
+    acceleration, of one object or of all, may change from clip to clip without its being another.
+    """
     if not rounds:
         return False
     last = rounds[-1]
     needed = STANDS.get(last["status"])
     if needed is None or len(rounds) < needed:
         return False
-    return all(
-        one["status"] == last["status"] and one["effects"] == last["effects"]
-        for one in rounds[-needed:]
-    )
+    return all(_says(one) == _says(last) for one in rounds[-needed:])
+
+
+def _says(one: Mapping[str, Any]) -> tuple[str, Any]:
+    """What a verdict is and what it is about."""
+    law = one.get("law") if one["status"] == "law" else None
+    if law is None:
+        return one["status"], one["effects"]
+    # What a formula changes stands in its effect's name (`laws.source.name_of`). One passage does
+    # not tell a push from a change of friction; passages at several slopes do.
+    is_friction = [name.startswith("law_friction_") for name in one["effects"]]
+    return one["status"], (law["family"], is_friction)
 
 
 def _unit(can: Can, settings: Sequence[Mapping[str, Any]]) -> np.ndarray:

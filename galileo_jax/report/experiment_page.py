@@ -89,7 +89,7 @@ def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -
         [
             str(len(one["clips"])),
             escape(one["status"]),
-            escape(", ".join(one["effects"]) or one["form"] or ""),
+            escape(_what(one)),
             escape(p_text(one["p_value"])),
         ]
         for one in record["rounds"]
@@ -113,6 +113,14 @@ def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -
         f"<h2>Left alone</h2>\n{items(held)}" if held else "",
     ]
     write_text(path, document("discovery", [part for part in sections if part]))
+
+
+def _what(one: Mapping[str, Any]) -> str:
+    """What a verdict is about: a formula reads better than the name of its effect."""
+    law = one.get("law")
+    if law is not None and one["status"] == "law":
+        return str(law["text"])
+    return ", ".join(one["effects"]) or one["form"] or ""
 
 
 def _names(record: Mapping[str, Any]) -> Sequence[str]:

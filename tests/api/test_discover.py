@@ -12,7 +12,7 @@ import pytest
 
 import galileo_jax as gx
 from galileo_jax.api import discover as module
-from galileo_jax.diagnosis.diagnosis import Verdict
+from galileo_jax.diagnosis.diagnosis import Law, Verdict
 from galileo_jax.experiment.choose import Expected
 from galileo_jax.experiment.lab import LabError, described
 from galileo_jax.runtime.errors import InputError
@@ -22,6 +22,8 @@ CLIP = {
     "objects": [{"name": "object1", "shape": "box", "size_m": [0.06, 0.06, 0.06]}],
 }
 SETTINGS = {"height_m": {"low": 0.1, "high": 0.5}, "angle_deg": {"choices": [20.0]}}
+
+LAW = Law("a = -0.8 |v|^1.5 sign(v), all objects", "power_v", "", {"c": "0.8", "n": "1.5"})
 
 
 class Lab:
@@ -61,12 +63,17 @@ def verdicts(monkeypatch):
         status = given.statuses.pop(0) if given.statuses else "ambiguous"
         if isinstance(status, BaseException):
             raise status
-        effects = {"named": ("air_drag",), "ambiguous": ("air_drag", "rolling")}.get(status, ())
+        effects = {
+            "named": ("air_drag",),
+            "ambiguous": ("air_drag", "rolling"),
+            "law": ("law_drag_v_power",),
+        }.get(status, ())
+        law = LAW if status == "law" else None
         return types.SimpleNamespace(
-            verdict=Verdict(status, effects),
+            verdict=Verdict(status, effects, law=law),
             sentence=f"it is {status}",
             document={"p_value": 0.5},
-            save=lambda folder: None,
+            save=lambda folder: folder.mkdir(exist_ok=True),
         )
 
     def rehearsed(found, settings, seed):
@@ -101,6 +108,18 @@ def test_it_ends_when_the_verdict_has_stood(verdicts, tmp_path):
     assert shares == sorted(shares) and shares[-1] == 1.0
     assert len([part for _, part in told if part and "experiment" in part]) == 3
     assert list(found.experiments.columns[:2]) == ["number", "settings"]
+
+
+def test_a_law_is_left_with_its_formula(verdicts, tmp_path):
+    verdicts.statuses = ["unknown", "law", "law"]
+    found = gx.discover(Lab(), out=tmp_path)
+    document = json.loads((tmp_path / "discover.json").read_text())
+    assert [one["law"] for one in document["rounds"]] == [
+        None,
+        *[{"text": LAW.text, "family": "power_v", "constants": {"c": 0.8, "n": 1.5}}] * 2,
+    ]
+    assert document["ended"] == "the verdict (law) has stood" and found.status == "law"
+    assert "a = -0.8 |v|^1.5" in (tmp_path / "report.html").read_text()
 
 
 @pytest.mark.parametrize(
@@ -189,6 +208,18 @@ def test_interrupted_it_goes_on_where_it_was(where, verdicts, tmp_path):
     third = Lab()
     done = gx.discover(third, out=tmp_path)
     assert third.asked == [] and done.document["rounds"] == found.document["rounds"]
+
+
+def test_broken_off_before_it_was_saved_the_diagnosis_is_made_again(verdicts, tmp_path):
+    verdicts.statuses = ["named", "named", "named"]
+    gx.discover(Lab(), out=tmp_path)
+    (tmp_path / "diagnosis").rmdir()
+    lab = Lab()
+    gx.discover(lab, out=tmp_path)
+    assert (tmp_path / "diagnosis").is_dir() and lab.asked == []
+    assert verdicts.clips[2] == verdicts.clips[1], "of the same clips"
+    gx.discover(lab, out=tmp_path)
+    assert len(verdicts.clips) == 3, "once"
 
 
 def test_what_cannot_be_rehearsed_is_tried_all_the_same(verdicts, monkeypatch):

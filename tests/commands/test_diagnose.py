@@ -1,6 +1,7 @@
 """`galileo diagnose`: diagnosis.json by contract, a hidden effect is found, wrong calls."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.results.run import load_run
 from galileo_jax.runtime.atomic_write import write_json
@@ -96,6 +98,9 @@ def test_a_hypothesis_by_itself_moves_as_in_the_library(trials, tmp_path):
     assert alone.jacobian.shape == (part.num_values, len(part.model_parameters))
     whole = trials.problems[0].simulate(trials.of_clip(trials.theta(fit.z, fit.free), 0))
     np.testing.assert_array_equal(problem.simulate(part.of_clip(part.theta(alone.z), 0)), whole)
+    two = restricted_fit(replace(fit, beside=(fit,)), trials, part)
+    np.testing.assert_array_equal(two.beside[0].z, alone.z)
+    assert laplace_posterior(part, two, seed=1).draws.shape[-1] == len(part.parameters)
     with pytest.raises(ValueError, match="has not"):
         restricted_fit(fit_of(trials, ("viscous_drag",)), trials, part)
 
