@@ -39,19 +39,19 @@ class Finished:
 
 
 def finished(
-    fits: Sequence[list[Refined | None]], pieces: Sequence[Piece], exposure_share: float
+    fits: Sequence[list[Refined | None]], pieces: Sequence[Piece], shares: Sequence[float]
 ) -> list[Finished]:
     """The pieces' tracks from their fits of every frame (None: not found).
 
     Args:
       fits: per piece, per frame.
       pieces: with the points to follow, each in its piece's first frame.
-      exposure_share: open share of a frame's time.
+      shares: per piece, the open share of a frame's time.
     """
     seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
     seen = [
-        _at_mid_exposure(poses, noise, exposure_share, piece)
-        for (poses, noise), piece in zip(seen, pieces, strict=True)
+        _at_mid_exposure(poses, noise, share, piece)
+        for (poses, noise), piece, share in zip(seen, pieces, shares, strict=True)
     ]
     excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
     return [
