@@ -35,6 +35,7 @@ class Finished:
 
     position_px: np.ndarray
     covariance_px2: np.ndarray
+    common_px2: np.ndarray
     angle_rad: np.ndarray
 
 
@@ -63,12 +64,17 @@ def finished(
 def joined(pieces: Sequence[Finished], count: int) -> Finished:
     """One object's pieces, which follow each other, as one track of so many frames."""
     whole = Finished(
-        np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan), np.full(count, np.nan)
+        np.full((count, 2), np.nan),
+        np.full((count, 2, 2), np.nan),
+        np.full((count, 2, 2), np.nan),
+        np.full(count, np.nan),
     )
     for piece in pieces:
         is_seen = np.isfinite(piece.angle_rad)
         for into, part in zip(vars(whole).values(), vars(piece).values(), strict=True):
             into[is_seen] = part[is_seen]
+    if len(pieces) > 1:
+        whole.common_px2[:] *= 0.0  # each piece has its own
     return whole
 
 
@@ -117,6 +123,7 @@ def _anchored(
     first_frame, point_px = piece.first_frame, np.array(piece.point_px)
     first_fit = fits[first_frame] if first_frame < len(fits) else None
     anchor = np.array([*point_px, 0.0])
+    common = np.zeros_like(covariance)
     if first_fit is not None:
         anchor, anchor_noise = first_fit.pose, first_fit.covariance
         at_rest = frames[np.cumprod(~moves.any(axis=1)).astype(bool)] if len(frames) else frames
@@ -125,7 +132,8 @@ def _anchored(
         if len(began):
             anchor = poses[began].mean(axis=0)
             anchor_noise = noise[began].mean(axis=0) / max(1.0, len(began) / MEMORY_FRAMES)
-        covariance += anchor_noise
+        common = np.broadcast_to(anchor_noise, covariance.shape)
+        covariance += common
     covariance += SAMPLING_SD_PX**2 * np.eye(2)
     if piece.is_clicked:
         covariance += CLICK_SD_PX**2 * np.eye(2)
@@ -133,7 +141,7 @@ def _anchored(
     angle = poses[:, 2] - anchor[2]
     arm = point_px - anchor[:2]
     position = poses[:, :2] + np.stack([rotation(a) @ arm for a in angle])
-    return Finished(position, covariance, angle + piece.turned_rad)
+    return Finished(position, covariance, common, angle + piece.turned_rad)
 
 
 def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray:
