@@ -21,6 +21,7 @@ from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_si
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.track_cache import track_once
+from galileo_jax.measurement.wander_size import with_wander
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
@@ -100,6 +101,8 @@ def measure(clip: Clip) -> Measurement:
         measured = replace(measured, clip=moving)
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
     observation = to_last_cut(observation, cuts)
+    if is_level(measured.clip):
+        observation = with_wander(observation)
     if pixels is None and observation.position_m.shape[1] == 2:
         # In space and from above the likelihood lets every track wander.
         observation, said = with_errors_in_time(observation)

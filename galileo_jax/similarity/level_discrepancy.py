@@ -34,7 +34,8 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
             own = np.zeros_like(position)
             own[:, :2] = pattern[:, :2]
             found.append(own)
-        found.extend(wander(observation, WOBBLE_SD_M, WOBBLE_S, smallest=0.0))
+        size_m = WOBBLE_SD_M if observation.wander_m is None else observation.wander_m
+        found.extend(wander(observation, size_m, WOBBLE_S, smallest=0.0))
     for i, j in combinations(range(len(position)), 2):
         both = observation.mask[i] & observation.mask[j]
         apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
