@@ -1,16 +1,19 @@
 """Tracks gone astray: where what is tracked is not, or hardly, the object that was marked.
 
 The tracker drops what does not look like its object (correlation below 0.7), and may go on with
-something that does. So there are two signs, looked for in every object's track:
+something that does. So there are three signs, looked for in every object's track:
 
     leapt   it changes its speed as only a blow could, where nothing is to be hit
+    shared  of pucks seen from above: it is where another one is; at least one of the tracks is
+            of something else, and both are left out from there on
     lost    it is not found any more, though it did not leave the picture
 
 Something that looks the same, and where the object might well be after a time out of sight, only
 the fit tells from it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,15 +35,25 @@ UNKNOWN_M = 0.06
 """The size of an object that nobody measured."""
 LOST_FRAMES = 10
 """An object that is hidden for less is not lost."""
+APART = 0.8
+"""Pucks lie side by side: their centres are never within this share of the sum of their radii."""
 
 
 @dataclass(frozen=True)
 class Astray:
-    """From when on an object's track is not to be believed, and why."""
+    """From when on an object's track is not to be believed, and why.
+
+    Attributes:
+      name: the object's.
+      time_s: from when on.
+      why: in words.
+      is_left_out: whether what is tracked from there on is not used.
+    """
 
     name: str
     time_s: float
     why: str
+    is_left_out: bool = False
 
     def __str__(self) -> str:
         """Object and time: 'object1 is lost from 0.63 s on'."""
@@ -61,6 +74,11 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
         if len(seen) < FEWEST_FRAMES:
             continue
         last = int(seen[-1])
+        if (shared := _shared(clip, observation, i)) is not None:
+            frame, other = shared
+            why = f"what is tracked there is where {other} is; what follows of both is left out"
+            found.append(Astray(name, float(observation.times_s[frame]), why, True))
+            continue
         if (frame := _leapt(clip, observation, i, seen)) is not None:
             why = "what is tracked there moves as nothing can that hits nothing: something else"
         elif _is_lost(track, i, last, clip.objects[i].last_frame):
@@ -69,6 +87,15 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
             continue
         found.append(Astray(name, float(observation.times_s[frame]), why))
     return tuple(found)
+
+
+def without_astray(observation: Observation, astray: Sequence[Astray]) -> Observation:
+    """The observation without what is to be left out."""
+    mask = observation.mask.copy()
+    for one in astray:
+        if one.is_left_out:
+            mask[observation.names.index(one.name), observation.times_s >= one.time_s] = False
+    return replace(observation, mask=mask)
 
 
 def longest_absence(observation: Observation) -> tuple[str, float, float] | None:
@@ -87,6 +114,23 @@ def longest_absence(observation: Observation) -> tuple[str, float, float] | None
         return None
     _, name, gone, back = found
     return name, float(observation.times_s[gone]), float(observation.times_s[back])
+
+
+def _shared(clip: Clip, observation: Observation, i: int) -> tuple[int, str] | None:
+    """The first frame in which puck `i` is where another one is, and which; None: in none."""
+    if not SCENARIOS[clip.scenario].is_level:
+        return None
+    place, found = observation.position_m[:, :2], None
+    for j, other in enumerate(clip.objects):
+        both = observation.mask[i] & observation.mask[j]
+        sizes = clip.objects[i].size_m, other.size_m
+        if j == i or not both.any() or sizes[0] is None or sizes[1] is None:
+            continue
+        apart = np.where(both, np.linalg.norm(place[j] - place[i], axis=0), np.inf)
+        frames = np.flatnonzero(apart < APART * (sizes[0][0] + sizes[1][0]))
+        if frames.size and (found is None or frames[0] < found[0]):
+            found = int(frames[0]), other.name
+    return found
 
 
 def _leapt(clip: Clip, observation: Observation, i: int, seen: np.ndarray) -> int | None:

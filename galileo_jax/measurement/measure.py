@@ -10,7 +10,7 @@ from typing import Any
 from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
-from galileo_jax.measurement.astray import Astray, find_astray
+from galileo_jax.measurement.astray import Astray, find_astray, without_astray
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
@@ -100,7 +100,7 @@ def measure(clip: Clip) -> Measurement:
         moving = measured.clip.model_copy(update={"starts_moving": True})
         measured = replace(measured, clip=moving)
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
-    observation = to_last_cut(observation, cuts)
+    observation = without_astray(to_last_cut(observation, cuts), astray)
     if is_level(measured.clip):
         observation = with_wander(observation)
     if pixels is None and observation.position_m.shape[1] == 2:
