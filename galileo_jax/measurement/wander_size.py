@@ -52,7 +52,7 @@ def with_wander(observation: Observation) -> Observation:
                 evidence += _evidence(observation.times_s[piece], place, variance)
     if not evidence.any():
         return replace(observation, wander_m=LARGEST_M)
-    weight = np.exp(evidence - logsumexp(evidence))
+    weight = np.exp(evidence - float(logsumexp(evidence)))
     return replace(observation, wander_m=float(np.sqrt(weight @ SIZES**2)))
 
 
@@ -70,9 +70,7 @@ def _pieces(observation: Observation, i: int) -> list[np.ndarray]:
         frames = frames[np.abs(frames - end) > BESIDE_HIT]
     between = np.split(frames, np.flatnonzero(np.diff(frames) > 2 * BESIDE_HIT) + 1)
     return [
-        piece
-        for own in between
-        for piece in np.array_split(own, max(1, round(len(own) / PIECE)))
+        piece for own in between for piece in np.array_split(own, max(1, round(len(own) / PIECE)))
     ]
 
 

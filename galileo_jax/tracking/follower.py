@@ -52,7 +52,7 @@ CLICKED_PX, CLICKED_SHARE = 4.0, 0.5
 """How far from its centre, or at which share of its template's radius, one may click on it."""
 MAX_PATCHES = 32
 KNOWN_FROM = 2
-"""Before its so-manieth frame, counted from 0, nobody knows whether an object moved in its first."""
+"""Before this frame, counted from 0, nobody knows whether an object moved in its first."""
 HIT_GAIN = 2.0
 """What is hit by something heavy, elastically, flies off with twice its speed."""
 SAME_PLACE = 0.5

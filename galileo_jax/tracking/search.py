@@ -38,9 +38,7 @@ class Guess:
     motion: np.ndarray
     through: np.ndarray | None = None
 
-    def pair(
-        self, picture: Picture, template: Template, width_px: float
-    ) -> tuple[Picture, Target]:
+    def pair(self, picture: Picture, template: Template, width_px: float) -> tuple[Picture, Target]:
         """What is to be aligned with what."""
         if self.through is not None:
             picture = picture.smeared(rotation(self.pose[2]) @ self.through[:2])
