@@ -52,7 +52,7 @@ def with_wander(observation: Observation) -> Observation:
                 evidence += _evidence(observation.times_s[piece], place, variance)
     if not evidence.any():
         return replace(observation, wander_m=LARGEST_M)
-    weight = np.exp(evidence - float(logsumexp(evidence)))
+    weight = np.exp(evidence - np.asarray(logsumexp(evidence)))
     return replace(observation, wander_m=float(np.sqrt(weight @ SIZES**2)))
 
 
