@@ -90,6 +90,7 @@ class Follower:
     frames_sharp: int = 0
     frames_before: int = 0  # that somebody has put it right in
     fastest_px: float = 0.0  # of the other objects, per frame
+    is_alone: bool = True  # there is nothing that could strike it
     taken: tuple[np.ndarray, ...] = ()  # places where other objects are in this frame
 
     def __post_init__(self) -> None:
@@ -147,7 +148,9 @@ class Follower:
         self._off_course_px = float(np.hypot(*(fit.pose - self._expected())[:2]))
         is_smooth = not self.frames_missed and not self._is_blow(fit.pose)
         if before is not None:
-            if len(self.poses) == KNOWN_FROM and not self.frames_before:
+            # What is alone is never struck: it is smeared now as it was first, and its template
+            # is renewed from what it looks like on its way.
+            if len(self.poses) == KNOWN_FROM and not self.frames_before and not self.is_alone:
                 self._see_how_it_began(fit.pose)
             self.velocity, self.mean_velocity = (
                 self._velocity_at(fit.pose),
@@ -157,7 +160,7 @@ class Follower:
         self.frames_missed = self.frames_held = 0
         self.pose = fit.pose
         self.poses.append(fit.pose)
-        if len(self.poses) > KNOWN_FROM and is_smooth:
+        if self.is_alone or (len(self.poses) > KNOWN_FROM and is_smooth):
             self.exposure.add(picture, self.template, self.pose, self.velocity)
         self._keep(picture)
 
@@ -239,7 +242,7 @@ class Follower:
         if (fit := self._best(picture, guesses, FOUND_AGAIN)) is not None:
             return fit
         most = max(float(np.hypot(*self.velocity[:2])), HIT_GAIN * self.fastest_px)
-        if most < MIN_SPEED_PX:
+        if self.is_alone or most < MIN_SPEED_PX:
             return None
         blows = after_blow(
             picture, self.template, self.pose, self.velocity, self._frames_since,

@@ -109,6 +109,7 @@ def follow_on(
         pieces.append(replace(_begun(told, picture, exposure), corrected=(index,)))
         pieces[-1] = replace(pieces[-1], turned_rad=turned)
     own = pieces[-1]
+    own.follower.is_alone = not beside
     own.follower.fastest_px = max((one.speed_px for one in beside), default=0.0)
     own.follower.step(before if index > own.first_frame else None, picture)
 

@@ -155,8 +155,12 @@ def struck(frames=16, speed=14.0, after=3.0, hit=7):
 
 
 def test_a_box_that_is_smeared_in_its_first_frame_is_followed_past_a_blow():
-    path = struck()
-    track = tracked(film([(BOX, path)], share=0.8), path[0])
+    path, other = struck(), Box(seed=4)
+    flies = np.stack(
+        [180.0 + 10.0 * np.maximum(np.arange(16.0) - 7, 0), np.full(16, 60.7), np.zeros(16)], axis=1
+    )
+    frames = film([(BOX, path), (other, flies)], share=0.8, size_px=(320, 120))
+    track = tracked(frames, path[0], flies[0])
     assert track.is_visible.all()
     assert np.abs(errors(track, path)).max() < 0.5
 
