@@ -1,16 +1,19 @@
 """Tracks gone astray: where what is tracked is not, or hardly, the object that was marked.
 
 The tracker drops what does not look like its object (correlation below 0.7), and may go on with
-something that does. So there are two signs, looked for in every object's track:
+something that does. So there are three signs, looked for in every object's track:
 
     leapt   it changes its speed as only a blow could, where nothing is to be hit
+    shared  of pucks seen from above: it is where another one is; at least one of the tracks is
+            of something else, and both are left out from there on
     lost    it is not found any more, though it did not leave the picture
 
 Something that looks the same, and where the object might well be after a time out of sight, only
 the fit tells from it.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,15 +35,27 @@ UNKNOWN_M = 0.06
 """The size of an object that nobody measured."""
 LOST_FRAMES = 10
 """An object that is hidden for less is not lost."""
+STEPS_ON_WAY = 9
+"""Places on a way of two frames at which a puck is compared with the others."""
+APART = 0.8
+"""Pucks lie side by side: their centres are never within this share of the sum of their radii."""
 
 
 @dataclass(frozen=True)
 class Astray:
-    """From when on an object's track is not to be believed, and why."""
+    """From when on an object's track is not to be believed, and why.
+
+    Attributes:
+      name: the object's.
+      time_s: from when on.
+      why: in words.
+      is_left_out: whether what is tracked from there on is not used.
+    """
 
     name: str
     time_s: float
     why: str
+    is_left_out: bool = False
 
     def __str__(self) -> str:
         """Object and time: 'object1 is lost from 0.63 s on'."""
@@ -61,14 +76,33 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
         if len(seen) < FEWEST_FRAMES:
             continue
         last = int(seen[-1])
+        if (shared := _shared(clip, observation, i)) is not None:
+            frame, other = shared
+            why = f"what is tracked there is where {other} is; what follows of both is left out"
+            found.append(Astray(name, float(observation.times_s[frame]), why, True))
+            continue
         if (frame := _leapt(clip, observation, i, seen)) is not None:
             why = "what is tracked there moves as nothing can that hits nothing: something else"
+            # Where it is lost soon after, what led there was no longer the puck, either.
+            is_left_out = SCENARIOS[clip.scenario].is_level
         elif _is_lost(track, i, last, clip.objects[i].last_frame):
             frame, why = last + 1, "nothing there looks like it; what follows is left out"
+            is_left_out = False  # nothing follows
         else:
             continue
-        found.append(Astray(name, float(observation.times_s[frame]), why))
+        if is_left_out:
+            why += "; it is left out from there on"
+        found.append(Astray(name, float(observation.times_s[frame]), why, is_left_out))
     return tuple(found)
+
+
+def without_astray(observation: Observation, astray: Sequence[Astray]) -> Observation:
+    """The observation without what is to be left out."""
+    mask = observation.mask.copy()
+    for one in astray:
+        if one.is_left_out:
+            mask[observation.names.index(one.name), observation.times_s >= one.time_s] = False
+    return replace(observation, mask=mask)
 
 
 def longest_absence(observation: Observation) -> tuple[str, float, float] | None:
@@ -89,38 +123,87 @@ def longest_absence(observation: Observation) -> tuple[str, float, float] | None
     return name, float(observation.times_s[gone]), float(observation.times_s[back])
 
 
+def _shared(clip: Clip, observation: Observation, i: int) -> tuple[int, str] | None:
+    """The first frame in which puck `i` is where another one is, and which; None: in none."""
+    if not SCENARIOS[clip.scenario].is_level:
+        return None
+    place, found = observation.position_m[:, :2], None
+    for j, other in enumerate(clip.objects):
+        both = observation.mask[i] & observation.mask[j]
+        sizes = clip.objects[i].size_m, other.size_m
+        if j == i or not both.any() or sizes[0] is None or sizes[1] is None:
+            continue
+        apart = np.where(both, np.linalg.norm(place[j] - place[i], axis=0), np.inf)
+        frames = np.flatnonzero(apart < APART * (sizes[0][0] + sizes[1][0]))
+        if frames.size and (found is None or frames[0] < found[0]):
+            found = int(frames[0]), other.name
+    return found
+
+
 def _leapt(clip: Clip, observation: Observation, i: int, seen: np.ndarray) -> int | None:
     """The first frame in which object `i` is where only a blow could have taken it; or None.
 
     Once it has gone half its size: until then a hand may be at it.
     """
-    if not SCENARIOS[clip.scenario].has_ramp or not clip.is_scale_known:
+    scenario = SCENARIOS[clip.scenario]
+    if not (scenario.has_ramp or scenario.is_level) or not clip.is_scale_known:
         return None
-    place = observation.position_m[i][:, seen]
+    place = observation.position_m[i, :2][:, seen]
     step_s = np.diff(observation.times_s[seen])
     velocity = np.diff(place) / step_s
     jump = np.hypot(*np.diff(velocity))
-    variance = np.einsum("iit->t", observation.covariance_m2[i][..., seen]) / 2
+    variance = np.einsum("iit->t", observation.covariance_m2[i, :2, :2][..., seen]) / 2
     step_variance = (variance[1:] + variance[:-1]) / step_s**2
     sd = np.sqrt(step_variance[1:] + step_variance[:-1])
     most = BLOW_M_S2 * (step_s[1:] + step_s[:-1]) / 2 + CLEAR * sd
     gone = np.hypot(*(place[:, 1:-1] - place[:, :1])) > _size_m(clip.objects[i]) / 2
     for at in np.flatnonzero((jump > most) & gone):
-        reach = np.hypot(*velocity[:, at]) * (step_s[at] + step_s[at + 1])
-        if not _may_be_hit(clip, observation, i, int(seen[at + 1]), float(reach)):
-            return int(seen[at + 2])
+        way = velocity[:, at] * (step_s[at] + step_s[at + 1])
+        reach = np.hypot(*way)
+        if scenario.is_level:
+            frames = seen[at : at + 3]
+            may_be_hit = _meets(clip, observation, i, frames, place[:, at], way)
+        else:
+            may_be_hit = _may_be_hit(clip, observation, i, int(seen[at + 1]), float(reach))
+        if not may_be_hit:
+            # Of three places that no puck takes one after the other the middle one may be wrong.
+            return int(seen[at + 1 if scenario.is_level else at + 2])
     return None
+
+
+def _meets(
+    clip: Clip,
+    observation: Observation,
+    i: int,
+    frames: np.ndarray,
+    place: np.ndarray,
+    way: np.ndarray,
+) -> bool:
+    """Whether puck `i`, at a place in the first of these frames, may meet another one on its way.
+
+    One that is not seen there may be anywhere.
+    """
+    size = _size_m(clip.objects[i])
+    on_way = place[:, None] + way[:, None] * np.linspace(0.0, 1.0, STEPS_ON_WAY)
+    for j, other in enumerate(clip.objects):
+        if j == i:
+            continue
+        there = observation.position_m[j, :2][:, frames]
+        apart = np.linalg.norm(on_way[:, :, None] - there[:, None, :], axis=0)
+        if not apart.min() > NEAR * (size + _size_m(other)) / 2:
+            return True
+    return False
 
 
 def _may_be_hit(clip: Clip, observation: Observation, i: int, frame: int, reach_m: float) -> bool:
     """Whether object `i` is near another, one that is not seen there, or the ramp's foot."""
     sizes = [_size_m(item) for item in clip.objects]
-    place = observation.position_m[i, :, frame]
+    place = observation.position_m[i, :2, frame]
     if SCENARIOS[clip.scenario].has_table and abs(place[0]) < NEAR * sizes[i] + reach_m:
         return True
     for other, size in enumerate(sizes):
         if other != i:
-            apart = np.hypot(*(observation.position_m[other, :, frame] - place))
+            apart = np.hypot(*(observation.position_m[other, :2, frame] - place))
             if not apart > NEAR * (size + sizes[i]) / 2 + reach_m:
                 return True
     return False

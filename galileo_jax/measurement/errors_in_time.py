@@ -138,7 +138,7 @@ def _evidence(
         errors += [(1 - share) * np.eye(size) + share * kernel for share in SHARES]
     since = (times_s - times_s[0]) / (times_s[-1] - times_s[0])
     # The path in units of the errors, so that the scale of both comes out at the end.
-    cover = np.array(errors)[:, None] + PATHS[:, None, None] ** 2 * _path(since)
+    cover = np.array(errors)[:, None] + PATHS[:, None, None] ** 2 * smooth_path(since)
     root = np.linalg.cholesky(cover)
     parabola = np.vander(since, 3)
     both = np.linalg.solve(root, np.column_stack([parabola, values]))
@@ -168,7 +168,7 @@ def _kernels(times_s: np.ndarray, step_s: float) -> Float[np.ndarray, "kernel ro
     )
 
 
-def _path(since: np.ndarray) -> Float[np.ndarray, "row row"]:
+def smooth_path(since: np.ndarray) -> Float[np.ndarray, "row row"]:
     """The covariance of thrice integrated white noise: int_0^s (s-u)^2 (t-u)^2 / 4 du, s <= t."""
     first = np.minimum(since[:, None], since)
     gap = np.abs(since[:, None] - since)

@@ -10,7 +10,7 @@ from typing import Any
 from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
-from galileo_jax.measurement.astray import Astray, find_astray
+from galileo_jax.measurement.astray import Astray, find_astray, without_astray
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
@@ -21,6 +21,7 @@ from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_si
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.track_cache import track_once
+from galileo_jax.measurement.wander_size import with_wander
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
@@ -99,7 +100,9 @@ def measure(clip: Clip) -> Measurement:
         moving = measured.clip.model_copy(update={"starts_moving": True})
         measured = replace(measured, clip=moving)
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
-    observation = to_last_cut(observation, cuts)
+    observation = without_astray(to_last_cut(observation, cuts), astray)
+    if is_level(measured.clip):
+        observation = with_wander(observation)
     if pixels is None and observation.position_m.shape[1] == 2:
         # In space and from above the likelihood lets every track wander.
         observation, said = with_errors_in_time(observation)

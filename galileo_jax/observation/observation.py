@@ -32,6 +32,7 @@ class Observation:
       turned_rad: `[object, frame]`, how far each puck has turned by its picture, counter-clockwise:
         to know how it starts, not to be fitted; NaN where nothing shows it, None where nobody
         looked.
+      wander_m: how far camera and tracker wander in this clip, m; None where nobody looked.
       is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """
 
@@ -45,6 +46,7 @@ class Observation:
     num_errors: int = 0
     is_turning: bool = False
     turned_rad: Float[np.ndarray, "object frame"] | None = None
+    wander_m: float | None = None
 
     @property
     def axes(self) -> tuple[str, ...]:

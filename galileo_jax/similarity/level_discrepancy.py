@@ -34,7 +34,8 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
             own = np.zeros_like(position)
             own[:, :2] = pattern[:, :2]
             found.append(own)
-        found.extend(wander(observation, WOBBLE_SD_M, WOBBLE_S, smallest=0.0))
+        size_m = WOBBLE_SD_M if observation.wander_m is None else observation.wander_m
+        found.extend(wander(observation, size_m, WOBBLE_S, smallest=0.0))
     for i, j in combinations(range(len(position)), 2):
         both = observation.mask[i] & observation.mask[j]
         apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
@@ -47,15 +48,25 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
                 step = np.zeros_like(position)
                 step[k, axis, hit + 1 :] = HIT_STEP_SD_M
                 found.append(step)
-    if observation.is_turning:
-        found.extend(_off_centre(position, scene))
+    turned = position[:, 2] if observation.is_turning else observation.turned_rad
+    if turned is not None:
+        found.extend(_off_centre(position, turned, scene))
     return np.stack(found)
 
 
-def _off_centre(position: np.ndarray, scene: Surroundings) -> list[np.ndarray]:
-    """A point that is off its puck's centre, along x and along y when it is first seen."""
+def _off_centre(
+    position: np.ndarray, turned_rad: np.ndarray, scene: Surroundings
+) -> list[np.ndarray]:
+    """A point that is off its puck's centre, along x and along y when it is first seen.
+
+    Of a puck that does not show how it turns nothing is known to be marked but the middle.
+    """
     found = []
-    for i, turned in enumerate(position[:, 2] - position[:, 2, :1]):
+    for i, turned in enumerate(turned_rad):
+        known = np.flatnonzero(np.isfinite(turned))
+        if not known.size:
+            continue
+        turned = np.nan_to_num(turned - turned[known[0]])  # unseen frames count for nothing
         size = CENTRE_SHARE * scene.half_length_m[i]
         for x, y in ((np.cos(turned), np.sin(turned)), (-np.sin(turned), np.cos(turned))):
             own = np.zeros_like(position)

@@ -131,6 +131,7 @@ class Store:
             is_squared=bool(notes.get("is_squared", False)),
             is_turning=bool(notes.get("is_turning", False)),
             num_errors=int(notes.get("num_errors", 0)),
+            wander_m=notes.get("wander_m"),
         )
         said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
         astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
@@ -146,7 +147,7 @@ class Store:
         notes["cuts"] = [vars(entry) for entry in one.cuts]
         notes["astray"] = [vars(entry) for entry in one.astray]
         notes |= {"is_squared": seen.is_squared, "is_turning": seen.is_turning}
-        notes["num_errors"] = seen.num_errors
+        notes |= {"num_errors": seen.num_errors, "wander_m": seen.wander_m}
         arrays = {name: getattr(seen, name) for name in ARRAYS}
         if seen.modes_m is not None:
             arrays["modes_m"] = seen.modes_m

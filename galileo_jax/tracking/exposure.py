@@ -69,8 +69,13 @@ class Exposure:
     def add(
         self, picture: Picture, template: Template, pose: np.ndarray, velocity: np.ndarray
     ) -> None:
-        """Counts one frame in, where the object stands at `pose` and moves by `velocity`."""
-        if np.hypot(*velocity[:2]) < MIN_SPEED_PX or self.frames >= MAX_FRAMES:
+        """Counts one frame in, where the object stands at `pose` and moves by `velocity`.
+
+        A template that is smeared itself tells by how much more or less the picture is, not how
+        long the shutter is open.
+        """
+        is_slow = np.hypot(*velocity[:2]) < MIN_SPEED_PX
+        if is_slow or not template.is_sharp or self.frames >= MAX_FRAMES:
             return
         self.frames += 1
         motion = own_motion(velocity, pose[2])

@@ -35,23 +35,24 @@ class Finished:
 
     position_px: np.ndarray
     covariance_px2: np.ndarray
+    common_px2: np.ndarray
     angle_rad: np.ndarray
 
 
 def finished(
-    fits: Sequence[list[Refined | None]], pieces: Sequence[Piece], exposure_share: float
+    fits: Sequence[list[Refined | None]], pieces: Sequence[Piece], shares: Sequence[float]
 ) -> list[Finished]:
     """The pieces' tracks from their fits of every frame (None: not found).
 
     Args:
       fits: per piece, per frame.
       pieces: with the points to follow, each in its piece's first frame.
-      exposure_share: open share of a frame's time.
+      shares: per piece, the open share of a frame's time.
     """
     seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
     seen = [
-        _at_mid_exposure(poses, noise, exposure_share, piece)
-        for (poses, noise), piece in zip(seen, pieces, strict=True)
+        _at_mid_exposure(poses, noise, share, piece)
+        for (poses, noise), piece, share in zip(seen, pieces, shares, strict=True)
     ]
     excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
     return [
@@ -63,12 +64,17 @@ def finished(
 def joined(pieces: Sequence[Finished], count: int) -> Finished:
     """One object's pieces, which follow each other, as one track of so many frames."""
     whole = Finished(
-        np.full((count, 2), np.nan), np.full((count, 2, 2), np.nan), np.full(count, np.nan)
+        np.full((count, 2), np.nan),
+        np.full((count, 2, 2), np.nan),
+        np.full((count, 2, 2), np.nan),
+        np.full(count, np.nan),
     )
     for piece in pieces:
         is_seen = np.isfinite(piece.angle_rad)
         for into, part in zip(vars(whole).values(), vars(piece).values(), strict=True):
             into[is_seen] = part[is_seen]
+    if len(pieces) > 1:
+        whole.common_px2[:] *= 0.0  # each piece has its own
     return whole
 
 
@@ -117,6 +123,7 @@ def _anchored(
     first_frame, point_px = piece.first_frame, np.array(piece.point_px)
     first_fit = fits[first_frame] if first_frame < len(fits) else None
     anchor = np.array([*point_px, 0.0])
+    common = np.zeros_like(covariance)
     if first_fit is not None:
         anchor, anchor_noise = first_fit.pose, first_fit.covariance
         at_rest = frames[np.cumprod(~moves.any(axis=1)).astype(bool)] if len(frames) else frames
@@ -125,7 +132,8 @@ def _anchored(
         if len(began):
             anchor = poses[began].mean(axis=0)
             anchor_noise = noise[began].mean(axis=0) / max(1.0, len(began) / MEMORY_FRAMES)
-        covariance += anchor_noise
+        common = np.broadcast_to(anchor_noise, covariance.shape)
+        covariance += common
     covariance += SAMPLING_SD_PX**2 * np.eye(2)
     if piece.is_clicked:
         covariance += CLICK_SD_PX**2 * np.eye(2)
@@ -133,7 +141,7 @@ def _anchored(
     angle = poses[:, 2] - anchor[2]
     arm = point_px - anchor[:2]
     position = poses[:, :2] + np.stack([rotation(a) @ arm for a in angle])
-    return Finished(position, covariance, angle + piece.turned_rad)
+    return Finished(position, covariance, common, angle + piece.turned_rad)
 
 
 def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray:

@@ -1,16 +1,24 @@
 """First pass: following one object through the frames, and collecting its sharp patches."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from galileo_jax.tracking.exposure import Exposure, distinct, own_motion
+from galileo_jax.tracking.exposure import MIN_SPEED_PX, Exposure, distinct, own_motion
 from galileo_jax.tracking.lucas_kanade import follow
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.refine import FINE_PX, Fit, align
 from galileo_jax.tracking.rigid import rigid_motion
-from galileo_jax.tracking.search import SURE, TURNS_RAD, best_fit, candidate_poses, is_alike
+from galileo_jax.tracking.search import (
+    SURE,
+    TURNS_RAD,
+    Guess,
+    after_blow,
+    best_fit,
+    candidate_poses,
+    is_alike,
+)
 from galileo_jax.tracking.template import Template, median_template
 
 FOUND, FOUND_AGAIN = 0.75, 0.85
@@ -43,6 +51,12 @@ SHARP_PX = 1.0
 CLICKED_PX, CLICKED_SHARE = 4.0, 0.5
 """How far from its centre, or at which share of its template's radius, one may click on it."""
 MAX_PATCHES = 32
+KNOWN_FROM = 2
+"""Before this frame, counted from 0, nobody knows whether an object moved in its first."""
+HIT_GAIN = 2.0
+"""What is hit by something heavy, elastically, flies off with twice its speed."""
+SAME_PLACE = 0.5
+"""Centres that are within this share of the smaller one's size: two objects are not there."""
 RENEWALS = frozenset(8 * 2**i for i in range(32))
 """Numbers of sharp frames after which the template becomes the median of the patches so far:
 without noise, without the hand, and in time without what was behind the object."""
@@ -75,12 +89,46 @@ class Follower:
     stride: int = 1
     frames_sharp: int = 0
     frames_before: int = 0  # that somebody has put it right in
+    fastest_px: float = 0.0  # of the other objects, per frame
+    is_alone: bool = True  # there is nothing that could strike it
+    taken: tuple[np.ndarray, ...] = ()  # places where other objects are in this frame
 
     def __post_init__(self) -> None:
         self.first_pose = self.pose
+        self._off_course_px = 0.0
+
+    @property
+    def size_px(self) -> float:
+        """The radius of a disc as large as the region that is compared."""
+        return float(np.sqrt(self.template.region.sum() / np.pi))
+
+    @property
+    def speed_px(self) -> float:
+        """How far it goes per frame, as last seen."""
+        return float(np.hypot(*self.velocity[:2]))
+
+    @property
+    def off_course_px(self) -> float:
+        """How far from where it should have been it was found last."""
+        return self._off_course_px
+
+    def again(
+        self, before: Picture | None, picture: Picture, taken: tuple[np.ndarray, ...]
+    ) -> None:
+        """Looks for the object anew in the frame of the last `step`, but not at `taken`."""
+        del self.poses[self._last["num_poses"] :]
+        for name, value in self._last.items():
+            if name != "num_poses":
+                setattr(self, name, value)
+        self.taken = taken
+        self.step(before, picture)
+        self.taken = ()
 
     def step(self, before: Picture | None, picture: Picture) -> None:
         """Finds the object in the next frame; `before` is the frame preceding it."""
+        self._last = {name: getattr(self, name) for name in CHANGING} | {
+            "num_poses": len(self.poses), "patches": [*self.patches],
+        }  # fmt: skip
         if self.frames_missed > LONG_GONE_FRAMES and self.frames_missed % LOOK_EVERY:
             fit = None
         else:
@@ -97,7 +145,13 @@ class Follower:
             return
         if self.frames_held and not self.frames_missed and self._went_on(fit):
             self.poses[-1] = np.full(3, np.nan)
+        self._off_course_px = float(np.hypot(*(fit.pose - self._expected())[:2]))
+        is_smooth = not self.frames_missed and not self._is_blow(fit.pose)
         if before is not None:
+            # What is alone is never struck: it is smeared now as it was first, and its template
+            # is renewed from what it looks like on its way.
+            if len(self.poses) == KNOWN_FROM and not self.frames_before and not self.is_alone:
+                self._see_how_it_began(fit.pose)
             self.velocity, self.mean_velocity = (
                 self._velocity_at(fit.pose),
                 (fit.pose - self.pose) / self._frames_since,
@@ -106,7 +160,8 @@ class Follower:
         self.frames_missed = self.frames_held = 0
         self.pose = fit.pose
         self.poses.append(fit.pose)
-        self.exposure.add(picture, self.template, self.pose, self.velocity)
+        if self.is_alone or (len(self.poses) > KNOWN_FROM and is_smooth):
+            self.exposure.add(picture, self.template, self.pose, self.velocity)
         self._keep(picture)
 
     def put_right(self, picture: Picture, point_px: tuple[float, float]) -> bool:
@@ -119,7 +174,7 @@ class Follower:
         upright = {float(self.pose[2]), float(self.first_pose[2])}
         still = np.zeros(3)
         guesses = [
-            (np.array([*point_px, angle + turn]), still) for angle in upright for turn in turns
+            Guess(np.array([*point_px, angle + turn]), still) for angle in upright for turn in turns
         ]
         fit = best_fit(picture, self.template, guesses)
         is_there = np.hypot(*(fit.pose[:2] - point_px)) < max(
@@ -169,11 +224,13 @@ class Follower:
     def _as_expected(self, picture: Picture) -> Fit | None:
         """The object where it should be, looking as it did; its features would tell no more."""
         expected = self._expected()
-        motion = self.exposure.share * own_motion(self.velocity, expected[2])
-        fit = align(picture, self.template.target(motion, FINE_PX), expected)
+        motion = own_motion(self.velocity, expected[2])
+        guess = self._compared(expected, motion, (self.exposure.share,))[0]
+        fit = align(*guess.pair(picture, self.template, FINE_PX), expected)
         is_there = np.hypot(*(fit.pose - expected)[:2]) < AS_EXPECTED_PX
         is_it = is_alike(fit) and fit.correlation > max(SURE, self.correlation - AS_SEEN)
-        return fit if is_there and is_it and not self._is_scene(picture, fit) else None
+        is_free = self._is_free(fit.pose)
+        return fit if is_there and is_it and is_free and not self._is_scene(picture, fit) else None
 
     def _far(self, picture: Picture) -> Fit | None:
         """The best fit in a wide neighbourhood; rarely looked for while the object is gone."""
@@ -182,26 +239,66 @@ class Follower:
             return None
         reach = max(2 * np.hypot(*self.velocity[:2]), REACH_SHARE * max(picture.size_px))
         guesses = candidate_poses(picture.grey, self.template, self._expected(), float(reach))
-        return self._best(picture, guesses, FOUND_AGAIN)
+        if (fit := self._best(picture, guesses, FOUND_AGAIN)) is not None:
+            return fit
+        most = max(float(np.hypot(*self.velocity[:2])), HIT_GAIN * self.fastest_px)
+        if self.is_alone or most < MIN_SPEED_PX:
+            return None
+        blows = after_blow(
+            picture, self.template, self.pose, self.velocity, self._frames_since,
+            tuple(filter(None, self.exposure.trials)), most,
+        )  # fmt: skip
+        return self._best_of(picture, blows, FOUND_AGAIN) if blows else None
+
+    def _see_how_it_began(self, pose: np.ndarray) -> None:
+        """Whether the object, now in its third frame, moved in its first, and how.
+
+        If so the template, taken from the first frame, is smeared.
+        """
+        steps = np.diff([*self.poses, pose], axis=0)
+        change = steps[1] - steps[0]
+        is_blow = np.hypot(*change[:2]) > 0.5 * np.hypot(*steps[1][:2])
+        velocity = steps[0] - (0 if is_blow else change / 2)
+        # NaN compares False: if it was not found in between nobody knows.
+        if np.hypot(*velocity[:2]) >= MIN_SPEED_PX:
+            self.template = replace(self.template, moved=own_motion(velocity, self.first_pose[2]))
+
+    def _compared(
+        self, pose: np.ndarray, motion: np.ndarray, shares: tuple[float, ...]
+    ) -> list[Guess]:
+        """How the object, moving so (own axes, per frame), is compared with its template."""
+        template = self.template
+        if template.is_sharp:
+            smears = distinct([share * motion for share in shares], template.radius)
+            return [Guess(pose, smear) for smear in smears]
+        if np.hypot(*(motion - template.moved)[:2]) < MIN_SPEED_PX:
+            return [Guess(pose, np.zeros(3))]
+        return [Guess(pose, share * motion, share * template.moved) for share in shares]
 
     def _best(self, picture: Picture, poses: list[np.ndarray], least: float) -> Fit | None:
         """The best fit from the guessed `poses` if it can be the object."""
-        guesses: list[tuple[np.ndarray, np.ndarray]] = []
+        guesses: list[Guess] = []
         for pose in poses:
             motion = own_motion(self._velocity_at(pose), pose[2])
-            motions = [share * motion for share in self.exposure.trials]
-            guesses += [(pose, smear) for smear in distinct(motions, self.template.radius)]
-        if not guesses:
-            return None
+            guesses += self._compared(pose, motion, self.exposure.trials)
+        return self._best_of(picture, guesses, least) if guesses else None
+
+    def _best_of(self, picture: Picture, guesses: list[Guess], least: float) -> Fit | None:
+        """The best fit from the guesses, at least one, if it can be the object."""
         fit = best_fit(picture, self.template, guesses)
         width, height = picture.size_px
         is_inside = 0 <= fit.pose[0] < width and 0 <= fit.pose[1] < height
         leaps = [np.hypot(*(fit.pose - p)[:2]) for p in (self.pose, self._expected())]
         is_near = min(leaps) <= self._leap_px()
         is_upright = abs(fit.pose[2] - self.pose[2]) <= MAX_TURN_RAD
-        is_it = is_alike(fit) and fit.correlation >= least
+        is_it = is_alike(fit) and fit.correlation >= least and self._is_free(fit.pose)
         is_possible = is_inside and is_near and is_upright and is_it
         return fit if is_possible and not self._is_scene(picture, fit) else None
+
+    def _is_free(self, pose: np.ndarray) -> bool:
+        """Whether no other object is there."""
+        near = SAME_PLACE * self.size_px
+        return all(np.hypot(*(pose[:2] - place[:2])) > near for place in self.taken)
 
     def _is_scene(self, picture: Picture, fit: Fit) -> bool:
         """Whether what was found stood there before the object came.
@@ -223,7 +320,8 @@ class Follower:
         if len(self.poses) - self.frames_before - self.frames_missed < SETTLED_FRAMES:
             return np.inf
         speed = float(np.hypot(*self.velocity[:2]))
-        return max(1.5 * speed, self.template.radius) * min(self._frames_since, MAX_LEAP_FRAMES)
+        most = max(1.5 * speed, self.template.radius, HIT_GAIN * self.fastest_px)
+        return most * min(self._frames_since, MAX_LEAP_FRAMES)
 
     def _velocity_at(self, pose: np.ndarray) -> np.ndarray:
         """The velocity at `pose`: the mean one since the last frame plus half its change.
@@ -233,12 +331,22 @@ class Follower:
         """
         mean = (pose - self.pose) / self._frames_since
         change = mean - self.mean_velocity
-        is_blow = np.hypot(*change[:2]) > 0.5 * np.hypot(*mean[:2])
-        return mean if is_blow else mean + change / 2
+        return mean if self._is_blow(pose) else mean + change / 2
+
+    def _is_blow(self, pose: np.ndarray) -> bool:
+        """Whether it can be at `pose` only if its speed changed by a half, or more."""
+        mean = (pose - self.pose) / self._frames_since
+        change = mean - self.mean_velocity
+        return bool(np.hypot(*change[:2]) > 0.5 * np.hypot(*mean[:2]))
 
     def _keep(self, picture: Picture) -> None:
         if np.hypot(*self.velocity[:2]) * self.exposure.share > SHARP_PX:
             return
+        if not self.template.is_sharp:
+            # The first sharp look of what was smeared takes the smeared one's place.
+            self.patches, self.frames_sharp, self.stride = [], 0, 1
+            sharp = patch_at(picture.grey, self.pose, self.template.radius)
+            self.template = Template(sharp, self.template.region)
         if self.frames_sharp % self.stride == 0:
             self.patches.append(patch_at(picture.grey, self.pose, self.template.radius))
             if len(self.patches) > MAX_PATCHES:
@@ -247,6 +355,13 @@ class Follower:
         self.frames_sharp += 1
         if self.frames_sharp in RENEWALS:
             self.template = median_template(self.patches, self.template.region)
+
+
+CHANGING = (
+    "template", "pose", "velocity", "mean_velocity", "correlation", "frames_missed",
+    "frames_held", "stride", "frames_sharp", "_off_course_px",
+)  # fmt: skip
+"""What a step changes of a follower, besides its lists."""
 
 
 def _correlation(fit: Fit) -> float:

@@ -3,6 +3,8 @@
 import cv2
 import numpy as np
 
+from galileo_jax.tracking.pose import SHARP_PX, smeared_along
+
 MARGIN_PX = 6
 """How far an object may move in an alignment before more of the frame is smoothed."""
 PART_MARGIN_PX = 24
@@ -13,6 +15,8 @@ PYRAMID_VARIANCE_PX2 = 0.25
 """OpenCV's `pyrUp` smooths by the binomial (1 4 6 4 1) / 16 of half pixels, while it doubles."""
 LINEAR_SHARE = 1 / 6
 """Linear interpolation between samples `h` apart smooths by a variance of this times h^2."""
+SAME_SMEAR_PX, MAX_SMEARED = 0.5, 8
+"""Smears that are alike to this are made once; so many of them are kept."""
 
 
 class Picture:
@@ -41,12 +45,33 @@ class Picture:
         self._corner_px = corner_px
         self.size_px = (grey.shape[1], grey.shape[0]) if size_px is None else size_px
         self._windows: dict[float, _Window] = {}
+        self._smeared: dict[tuple[float, float], Picture] = {}
 
     def part(self, pose: np.ndarray, reach_px: float) -> "Picture":
         """A copy of what is within `reach_px` of the pose's point, and of what smoothing needs."""
         cut, (left, top) = _cut(self.grey, pose[:2] - self._corner_px, reach_px + PART_MARGIN_PX)
         x, y = self._corner_px
         return Picture(cut.copy(), (left + x, top + y), self.size_px)
+
+    def window(self, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
+        """The pixels from `low` to `high` (x, y), both within, float32; None: not all are seen."""
+        (left, top), (right, bottom) = low - self._corner_px, high - self._corner_px
+        height, width = self.grey.shape
+        if left < 0 or top < 0 or right >= width or bottom >= height:
+            return None
+        return self.grey[top : bottom + 1, left : right + 1].astype(np.float32)
+
+    def smeared(self, shift: np.ndarray) -> "Picture":
+        """The picture as it were if all in it moved by `shift` (x, y), px, in the exposure."""
+        x, y = (SAME_SMEAR_PX * round(float(part) / SAME_SMEAR_PX) for part in shift)
+        if np.hypot(x, y) < SHARP_PX:
+            return self
+        if (x, y) not in self._smeared:
+            if len(self._smeared) >= MAX_SMEARED:
+                self._smeared.clear()
+            grey = smeared_along(self.grey, np.array([x, y]))
+            self._smeared[x, y] = Picture(grey, self._corner_px, self.size_px)
+        return self._smeared[x, y]
 
     def at(self, pose: np.ndarray, own: np.ndarray, reach_px: float, width_px: float) -> np.ndarray:
         """The values at places of an object, smoothed by a Gaussian, `[place]` float32.

@@ -1,11 +1,13 @@
 """The pieces of an object's path: a new one begins where it is put right and looks otherwise."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from galileo_jax.tracking.exposure import Exposure
-from galileo_jax.tracking.follower import Follower
+from galileo_jax.tracking.follower import SAME_PLACE, Follower
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.refiner import Velocities, velocities_at
 from galileo_jax.tracking.template import Outline, template_at
@@ -83,6 +85,7 @@ def follow_on(
     before: Picture | None,
     picture: Picture,
     exposure: Exposure,
+    beside: Sequence[Follower] = (),
 ) -> None:
     """One frame further; `pieces` grows where a new one begins.
 
@@ -93,6 +96,7 @@ def follow_on(
       before: the frame before it.
       picture: the frame.
       exposure: of the video, shared by all objects.
+      beside: the other objects, which may hit it.
     """
     if not pieces:
         pieces.append(_begun(start, picture, exposure))
@@ -105,7 +109,29 @@ def follow_on(
         pieces.append(replace(_begun(told, picture, exposure), corrected=(index,)))
         pieces[-1] = replace(pieces[-1], turned_rad=turned)
     own = pieces[-1]
+    own.follower.is_alone = not beside
+    own.follower.fastest_px = max((one.speed_px for one in beside), default=0.0)
     own.follower.step(before if index > own.first_frame else None, picture)
+
+
+def keep_apart(
+    pieces: Sequence[Piece], index: int, before: Picture | None, picture: Picture
+) -> None:
+    """Two objects cannot be at one place: the one that is less expected there is sought elsewhere.
+
+    Args:
+      pieces: of all objects, one frame further.
+      index: of the frame.
+      before: the frame before it.
+      picture: the frame.
+    """
+    for one, other in combinations([piece for piece in pieces if index > piece.first_frame], 2):
+        pair = [one.follower, other.follower]
+        apart = float(np.hypot(*(pair[0].poses[-1] - pair[1].poses[-1])[:2]))
+        # NaN compares False: what is not found is nowhere.
+        if apart < SAME_PLACE * min(follower.size_px for follower in pair):
+            strays, stays = sorted(pair, key=lambda each: -each.off_course_px)
+            strays.again(before, picture, (stays.poses[-1],))
 
 
 def _begun(start: Start, picture: Picture, exposure: Exposure) -> Piece:

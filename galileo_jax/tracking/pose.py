@@ -59,11 +59,10 @@ def smear(image: np.ndarray, motion: np.ndarray) -> np.ndarray:
     length = np.hypot(*motion[:2]) + turning
     if length < SHARP_PX:
         return image
+    if turning < SHARP_PX:
+        return smeared_along(image, motion[:2])
     samples = int(np.ceil(length)) + 1
     shares = (np.arange(samples) + 0.5) / samples - 0.5
-    if turning < SHARP_PX:
-        kernel = _kernel(shares[:, None] * motion[:2])
-        return cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_REPLICATE)
     total = np.zeros_like(image)
     centre = np.array([radius, radius])
     for share in shares:
@@ -77,6 +76,17 @@ def smear(image: np.ndarray, motion: np.ndarray) -> np.ndarray:
             borderMode=cv2.BORDER_REPLICATE,
         )
     return total / samples
+
+
+def smeared_along(image: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """A picture that is smeared evenly along `shift` (x, y), px, centred; as `smear`."""
+    length = float(np.hypot(*shift))
+    if length < SHARP_PX:
+        return image
+    samples = int(np.ceil(length)) + 1
+    shares = (np.arange(samples) + 0.5) / samples - 0.5
+    kernel = _kernel(shares[:, None] * shift)
+    return cv2.filter2D(image, -1, kernel, borderType=cv2.BORDER_REPLICATE)
 
 
 def _kernel(shifts: np.ndarray) -> np.ndarray:

@@ -73,7 +73,7 @@ class Target:
         y, x = np.divmod(inside, region.shape[1])
         self.places = np.stack([x - self.radius, y - self.radius]).astype(np.float32)
         self.reach_px = float(np.sqrt((self.places**2).sum(axis=0).max(initial=0)))
-        smooth = cv2.GaussianBlur(image, (0, 0), width_px)
+        smooth = self.image = cv2.GaussianBlur(image, (0, 0), width_px)
         dx = cv2.Sobel(smooth, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8).take(inside)
         dy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=3, scale=1 / 8).take(inside)
         turned = dy * self.places[0] - dx * self.places[1]

@@ -1,11 +1,14 @@
 """Finding an object in a frame when it is known roughly, or hardly, where it is."""
 
+import itertools
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import rotation
-from galileo_jax.tracking.refine import COARSE_PX, FINE_PX, Fit, align
+from galileo_jax.tracking.refine import COARSE_PX, FINE_PX, Fit, Target, align
 from galileo_jax.tracking.template import Template
 
 SURE = 0.85
@@ -15,23 +18,46 @@ CONTRAST = (0.4, 2.5)
 TURNS_RAD = (0.0, 0.17, -0.17, 0.35, -0.35)
 """Turns tried in a wide search: the alignment reaches 5 degrees to each side of them."""
 MAX_PEAKS = 4
+DIRECTIONS, SPEEDS = 16, 6
+"""Velocities after a blow that are tried: the smear is then right to a sixth of its length."""
+BLOW_MARGIN_PX = 4.0
 
 
-def best_fit(
-    picture: Picture, template: Template, guesses: list[tuple[np.ndarray, np.ndarray]]
-) -> Fit:
-    """The best alignment over guesses, at least one, each a pose and a motion during the exposure.
+@dataclass(frozen=True)
+class Guess:
+    """Where an object may be, and how picture and template are made alike before they are compared.
+
+    Attributes:
+      pose: to start from.
+      motion: (own axes) in the exposure; the template is smeared by it.
+      through: (own axes) the smear that is in the template; the picture is given it, too. None:
+        it is left as it is.
+    """
+
+    pose: np.ndarray
+    motion: np.ndarray
+    through: np.ndarray | None = None
+
+    def pair(self, picture: Picture, template: Template, width_px: float) -> tuple[Picture, Target]:
+        """What is to be aligned with what."""
+        if self.through is not None:
+            picture = picture.smeared(rotation(self.pose[2]) @ self.through[:2])
+        return picture, template.target(self.motion, width_px, self.through)
+
+
+def best_fit(picture: Picture, template: Template, guesses: list[Guess]) -> Fit:
+    """The best alignment over guesses, at least one.
 
     The first guess is tried finely at once; then each coarsely, then finely. Stops at the first
     sure one. Fits whose contrast is not the template's count only if there is no other.
     """
-    pose, motion = guesses[0]
-    best = align(picture, template.target(motion, FINE_PX), pose)
+    best = align(*guesses[0].pair(picture, template, FINE_PX), guesses[0].pose)
     if _is_sure(best):
         return best
-    for pose, motion in guesses:
-        coarse = align(picture, template.target(motion, COARSE_PX), pose, steps=6, robust=False)
-        fit = align(picture, template.target(motion, FINE_PX), coarse.pose)
+    for guess in guesses:
+        rough = guess.pair(picture, template, COARSE_PX)
+        coarse = align(*rough, guess.pose, steps=6, robust=False)
+        fit = align(*guess.pair(picture, template, FINE_PX), coarse.pose)
         best = max(best, fit, key=_rank)
         if _is_sure(best):
             break
@@ -79,3 +105,67 @@ def candidate_poses(
             cv2.circle(score, (x, y), 3, -1, -1)
     found.sort(key=lambda item: -item[0])
     return [pose for _, pose in found[: 2 * MAX_PEAKS]]
+
+
+def after_blow(
+    picture: Picture,
+    template: Template,
+    pose: np.ndarray,
+    velocity: np.ndarray,
+    frames: int,
+    shares: tuple[float, ...],
+    most_px: float,
+) -> list[Guess]:
+    """Guesses for an object that has been struck since it was last seen, smeared as it then is.
+
+    What moves fast is smeared beyond recognition, but the smear tells where to look: struck at a
+    time f after the last frame, an object with the velocity v since is at
+
+        pose + f velocity + (frames - f) v,    0 <= f <= 1,    smeared by share v.
+
+    So for velocities of `DIRECTIONS` directions and `SPEEDS` sizes the smeared template is looked
+    for where each would have taken it.
+
+    Args:
+      picture: the frame.
+      template: the object's.
+      pose: where it was last seen.
+      velocity: its change per frame there.
+      frames: since then.
+      shares: of a frame's time that the shutter may be open.
+      most_px: no blow makes it faster, per frame.
+    """
+    found: list[tuple[float, Guess]] = []
+    rim = template.radius
+    side, centre = 2 * rim + 1, np.array([rim, rim])
+    angles = [pose[2] + frames * velocity[2] + turn for turn in TURNS_RAD]
+    each = itertools.product(angles if template.shows_turns else angles[:1], shares)
+    for angle, share in each:
+        matrix = rotation(angle)
+        through = None if template.is_sharp else share * template.moved
+        shown = picture if through is None else picture.smeared(matrix @ through[:2])
+        for speed in most_px * np.arange(1, SPEEDS + 1) / SPEEDS:
+            for direction in 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
+                after = speed * np.array([np.cos(direction), np.sin(direction)])
+                ends = [pose[:2] + f * velocity[:2] + (frames - f) * after for f in (0, 1)]
+                beside = frames * max(np.pi * speed / DIRECTIONS, most_px / SPEEDS / 2)
+                reach = beside + BLOW_MARGIN_PX
+                low = np.floor(np.minimum(*ends) - reach).astype(int)
+                high = np.ceil(np.maximum(*ends) + reach).astype(int)
+                window = shown.window(low - rim, high + rim)
+                if window is None:
+                    continue
+                motion = share * np.array([*(matrix.T @ after), velocity[2]])
+                target = template.target(motion, FINE_PX, through)
+                warp = np.column_stack([matrix, centre - matrix @ centre])
+                turned = cv2.warpAffine(
+                    target.image, warp, (side, side), borderMode=cv2.BORDER_REPLICATE
+                )
+                mask = cv2.warpAffine(target.region.astype(np.float32), warp, (side, side))
+                score = cv2.matchTemplate(window, turned, cv2.TM_CCOEFF_NORMED, mask=mask)
+                score[~np.isfinite(score)] = -1
+                _, peak, _, (x, y) = cv2.minMaxLoc(score)
+                there = np.array([low[0] + x, low[1] + y, angle])
+                found.append((peak, Guess(there, motion, through)))
+    found.sort(key=lambda item: -item[0])
+    return [guess for _, guess in found[: 2 * MAX_PEAKS]]

@@ -90,12 +90,16 @@ class SquareView:
         # Pixels to view: the slopes of both maps to metres.
         back = np.linalg.inv(np.nan_to_num(self.plane.slope(position), nan=1.0))
         back = back @ self.view.slope(found.position_px)
-        covariance = back @ found.covariance_px2 @ np.swapaxes(back, -1, -2)
+        covariance, common = (
+            back @ each @ np.swapaxes(back, -1, -2)
+            for each in (found.covariance_px2, found.common_px2)
+        )
         assert clip.frame_size_px is not None  # of a video
         return replace(
             found,
             position_px=position,
             covariance_px2=covariance,
+            common_px2=common,
             frame_size_px=clip.frame_size_px,
         )
 

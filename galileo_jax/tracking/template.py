@@ -43,10 +43,15 @@ class Outline:
 
 @dataclass(frozen=True)
 class Template:
-    """`image` `[size, size]` float32, and `region` (bool), the pixels that are compared."""
+    """`image` `[size, size]` float32, and `region` (bool), the pixels that are compared.
+
+    `moved` is the object's change of place (own axes) and angle per frame when the image was
+    taken: it is smeared by the open share of that. 0: it is sharp.
+    """
 
     image: np.ndarray
     region: np.ndarray
+    moved: np.ndarray = field(default_factory=lambda: np.zeros(3))
     _sharp: dict[float, Target] = field(default_factory=dict, repr=False)
 
     @property
@@ -59,12 +64,28 @@ class Template:
         """False for a plain disc, which looks the same however it is turned."""
         return self.sharp(FINE_PX).shows_turns
 
-    def target(self, motion: np.ndarray, width_px: float) -> Target:
-        """What a patch looks like that moves by `motion` (own axes) during the exposure."""
+    @property
+    def is_sharp(self) -> bool:
+        """Whether it was taken of an object that hardly moved."""
+        return not self.moved.any()
+
+    def target(
+        self, motion: np.ndarray, width_px: float, through: np.ndarray | None = None
+    ) -> Target:
+        """What a patch looks like that moves by `motion` (own axes) during the exposure.
+
+        Args:
+          motion: in the exposure.
+          width_px: of the Gaussian that smooths both.
+          through: the smear that is in this template and is given to the picture, too; what
+            neither smear brings in from beside the object is compared.
+        """
         smeared = smear(self.image, motion)
-        if smeared is self.image:
+        if smeared is self.image and through is None:
             return self.sharp(width_px)
         share = smear(self.region.astype(np.float32), motion)
+        if through is not None:
+            share = smear(share, through)
         least, region = MIN_REGION_SHARE * self.region.mean(), share >= ALWAYS
         if region.mean() < least:
             region = share >= np.quantile(share, 1 - least)

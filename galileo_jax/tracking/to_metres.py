@@ -31,14 +31,18 @@ def observe(clip: Clip, track: Track) -> Observation:
             "corners_px is not; mend them"
         )
     slope = plane.slope(track.position_px)
-    covariance = slope @ track.covariance_px2 @ np.swapaxes(slope, -1, -2)
+    is_level = SCENARIOS[clip.scenario].is_level
+    # Of pucks the likelihood has the point that was marked off the centre as what it is: one
+    # error, which turns with the puck. In every frame's own error it would hide the motion.
+    own_px2 = track.covariance_px2 - (track.common_px2 if is_level else 0.0)
+    covariance = slope @ own_px2 @ np.swapaxes(slope, -1, -2)
     return Observation(
         names=track.names,
         times_s=track.times_s,
         position_m=np.moveaxis(position, 1, 2),
         covariance_m2=np.moveaxis(covariance, 1, -1),
         mask=mask,
-        turned_rad=_turned(track, slope, mask) if SCENARIOS[clip.scenario].is_level else None,
+        turned_rad=_turned(track, slope, mask) if is_level else None,
     )
 
 

@@ -19,6 +19,8 @@ class Track:
         the clip declares (`point_px`), or the object's centre when it declares none;
         NaN where not visible.
       covariance_px2: `[object, frame, 2, 2]`, the error's covariance of each point.
+      common_px2: the same shape, how much of that is one error of the object's first frame, which
+        all its points have in common and which turns with it; 0 where pieces follow each other.
       angle_rad: `[object, frame]`, rotation in the image since the first frame,
         clockwise positive (x right, y down).
       is_visible: `[object, frame]`, False where the object is hidden or was lost.
@@ -29,6 +31,7 @@ class Track:
     times_s: Float[np.ndarray, " frame"]
     position_px: Float[np.ndarray, "object frame 2"]
     covariance_px2: Float[np.ndarray, "object frame 2 2"]
+    common_px2: Float[np.ndarray, "object frame 2 2"]
     angle_rad: Float[np.ndarray, "object frame"]
     is_visible: Bool[np.ndarray, "object frame"]
     frame_size_px: tuple[int, int]

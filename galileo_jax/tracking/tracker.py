@@ -2,17 +2,17 @@
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from galileo_jax.tracking.exposure import Exposure
+from galileo_jax.tracking.exposure import LEARNT_FRAMES, Exposure
 from galileo_jax.tracking.finish import finished, joined
 from galileo_jax.tracking.follower import Follower
 from galileo_jax.tracking.picture import Picture
-from galileo_jax.tracking.pieces import Piece, Start, follow_on
-from galileo_jax.tracking.refiner import Refined, refine_pose
-from galileo_jax.tracking.template import grey, median_template
+from galileo_jax.tracking.pieces import Piece, Start, follow_on, keep_apart
+from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
+from galileo_jax.tracking.template import Template, grey, median_template
 from galileo_jax.tracking.track import Track
 
 MAX_KEPT_BYTES = 256 << 20
@@ -64,31 +64,34 @@ def track_video(
     count, size_px = 0, (0, 0)
     for index, frame in enumerate(open_frames()):
         picture = Picture(grey(frame))
-        for k, start in enumerate(starts):
-            if start.uses(index):
-                follow_on(pieces[k], start, index, before, picture, exposure)
-                kept.add(k, index, picture, pieces[k][-1].follower)
+        used = [k for k, start in enumerate(starts) if start.uses(index)]
+        for k in used:
+            beside = [own[-1].follower for i, own in enumerate(pieces) if own and i != k]
+            follow_on(pieces[k], starts[k], index, before, picture, exposure, beside)
+        keep_apart([pieces[k][-1] for k in used], index, before, picture)
+        for k in used:
+            kept.add(k, index, picture, pieces[k][-1].follower)
         before = picture
         count, size_px = index + 1, picture.size_px
         advance(Seen(index, tuple(_place(own, index) for own in pieces)))
 
     flat = [(k, piece) for k, own in enumerate(pieces) for piece in own]
     coarse = [piece.poses(count) for _, piece in flat]
-    templates = [
-        median_template(piece.follower.patches, piece.follower.template.region) for _, piece in flat
-    ]
+    templates = [_final_template(piece.follower) for _, piece in flat]
+    shares = _learnt(kept, open_frames, [k for k, _ in flat], coarse, templates, exposure)
     fits: list[list[Refined | None]] = [[] for _ in flat]
     for index, pictures in enumerate(kept.pictures(open_frames, count)):
-        for (k, piece), poses, template, found in zip(flat, coarse, templates, fits, strict=True):
+        each = zip(flat, coarse, templates, shares, fits, strict=True)
+        for (k, piece), poses, template, share, found in each:
             picture = pictures[k]
             if picture is None or not np.isfinite(poses[index, 0]):
                 found.append(None)
                 continue
             velocities = piece.velocities(poses, index)
-            found.append(refine_pose(picture, template, poses[index], velocities, exposure.share))
+            found.append(refine_pose(picture, template, poses[index], velocities, share))
         advance(None)
 
-    done = finished(fits, [piece for _, piece in flat], exposure.share)
+    done = finished(fits, [piece for _, piece in flat], shares)
     objects = [
         joined([one for (of, _), one in zip(flat, done, strict=True) if of == k], count)
         for k in range(len(starts))
@@ -98,6 +101,7 @@ def track_video(
         times_s=np.arange(count) / fps,
         position_px=np.stack([item.position_px for item in objects]),
         covariance_px2=np.stack([item.covariance_px2 for item in objects]),
+        common_px2=np.stack([item.common_px2 for item in objects]),
         angle_rad=np.stack([item.angle_rad for item in objects]),
         is_visible=np.stack([np.isfinite(item.angle_rad) for item in objects]),
         frame_size_px=size_px,
@@ -132,6 +136,50 @@ class _Kept:
             return
         for frame in itertools.islice(open_frames(), count):
             yield [Picture(grey(frame))] * self._num_objects
+
+
+def _final_template(follower: Follower) -> Template:
+    """The median of an object's sharp patches; smeared as its first frame if there are none."""
+    own = follower.template
+    return replace(median_template(follower.patches, own.region), moved=own.moved)
+
+
+def _learnt(
+    kept: _Kept,
+    open_frames: Callable[[], Iterable[np.ndarray]],
+    objects: Sequence[int],
+    poses: Sequence[np.ndarray],
+    templates: Sequence[Template],
+    exposure: Exposure,
+) -> list[float]:
+    """The open share of a frame's time for each piece, where the first pass has not learned it.
+
+    What was smeared in its first frame shows it only once there is a sharp look of it. Where there
+    never is, the share is that by which the pictures are smeared more than the template.
+
+    Args:
+      kept: what the first pass saw.
+      open_frames: gives the video's frames again.
+      objects: of each piece.
+      poses: of each piece, `[frame, 3]`.
+      templates: of each piece, final.
+      exposure: what the first pass has learned.
+    """
+    blurred = [k for k, template in enumerate(templates) if not template.is_sharp]
+    is_learnt = exposure.frames >= LEARNT_FRAMES
+    if is_learnt and not blurred:
+        return [exposure.share] * len(objects)
+    own = {k: Exposure() for k in blurred}
+    as_sharp = [replace(template, moved=np.zeros(3)) for template in templates]
+    for index, pictures in enumerate(kept.pictures(open_frames, len(poses[0]) if poses else 0)):
+        for k, path in enumerate(poses):
+            picture = pictures[objects[k]]
+            if picture is None or not np.isfinite(path[index, 0]) or (k not in own and is_learnt):
+                continue
+            told = velocities_at(path, index)
+            into = own.get(k, exposure)
+            into.add(picture, as_sharp[k], path[index], (told.before + told.after) / 2)
+    return [own.get(k, exposure).share for k in range(len(objects))]
 
 
 def _place(pieces: list[Piece], index: int) -> tuple[float, float] | None:

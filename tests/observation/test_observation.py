@@ -22,6 +22,7 @@ def track():
         times_s=np.arange(3) / 30,
         position_px=PX,
         covariance_px2=COVARIANCE_PX2,
+        common_px2=np.zeros_like(COVARIANCE_PX2),
         angle_rad=np.zeros((1, 3)),
         is_visible=np.ones((1, 3), bool),
         frame_size_px=(640, 360),

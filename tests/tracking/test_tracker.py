@@ -144,4 +144,34 @@ def test_plain_disc_is_followed_without_a_turn():
     track = track_video(lambda: iter(frames), [start], FPS)
     assert track.is_visible.all()
     assert np.abs(errors(track, path)).max() < 0.1
-    assert np.abs(track.angle_rad).max() < 1e-6
+    assert np.abs(track.angle_rad).max() < 1e-5
+
+
+def struck(frames=16, speed=14.0, after=3.0, hit=7):
+    """A box that moves from the first frame on, and is braked by a blow."""
+    time = np.arange(frames, dtype=float)
+    x = 40.3 + speed * np.minimum(time, hit) + after * np.maximum(time - hit, 0)
+    return np.stack([x, np.full(frames, 60.4), 0.05 * time], axis=1)
+
+
+def test_a_box_that_is_smeared_in_its_first_frame_is_followed_past_a_blow():
+    path, other = struck(), Box(seed=4)
+    flies = np.stack(
+        [180.0 + 10.0 * np.maximum(np.arange(16.0) - 7, 0), np.full(16, 60.7), np.zeros(16)], axis=1
+    )
+    frames = film([(BOX, path), (other, flies)], share=0.8, size_px=(320, 120))
+    track = tracked(frames, path[0], flies[0])
+    assert track.is_visible.all()
+    assert np.abs(errors(track, path)).max() < 0.5
+
+
+def test_an_object_that_vanishes_is_not_taken_for_its_twin_beside_it():
+    time = np.arange(24, dtype=float)
+    first = np.stack([40.3 + 6.0 * time, np.full(24, 60.4), 0 * time], axis=1)
+    second = np.tile([139.6, 60.7, 0.0], (24, 1))
+    frames = film([(BOX, first), (BOX, second)])
+    frames[10:] = film([(BOX, second)])[10:]
+    track = tracked(frames, first[0], second[0])
+    assert track.is_visible[1].all()
+    assert track.is_visible[0, :10].all()
+    assert not track.is_visible[0, 10:].any()

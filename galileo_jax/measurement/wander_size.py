@@ -1,0 +1,100 @@
+"""How far do camera and tracker wander in a clip of pucks seen from above?
+
+What they do wanders slowly (an Ornstein-Uhlenbeck process, `similarity.level_discrepancy`), by a
+hundredth of a pixel in one clip and by a sixth in another. Slow as it is, it has a fast part that
+no sliding puck has: from frame to frame it takes steps of w sqrt(2 dt / tau). So, before any
+physics, each coordinate is described in pieces as
+
+    measured = smooth path + wander + error,    w^2 K_tau + s^2 sd^2 1
+
+with a path as in `errors_in_time`: a parabola and a thrice integrated white noise of any size. The
+size w is that which explains all pieces of all pucks best, averaged over what explains them well;
+s and the path's size are averaged over in each piece.
+
+Limits: between 1/300 of the largest wander, from which on nothing in an interval changes, and the
+largest. Where a track is too short to tell, it is taken to be the largest.
+"""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import logsumexp
+
+from galileo_jax.measurement.errors_in_time import smooth_path
+from galileo_jax.observation.observation import Observation
+
+LARGEST_M, LASTS_S = 4e-4, 0.3
+"""Standard deviation and duration of the wander in a clip of which nothing is known; the likelihood
+takes it so where an observation does not tell."""
+SIZES = LARGEST_M * np.geomspace(1 / 300, 1.0, 16)
+SCALES, SCALE_SD = np.geomspace(0.4, 2.5, 7), 0.5
+"""Of the stated errors, and the standard deviation of their logarithm."""
+PATHS = np.geomspace(1e-1, 1e7, 13)
+"""Sizes of the path's third derivative, in errors over a piece's length^2.5."""
+PIECE, LEAST_FRAMES = 40, 8
+BESIDE_HIT = 1
+
+
+def with_wander(observation: Observation) -> Observation:
+    """The observation with the size of its wander, `wander_m`.
+
+    Args:
+      observation: of pucks in a plane; its errors as stated.
+    """
+    evidence = np.zeros(len(SIZES))
+    for i, axis in product(range(len(observation.names)), range(2)):
+        for piece in _pieces(observation, i):
+            if len(piece) >= LEAST_FRAMES:
+                variance = observation.covariance_m2[i, axis, axis, piece]
+                place = observation.position_m[i, axis, piece]
+                evidence += _evidence(observation.times_s[piece], place, variance)
+    if not evidence.any():
+        return replace(observation, wander_m=LARGEST_M)
+    weight = np.exp(evidence - np.asarray(logsumexp(evidence)))
+    return replace(observation, wander_m=float(np.sqrt(weight @ SIZES**2)))
+
+
+def _pieces(observation: Observation, i: int) -> list[np.ndarray]:
+    """Frames of puck `i` between hits, in pieces; a hit's own, and those beside it, are in none."""
+    frames = np.flatnonzero(observation.mask[i])
+    place = observation.position_m[:, :2]
+    ends = []
+    for j in range(len(place)):
+        both = observation.mask[i] & observation.mask[j]
+        if j != i and both.any():
+            apart = np.linalg.norm(place[j] - place[i], axis=0)
+            ends.append(int(np.argmin(np.where(both, apart, np.inf))))
+    for end in ends:
+        frames = frames[np.abs(frames - end) > BESIDE_HIT]
+    between = np.split(frames, np.flatnonzero(np.diff(frames) > 2 * BESIDE_HIT) + 1)
+    return [
+        piece for own in between for piece in np.array_split(own, max(1, round(len(own) / PIECE)))
+    ]
+
+
+def _evidence(
+    times_s: Float[np.ndarray, " frame"],
+    place_m: Float[np.ndarray, " frame"],
+    variance_m2: Float[np.ndarray, " frame"],
+) -> Float[np.ndarray, " size"]:
+    """The log marginal likelihood of a piece for each of `SIZES`, of what no parabola takes up."""
+    size = len(times_s)
+    since = (times_s - times_s[0]) / (times_s[-1] - times_s[0])
+    apart = np.abs(times_s[:, None] - times_s)
+    unit = float(np.sqrt(np.median(variance_m2)))
+    wander = (SIZES[:, None, None] / unit) ** 2 * np.exp(-apart / LASTS_S)
+    error = SCALES[:, None, None] ** 2 * np.diag(variance_m2) / unit**2
+    path = PATHS[:, None, None] ** 2 * smooth_path(since)
+    cover = wander[:, None, None] + error[:, None] + path  # [size, scale, path, frame, frame]
+    root = np.linalg.cholesky(cover)
+    both = np.linalg.solve(root, np.column_stack([np.vander(since, 3), place_m / unit]))
+    basis, upper = np.linalg.qr(both[..., :3])
+    along = np.einsum("...nk,...n->...k", basis, both[..., 3])
+    square = np.sum(both[..., 3] ** 2, axis=-1) - np.sum(along**2, axis=-1)
+    logs = np.log(np.einsum("...nn->...n", root)).sum(-1)
+    logs += np.log(np.abs(np.einsum("...nn->...n", upper))).sum(-1)
+    log_density = -logs - square / 2 - (size - 3) * np.log(unit)
+    prior = -0.5 * (np.log(SCALES) / SCALE_SD) ** 2
+    return np.asarray(logsumexp(log_density + prior[:, None], axis=(1, 2)))
