@@ -35,6 +35,7 @@ from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.library_again import singles_beside, singles_of_pairs
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.race import Race
+from galileo_jax.diagnosis.second_effect import promised_by_a_second
 from galileo_jax.diagnosis.slow_errors import unless_slow_errors
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
@@ -113,11 +114,15 @@ def diagnose(
     compared: dict[tuple[str, ...], Comparison] = {}
     decisive = decisive_margin(is_adequate)
     candidates = _compared(trials, candidates, decisive, seed, compared)
-    if needs_pairs(candidates):
+    must = needs_pairs(candidates)
+    second = None if must else promised_by_a_second(race, candidates, library)
+    if must or second is not None:
         on_stage("fitting pairs of effects")
         pairs = fitted_pairs(race, candidates, library)
-        if pairs:
-            form, single = form_that_leads(candidates), best_named(candidates)
+        form, single = form_that_leads(candidates), best_named(candidates)
+        if pairs and second is not None:
+            why = (*why, reasons.pairs_promised(single, second, len(pairs)))
+        elif pairs:
             why = (*why, reasons.pairs_tried(single, form, len(pairs)))
         for candidate in pairs:
             on_candidate(candidate)

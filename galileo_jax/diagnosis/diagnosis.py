@@ -94,6 +94,21 @@ class Candidate:
 
 
 @dataclass(frozen=True)
+class Promise:
+    """What a second effect would add to the best single one, as far as its slope tells.
+
+    Attributes:
+      effect: its name.
+      nats: by which it lowers the misfit.
+      price: nats by which two effects are less probable than one, before the data.
+    """
+
+    effect: str
+    nats: float
+    price: float
+
+
+@dataclass(frozen=True)
 class Reason:
     """A rule of the verdict that fired.
 

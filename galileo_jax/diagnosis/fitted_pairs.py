@@ -1,10 +1,11 @@
 """Pairs of effects, fitted: where no single effect explains the data."""
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 
-from galileo_jax.diagnosis.candidates import reduced
+from galileo_jax.diagnosis.candidates import Hypothesis, reduced
 from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_from_scratch, pairs_to_try
 from galileo_jax.diagnosis.race import Race
@@ -44,6 +45,7 @@ def fitted_pairs(
         made += _alike(race, best, library, searched)
         if ranked(made)[0].effects == best.effects:
             break
+    made += _of_others(race, ranked(made)[0], candidates, library, searched)
     return ranked(made)
 
 
@@ -55,14 +57,40 @@ def _alike(
     Which these are a short search for them all tells: without one of its effects the best pair is
     so far from the data that slopes mean nothing there. Those searched for are added to `searched`.
     """
-    fitter, sets, starts = race.fitter, [], []
+    sets, starts = [], []
     for kept in best.effects:
         others = not_tried(kept, library, searched)
         sets += others
-        starts += [reduced(fitter.trials, best.hypothesis, [kept])] * len(others)
+        starts += [reduced(race.fitter.trials, best.hypothesis, [kept])] * len(others)
+    searched.update(frozenset(pair) for pair in sets)
+    return _nearest(race, best, starts, sets)
+
+
+def _of_others(
+    race: Race,
+    best: Candidate,
+    candidates: Sequence[Candidate],
+    library: Sequence[str],
+    searched: set[frozenset[str]],
+) -> list[Candidate]:
+    """Pairs of neither effect of the best pair, fitted where a short search comes near that.
+
+    Two effects may together do what the best single effect does alone, and neither of them need be
+    among the best. Each pair starts from the better of its single effects.
+    """
+    singles = sorted((c for c in candidates if c.name in library), key=lambda c: -c.log_evidence)
+    pairs = [(one, (one.name, other.name)) for one, other in combinations(singles, 2)]
+    left = [(one, pair) for one, pair in pairs if frozenset(pair) not in searched]
+    return _nearest(race, best, [one.hypothesis for one, _ in left], [pair for _, pair in left])
+
+
+def _nearest(
+    race: Race, best: Candidate, starts: Sequence[Hypothesis], sets: Sequence[tuple[str, str]]
+) -> list[Candidate]:
+    """Of pairs those that a short search brings near the best one so far, fitted."""
     if not sets:
         return []
-    searched.update(frozenset(pair) for pair in sets)
+    fitter = race.fitter
     fit, count = best.hypothesis.fit, len(fitter.trials.model_parameters)
     lowest = float(fitter.search_costs(fit.z[None, :count], fit.free[None, :count])[0])
     z, costs = short_search(fitter, [one.fit for one in starts], sets, race.seed, lowest)

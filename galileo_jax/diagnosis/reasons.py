@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from math import exp, log
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
-from galileo_jax.diagnosis.diagnosis import Candidate, Reason
+from galileo_jax.diagnosis.diagnosis import Candidate, Promise, Reason
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
@@ -93,6 +93,31 @@ def pairs_tried(single: Candidate, form: Candidate | None, count: int) -> Reason
         "pairs_tried",
         f"{said}: {count} pairs of effects were tried.",
         {"hypothesis": single.name, "p_value": single.p_value, "num_pairs": count},
+    )
+
+
+def pairs_promised(single: Candidate, second: Promise, count: int) -> Reason:
+    """Why pairs were tried although a single effect leaves only noise.
+
+    Args:
+      single: the best effect alone.
+      second: what another one promises beside it.
+      count: how many pairs.
+    """
+    return Reason(
+        "pairs_promised",
+        f"{single.title} leaves {p_equals(single.p_value or 0.0)}, but beside it "
+        f"{second.effect.replace('_', ' ')} promises to lower the misfit by {second.nats:.1f} nats "
+        f"(two effects are {second.price:.1f} nats less probable than one): {count} pairs of "
+        "effects were tried.",
+        {
+            "hypothesis": single.name,
+            "p_value": single.p_value,
+            "second": second.effect,
+            "nats": second.nats,
+            "price": second.price,
+            "num_pairs": count,
+        },
     )
 
 

@@ -99,3 +99,34 @@ def test_what_could_be_confused_with_a_better_pair_is_searched_for_once_more(mon
     assert len(searched) == 2 and not searched[0] & searched[1]
     sets, starts = started[1]
     assert [tuple(pair) for pair in sets] == [("b", "c")] and starts[0].shape == (1, 1)
+
+
+def test_a_pair_without_either_effect_of_the_best_one_is_found(monkeypatch):
+    """From the better of its single effects; what comes nowhere near is not fitted."""
+    odds = {"a+b": 50.0, "c+d": 90.0}
+    fitted = []
+
+    def search(fitter, bases, pairs, seed, lowest):
+        costs = [0.0 if set(pair) == {"c", "d"} else 99.0 for pair in pairs]
+        return np.arange(float(len(pairs)))[:, None], np.array(costs)
+
+    def race(bases, sets, starts=None):
+        fitted.extend(zip(bases, sets, strict=True))
+        return [
+            candidate("+".join(sorted(pair)), odds.get("+".join(sorted(pair)), 1.0))
+            for pair in sets
+        ]
+
+    fitter = SimpleNamespace(
+        trials=SimpleNamespace(model_parameters=()), search_costs=lambda z, free: np.zeros(1)
+    )
+    stub: Any = MagicMock(side_effect=race, seed=0, fitter=fitter)
+    monkeypatch.setattr(pairs_module, "best_gains", lambda *_: np.array([0, 9, 0, 0, 0.0]))
+    monkeypatch.setattr(pairs_module, "reduced", lambda trials, best, kept: best)
+    monkeypatch.setattr(pairs_module, "short_search", search)
+    monkeypatch.setattr(pairs_module, "pairs_to_try", lambda *_: [[("a", "b")], [], []])
+    singles = [candidate(name, 40.0 - i) for i, name in enumerate("adc")]
+    found = pairs_module.fitted_pairs(stub, singles, list("abcd"))
+    assert [one.name for one in found] == ["c+d", "a+b"]
+    base, pair = fitted[-1]
+    assert tuple(pair) == ("d", "c") and base is singles[1].hypothesis
