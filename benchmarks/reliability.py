@@ -108,17 +108,22 @@ def make_clip(folder: Path, name: str, kind: str, library: Sequence[str]) -> Non
             continue
 
 
-@in_float64
-def seen_truth(yaml: Path, kind: str) -> str:
-    """The hidden effects that leave a trace in a track, joined by +; none: "none".
+def seen_truth(traces: Mapping[str, float]) -> str:
+    """The hidden effects that leave a trace in a track, joined by +; none: "none"."""
+    return "+".join(name for name, nats in traces.items() if nats > 0) or "none"
 
-    One leaves a trace where the track's evidence is better with all that are hidden than without
-    it. The fit with all is looked for from the truth, too, so that no narrow valley hides one.
+
+@in_float64
+def traces(yaml: Path, kind: str) -> dict[str, float]:
+    """By how many nats the track's evidence is better with all hidden effects than without each.
+
+    The fit with all is looked for from the truth, too, so that no narrow valley hides one. What is
+    outside the library always leaves one: infinite.
     """
     record = json.loads(yaml.with_suffix(".truth.json").read_text())
     hidden = tuple(record["effect"].split("+"))
     if kind == "outside":
-        return record["effect"]
+        return {record["effect"]: np.inf}
     clip = load_clip(yaml)
     observation = measure(clip).observation
     trials = make_joint_problem([clip], [observation], effects=make_effects(hidden))
@@ -131,13 +136,15 @@ def seen_truth(yaml: Path, kind: str) -> str:
     whole = max(fitter.fit(0, effects=hidden).log_evidence, beside.log_evidence)
     without = {name: tuple(other for other in hidden if other != name) for name in hidden}
     less = {name: fitter.fit(0, effects=rest).log_evidence for name, rest in without.items()}
-    return "+".join(name for name in hidden if whole > less[name]) or "none"
+    return {name: whole - less[name] for name in hidden}
 
 
 def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
     entry: dict[str, Any] = {"case": name, "kind": kind, "diagnosis": None, "error": None}
     yaml = out / "clips" / f"{name}.yaml"
-    entry["truth"] = seen_truth(yaml, kind)
+    found = traces(yaml, kind)
+    entry["truth"] = seen_truth(found)
+    entry["traces_nats"] = {name: nats for name, nats in found.items() if np.isfinite(nats)}
     try:
         run = hidden_effects.run_diagnosis([yaml], out / "runs" / name, 0)
         keys = ("verdict", "probability_none", "history", "p_value")
@@ -187,7 +194,9 @@ def summary(entries: Sequence[Mapping[str, Any]], library: Sequence[str]) -> dic
             for kind in sorted(set(KINDS))
         },
         "named_wrong": [
-            f"{e['case']}: {e['truth']} named {s.label}" for e, s in scored if s.is_confident_wrong
+            f"{e['case']}: {e['truth']} named {s.label}; {_weakest(e)}"
+            for e, s in scored
+            if s.is_confident_wrong
         ],
     }
 
@@ -212,6 +221,15 @@ def _claims(entry: Mapping[str, Any], library: Sequence[str]) -> list[tuple[floa
     return [
         (odds.get(each, 0.0), each == truth if each <= {*library} else is_outside) for each in parts
     ]
+
+
+def _weakest(entry: Mapping[str, Any]) -> str:
+    """Of the effects that are there the one that shows least."""
+    shown = {n: x for n, x in entry.get("traces_nats", {}).items() if n in entry["truth"]}
+    if not shown:
+        return "outside the library"
+    least = min(shown, key=shown.__getitem__)
+    return f"{least} shows by {shown[least]:.1f} nats"
 
 
 def _counts(statuses: Sequence[str]) -> dict[str, int]:
