@@ -8,7 +8,8 @@ J: d(centres)/d(parameter), JAX's forward derivative of the rigid engine. J_fd: 
 differences of plain rollouts at 1/4, 1/2, 1 and 2 sd of the posterior (normal, by J itself);
 the bars are for 1/2 sd. What is left at 2 sd is curvature, and frames between which an impact
 moves: a difference sees both sides of it. `--mjx N`: for N sets also MJX's exact forward
-derivative through its contacts, against the same differences. The last line is JSON.
+derivative through its contacts, against the same differences; `--mended`: with the two lines of
+its solver put right that make it NaN (`mjx_mended.py`). The last line is JSON.
 """
 
 import argparse
@@ -17,6 +18,7 @@ from collections.abc import Callable, Sequence
 
 import jax
 import jax.numpy as jnp
+import mjx_mended
 import numpy as np
 import synthetic_tracks
 import tables
@@ -39,6 +41,8 @@ Predict = Callable[[jax.Array], jax.Array]
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     jax.config.update("jax_enable_x64", True)
+    if call.mended:
+        mjx_mended.mend()
     compilation_cache.enable()
     used, exact = [], []
     tables.row("set", [f"{name} {scale:g}sd" for name in PARAMETERS for scale in SCALES_SD])
@@ -151,6 +155,7 @@ def _parser() -> command.Parser:
     parser.add_argument("--num", type=int, default=32, help="parameter sets")
     parser.add_argument("--seed", type=int, default=0, help="the first set's seed")
     parser.add_argument("--mjx", type=int, default=0, help="sets for MJX's exact derivative: slow")
+    parser.add_argument("--mended", action="store_true", help="MJX with finite derivatives")
     return parser
 
 

@@ -10,7 +10,7 @@ every parameter, according to how much of its prior the data exclude.
     2. The best end of each candidate is refined at the clip's own noise, the most promising first.
     3. Every candidate starts once more from values that reproduce the motion of the best one, with
        all other parameters as in that. Where it comes to another valley that may be better, that
-       is refined, too.
+       is refined, too. So it is not where no candidate can come to matter.
     4. Of the candidates that the verdict may hang on, every valley that was found is refined, and
        the best fit once more with its positive nuisances moved. Of the others this could change
        nothing that a rule looks at.
@@ -143,8 +143,10 @@ def fit_candidates(
     for i, fit in fitter.polish_in_turn(found.best.z[first], free, _by_promise(found, first)):
         take(i, fit)
         on_fit(Hypothesis(tuple(candidates[i]), fit))
-    _second(fitter, from_fits, candidates, found, first, fits, take, seed)
     hypotheses = [Hypothesis(tuple(e), fits[i]) for i, e in enumerate(candidates)]
+    if matters(hypotheses).any():
+        _second(fitter, from_fits, candidates, found, first, fits, take, seed)
+        hypotheses = [Hypothesis(tuple(e), fits[i]) for i, e in enumerate(candidates)]
     evidence = np.array([fits[i].log_evidence for i in range(len(candidates))])
     winners = [int(i) for i in np.argsort(-evidence) if matters(hypotheses)[i]][:NUM_REFITTED]
     if winners:
