@@ -22,12 +22,36 @@ pytestmark = [pytest.mark.slow, pytest.mark.video]
 
 BOARD = "--scenario incline --size 320x180 --m1 0.15"
 CUBIC = "--effects-from my_effect.py --effect cubic_drag:cubic_drag"
-CLIPS = {  # a drag with the cube of the speed is a law where it shows clearly, else unknown
-    "unknown": f"{BOARD} {CUBIC}=0.3 --seed 9 --angle 40 --k1 0.1 --fps 60",
+TAPPED = "--effects-from my_effect.py --effect taps:taps=-3"
+CLIPS = {  # a drag with the cube of the speed is a law; no formula says three taps
+    "unknown": f"{BOARD} {TAPPED} --seed 9 --angle 30 --k1 0.2 --fps 60",
     "law": f"{BOARD} {CUBIC}=0.1 --seed 4 --angle 35 --k1 0.15",
     "ambiguous": f"{BOARD} --effect air_drag --strength 0.1 --seed 7 --angle 25 --k1 0.2"
     " --noise 10",
 }
+TAPS = '''import jax.numpy as jnp
+
+from galileo_jax import Effect, Normal, Parameter, register_effect
+
+
+@register_effect
+class Taps(Effect):
+    """Three taps on the board: each pushes for some hundredths of a second."""
+
+    name = "taps"
+
+    def parameters(self, scene):
+        return (Parameter("taps", "m/s^2", Normal(0.0, 3.0), 0.0, "effect", 0.1),)
+
+    def force(self, theta, scene):
+        m, taps = theta["m1"][..., None], theta["taps"][..., None]
+
+        def law(state):
+            shapes = [jnp.exp(-(((state.time_s - at) / 0.03) ** 2)) for at in (0.2, 0.35, 0.6)]
+            return m * taps * sum(shapes)
+
+        return law
+'''
 SECONDS = {"unknown": 1.2, "law": 1.2, "ambiguous": 0.7}
 
 
@@ -51,7 +75,7 @@ def left(tmp_path_factory):
         if name not in made:
             made[name] = folder = tmp_path_factory.mktemp(name)
             own = folder / "my_effect.py"
-            own.write_text(TEMPLATE)
+            own.write_text(TAPS if name == "unknown" else TEMPLATE)
             seconds = str(SECONDS[name])
             words = ["--out", "clip.mp4", "--seconds", seconds, *CLIPS[name].split()]
             galileo(folder, "simulate", *words)
@@ -91,18 +115,19 @@ def test_unknown_shows_the_missing_acceleration_and_takes_an_effect_of_ones_own(
         own = folder / "my_effect.py"
         hand.click("[data-own] .own")
         page.wait_for_selector("[data-effect]")
+        page.fill("[data-effect]", TAPS)
         hand.picture("unknown")
         assert not own.exists(), "nothing is written or run before the press"
         hand.click("[data-do=run-effect]")
         hand.wait("diagnose", "running")
-        assert "class CubicDrag" in own.read_text()
+        assert "class Taps" in own.read_text()
         hand.wait("diagnose")
         first = page.locator("[data-candidate]").first.get_attribute("data-candidate")
-        assert first == "cubic_drag" and verdict(folder)["status"] == "named"
-        hand.click("[data-add=cubic_drag]")
+        assert first == "taps" and verdict(folder)["status"] == "named"
+        hand.click("[data-add=taps]")
         hand.wait_for("[data-do=remove]")
         hand.wait("compare")
-    assert read_result(folder / "runs" / "clip")["effects"] == ["cubic_drag"]
+    assert read_result(folder / "runs" / "clip")["effects"] == ["taps"]
 
 
 def test_ambiguous_says_what_to_film_next(browser, left):

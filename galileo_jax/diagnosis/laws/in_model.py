@@ -10,7 +10,7 @@ from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.laws.grammar import Structure, without_one_factor
 from galileo_jax.diagnosis.laws.one_program import MOST_NUMBERS, ActingFormulas, Spare
-from galileo_jax.diagnosis.laws.screen import NUM_LAWS, Shape, Suggestion, suggestions
+from galileo_jax.diagnosis.laws.screen import NUM_LAWS, Shape, Suggestion, of_family, suggestions
 from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.inference.fits.gradient import GradientFitter
@@ -69,7 +69,9 @@ def fitted_laws(
 ) -> list[FittedLaw]:
     """The best few formulas, fitted; the most evident first.
 
-    If the best has two factors, it is tried without either, too: one may do nothing.
+    If the best has two factors, it is tried without either, too: one may do nothing. And whether a
+    formula pushes or changes friction, one object or all, only a fit can tell: the best is tried
+    in every way.
 
     Args:
       trials: what was diagnosed.
@@ -79,10 +81,10 @@ def fitted_laws(
     """
     made = _fitted(trials, near, suggestions(views, wanted), views)
     known = {name_of(law.structure) for law in made}
-    simpler = (
-        [one for one in _simpler(made[0]) if name_of(one.structure) not in known] if made else []
-    )
-    made += _fitted(trials, near, simpler, views)
+    if made:
+        others = [*_simpler(made[0]), *of_family(views, made[0].structure.family)]
+        new = [one for one in others if name_of(one.structure) not in known]
+        made += _fitted(trials, near, new[:NUM_LAWS], views)
     return without_twins(sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence))
 
 

@@ -62,15 +62,25 @@ def suggestions(views: Sequence[View], wanted: Collection[Shape] = ()) -> list[S
       views: of each clip.
       wanted: what is to be among them.
     """
+    return chosen(_suggested(views), wanted)
+
+
+def of_family(views: Sequence[View], family: str) -> list[Suggestion]:
+    """Every formula of a family, whatever it acts by and on whom, best first."""
+    return sorted(_suggested(views, family), key=lambda one: -one.score)
+
+
+def _suggested(views: Sequence[View], family: str | None = None) -> list[Suggestion]:
+    """All formulas that show, or those of one family."""
     sights = [Sight.of(view) for view in views]
     scene = views[0].model.scene.surroundings
     ranges = _ranges(views)
-    found = [
+    return [
         one
         for structure in structures(scene.has_surface, len(scene.names))
-        if (one := suggestion_of(sights, structure, ranges)) is not None
+        if family in (None, structure.family)
+        and (one := suggestion_of(sights, structure, ranges)) is not None
     ]
-    return chosen(found, wanted)
 
 
 def chosen(found: Sequence[Suggestion], wanted: Collection[Shape] = ()) -> list[Suggestion]:

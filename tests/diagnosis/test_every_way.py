@@ -1,0 +1,63 @@
+"""The best formula is fitted in every way: as a push and as friction, on one object and on all."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from galileo_jax.diagnosis.laws import in_model, screen
+from galileo_jax.diagnosis.laws.grammar import Structure
+from galileo_jax.diagnosis.laws.in_model import fitted_laws
+from galileo_jax.diagnosis.laws.screen import NUM_OF_FAMILY, of_family
+from tests.diagnosis.test_screen import FACTOR, RANGES, TIMES, made, sight
+
+
+@pytest.fixture
+def views(monkeypatch) -> Any:
+    """One clip in which object 1 is pushed on over a bump."""
+    away = (TIMES - 0.5) / 0.1
+    seen = sight(3.0 * away * np.exp(-(away**2)))
+    monkeypatch.setattr(screen.Sight, "of", lambda view: seen)
+    monkeypatch.setattr(screen, "_ranges", lambda views: RANGES)
+    surroundings = SimpleNamespace(has_surface=True, names=("object1", "object2"))
+    return [
+        SimpleNamespace(model=SimpleNamespace(scene=SimpleNamespace(surroundings=surroundings)))
+    ]
+
+
+def test_a_family_has_more_ways_than_are_screened(views):
+    family = Structure("push", False, (FACTOR["slope_q"],)).family
+    found = of_family(views, family)
+    ways = {(one.structure.nature, one.structure.is_on_all) for one in found}
+    assert {("push", False), ("friction", False)} <= ways and len(ways) > NUM_OF_FAMILY
+    assert {one.structure.family for one in found} == {family}
+    assert [one.score for one in found] == sorted((one.score for one in found), reverse=True)
+
+
+def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
+    """Where the screening takes both places of a family for changes of friction."""
+    ways = [("friction", False), ("friction", True), ("push", False), ("push", True)]
+    family = [made("slope_q", 90.0 - i, *way) for i, way in enumerate(ways)]
+    evidence = {"push": 285.0, "friction": 275.0}
+
+    def fitted(trials, near, found, views):
+        return [
+            SimpleNamespace(
+                structure=one.structure,
+                constants=dict,
+                hypothesis=SimpleNamespace(
+                    fit=SimpleNamespace(log_evidence=evidence[one.structure.nature])
+                ),
+            )
+            for one in found
+        ]
+
+    monkeypatch.setattr(in_model, "suggestions", lambda views, wanted: family[:2])
+    monkeypatch.setattr(in_model, "of_family", lambda views, name: family)
+    monkeypatch.setattr(in_model, "_fitted", fitted)
+    monkeypatch.setattr(in_model, "without_twins", lambda laws: laws)
+    none: Any = None
+    found = fitted_laws(none, none, [])
+    assert len(found) == len(family), "each once"
+    assert found[0].structure == Structure("push", False, (FACTOR["slope_q"],))
