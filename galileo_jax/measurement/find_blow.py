@@ -67,10 +67,10 @@ def blow_frame(observation: Observation) -> int | None:
     last = first + int(np.argmin(np.append(is_blow[first:], False)))
     # Of the windows that see it, those in whose middle it is: there the change is largest.
     at = first + int(np.argmax(size[first:last]))
-    return int(seen[_last_before(times_s, place_m, variance, at + STEPS)])
+    return int(seen[last_before(times_s, place_m, variance, at + STEPS)])
 
 
-def _last_before(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, about: int) -> int:
+def last_before(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, about: int) -> int:
     """The last frame before a blow that is within `STEPS` frames of `about`."""
     begin, end = max(about - PARABOLA_FRAMES + 1, 0), about + PARABOLA_FRAMES + 1
     times, place = times_s[begin:end] - times_s[about], place_m[:, begin:end]
