@@ -51,6 +51,14 @@ objects:
   - {{name: object1, shape: cylinder, size_m: null, point_px: [79.8, 72.0], first_frame: 168}}
   - {{name: object2, shape: cylinder, size_m: null, point_px: [150.3, 86.1], first_frame: 168}}
 """
+CUBE = """track: {track}
+track_up: z
+scenario: toss
+objects:
+  - {{name: object1, shape: box, size_m: [0.1048, 0.1048, 0.1048], mass_kg: 0.37}}
+"""
+EVERY_TOSS = 5
+SHOWN = 6  # candidates
 BESIDE_HIT = 14  # frames on either side of a hit through which velocities are laid
 
 
@@ -170,10 +178,11 @@ def spin_named(folder: Path, out: Path, flights: slice) -> str:
         if np.linalg.norm(spin) <= FAST_RAD_S:
             continue
         try:
-            verdict = gx.diagnose(path, seed=0).document["verdict"]
+            document = gx.diagnose(path, seed=0).document
         except InputError as error:
             print(f"spin_named: {error}")
             continue
+        verdict, first = document["verdict"], document["candidates"][0]
         effects = verdict["effects"]
         has_spin = any("magnus" in one for one in effects)
         asked += 1
@@ -181,7 +190,7 @@ def spin_named(folder: Path, out: Path, flights: slice) -> str:
         among += verdict["status"] == "ambiguous" and has_spin and len(effects) <= MOST_AMONG
         print(
             f"spin_named: {path.stem}, {np.linalg.norm(spin):.0f} rad/s: {verdict['status']} "
-            f"{', '.join(effects)}",
+            f"{', '.join(effects)}; first {_with_p(first)}",
             flush=True,
         )
     return (
@@ -197,6 +206,22 @@ def cube_tosses(folder: Path, out: Path, _: slice) -> str:
         script = Path(__file__).with_name(call[0])
         subprocess.run([sys.executable, str(script), *call[1:]], check=True)
     return "see the lines above"
+
+
+def cube_falls(folder: Path, out: Path, _: slice) -> str:
+    """What `diagnose` says of the free flights of some tosses, as trials of one cube."""
+    paths = []
+    for table in sorted((folder / "cube_tosses").glob("*.csv"))[::EVERY_TOSS]:
+        (out / table.name).write_bytes(table.read_bytes())
+        paths.append((out / table.name).with_suffix(".yaml"))
+        paths[-1].write_text(CUBE.format(track=table.name))
+    found = gx.diagnose(paths, seed=0)
+    leading = "; ".join(
+        f"{_with_p(one)}, probability {one['probability']:.3f}, log odds {one['score']:.1f}"
+        for one in found.document["candidates"][:SHOWN]
+    )
+    advice = found.document["verdict"].get("advice", ())
+    return f"{len(paths)} flights: {_verdict(found)}; {leading}; " + " ".join(map(str, advice))
 
 
 def puck_head_on(folder: Path, out: Path, _: slice) -> str:
@@ -264,6 +289,7 @@ SETS: dict[str, tuple[tuple[str, ...], Row]] = {
     "spin_told": (("spin_flights/index.csv",), spin_told),
     "spin_named": (("spin_flights/index.csv",), spin_named),
     "puck_head_on": (("puck_head_on.mp4",), puck_head_on),
+    "cube_falls": (("cube_tosses",), cube_falls),
     "cube_tosses": (("cube_tosses",), cube_tosses),
 }
 
@@ -321,6 +347,11 @@ def _estimate(found: gx.Fit, name: str) -> str:
 def _error(found: gx.Fit) -> str:
     error: dict[str, Any] = found.result["error"]
     return f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}"
+
+
+def _with_p(candidate: dict[str, Any]) -> str:
+    p = candidate["p_value"]
+    return f"{candidate['effect']} (p {'not asked' if p is None else format(p, '.2g')})"
 
 
 def _verdict(found: gx.Diagnosis) -> str:
