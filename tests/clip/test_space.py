@@ -100,6 +100,15 @@ def test_a_measured_spin_is_the_prior(tmp_path):
     assert means == pytest.approx(SPIN)
 
 
+def test_the_drag_of_the_air_is_expected(tmp_path):
+    measured = measure(load_clip(write(tmp_path)))
+    (effect,) = make_effects(["air_drag"])
+    problem = make_problem(measured.clip, measured.observation, effects=[effect])
+    scene = problem.model.scene.surroundings
+    assert effect.odds({"air_drag": np.array(DRAG_KG_M)}, scene) > 10
+    assert effect.odds({"air_drag": np.array(30 * DRAG_KG_M)}, scene) < 1.5
+
+
 def test_what_is_wrong_is_one_line(tmp_path):
     path = write(tmp_path, ", spin_rad_s: [1.0, 2.0]")
     with pytest.raises(InputError, match=r"spin_rad_s\[2\]: missing"):

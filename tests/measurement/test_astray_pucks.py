@@ -16,9 +16,9 @@ NAMES = ("one", "other")
 
 
 def looked_for(
-    place: np.ndarray, unseen: slice | None = None
+    place: np.ndarray, unseen: slice | None = None, which: int = 1
 ) -> tuple[Observation, tuple[Astray, ...]]:
-    """What is found in two tracks `[object, axis, frame]`, m; the other is unseen meanwhile."""
+    """What is found in tracks `[object, axis, frame]`, m, of which one is unseen meanwhile."""
     clip = Clip(
         path=Path("pucks.yaml"),
         video=Path("pucks.mp4"),
@@ -33,7 +33,7 @@ def looked_for(
     )
     mask = np.ones((2, FRAMES), bool)
     if unseen is not None:
-        mask[1, unseen] = False
+        mask[which, unseen] = False
     place = np.where(mask[:, None], place, np.nan)
     error = np.broadcast_to(SD_M**2 * np.eye(2)[None, :, :, None], (2, 2, 2, FRAMES))
     times = np.arange(FRAMES) / FPS
@@ -103,3 +103,10 @@ def test_a_puck_may_be_struck_between_two_frames() -> None:
 def test_what_is_not_seen_may_be_there() -> None:
     unseen = slice(AT - 3, AT + 3)
     assert looked_for(slides((0.2, 0.5), back=True), unseen)[1] == ()
+
+
+def test_a_puck_that_is_seen_in_two_frames_only_is_lost() -> None:
+    _, (found,) = looked_for(slides((0.2, 0.5)), slice(2, None), which=0)
+    assert (found.name, found.is_left_out) == ("one", False)
+    assert found.time_s == pytest.approx(2 / FPS)
+    assert "nothing there looks like it" in found.why
