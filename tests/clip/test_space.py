@@ -102,8 +102,8 @@ def test_a_measured_spin_is_the_prior(tmp_path):
 
 def test_the_drag_of_the_air_is_expected(tmp_path):
     measured = measure(load_clip(write(tmp_path)))
-    (effect,) = make_effects(["air_drag"])
-    problem = make_problem(measured.clip, measured.observation, effects=[effect])
+    (effect,) = effects = make_effects(["air_drag"])
+    problem = make_problem(measured.clip, measured.observation, effects=effects)
     scene = problem.model.scene.surroundings
     assert effect.odds({"air_drag": np.array(DRAG_KG_M)}, scene) > 10
     assert effect.odds({"air_drag": np.array(30 * DRAG_KG_M)}, scene) < 1.5
