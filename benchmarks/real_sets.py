@@ -221,7 +221,10 @@ def cube_falls(folder: Path, out: Path, _: slice) -> str:
         for one in found.document["candidates"][:SHOWN]
     )
     advice = found.document["verdict"].get("advice", ())
-    return f"{len(paths)} flights: {_verdict(found)}; {leading}; " + " ".join(map(str, advice))
+    status, p_value = found.document["verdict"]["status"], found.document["p_value"]
+    return f"{len(paths)} flights: {status} (p {p_value:.2g} without effects); {leading}; " + (
+        " ".join(map(str, advice))
+    )
 
 
 def puck_head_on(folder: Path, out: Path, _: slice) -> str:
