@@ -51,6 +51,7 @@ class Candidate:
       confounded_with: candidates that these data do not tell from it.
       law: the formula, where it is a law that the missing force suggested; else None.
       num_constants: parameters of its effects.
+      num_expected: how many of its effects the clip leads to expect, as the drag of the air.
     """
 
     effects: tuple[str, ...]
@@ -64,6 +65,7 @@ class Candidate:
     confounded_with: tuple[str, ...]
     law: "Law | None" = None
     num_constants: int = 1
+    num_expected: int = 0
 
     @property
     def name(self) -> str:

@@ -14,6 +14,7 @@ from galileo_jax.diagnosis.verdict import (
     is_close_call,
     log_prior,
     may_decide,
+    num_expected,
     ranked,
 )
 from galileo_jax.inference.fits.gradient import GradientFitter
@@ -128,6 +129,7 @@ class Race:
             p_value=None,
             confounded_with=(),
             num_constants=_num_constants(trials, hypothesis),
+            num_expected=num_expected(_odds(trials, hypothesis)),
         )
 
 

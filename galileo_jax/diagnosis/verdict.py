@@ -29,8 +29,10 @@ FAINT_FACTOR = 2.0
 # Log odds, in nats, at which an effect is believed although the base model passes its comparison:
 # a test that looks everywhere notices less than one that knows where to look (e^7 = 1100).
 CONVINCING = 7.0
-# A pair must pass this p-value, not ADEQUATE_P: two effects come close to almost any motion.
+# A pair must pass this p-value, not ADEQUATE_P: two effects come close to almost any motion. An
+# effect that is so many times as likely as others, as the air's drag on a ball, does not count.
 PAIR_P = 0.05
+EXPECTED_ODDS = 3.0
 # Two effects at once are so much rarer than one: who measures knows of most of what disturbs.
 SECOND_EFFECT_ODDS = 0.1
 # Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
@@ -61,6 +63,11 @@ def log_prior(odds: Sequence[float], num_effects: int) -> float:
     """
     share = SECOND_EFFECT_ODDS ** (len(odds) - 1) / comb(num_effects, len(odds))
     return log(share) + float(np.sum(np.log(odds)))
+
+
+def num_expected(odds: Sequence[float]) -> int:
+    """How many effects of a hypothesis the clip leads to expect; `odds` as of `log_prior`."""
+    return sum(each > EXPECTED_ODDS for each in odds)
 
 
 def ranked(candidates: Iterable[Candidate]) -> tuple[Candidate, ...]:
@@ -127,7 +134,8 @@ def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]
 
 def explains(candidate: Candidate) -> bool:
     """Whether a candidate was compared with the data and leaves nothing but noise."""
-    least = ADEQUATE_P if len(candidate.effects) == 1 else PAIR_P
+    num_surprising = len(candidate.effects) - candidate.num_expected
+    least = ADEQUATE_P if num_surprising <= 1 else PAIR_P
     return candidate.p_value is not None and candidate.p_value >= least
 
 

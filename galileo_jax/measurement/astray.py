@@ -73,7 +73,7 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
     found = []
     for i, name in enumerate(track.names):
         seen = np.flatnonzero(observation.mask[i])
-        if len(seen) < FEWEST_FRAMES:
+        if not seen.size:
             continue
         last = int(seen[-1])
         if (shared := _shared(clip, observation, i)) is not None:
@@ -146,7 +146,8 @@ def _leapt(clip: Clip, observation: Observation, i: int, seen: np.ndarray) -> in
     Once it has gone half its size: until then a hand may be at it.
     """
     scenario = SCENARIOS[clip.scenario]
-    if not (scenario.has_ramp or scenario.is_level) or not clip.is_scale_known:
+    is_asked = (scenario.has_ramp or scenario.is_level) and clip.is_scale_known
+    if not is_asked or len(seen) < FEWEST_FRAMES:
         return None
     place = observation.position_m[i, :2][:, seen]
     step_s = np.diff(observation.times_s[seen])

@@ -21,6 +21,7 @@ from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.find_blow import blow_frame, goes_on
+from galileo_jax.measurement.find_bounce import bounce_frame
 from galileo_jax.measurement.find_fold import fold_frame
 from galileo_jax.measurement.find_hand import hand_frame
 from galileo_jax.measurement.find_placed import placed_frames
@@ -78,7 +79,10 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
     observation, cuts = _left_to_itself(observation) if is_let_go else (observation, [])
     ends = [
         (frame, why)
-        for frame, why in ((find(observation), why) for find, why in _ends(clip))
+        for frame, why in (
+            (find(observation), why)
+            for find, why in _ends(clip, observation.position_m.shape[1] == 3)
+        )
         if frame is not None
     ]
     if ends:
@@ -125,7 +129,7 @@ def to_last_cut(observation: Observation, cuts: Sequence[Cut]) -> Observation:
     )
 
 
-def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
+def _ends(clip: Clip, is_in_space: bool) -> list[tuple[Callable[[Observation], int | None], str]]:
     """What may end the motion of the scene."""
     if is_board(clip) or (clip.scenario == "fall" and not clip.has_floor):
         return [(arrest_frame, STOPPED), (blow_frame, STRUCK)]
@@ -133,7 +137,7 @@ def _ends(clip: Clip) -> list[tuple[Callable[[Observation], int | None], str]]:
         poses = read_poses_csv(clip.track, clip.track_up)
         return [(lambda _: last_free_frame(poses, clip.objects[0].size_m), LANDED)]
     if clip.scenario == "flight" and not clip.has_floor:
-        return [(blow_frame, STRUCK)]
+        return [(bounce_frame if is_in_space else blow_frame, STRUCK)]
     return []
 
 

@@ -10,6 +10,11 @@ of the change of velocity c = v_b - v_a
                                            lengths may be in units that nobody knows
 
 where v_a and v_b are medians of the steps on either side, so that no single point makes a blow.
+Medians are blind to a step or two. So when it was is told by two parabolas, one to the last frame
+before the blow and one from the next on: that frame is taken with which they leave least, or the
+latest that leaves hardly more, for a frame of the blow itself lies on both. As errors may be larger
+in one direction than in another (along the way, where times are not known well), what they leave is
+the determinant of its scatter.
 """
 
 import numpy as np
@@ -23,6 +28,9 @@ USUAL = 4.0
 GOES_ON = 0.1  # of the speed: what keeps less has been stopped
 STEPS = 3  # on either side
 SMEARED = 2  # steps into which the blow itself may fall
+PARABOLA_FRAMES, FEWEST = 10, 4  # on either side of a blow
+AS_WELL = 9.0  # in -2 log likelihood: three standard deviations
+FLOOR = 0.01  # of the track's variance: a few points may leave nothing in some direction
 
 
 def blow_frame(observation: Observation) -> int | None:
@@ -59,8 +67,29 @@ def blow_frame(observation: Observation) -> int | None:
     last = first + int(np.argmin(np.append(is_blow[first:], False)))
     # Of the windows that see it, those in whose middle it is: there the change is largest.
     at = first + int(np.argmax(size[first:last]))
-    steps = np.linalg.norm(np.diff(velocity[:, at + STEPS - 1 : at + STEPS + SMEARED]), axis=0)
-    return int(seen[at + STEPS + int(np.argmax(steps > 0.25 * size[at]))])
+    return int(seen[last_before(times_s, place_m, variance, at + STEPS)])
+
+
+def last_before(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, about: int) -> int:
+    """The last frame before a blow that is within `STEPS` frames of `about`."""
+    begin, end = max(about - PARABOLA_FRAMES + 1, 0), about + PARABOLA_FRAMES + 1
+    times, place = times_s[begin:end] - times_s[about], place_m[:, begin:end]
+    floor = FLOOR * float(np.median(variance[begin:end])) * np.eye(len(place))
+    left = {}
+    for last in range(about - STEPS, about + STEPS + 1):
+        sides = slice(None, last + 1 - begin), slice(last + 1 - begin, None)
+        if min(len(times[side]) for side in sides) < FEWEST:
+            continue
+        beside = np.concatenate([_beside(times[side], place[:, side]) for side in sides], axis=1)
+        count = beside.shape[1]
+        left[last] = count * np.linalg.slogdet(beside @ beside.T / count + floor)[1]
+    return max(last for last, cost in left.items() if cost <= min(left.values()) + AS_WELL)
+
+
+def _beside(times_s: np.ndarray, place_m: np.ndarray) -> np.ndarray:
+    """What a parabola leaves, `[axis, frame]`, m."""
+    design = np.vander(times_s, 3)
+    return place_m - (design @ np.linalg.lstsq(design, place_m.T, rcond=None)[0]).T
 
 
 def goes_on(observation: Observation, last: int) -> bool:

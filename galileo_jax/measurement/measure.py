@@ -101,7 +101,9 @@ def measure(clip: Clip) -> Measurement:
         measured = replace(measured, clip=moving)
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
     observation = without_astray(to_last_cut(observation, cuts), astray)
-    if is_level(measured.clip):
+    if is_level(measured.clip) or clip.scenario == "toss":
+        # The places of a ball in space are as uncertain along its way as its times, which a wander
+        # that is told by the track would take for it.
         observation = with_wander(observation)
     if pixels is None and observation.position_m.shape[1] == 2:
         # In space and from above the likelihood lets every track wander.

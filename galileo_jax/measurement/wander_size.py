@@ -1,9 +1,9 @@
-"""How far do camera and tracker wander in a clip of pucks seen from above?
+"""How far do camera and tracker wander in a clip of pucks seen from above, or of a tossed box?
 
 What they do wanders slowly (an Ornstein-Uhlenbeck process, `similarity.level_discrepancy`), by a
 hundredth of a pixel in one clip and by a sixth in another. Slow as it is, it has a fast part that
-no sliding puck has: from frame to frame it takes steps of w sqrt(2 dt / tau). So, before any
-physics, each coordinate is described in pieces as
+no sliding puck has, nor a box in free flight: from frame to frame it takes steps of
+w sqrt(2 dt / tau). So, before any physics, each coordinate is described in pieces as
 
     measured = smooth path + wander + error,    w^2 K_tau + s^2 sd^2 1
 
@@ -28,7 +28,10 @@ from galileo_jax.observation.observation import Observation
 LARGEST_M, LASTS_S = 4e-4, 0.3
 """Standard deviation and duration of the wander in a clip of which nothing is known; the likelihood
 takes it so where an observation does not tell."""
-SIZES = LARGEST_M * np.geomspace(1 / 300, 1.0, 16)
+IN_SPACE_M, IN_SPACE_S = 2e-3, 0.15
+"""The same of a track in space."""
+SIZES = np.geomspace(1 / 300, 1.0, 16)
+"""Tried, of the largest."""
 SCALES, SCALE_SD = np.geomspace(0.4, 2.5, 7), 0.5
 """Of the stated errors, and the standard deviation of their logarithm."""
 PATHS = np.geomspace(1e-1, 1e7, 13)
@@ -41,19 +44,23 @@ def with_wander(observation: Observation) -> Observation:
     """The observation with the size of its wander, `wander_m`.
 
     Args:
-      observation: of pucks in a plane; its errors as stated.
+      observation: of pucks in a plane, or of one body in space; its errors as stated.
     """
+    num_axes = len([axis for axis in observation.axes if axis != "turning"])
+    largest_m, lasts_s = (LARGEST_M, LASTS_S) if num_axes == 2 else (IN_SPACE_M, IN_SPACE_S)
+    sizes_m = largest_m * SIZES
     evidence = np.zeros(len(SIZES))
-    for i, axis in product(range(len(observation.names)), range(2)):
+    for i, axis in product(range(len(observation.names)), range(num_axes)):
         for piece in _pieces(observation, i):
             if len(piece) >= LEAST_FRAMES:
                 variance = observation.covariance_m2[i, axis, axis, piece]
                 place = observation.position_m[i, axis, piece]
-                evidence += _evidence(observation.times_s[piece], place, variance)
+                times_s = observation.times_s[piece]
+                evidence += _evidence(times_s, place, variance, sizes_m, lasts_s)
     if not evidence.any():
-        return replace(observation, wander_m=LARGEST_M)
+        return replace(observation, wander_m=largest_m)
     weight = np.exp(evidence - np.asarray(logsumexp(evidence)))
-    return replace(observation, wander_m=float(np.sqrt(weight @ SIZES**2)))
+    return replace(observation, wander_m=float(np.sqrt(weight @ sizes_m**2)))
 
 
 def _pieces(observation: Observation, i: int) -> list[np.ndarray]:
@@ -78,13 +85,15 @@ def _evidence(
     times_s: Float[np.ndarray, " frame"],
     place_m: Float[np.ndarray, " frame"],
     variance_m2: Float[np.ndarray, " frame"],
+    sizes_m: Float[np.ndarray, " size"],
+    lasts_s: float,
 ) -> Float[np.ndarray, " size"]:
-    """The log marginal likelihood of a piece for each of `SIZES`, of what no parabola takes up."""
+    """The log marginal likelihood of a piece for each size, of what no parabola takes up."""
     size = len(times_s)
     since = (times_s - times_s[0]) / (times_s[-1] - times_s[0])
     apart = np.abs(times_s[:, None] - times_s)
     unit = float(np.sqrt(np.median(variance_m2)))
-    wander = (SIZES[:, None, None] / unit) ** 2 * np.exp(-apart / LASTS_S)
+    wander = (sizes_m[:, None, None] / unit) ** 2 * np.exp(-apart / lasts_s)
     error = SCALES[:, None, None] ** 2 * np.diag(variance_m2) / unit**2
     path = PATHS[:, None, None] ** 2 * smooth_path(since)
     cover = wander[:, None, None] + error[:, None] + path  # [size, scale, path, frame, frame]

@@ -17,7 +17,7 @@ from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import crossings, modes, offsets, wander
+from galileo_jax.similarity.discrepancy import WANDER_SD_M, crossings, modes, offsets, wander
 from galileo_jax.similarity.level_discrepancy import level_modes
 
 NoiseModel = Literal["camera", "bodies", "tracker"]
@@ -73,7 +73,8 @@ class GaussianLikelihood:
         elif scene.is_level:
             patterns = level_modes(observation, scene, is_filmed=noise == "camera")
         elif axes == 3:
-            patterns = np.stack([*offsets(observation), *wander(observation)])
+            size_m = WANDER_SD_M if observation.wander_m is None else observation.wander_m
+            patterns = np.stack([*offsets(observation), *wander(observation, size_m)])
         else:
             patterns = modes(observation, scene, is_filmed=noise == "camera")
             patterns = np.concatenate([patterns, crossings(observation, scene)])

@@ -16,7 +16,7 @@ from galileo_jax.model.effects.air import AIR_KG_M3
 from galileo_jax.runtime.errors import InputError
 from tests.precision import in_64_bit
 
-MASS_KG, RADIUS_M, LIFT, DRAG_KG_M = 0.0027, 0.02, 0.6, 3.5e-4
+MASS_KG, RADIUS_M, LIFT, DRAG_KG_M = 0.0027, 0.02, 1.1, 3.5e-4
 SPIN = np.array([150.0, -90.0, 60.0])  # x, y (up), z
 SD_M, SD_S = 5e-4, 5e-4
 START = np.array([0.3, 2.0, -7.0])
@@ -34,7 +34,9 @@ def flown(times_s: np.ndarray) -> np.ndarray:
 
     def change(_: float, state: np.ndarray) -> np.ndarray:
         v = state[3:]
-        force = size * np.cross(SPIN, v) - DRAG_KG_M * np.linalg.norm(v) * v
+        turned, speed = np.cross(SPIN, v), np.linalg.norm(v)
+        lift = size * turned / (1 + 2 * RADIUS_M * np.linalg.norm(turned) / speed**2)
+        force = lift - DRAG_KG_M * speed * v
         return np.concatenate([v, force / MASS_KG + [0, -9.81, 0]])
 
     begin = np.concatenate([[0.1, 0.4, 0.9], START])
@@ -96,6 +98,15 @@ def test_a_measured_spin_is_the_prior(tmp_path):
         if parameter.name in ("magnus_x", "magnus_y", "magnus_z")
     ]
     assert means == pytest.approx(SPIN)
+
+
+def test_the_drag_of_the_air_is_expected(tmp_path):
+    measured = measure(load_clip(write(tmp_path)))
+    (effect,) = effects = make_effects(["air_drag"])
+    problem = make_problem(measured.clip, measured.observation, effects=effects)
+    scene = problem.model.scene.surroundings
+    assert effect.odds({"air_drag": np.array(DRAG_KG_M)}, scene) > 10
+    assert effect.odds({"air_drag": np.array(30 * DRAG_KG_M)}, scene) < 1.5
 
 
 def test_what_is_wrong_is_one_line(tmp_path):

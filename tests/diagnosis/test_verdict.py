@@ -22,6 +22,7 @@ from galileo_jax.diagnosis.verdict import (
     looked_at_again,
     may_decide,
     needs_pairs,
+    num_expected,
     ranked,
     rivals,
     to_add,
@@ -477,3 +478,12 @@ def test_whose_evidence_must_be_right_to_a_nat(log_odds, best, is_adequate, expe
     margin = 6.0 if is_adequate else 3.0
     found = is_close_call(np.array(log_odds), best, margin, is_adequate)
     assert found.tolist() == expected
+
+
+def test_a_pair_with_what_is_expected_counts_as_one_effect():
+    """The air's drag on a ball surprises nobody: p = 0.03 is enough for it and one effect more."""
+    pair = candidate(PAIR, 50.0, p_value=0.03)
+    assert not explains(pair)
+    assert explains(replace(pair, num_expected=1))
+    assert not explains(replace(candidate(PAIR, 50.0, p_value=0.009), num_expected=1))
+    assert [num_expected(odds) for odds in ([1.0, 30.0], [1.0, 2.0], [30.0, 5.0])] == [1, 0, 2]

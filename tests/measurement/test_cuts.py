@@ -111,6 +111,22 @@ def test_a_blow_ends_the_run(fps, kept):
     assert hand_frame(seen) is None
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_bounce_between_two_frames_ends_the_flight_before_it(seed):
+    """In space, with times uncertain by 0.4 ms: errors along the way are far larger than across."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(60) / 145
+    hit_s = times[22] + rng.uniform(0.25, 0.75) / 145
+    read_s = times + 4e-4 * rng.standard_normal(60)
+    since = np.maximum(read_s - hit_s, 0)
+    height = 2.2 * (hit_s - read_s) + 4.0 * since - 4.9 * (read_s - hit_s) ** 2
+    place = np.stack([0.4 * read_s, height, 8.0 * read_s - 1.5 * since])
+    place = place + 7e-4 * rng.standard_normal(place.shape)
+    error = np.broadcast_to(2e-3**2 * np.eye(3)[None, :, :, None], (1, 3, 3, 60))
+    seen = Observation(("object1",), times, place[None], error, np.ones((1, 60), bool))
+    assert blow_frame(seen) == 22
+
+
 def test_one_bad_point_is_no_blow():
     way = 1.2 * np.arange(1, 240) / 240
     seen = slid(way, 240.0)

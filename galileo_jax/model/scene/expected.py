@@ -7,7 +7,7 @@ declared angle, scale and origin they are how well the yaml says that these are 
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -80,6 +80,7 @@ def expected(
         **declared,
         **_launcher(clip),
         **_spin(clip),
+        **(_drag_in_space(clip, velocity) if len(velocity) == 3 else {}),
         **(_high_fall(clip, float(down_m.max())) if clip.scenario == "fall" and known else {}),
     }
 
@@ -125,6 +126,14 @@ def _launcher(clip: Clip) -> dict[str, tuple[float, float]]:
     if clip.launch_angle_deg is None:
         return {}
     return {LAUNCH: (math.radians(clip.launch_angle_deg), math.radians(LAUNCH_SD_DEG))}
+
+
+def _drag_in_space(clip: Clip, velocity_m_s: Sequence[float]) -> dict[str, tuple[float, float]]:
+    """What the air does to a ball of declared size that several cameras follow; else nothing."""
+    ball, speed = clip.objects[0], float(np.linalg.norm(velocity_m_s))
+    if clip.scenario != "flight" or ball.shape != "sphere" or ball.size_m is None:
+        return {}
+    return expected_drags(ball.size_m[0], speed**2 / clip.gravity, clip.gravity)
 
 
 def _high_fall(clip: Clip, length_m: float) -> dict[str, tuple[float, float]]:

@@ -34,7 +34,7 @@ class AirDrag(Effect):
         return (Parameter("air_drag", "kg/m", prior, 0.0, "effect", 0.1),)
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
-        """High where the drag of the air on a ball of known size is found in a high fall."""
+        """High where it is that of air on a ball of known size, in a high fall or in space."""
         return expected_odds(self.name, theta, scene, FALL_PRIOR)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:
