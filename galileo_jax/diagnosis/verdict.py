@@ -164,8 +164,9 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
 
     Returns:
       Named: one hypothesis explains the data, and nothing else does about as well. Ambiguous:
-      several do; a form without a name stands last. Unknown: only a form does, or nothing, or
-      what does is far behind what does not.
+      several do; a form without a name stands last, and an effect that explains the data alone
+      is not repeated with others. Unknown: only a form does, or nothing, or what does is far
+      behind what does not.
     """
     best, explaining = candidates[0], [c for c in candidates if explains(c)]
     if not explaining:
@@ -184,9 +185,23 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     if len(equal) == 1:
         others = [c for c in candidates if c.effects != top.effects]
         return Verdict("named", top.effects, reasons=(why, reasons.decisive(top, others, decisive)))
-    alike = [*names, *forms[:1]]
+    alike = [*_without_more(names), *forms[:1]]
+    if len(alike) == 1:
+        alike = names
     contests = (reasons.contested(names[0], rival, decisive) for rival in alike[1:])
     return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *contests))
+
+
+def _without_more(names: Sequence[Candidate]) -> list[Candidate]:
+    """Ranked hypotheses without those that add to a more probable one an effect that it needs not.
+
+    Beside every effect that explains the data stand its pairs with whatever does nothing here.
+    """
+    return [
+        c
+        for i, c in enumerate(names)
+        if not any(set(other.effects) < set(c.effects) for other in names[:i])
+    ]
 
 
 def within_luck(

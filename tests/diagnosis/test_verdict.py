@@ -257,6 +257,26 @@ def test_one_form_stands_last_in_an_ambiguous_verdict():
     assert [why.numbers.get("rival") for why in found.reasons] == [None, "rolling", FORM]
 
 
+def test_an_effect_is_not_repeated_with_others_that_add_nothing():
+    found = verdict(
+        candidate(FORM, 42.0),
+        candidate("viscous_drag", 41.5),
+        candidate("viscous_drag+rolling", 41.0),
+        candidate("air_drag+rolling", 40.5),
+        candidate("air_drag", 40.0),
+    )
+    assert told(found) == (
+        "ambiguous",
+        ("viscous_drag", "air_drag+rolling", "air_drag", FORM),
+        None,
+    )
+
+
+def test_one_effect_or_it_and_another_is_ambiguous():
+    found = verdict(candidate("air_drag", 42.0), candidate("air_drag+rolling", 40.0))
+    assert told(found) == ("ambiguous", ("air_drag", "air_drag+rolling"), None)
+
+
 # None.
 
 
