@@ -46,7 +46,7 @@ def main(argv: Sequence[str]) -> int | None:
     names = call.only or [*LAWS, *LIBRARY, NO_LAW]
     rows = []
     for i, name in enumerate(names):
-        case = f"{name}_{call.clips}_{call.seed}"
+        case = f"{name}_{call.clips}_{call.seed + i}"
         if case not in done:
             done[case] = {"case": case, **_one(call, name, call.seed + i)}
             with log.open("a") as file:
