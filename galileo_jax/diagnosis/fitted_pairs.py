@@ -40,12 +40,12 @@ def fitted_pairs(
         return ()
     made = race(starts, sets)
     searched = {frozenset(c.effects) for c in made}
+    made += _of_others(race, ranked(made)[0], candidates, library, searched)
     for _ in range(NUM_ROUNDS):
         best = ranked(made)[0]
         made += _alike(race, best, library, searched)
         if ranked(made)[0].effects == best.effects:
             break
-    made += _of_others(race, ranked(made)[0], candidates, library, searched)
     return ranked(made)
 
 
@@ -76,12 +76,19 @@ def _of_others(
     """Pairs of neither effect of the best pair, fitted where a short search comes near that.
 
     Two effects may together do what the best single effect does alone, and neither of them need be
-    among the best. Each pair starts from the better of its single effects.
+    among the best. Each pair starts from the better of its single effects. Those fitted are added
+    to `searched`.
     """
     singles = sorted((c for c in candidates if c.name in library), key=lambda c: -c.log_evidence)
     pairs = [(one, (one.name, other.name)) for one, other in combinations(singles, 2)]
-    left = [(one, pair) for one, pair in pairs if frozenset(pair) not in searched]
-    return _nearest(race, best, [one.hypothesis for one, _ in left], [pair for _, pair in left])
+    left = [
+        (one, pair)
+        for one, pair in pairs
+        if frozenset(pair) not in searched and not set(pair) & set(best.effects)
+    ]
+    made = _nearest(race, best, [one.hypothesis for one, _ in left], [pair for _, pair in left])
+    searched.update(frozenset(c.effects) for c in made)
+    return made
 
 
 def _nearest(

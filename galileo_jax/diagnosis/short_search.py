@@ -10,6 +10,7 @@ from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.fits.starts import scattered_starts
 
 NUM_SCATTERED = 32  # over all priors; the best of them descends
+MOST_DESCENDED = 32  # candidates, those whose first start costs least
 
 
 def short_search(
@@ -33,16 +34,28 @@ def short_search(
       lowest: cost that others have already come to, nats.
 
     Returns:
-      z of the better end of each, and its cost at the search's noise, nats.
+      z of the better end of each, and its cost at the search's noise, nats. Of many candidates
+      those that begin far behind stay where they match: their costs are infinite.
     """
     trials, count = fitter.trials, len(fitter.trials.model_parameters)
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
-    matching, _ = matched(fitter, bases, candidates, seed)
+    first = np.stack([own[0] for own in matched(fitter, bases, candidates, seed)[0]])
+    z, cost = first.copy(), np.full(len(free), np.inf)
+    some = np.argsort(fitter.search_costs(first, free), kind="stable")[:MOST_DESCENDED]
+    z[some], cost[some] = _descended(fitter, first[some], free[some], seed, lowest)
+    return z, cost
+
+
+def _descended(
+    fitter: GradientFitter, first: np.ndarray, free: np.ndarray, seed: int, lowest: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """From a start of each and the best of some over all priors: the better end, and its cost."""
+    trials, count = fitter.trials, free.shape[1]
     every = np.stack([scattered_starts(trials, row, NUM_SCATTERED, seed) for row in free])
     of = np.repeat(np.arange(len(free)), NUM_SCATTERED)
     costs = fitter.search_costs(every.reshape(len(of), count), free[of]).reshape(len(free), -1)
     scattered = every[np.arange(len(free)), np.argmin(costs, axis=1)]
-    starts = np.concatenate([[own[0] for own in matching], scattered])
+    starts = np.concatenate([first, scattered])
     owner = np.tile(np.arange(len(free)), 2)
     found = fitter.race(starts, free[owner], owner, lowest).best
     cost = found.cost.reshape(2, -1)
