@@ -1,4 +1,4 @@
-"""What is missing fails in CI and is skipped elsewhere; and no test depends on the clock."""
+"""What a set-up installs fails in CI where it is missing; no test depends on the clock."""
 
 import re
 from pathlib import Path
@@ -7,40 +7,29 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests import missing
-from tests.missing import NO_SHARED_DATA, is_missing, is_required, needed_module
+from tests.missing import is_ci, is_missing, needed_module
 from tests.report import browser
 
 Skipped, Failed = pytest.skip.Exception, pytest.fail.Exception
 
 
 @pytest.mark.parametrize(
-    ("environ", "waiver", "is_failure"),
+    ("environ", "expected"),
     [
-        ({}, None, False),
-        ({"CI": ""}, None, False),
-        ({"CI": "false"}, None, False),
-        ({"CI": "0"}, None, False),
-        ({"CI": "true"}, None, True),
-        ({"CI": "1"}, None, True),
-        ({"CI": "true"}, NO_SHARED_DATA, True),
-        ({"CI": "true", NO_SHARED_DATA: "0"}, NO_SHARED_DATA, True),
-        ({"CI": "true", NO_SHARED_DATA: "1"}, NO_SHARED_DATA, False),
-        ({"CI": "true", NO_SHARED_DATA: "1"}, None, True),  # a browser is no data
-        ({NO_SHARED_DATA: "1"}, NO_SHARED_DATA, False),
+        ({}, False),
+        ({"CI": ""}, False),
+        ({"CI": "false"}, False),
+        ({"CI": "0"}, False),
+        ({"CI": "true"}, True),
+        ({"CI": "1"}, True),
     ],
 )
-def test_what_is_missing_is_required_in_ci_alone(environ, waiver, is_failure):
-    assert is_required(environ, waiver) is is_failure
+def test_ci_is_what_is_set_so(environ, expected):
+    assert is_ci(environ) is expected
 
 
 def test_it_ends_the_test(monkeypatch):
     monkeypatch.setenv("CI", "true")
-    monkeypatch.delenv(NO_SHARED_DATA, raising=False)
-    with pytest.raises(Failed, match=rf"no data here, and this is CI .*{NO_SHARED_DATA}=1"):
-        is_missing("no data here", NO_SHARED_DATA)
-    monkeypatch.setenv(NO_SHARED_DATA, "1")
-    with pytest.raises(Skipped, match=r"^no data here$"):
-        is_missing("no data here", NO_SHARED_DATA)
     with pytest.raises(Failed, match="no browser here, and this is CI"):
         is_missing("no browser here")
     monkeypatch.delenv("CI")
@@ -58,20 +47,22 @@ def test_modules(monkeypatch):
         needed_module("nonesuch.part")
 
 
-def test_the_data_and_the_browser_are_missing_by_the_same_rule(monkeypatch, tmp_path):
-    monkeypatch.setattr(missing, "SHARED_DATA", tmp_path / "none")
+def test_a_browser_is_missing_by_the_same_rule(monkeypatch):
     monkeypatch.setattr(browser, "CHROMIUM", None)
     monkeypatch.setenv("CI", "true")
-    monkeypatch.delenv(NO_SHARED_DATA, raising=False)
-    with pytest.raises(Failed, match=r"no \.\./shared/data beside this checkout, and this is CI"):
-        missing.find_shared_data()
     with pytest.raises(Failed, match="no chromium here, and this is CI"), browser.started():
         pass
     monkeypatch.delenv("CI")
-    with pytest.raises(Skipped):
-        missing.find_shared_data()
     with pytest.raises(Skipped), browser.started():
         pass
+
+
+@pytest.mark.parametrize("ci", ["", "true"])
+def test_without_the_shared_data_a_test_is_skipped_also_in_ci(monkeypatch, tmp_path, ci):
+    monkeypatch.setenv("CI", ci)
+    monkeypatch.setattr(missing, "SHARED_DATA", tmp_path / "none")
+    with pytest.raises(Skipped, match=r"no \.\./shared/data beside this checkout"):
+        missing.find_shared_data()
     monkeypatch.setattr(missing, "SHARED_DATA", tmp_path)
     assert missing.find_shared_data() == tmp_path
 
