@@ -117,6 +117,8 @@ def seen_truth(traces: Mapping[str, float]) -> str:
 def traces(yaml: Path, kind: str) -> dict[str, float]:
     """By how many nats the track's evidence is better with all hidden effects than without each.
 
+    Without one: with all others, or with none, whichever is better.
+
     The fit with all is looked for from the truth, too, so that no narrow valley hides one. What is
     outside the library always leaves one: infinite.
     """
@@ -135,7 +137,8 @@ def traces(yaml: Path, kind: str) -> dict[str, float]:
     (beside,) = fitter.fit_from(np.where(free, truth, 0.0)[None], free[None], np.zeros(1, int))
     whole = max(fitter.fit(0, effects=hidden).log_evidence, beside.log_evidence)
     without = {name: tuple(other for other in hidden if other != name) for name in hidden}
-    less = {name: fitter.fit(0, effects=rest).log_evidence for name, rest in without.items()}
+    evidence = {rest: fitter.fit(0, effects=rest).log_evidence for rest in {(), *without.values()}}
+    less = {name: max(evidence[rest], evidence[()]) for name, rest in without.items()}
     return {name: whole - less[name] for name in hidden}
 
 

@@ -101,7 +101,7 @@ class Promise:
 
     Attributes:
       effect: its name.
-      nats: by which it lowers the misfit.
+      nats: by which it raises the evidence.
       price: nats by which two effects are less probable than one, before the data.
     """
 

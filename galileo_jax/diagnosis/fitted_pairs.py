@@ -7,7 +7,13 @@ import numpy as np
 
 from galileo_jax.diagnosis.candidates import Hypothesis, reduced
 from galileo_jax.diagnosis.diagnosis import Candidate
-from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_from_scratch, pairs_to_try
+from galileo_jax.diagnosis.pairs import (
+    crossed_pairs,
+    most_alike,
+    not_tried,
+    pairs_from_scratch,
+    pairs_to_try,
+)
 from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.score_tests import best_gains
 from galileo_jax.diagnosis.short_search import short_search
@@ -46,7 +52,7 @@ def fitted_pairs(
         made += _alike(race, best, library, searched)
         if ranked(made)[0].effects == best.effects:
             break
-    return ranked(made)
+    return ranked([*made, *_crossed(race, ranked(made))])
 
 
 def _alike(
@@ -89,6 +95,20 @@ def _of_others(
     made = _nearest(race, best, [one.hypothesis for one, _ in left], [pair for _, pair in left])
     searched.update(frozenset(c.effects) for c in made)
     return made
+
+
+def _crossed(race: Race, made: Sequence[Candidate]) -> list[Candidate]:
+    """What the effects of the pairs that are about equal make with each other, fitted.
+
+    Where A and B do as well as A and C and as D and C, so may B and C, with all else so different
+    that from any of them only side valleys are reached: each is searched for from scratch.
+    """
+    sets = crossed_pairs(made)
+    if not sets:
+        return []
+    count = len(race.fitter.trials.model_parameters)
+    starts = [race.fitter.fit(race.seed, effects=pair).z[None, :count] for pair in sets]
+    return race([race.base] * len(sets), sets, starts)
 
 
 def _nearest(

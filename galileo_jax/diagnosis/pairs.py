@@ -6,7 +6,13 @@ from itertools import combinations
 import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import Candidate
-from galileo_jax.diagnosis.verdict import NUM_CROSSED, NUM_JOINED, NUM_PAIRS, NUM_SWAPPED
+from galileo_jax.diagnosis.verdict import (
+    DECISIVE,
+    NUM_CROSSED,
+    NUM_JOINED,
+    NUM_PAIRS,
+    NUM_SWAPPED,
+)
 from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH
 
 
@@ -52,6 +58,19 @@ def not_tried(
     return [
         (kept, name) for name in library if name != kept and frozenset((kept, name)) not in tried
     ]
+
+
+def crossed_pairs(made: Sequence[Candidate]) -> list[tuple[str, str]]:
+    """At most `NUM_PAIRS` that the effects of the best pairs make with each other, not fitted yet.
+
+    Args:
+      made: pairs that were fitted, ranked.
+    """
+    equal = [c for c in made if made[0].log_odds - c.log_odds < DECISIVE]
+    names = dict.fromkeys(name for c in equal for name in c.effects)
+    known = {frozenset(c.effects) for c in made}
+    crossed = [pair for pair in combinations(names, 2) if frozenset(pair) not in known]
+    return crossed[:NUM_PAIRS]
 
 
 def most_alike(costs: np.ndarray, lowest: float) -> np.ndarray:

@@ -107,7 +107,7 @@ def pairs_promised(single: Candidate, second: Promise, count: int) -> Reason:
     return Reason(
         "pairs_promised",
         f"{single.title} leaves {p_equals(single.p_value or 0.0)}, but beside it "
-        f"{second.effect.replace('_', ' ')} promises to lower the misfit by {second.nats:.1f} nats "
+        f"{second.effect.replace('_', ' ')} promises {second.nats:.1f} nats more evidence "
         f"(two effects are {second.price:.1f} nats less probable than one): {count} pairs of "
         "effects were tried.",
         {

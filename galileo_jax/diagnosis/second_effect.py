@@ -10,8 +10,11 @@ import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import Candidate, Promise
 from galileo_jax.diagnosis.race import Race
-from galileo_jax.diagnosis.score_tests import best_gains
+from galileo_jax.diagnosis.score_tests import promised_evidence
 from galileo_jax.diagnosis.verdict import DECISIVE, best_named, log_prior
+
+# Nats by which slopes may promise too little: they promised 1.1 and 4.1 of what were 2.3 and 4.7.
+SLOPE_NATS = 0.5
 
 
 def promised_by_a_second(
@@ -19,9 +22,8 @@ def promised_by_a_second(
 ) -> Promise | None:
     """The effect that promises most beside the best single one; None if none promises enough.
 
-    Enough is what would make the pair `DECISIVE` nats more probable. Each effect promises what its
-    slope explains with its best shape, so that now and then noise promises as much: pairs are then
-    tried in vain.
+    Enough is more evidence, and so much that the pair would be less than `DECISIVE` nats behind the
+    single effect: it might contest the name.
 
     Args:
       race: of the candidates.
@@ -33,7 +35,8 @@ def promised_by_a_second(
     if not others:
         return None
     pairs = [(*best.effects, name) for name in others]
-    gains = best_gains(race.fitter.trials, best.hypothesis.fit, pairs, race.seed)
+    evidence = promised_evidence(race.fitter.trials, best.hypothesis.fit, pairs, race.seed)
     one, two = (log_prior([1.0] * count, len(library)) for count in (1, 2))
-    found = Promise(others[int(np.argmax(gains))], float(gains.max()), one - two)
-    return found if found.nats > found.price + DECISIVE else None
+    found = Promise(others[int(np.argmax(evidence))], float(evidence.max()), one - two)
+    least = max(found.price - DECISIVE - SLOPE_NATS, 0.0)
+    return found if found.nats > least else None

@@ -139,6 +139,23 @@ def explains(candidate: Candidate) -> bool:
     return candidate.p_value is not None and candidate.p_value >= least
 
 
+def _explaining(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Ranked candidates that explain the data, and pairs that only the stricter p-value keeps out.
+
+    Where a less probable pair of effects passes it, one that is no less adequate than a single
+    effect must be does so, too.
+    """
+    top = next((c for c in candidates if explains(c)), None)
+    if top is None:
+        return []
+    leads = [
+        c
+        for c in candidates[: candidates.index(top)]
+        if c.p_value is not None and c.p_value >= ADEQUATE_P and len(c.effects) == len(top.effects)
+    ]
+    return [c for c in candidates if c in leads or explains(c)]
+
+
 def form_that_leads(singles: Sequence[Candidate]) -> Candidate | None:
     """The form that explains the data better than any single effect with a name, if one does."""
     best = best_named(singles)
@@ -168,7 +185,7 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
       is not repeated with others. Unknown: only a form does, or nothing, or what does is far
       behind what does not.
     """
-    best, explaining = candidates[0], [c for c in candidates if explains(c)]
+    best, explaining = candidates[0], _explaining(candidates)
     if not explaining:
         return Verdict("unknown", (), reasons=(reasons.nothing_explains(best),))
     top = explaining[0]
@@ -195,12 +212,16 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
 def _without_more(names: Sequence[Candidate]) -> list[Candidate]:
     """Ranked hypotheses without those that add to a more probable one an effect that it needs not.
 
-    Beside every effect that explains the data stand its pairs with whatever does nothing here.
+    Beside every effect that explains the data stand its pairs with whatever does nothing here. One
+    with more evidence stays: only what was believed before the data speaks against it.
     """
     return [
         c
         for i, c in enumerate(names)
-        if not any(set(other.effects) < set(c.effects) for other in names[:i])
+        if not any(
+            set(other.effects) < set(c.effects) and c.log_evidence <= other.log_evidence
+            for other in names[:i]
+        )
     ]
 
 

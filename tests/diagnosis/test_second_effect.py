@@ -1,6 +1,11 @@
 """A second effect is looked for where its slope promises it, though one effect is enough."""
 
+import hypothesis.strategies as st
+import jax.numpy as jnp
+import numpy as np
 import pytest
+from hypothesis import given
+from scipy.special import logsumexp
 
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
@@ -8,11 +13,13 @@ from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.race import Race
+from galileo_jax.diagnosis.score_tests import average_gain
 from galileo_jax.diagnosis.second_effect import promised_by_a_second
 from galileo_jax.diagnosis.verdict import DECISIVE, log_prior, ranked
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.model.parameters import LogNormal, Normal
 from tests.precision import in_64_bit
 
 LIBRARY = ("air_drag", "frame_rate", "restitution")
@@ -42,10 +49,38 @@ def two_effects(tmp_path_factory):
     return promise_in(tmp_path_factory.mktemp("two"), effects)
 
 
+@given(
+    st.lists(st.tuples(st.floats(-5.0, 5.0), st.floats(-3.0, 3.0)), min_size=1, max_size=4),
+    st.floats(0.01, 2.0),
+    st.floats(0.001, 0.2),
+)
+def test_the_average_gain_over_a_normal_prior_is_that_of_the_linear_gaussian_model(
+    shapes, sd, size
+):
+    """Per z: slope d, residuals r; averaged, exp(d.r z - d.d z^2/2) is in closed form."""
+    sds, log_length = np.array(shapes).T
+    length = 10.0**log_length
+    along, power = sds * length, length**2
+    exact = 0.5 * along**2 / (1 + power) - 0.5 * np.log1p(power)
+    per_probe = size / sd
+    found = average_gain(along * per_probe, power * per_probe**2, Normal(0.0, sd), size)
+    assert found == pytest.approx(logsumexp(exact) - np.log(len(exact)), abs=0.02)
+
+
+def test_the_average_gain_over_a_positive_prior_is_that_of_its_draws():
+    prior, size = LogNormal(0.3, 1.0), 0.05
+    z = jnp.asarray(np.random.default_rng(5).normal(size=400_000))
+    draws = np.asarray(prior.forward(z)) / size
+    along, power = 0.8, 0.04
+    drawn = logsumexp(along * draws - 0.5 * power * draws**2) - np.log(len(draws))
+    found = average_gain(np.array([along]), np.array([power]), prior, size)
+    assert found == pytest.approx(drawn, abs=0.05)
+
+
 def test_the_second_of_two_effects_promises_more_than_it_costs(two_effects):
     promise, best = two_effects
     assert (best.name, promise.effect) == ("air_drag", "frame_rate")
-    assert promise.nats > promise.price + DECISIVE
+    assert promise.nats > promise.price + DECISIVE  # a frame rate wrong by 5 % shows by far
     assert promise.price == pytest.approx(log_prior([1.0], 3) - log_prior([1.0, 1.0], 3))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
-from galileo_jax.diagnosis.pairs import most_alike, not_tried, pairs_to_try
+from galileo_jax.diagnosis.pairs import crossed_pairs, most_alike, not_tried, pairs_to_try
 from galileo_jax.diagnosis.verdict import (
     best_named,
     decisive_margin,
@@ -208,6 +208,25 @@ def test_the_least_p_value_that_explains(name, least, beside, is_explained):
     assert (rules(verdict(one)) == ["nothing_explains"]) is not is_explained
 
 
+@pytest.mark.parametrize(
+    ("p_value", "beside", "names"),
+    [
+        (0.011, "air_drag+frame_rate", ("air_drag+frame_rate", PAIR)),
+        (0.01 - EDGE, "air_drag+frame_rate", tuple(PAIR.split("+"))),
+        (None, "air_drag+frame_rate", tuple(PAIR.split("+"))),
+    ],
+)
+def test_a_pair_is_not_passed_over_for_a_less_probable_one(p_value, beside, names):
+    """Both leave about as much; at 0.05 one of twenty true pairs would be passed over."""
+    found = verdict(candidate(beside, 41.0, p_value), candidate(PAIR, 40.0, 0.052))
+    assert told(found)[1] == names
+
+
+def test_a_pair_is_passed_over_for_a_single_effect_that_explains():
+    found = verdict(candidate("rolling+air_drag", 41.0, 0.02), candidate("stribeck", 40.0))
+    assert told(found) == ("named", ("stribeck",), None)
+
+
 def test_what_was_not_compared_explains_nothing():
     assert not explains(candidate("air_drag", 40.0, None))
 
@@ -270,6 +289,15 @@ def test_an_effect_is_not_repeated_with_others_that_add_nothing():
         ("viscous_drag", "air_drag+rolling", "air_drag", FORM),
         None,
     )
+
+
+def test_an_effect_with_another_that_the_data_favour_contests_it():
+    """Only what is believed before the data speaks for the effect alone: that is no claim."""
+    alone = candidate("air_drag", 41.0)
+    for evidence_ahead, names in ((EDGE, ("air_drag", PAIR)), (-EDGE, ("air_drag", "rolling"))):
+        joined = candidate(PAIR, 40.0, log_prior=-3.0 - evidence_ahead)
+        found = verdict(alone, joined, candidate("rolling", 39.0, log_prior=3.0))
+        assert told(found)[1][:2] == names
 
 
 def test_one_effect_or_it_and_another_is_ambiguous():
@@ -342,6 +370,28 @@ def test_either_effect_of_the_best_pair_is_joined_with_what_it_was_not_tried_wit
     tried = {frozenset(("stribeck", "air_drag")), frozenset(("rolling", "stribeck"))}
     assert not_tried("air_drag", LIBRARY, tried) == [("air_drag", "rolling")]
     assert not_tried("stribeck", LIBRARY, tried) == []
+
+
+def test_effects_of_equal_pairs_are_crossed():
+    """Those of pairs that are within 3 nats of the best, unless they were fitted already."""
+    made = ranked(
+        [
+            candidate("a+b", 40.0),
+            candidate("a+c", 39.0),
+            candidate("d+c", 37.0 + EDGE),
+            candidate("e+f", 37.0),
+            candidate("d+b", 20.0),
+        ]
+    )
+    assert crossed_pairs(made) == [("a", "d"), ("b", "c")]
+
+
+def test_at_most_six_are_crossed():
+    names = "abcdefgh"
+    made = ranked(
+        [candidate(f"{a}+{b}", 40.0) for a, b in zip(names[::2], names[1::2], strict=True)]
+    )
+    assert len(crossed_pairs(made)) == 6
 
 
 @pytest.mark.parametrize(
