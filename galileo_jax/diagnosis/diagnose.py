@@ -29,6 +29,7 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.fitted_pairs import fitted_pairs, pairs_from_base
+from galileo_jax.diagnosis.known_constants import with_known_constants
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
 from galileo_jax.diagnosis.law_verdict import best_formula, is_law_needed, law_to_doubt, needs_laws
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
@@ -168,6 +169,7 @@ def diagnose(
         else:
             why = (*why, reasons.library_says_it(best_named(candidates), law))
         verdict = unless_slow_errors(trials, base, verdict, candidates, decisive)
+    verdict = with_known_constants(trials, verdict, candidates, seed)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:

@@ -6,6 +6,7 @@ from math import exp, log
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis.diagnosis import Candidate, Promise, Reason
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
+from galileo_jax.model.effects.forms.form import Form
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
 NOTABLE_NATS = 1.0  # a prior that is more of a lead than this is told
@@ -296,6 +297,30 @@ def told_apart(best: Candidate, rival: Candidate, expected: float, needed: float
             "log_odds_behind": best.log_odds - rival.log_odds,
             "log_odds_expected": expected,
             "least_log_odds": needed,
+        },
+    )
+
+
+def constant_by_data(named: Candidate, form: Form, low: float, high: float) -> Reason:
+    """What the data say of a constant that a name takes for known.
+
+    Args:
+      named: the effect that is named.
+      form: what it is with the constant free.
+      low: of the constant's 95 % interval.
+      high: of the same.
+    """
+    known = form.named_values[named.name]
+    return Reason(
+        "constant_by_data",
+        f"{named.title} takes {form.constant_words} for {known:g}; by these data alone it lies "
+        f"between {low:.2g} and {high:.2g} (95 %).",
+        {
+            "hypothesis": named.name,
+            "form": form.name,
+            "value": known,
+            "low": low,
+            "high": high,
         },
     )
 

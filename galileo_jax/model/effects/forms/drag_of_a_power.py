@@ -3,6 +3,8 @@
 F = -drag_of_a_power (|v| / V)^power sign(v)    on every object; V = 1 m/s, in a fall 10 m/s
 """
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Array, Force, State, Surroundings, Theta
@@ -25,6 +27,11 @@ class DragOfAPower(Form):
     family: ClassVar[str] = "power_v"
     nature: ClassVar[str] = "drag"
     how_likely: ClassVar[float] = 0.05  # drags are well known: nearly all have a power with a name
+    constant: ClassVar[str] = "power"
+    constant_words: ClassVar[str] = "the power of the speed"
+    named_values: ClassVar[Mapping[str, float]] = MappingProxyType(
+        {"viscous_drag": 1.0, "air_drag": 2.0}
+    )
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The drag at the usual speed, and the power."""

@@ -1,5 +1,7 @@
 """What a form has besides what every effect has: words for it, as it has no name."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Effect, Surroundings, Theta
@@ -20,6 +22,12 @@ class Form(Effect):
     """Else on object 1 alone."""
     how_likely: ClassVar[float] = UNNAMED_ODDS
     """Before the data, against an effect with a name."""
+
+    constant: ClassVar[str] = ""
+    """Which of its constants is known of effects that have a name; empty: there are none."""
+    constant_words: ClassVar[str] = ""
+    named_values: ClassVar[Mapping[str, float]] = MappingProxyType({})
+    """The constant's value of each of these effects."""
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
         """The same for whatever strength and scene."""
