@@ -20,6 +20,7 @@ from galileo_jax.runtime.errors import InputError
 
 FEWEST = 8
 WINDOW, TERMS = 16, 4  # rows; numbers of a cubic
+BOUNCES = 9.0  # times the usual variance: no errors scatter so much
 HALF_WINDOW = 2  # points on either side, that give the direction of the velocity
 
 
@@ -56,8 +57,10 @@ def space_noise_m(
         free = size - TERMS
         square = float(np.sum(along**2))
         found.append((0.5 * (float(np.sum(left**2)) - square) / free, square / free))
-    # The median of windows: one with a bounce in it does not count.
-    sd, sd_along = np.sqrt(np.median(found, axis=0))
+    # Windows with a bounce in them do not count; of others all do, for times are not always as bad.
+    variance = np.array(found)
+    usual = variance < BOUNCES * np.median(variance, axis=0)
+    sd, sd_along = np.sqrt(np.average(variance, axis=0, weights=usual))
     return max(float(sd), MIN_SD_M), max(float(sd_along), float(sd), MIN_SD_M)
 
 

@@ -62,7 +62,7 @@ def with_errors_in_time(observation: Observation) -> tuple[Observation, list[str
         times = observation.times_s[rows]
         for a, axis in enumerate(observation.axes):
             sd = float(np.sqrt(np.median(covariance[i, a, a, rows])))
-            shared = _shared_errors(times, observation.position_m[i, a, rows] / sd)
+            shared = shared_errors(times, observation.position_m[i, a, rows] / sd)
             if shared is None:
                 continue
             alone, together = shared
@@ -88,14 +88,19 @@ def with_errors_in_time(observation: Observation) -> tuple[Observation, list[str
     return seen, said
 
 
-def _shared_errors(
-    times_s: Float[np.ndarray, " row"], values: Float[np.ndarray, " row"]
+def shared_errors(
+    times_s: Float[np.ndarray, " row"],
+    values: Float[np.ndarray, " row"],
+    is_once_enough: bool = False,
+    paths: Float[np.ndarray, " path"] = PATHS,
 ) -> tuple[float, Float[np.ndarray, "row row"]] | None:
     """The variance of independent errors and the covariance of others; None if there are none.
 
     Args:
       times_s: of the rows.
       values: in units of the stated standard deviation, as are both results.
+      is_once_enough: whether errors that only one half of the rows shows are errors, too.
+      paths: how rough the path may be.
     """
     if len(values) < LEAST_ROWS or position_noise_m(times_s, values) < LEAST_ROUGHNESS:
         return None
@@ -107,13 +112,13 @@ def _shared_errors(
     half = len(pieces) // 2
 
     def evidence_of(some: Sequence[np.ndarray]) -> Float[np.ndarray, "errors scale"]:
-        return np.sum([_evidence(times_s[own], values[own], step_s) for own in some], axis=0)
+        return np.sum([_evidence(times_s[own], values[own], step_s, paths) for own in some], axis=0)
 
     # What happens once, as a motion that begins, is no error: those are alike in both halves.
     by_half = []
     for own in (pieces[:half], pieces[half:]) if half else zip(np.array_split(pieces[0], 2)):
         by_half.append(evidence_of(own))
-        if _lead(by_half[-1]) < 0:
+        if _lead(by_half[-1]) < 0 and not is_once_enough:
             return None
     evidence = np.sum(by_half, axis=0) if half else evidence_of(pieces)
     if _lead(evidence) < CONVINCING * len(pieces):
@@ -126,7 +131,7 @@ def _shared_errors(
 
 
 def _evidence(
-    times_s: np.ndarray, values: np.ndarray, step_s: float
+    times_s: np.ndarray, values: np.ndarray, step_s: float, paths: np.ndarray
 ) -> Float[np.ndarray, "errors scale"]:
     """The log marginal likelihood of a piece; row 0: independent errors, then `ROWS` x `SHARES`.
 
@@ -138,7 +143,7 @@ def _evidence(
         errors += [(1 - share) * np.eye(size) + share * kernel for share in SHARES]
     since = (times_s - times_s[0]) / (times_s[-1] - times_s[0])
     # The path in units of the errors, so that the scale of both comes out at the end.
-    cover = np.array(errors)[:, None] + PATHS[:, None, None] ** 2 * smooth_path(since)
+    cover = np.array(errors)[:, None] + paths[:, None, None] ** 2 * smooth_path(since)
     root = np.linalg.cholesky(cover)
     parabola = np.vander(since, 3)
     both = np.linalg.solve(root, np.column_stack([parabola, values]))
@@ -149,7 +154,7 @@ def _evidence(
     diagonal += np.log(np.abs(np.einsum("...nn->...n", upper))).sum(-1)
     log_density = -diagonal[..., None] - (size - 3) * np.log(SCALES)
     log_density = log_density - square[..., None] / (2 * SCALES**2)
-    return np.asarray(logsumexp(log_density, axis=1)) - np.log(len(PATHS))
+    return np.asarray(logsumexp(log_density, axis=1)) - np.log(len(paths))
 
 
 def _lead(evidence: np.ndarray) -> float:

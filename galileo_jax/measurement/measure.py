@@ -15,6 +15,7 @@ from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.errors_in_time import with_errors_in_time
+from galileo_jax.measurement.errors_of_clock import with_errors_of_clock
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_radii import from_first_common_frame, is_level, told_by_hit
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
@@ -108,6 +109,9 @@ def measure(clip: Clip) -> Measurement:
     if pixels is None and observation.position_m.shape[1] == 2:
         # In space and from above the likelihood lets every track wander.
         observation, said = with_errors_in_time(observation)
+        remarks.extend(f"{clip.path}: {line}" for line in said)
+    elif pixels is None and clip.scenario == "flight":
+        observation, said = with_errors_of_clock(observation)
         remarks.extend(f"{clip.path}: {line}" for line in said)
     other_doubts = (
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
