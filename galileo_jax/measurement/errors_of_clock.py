@@ -70,7 +70,7 @@ def with_errors_of_clock(observation: Observation) -> tuple[Observation, list[st
 
 
 def _along_path(times_s: np.ndarray, places_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far along a smooth path each row is, `[row]`, m, and the path's direction `[axis, row]`."""
+    """How far along a smooth path a row is, `[row]`, m, and the path's direction, `[axis, row]`."""
     since = (times_s - times_s[0]) / (times_s[-1] - times_s[0])
     design = np.vander(since, TERMS)
     smooth = np.linalg.lstsq(design, places_m.T)[0]  # [term, axis]

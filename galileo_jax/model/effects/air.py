@@ -3,8 +3,10 @@
     c = C_d rho A / 2,    b = c v,   v = sqrt(g h), of the middle of the fall
 
 After a fall of more than a few metres, air drag on a light ball is a tenth of its weight or more in
-every clip, whereas scale and frame rate are wrong by several per cent only in a few clips. The data
-decide which form of drag fits.
+every clip, whereas scale and frame rate are wrong by several per cent only in a few clips. At
+Reynolds numbers of thousands it grows with the square of the speed; a drag of that size which grows
+with the speed itself is that of no air, and as likely as any other effect. Where speeds span so
+little that the data do not tell the form, that does.
 
 Source: Hoerner, Fluid-Dynamic Drag (1965), chapter 3: spheres have C_d 0.1 (fast and rough) to
 0.5, perforated ones up to 1.
@@ -18,7 +20,8 @@ from galileo_jax.model.parameters import LogNormal
 AIR_KG_M3 = 1.2
 DRAG_COEFFICIENT = (0.4, 0.5)  # middle, and the width of its logarithm
 CARRIED_SD = 0.1  # of its logarithm, as size, mass and the air's density are known
-EXPECTED_ODDS = 30.0  # of a drag of this size against any other effect of the library
+# Of a drag of this size against any other effect of the library.
+EXPECTED_ODDS = {"air_drag": 30.0, "viscous_drag": 1.0}
 
 
 def expected_drags(radius_m: float, length_m: float, gravity: float) -> dict[str, tuple]:
@@ -36,7 +39,7 @@ def expected_added_mass(radius_m: float, mass_kg: float) -> dict[str, tuple]:
 
 
 def expected_odds(name: str, theta: Theta, scene: Surroundings, prior: LogNormal) -> float:
-    """1 + EXPECTED_ODDS p(strength | air) / p(strength | prior); 1 where nothing is expected.
+    """1 + EXPECTED_ODDS[name] p(strength | air) / p(strength | prior); 1 where nothing is expected.
 
     With the evidence under `prior` it makes that under the mixture of both.
     """
@@ -45,7 +48,7 @@ def expected_odds(name: str, theta: Theta, scene: Surroundings, prior: LogNormal
         return 1.0
     middle, width = scene.expected[name]
     log_ratio = _log_normal(strength, middle, width) - _log_normal(strength, prior.median, prior.sd)
-    return 1.0 + EXPECTED_ODDS * math.exp(log_ratio)
+    return 1.0 + EXPECTED_ODDS[name] * math.exp(log_ratio)
 
 
 def undeclared_odds(name: str, theta: Theta, scene: Surroundings, prior: LogNormal) -> float:

@@ -33,7 +33,7 @@ class ViscousDrag(Effect):
         return (Parameter("viscous_drag", "kg/s", prior, 0.0, "effect", 0.1),)
 
     def odds(self, theta: Theta, scene: Surroundings) -> float:
-        """High where the drag of the air on a ball of known size is found in a high fall."""
+        """A little higher where it is of the size of the air's on a ball of known size."""
         return expected_odds(self.name, theta, scene, FALL_PRIOR)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:
