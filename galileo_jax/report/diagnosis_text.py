@@ -63,9 +63,7 @@ def verdict(diagnosis: Diagnosis) -> str:
         both = "" if p is None else f" ({p_equals(first.p_value)} without, {p_equals(p)} with)"
         return f"{names} {verb} the data{both}."
     if found.status == "ambiguous":
-        rivals = found.effects if found.law is None else (*found.effects, found.law.text)
-        names = " and ".join([", ".join(rivals[:-1]), rivals[-1]])
-        return f"This clip cannot distinguish between {names}; each of them explains the data."
+        return ambiguity(found.effects if found.law is None else (*found.effects, found.law.text))
     if found.law is not None:
         (chosen,) = (c for c in diagnosis.candidates if c.effects == found.effects)
         p = p_equals(chosen.p_value or 0.0)
@@ -75,6 +73,27 @@ def verdict(diagnosis: Diagnosis) -> str:
         )
     where = "; see the missing force" if diagnosis.missing is not None else ""
     return f"No known effect explains the data{where}."
+
+
+def ambiguity(rivals: Sequence[str]) -> str:
+    """What a clip cannot tell, in one sentence; what all have in common is told first.
+
+    Args:
+      rivals: hypotheses, the effects of each joined by +.
+    """
+    hypotheses = [rival.split("+") for rival in rivals]
+    common = [name for name in hypotheses[0] if all(name in own for own in hypotheses)]
+    if not common:
+        names = " and ".join([", ".join(rivals[:-1]), rivals[-1]])
+        return f"This clip cannot distinguish between {names}; each of them explains the data."
+    rest = ["+".join(n for n in own if n not in common) for own in hypotheses]
+    others = [name for name in rest if name]
+    one_of = " or ".join([", ".join(others[:-1]), others[-1]] if others[1:] else others)
+    alone = "" if len(others) == len(rest) else "alone or "
+    return (
+        f"{' and '.join(common)} explains the data {alone}together with {one_of}; "
+        f"this clip cannot tell which."
+    )
 
 
 def formula_text(record: Mapping[str, Any]) -> str:

@@ -175,6 +175,35 @@ def test_a_formula_that_does_as_well_is_shown(trials, clip, tmp_path):
     assert page.read_text(encoding="utf-8").count(escape(law.text)) >= 2  # verdict, candidates
 
 
+@pytest.mark.parametrize(
+    ("rivals", "said"),
+    [
+        (
+            ("stribeck", "rolling", "air_drag"),
+            "This clip cannot distinguish between stribeck, rolling and air_drag; each of them "
+            "explains the data.",
+        ),
+        (
+            ("table_tilt", "scale_error+table_tilt", "table_tilt+rolling"),
+            "table_tilt explains the data alone or together with scale_error or rolling; this clip "
+            "cannot tell which.",
+        ),
+        (
+            ("air_drag+magnus", "magnus+viscous_drag"),
+            "magnus explains the data together with air_drag or viscous_drag; this clip cannot "
+            "tell which.",
+        ),
+        (
+            ("rolling", "rolling+stribeck"),
+            "rolling explains the data alone or together with stribeck; this clip cannot tell "
+            "which.",
+        ),
+    ],
+)
+def test_what_all_hypotheses_have_in_common_is_told_first(rivals, said):
+    assert diagnosis_text.ambiguity(rivals) == said
+
+
 def test_what_the_best_formula_says():
     """Of diagnosis.json: it explains the missing force, or not, or there is none."""
     leaves = {"p_value": 0.2, "chi2_per_dof": 0.9, "probability": 0.5}
