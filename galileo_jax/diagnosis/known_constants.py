@@ -30,9 +30,9 @@ def with_known_constants(
       candidates: all of the table.
       seed: of the draws.
     """
-    if verdict.status != "named" or len(verdict.effects) > 1:
+    if verdict.status != "named" or len(verdict.effects) != 1:
         return verdict
-    (name,) = verdict.effects
+    name = verdict.effects[0]
     table = {c.name: c for c in candidates}
     said = []
     for form in FORMS:
