@@ -74,7 +74,9 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
     groups = [(group, how.format(again=again)) for group, how in SEPARATES]
     if motion in GRAVITY:
         groups.insert(1, (LIKE_GRAVITY, GRAVITY[motion]))
-    named = {name for effects in verdict.effects for name in effects.split("+")}
+    hypotheses = [set(effects.split("+")) for effects in verdict.effects]
+    # What all have in common is sure: there is nothing to tell it from.
+    named = set.union(*hypotheses) - set.intersection(*hypotheses)
     said = [
         f"to tell {', '.join(sorted(named & group))} apart: {how}"
         for group, how in groups

@@ -48,3 +48,11 @@ def test_several_clips_are_only_asked_for_where_there_is_one():
 def test_where_nothing_is_open_nothing_is_asked_for():
     assert advice(Verdict("named", ("air_drag",)), RAMP, 1) == ()
     assert "docs/how-to/write_an_effect.md" in advice(Verdict("unknown", ()), FALL, 1)[0]
+
+
+def test_what_is_sure_is_told_from_nothing():
+    """A tilt that is in all that explain the data, and friction that is in one of them."""
+    sure = Verdict("ambiguous", ("table_tilt", "table_tilt+surface_friction"))
+    assert not any("table_tilt" in line for line in advice(sure, RAMP, 1))
+    open_ = Verdict("ambiguous", ("table_tilt", "surface_friction"))
+    assert "to tell surface_friction, table_tilt apart" in advice(open_, RAMP, 1)[0]
