@@ -7,6 +7,7 @@ strength removes most of the misfit (the score test over all shapes).
 
 from collections.abc import Sequence
 
+import jax.numpy as jnp
 import numpy as np
 from scipy.special import ndtri
 
@@ -87,6 +88,49 @@ def matched(
     for i, best in zip(plain, found, strict=True):
         starts[i] = np.stack([best, starts[i][0]])
     return starts, gains
+
+
+def alike_or_matched(
+    fitter: GradientFitter,
+    best: GradientFit,
+    leader: str,
+    z: np.ndarray,
+    free: np.ndarray,
+    effects: Sequence[str],
+) -> np.ndarray:
+    """Starts, `[candidate, z]`: `z`, or with the leader's shape where that costs less.
+
+    An effect with the same kind of shape (`NAME_start`, `NAME_length`) that explains the data as
+    well has it where the leader has it; between the shapes that are tried a narrow one is missed.
+
+    Args:
+      fitter: of the trials.
+      best: the leading fit.
+      leader: its last effect.
+      z: where each candidate would start.
+      free: `[candidate, model parameter]`.
+      effects: the last effect of each candidate.
+    """
+    parameters = fitter.trials.model_parameters
+    at = {p.name: i for i, p in enumerate(parameters)}
+    shape = {n.removeprefix(leader): i for n, i in at.items() if n.startswith(f"{leader}_")}
+    alike = z.copy()
+    rows: list[int] = []
+    for row, effect in enumerate(effects):
+        same = [(at[effect + end], i) for end, i in shape.items() if effect + end in at]
+        for own, its in same:
+            value = parameters[its].prior.forward(jnp.asarray(best.z[its]))
+            alike[row, own] = parameters[own].prior.inverse(value)
+        if same and np.all(np.isfinite(alike[row])):
+            rows.append(row)
+    if not rows:
+        return z
+    where = [strength_of(fitter.trials, effects[row])[0] for row in rows]
+    alike[rows] = best_strengths(fitter, alike[rows], free[rows], where)
+    costs, others = (fitter.search_costs(starts[rows], free[rows]) for starts in (alike, z))
+    starts = z.copy()
+    starts[rows] = np.where((costs < others)[:, None], alike[rows], z[rows])
+    return starts
 
 
 def best_strengths(

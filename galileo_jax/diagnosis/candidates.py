@@ -9,8 +9,9 @@ every parameter, according to how much of its prior the data exclude.
        best of all, and its next step promises little of that.
     2. The best end of each candidate is refined at the clip's own noise, the most promising first.
     3. Every candidate starts once more from values that reproduce the motion of the best one, with
-       all other parameters as in that. Where it comes to another valley that may be better, that
-       is refined, too. So it is not where no candidate can come to matter.
+       all other parameters as in that, or that have the place, time or length of the best one where
+       it has one, too. Where it comes to another valley that may be better, that is refined, too.
+       So it is not where no candidate can come to matter.
     4. Of the candidates that the verdict may hang on, every valley that was found is refined, and
        the best fit once more with its positive nuisances moved. Of the others this could change
        nothing that a rule looks at.
@@ -23,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from galileo_jax.diagnosis.candidate_starts import matched, scattered
+from galileo_jax.diagnosis.candidate_starts import alike_or_matched, matched, scattered
 from galileo_jax.diagnosis.mended_evidence import mended
 from galileo_jax.inference.fits.descent import Descended, ends_of, in_valley
 from galileo_jax.inference.fits.ends import valleys
@@ -221,7 +222,10 @@ def _second(
     free = np.stack([trials.free(effects)[:count] for effects in named])
     of = np.arange(len(others))
     lowest = float(found.best.cost[first].min())
-    second = fitter.race(np.concatenate([own[:1] for own in starts]), free, of, lowest)
+    matching = np.concatenate([own[:1] for own in starts])
+    last = [effects[-1] for effects in named]
+    near = alike_or_matched(fitter, fits[best], candidates[best][-1], matching, free, last)
+    second = fitter.race(near, free, of, lowest)
     known = first[others]
     most = np.minimum(found.best.cost[known] + MAY_STILL_GAIN, lowest + OUT_OF_THE_RACE)
     is_new = [

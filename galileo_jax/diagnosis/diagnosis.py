@@ -97,14 +97,16 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Promise:
-    """What a second effect would add to the best single one, as far as its slope tells.
+    """What a second effect would add to one of the best single ones, as far as its slope tells.
 
     Attributes:
-      effect: its name.
-      nats: by which it raises the evidence.
+      beside: the name of that.
+      effect: its own.
+      nats: by which both have more evidence than the best single one.
       price: nats by which two effects are less probable than one, before the data.
     """
 
+    beside: str
     effect: str
     nats: float
     price: float

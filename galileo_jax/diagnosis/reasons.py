@@ -102,18 +102,19 @@ def pairs_promised(single: Candidate, second: Promise, count: int) -> Reason:
 
     Args:
       single: the best effect alone.
-      second: what another one promises beside it.
+      second: what another one promises beside it, or beside one of the next.
       count: how many pairs.
     """
     return Reason(
         "pairs_promised",
-        f"{single.title} leaves {p_equals(single.p_value or 0.0)}, but beside it "
-        f"{second.effect.replace('_', ' ')} promises {second.nats:.1f} nats more evidence "
+        f"{single.title} leaves {p_equals(single.p_value or 0.0)}, but {second.beside} "
+        f"with {second.effect} promises {second.nats:.1f} nats more evidence "
         f"(two effects are {second.price:.1f} nats less probable than one): {count} pairs of "
         "effects were tried.",
         {
             "hypothesis": single.name,
             "p_value": single.p_value,
+            "beside": second.beside,
             "second": second.effect,
             "nats": second.nats,
             "price": second.price,
