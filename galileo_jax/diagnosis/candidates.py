@@ -127,6 +127,7 @@ def fit_candidates(
             best = int(np.argmax(gains))
             [fit] = fitter.fit_from(matching[best][:1], free[[best]], np.zeros(1, int))
             on_fit(Hypothesis(tuple(candidates[best]), fit))
+            matching[best][0] = fit.z[:count]  # others that are far behind that leave the race
         both = zip(scattered(fitter, from_fits, free, seed), matching, strict=True)
         starts = [np.concatenate(pair) for pair in both]
     of = np.repeat(np.arange(len(candidates)), [len(own) for own in starts])
@@ -151,9 +152,12 @@ def fit_candidates(
     evidence = np.array([fits[i].log_evidence for i in range(len(candidates))])
     winners = [int(i) for i in np.argsort(-evidence) if matters(hypotheses)[i]][:NUM_REFITTED]
     if winners:
-        others = [found.best.z[ends[i][1:]] for i in winners]
-        variants = [fitter.with_variants(fits[i]) for i in winners]
-        again = [np.concatenate(pair) for pair in zip(variants, others, strict=True)]
+        count = len(trials.model_parameters)
+        again = []
+        for i in winners:  # what is there was refined roughly: all of it starts once more
+            fit = fits.pop(i)
+            beside = [other.z[:count] for other in ends_at[i] if other is not fit]
+            again.append([*fitter.with_variants(fit), *beside, *found.best.z[ends[i][1:]]])
         owner = np.repeat(np.arange(len(winners)), [len(own) for own in again])
         whose = np.array(winners)[owner]
         polished = fitter.polish(np.concatenate(again), free[whose], owner)

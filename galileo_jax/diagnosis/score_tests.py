@@ -7,14 +7,13 @@ time, a wavelength) one for each shape that is tried: a matched filter.
 
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from scipy.special import log_softmax, logsumexp, ndtri
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.model.parameters import Prior
+from galileo_jax.model.parameters import Prior, in_units
 from galileo_jax.runtime.latin_hypercube import latin_hypercube
 
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
@@ -102,7 +101,7 @@ def average_gain(along: np.ndarray, power: np.ndarray, prior: Prior, size: float
     steps = np.linspace(-NODE_FOLDS, NODE_FOLDS, NUM_NODES)
     nodes = MOST_NODE_Z * np.sinh(steps) / np.sinh(NODE_FOLDS)
     weights = log_softmax(np.log(np.cosh(steps)) - 0.5 * nodes**2)
-    strength = np.asarray(prior.forward(jnp.asarray(nodes))) / size
+    strength = in_units(prior, nodes) / size
     gains = np.outer(along, strength) - 0.5 * np.outer(power, strength**2)
     return float(logsumexp(gains + weights) - np.log(len(along)))
 
@@ -113,9 +112,9 @@ def strength_of(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:
     where = [i for i, n in enumerate(names) if n == effect or n.startswith(f"{effect}_")]
     first = trials.model_parameters[where[0]]
     own = [i for i in where if trials.model_parameters[i].prior == first.prior]
-    is_signed = float(first.prior.forward(jnp.asarray(-1.0))) < first.absent
+    is_signed = in_units(first.prior, -1.0) < first.absent
     at = PROBE_Z if is_signed else SMALL_QUANTILE_Z
-    return np.array(own if first.per_clip else own[:1]), float(first.prior.forward(jnp.asarray(at)))
+    return np.array(own if first.per_clip else own[:1]), float(in_units(first.prior, at))
 
 
 def shapes_beside(

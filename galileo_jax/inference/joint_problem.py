@@ -123,20 +123,33 @@ class JointProblem:
         Raises:
           ValueError: the models have no effect of that name.
         """
-        known: dict[str, set[str]] = {}
+        known, brought, is_given = self._brought
+        if unknown := [name for name in effects if name not in known]:
+            raise ValueError(f"effects not in the model: {unknown}; there: {sorted(known)}")
+        absent = [known[name] for name in known if name not in effects]
+        return ~is_given & ~brought[absent].any(axis=0)
+
+    @cached_property
+    def _brought(self) -> tuple[dict[str, int], np.ndarray, np.ndarray]:
+        """What each effect brings.
+
+        Returns:
+          Rows of the effects by name; the parameters that each brings, `[effect, parameter]`; and
+          those that are given, `[parameter]`.
+        """
+        named: dict[str, set[str]] = {}
         for problem in self.problems:
             scene = problem.model.scene.surroundings
             for effect in problem.model.effects:
-                found = known.setdefault(effect.name, set())
+                found = named.setdefault(effect.name, set())
                 found.update(p.name for p in effect.parameters(scene))
-        if unknown := [name for name in effects if name not in known]:
-            raise ValueError(f"effects not in the model: {unknown}; there: {sorted(known)}")
-        absent = set().union(*(known[name] for name in known if name not in effects), set())
-        free = np.ones(len(self.parameters), bool)
+        brought = np.zeros((len(named), len(self.parameters)), bool)
+        is_given = np.zeros(len(self.parameters), bool)
         for problem, column in zip(self.problems, self.columns, strict=True):
             for parameter, joint in zip(problem.parameters, column, strict=True):
-                free[joint] = parameter.name not in absent and parameter.role != "given"
-        return free
+                brought[:, joint] = [parameter.name in own for own in named.values()]
+                is_given[joint] = parameter.role == "given"
+        return {name: row for row, name in enumerate(named)}, brought, is_given
 
     @property
     def all_effects(self) -> tuple[str, ...]:

@@ -232,6 +232,12 @@ class PriorTable(NamedTuple):
         return theta
 
 
+def in_units(prior: Prior, z: Any) -> np.ndarray:
+    """`prior.forward(z)` in NumPy, of z of any shape."""
+    kind, a, b = (np.array([number]) for number in prior.encode())
+    return PriorTable(kind, a, b).in_units(np.asarray(z, float)[..., None])[..., 0]
+
+
 def _grown(z: np.ndarray, median: np.ndarray, sd: np.ndarray) -> np.ndarray:
     # A wild proposal's may be infinite: its rollout fails, and it is refused.
     with np.errstate(over="ignore"):

@@ -48,12 +48,14 @@ class Share:
       names: of their parameters.
       columns: where these stand among the model's.
       laws: those of `effects` that do not act in every rollout.
+      places: where these stand among `effects`.
     """
 
     effects: tuple[Effect, ...]
     names: tuple[str, ...]
     columns: tuple[int, ...]
     laws: tuple[Law, ...] = ()
+    places: tuple[int, ...] = ()
 
     def of(self, theta: np.ndarray) -> np.ndarray:
         """Of `theta` `[batch, parameter]` the columns of `names`."""
@@ -63,8 +65,9 @@ class Share:
         """Which of `effects` act in any of `theta`, `[effect]`; None: all, in every rollout."""
         if not self.laws:
             return None
-        idle = [law.effect for law in self.laws if not law.acts(theta).any()]
-        return np.array([effect not in idle for effect in self.effects])
+        found = np.ones(len(self.effects), bool)
+        found[list(self.places)] = [law.acts(theta).any() for law in self.laws]
+        return found
 
 
 class ActingLaws:
@@ -104,7 +107,8 @@ class ActingLaws:
         gone = {int(i) for effect in left_out for i in self._columns(effect)}
         columns = tuple(i for i in range(len(model.names)) if i not in gone)
         effects = tuple(e for e in model.effects if e not in left_out) + model.nuisances
-        return Share(effects, tuple(model.names[i] for i in columns), columns, laws)
+        places = tuple(effects.index(law.effect) for law in laws)
+        return Share(effects, tuple(model.names[i] for i in columns), columns, laws, places)
 
     def _columns(self, effect: Effect) -> np.ndarray:
         parameters = effect.parameters(self._model.scene.surroundings)

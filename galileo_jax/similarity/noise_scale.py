@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
-NUM_ITERATIONS = 100
+MOST_ITERATIONS, SETTLED = 100, 1e-10  # of the variance, in one iteration
 MODE_SIZES = np.linspace(0.0, 1.0, 41)
 
 
@@ -40,12 +40,14 @@ def fitted_noise_scale(
     rest = np.maximum(np.sum(white**2, axis=1) - np.sum(modes, axis=1), 0.0) * variance[:, 0]
     amplitude2 = modes * (variance + gain2)
     wide = 1 / (2 * prior_sd**2)  # the prior, at 1, is worth this many values
-    for _ in range(NUM_ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         share = variance / (variance + gain2)
         degrees = data.num_values - np.sum(1 - share, axis=1)
         total = rest + np.sum(amplitude2 * share**2, axis=1)
         left = np.maximum(degrees - used, 1.0)
-        variance = ((total + wide) / (left + wide))[:, None]
+        before, variance = variance, ((total + wide) / (left + wide))[:, None]
+        if np.all(np.abs(variance - before) <= SETTLED * before):
+            break
     return np.sqrt(variance[:, 0])
 
 

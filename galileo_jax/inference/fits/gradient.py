@@ -71,6 +71,7 @@ class Settings:
       settled: converged where a new round with fitted noise scales lowers chi2 / 2 by no more.
         Two starts then agree within some hundredths of an sd.
       settled_if_rough: the same with MuJoCo's contacts, whose chi2 is no smoother than that.
+      settled_in_turn: the same of many hypotheses, most of which no verdict will hang on.
     """
 
     num_starts: int = 64
@@ -84,6 +85,7 @@ class Settings:
     enough: float = 0.1
     settled: float = 0.05
     settled_if_rough: float = 0.5
+    settled_in_turn: float = 0.3
 
 
 class GradientFitter:
@@ -147,8 +149,8 @@ class GradientFitter:
         num = self.settings.num_second_starts
         scattered = scattered_starts(self.trials, free, num, seed + 1)
         starts = np.concatenate([self._starts_by_phases(free, num, seed), scattered])
-        ends = self._ends(starts, free, self.settings.num_second_refined)
-        fit = _with_beside([*fits, *self._in_valleys(ends, free)])
+        second = self._ends(starts, free, self.settings.num_second_refined).without(ends)
+        fit = _with_beside([*fits, *(self._in_valleys(second, free) if second.any else ())])
         if fit.code is Code.CONVERGED and not self.is_explained(fit, NOISE_SCALE_RANGE[1]):
             fit = replace(fit, code=Code.MISFIT)
         return fit
@@ -233,7 +235,7 @@ class GradientFitter:
         free: Bool[np.ndarray, "hypothesis parameter"],
         parts: Sequence[np.ndarray],
     ) -> Iterator[tuple[int, GradientFit]]:
-        """Fits one end of each of several hypotheses, part by part of them.
+        """Fits one end of each of several hypotheses, part by part of them, to `settled_in_turn`.
 
         Those far behind what an earlier part came to are left where they are.
 
@@ -242,10 +244,10 @@ class GradientFitter:
           free: `[hypothesis, model parameter]`.
           parts: indices of hypotheses.
         """
-        lowest = np.inf
+        lowest, settled = np.inf, max(self._settled, self.settings.settled_in_turn)
         for own in parts:
             points = self._batch(z[own], free[own])
-            fits, lowest = self._polish_below(points, np.arange(len(own)), 0, lowest)
+            fits, lowest = self._polish_below(points, np.arange(len(own)), 0, lowest, settled)
             for row, fit in fits.items():
                 yield int(own[row]), fit
 
@@ -387,14 +389,14 @@ class GradientFitter:
 
     def _polish(self, points: Batch, owner: np.ndarray, num_steps: int) -> dict[int, GradientFit]:
         """By the row of the point from which each came; who joined another has none."""
-        return self._polish_below(points, owner, num_steps, np.inf)[0]
+        return self._polish_below(points, owner, num_steps, np.inf, self._settled)[0]
 
     def _polish_below(
-        self, points: Batch, owner: np.ndarray, num_steps: int, lowest: float
+        self, points: Batch, owner: np.ndarray, num_steps: int, lowest: float, settled: float
     ) -> tuple[dict[int, GradientFit], float]:
         """As `_polish`, and the least cost; `lowest`: that of others."""
         most = self.settings.max_polish_steps
-        found = polish(self._descent, points, owner, self._settled, most, lowest)
+        found = polish(self._descent, points, owner, settled, most, lowest)
         stats: dict[str, float] = {"num_steps": num_steps + found.num_steps}
         fits = laplace_fits(self.trials, self._residuals, found, stats)
         return dict(zip(found.rows.tolist(), fits, strict=True)), found.lowest

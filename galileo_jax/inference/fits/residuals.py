@@ -156,11 +156,15 @@ class Residuals:
         if motion is not None:
             return self._whites(clip, moved, free, noise), motion
         first = len(points.z)
-        made = self._simulate(
-            clip, np.concatenate([points.z, moved]), np.concatenate([points.free, free])
+        theta = clip.theta(np.concatenate([points.z, moved]), np.concatenate([points.free, free]))
+        self.num_rollouts += len(theta)
+        whiten = _white_batch_of(clip)
+        white, *made = clip.problem.of_motions(
+            theta,
+            lambda theta, *rest: (whiten(theta, *rest), *rest[:2]),
+            np.concatenate([points.noise[:, c], noise]),
         )
-        white = _white(clip, [values[first:] for values in made], noise)
-        return white, tuple(values[:first] for values in made)
+        return white[first:], (theta[:first], *(values[:first] for values in made))
 
     def _seen_slopes(
         self, c: int, points: Batch, index: np.ndarray, motion: tuple[np.ndarray, ...]

@@ -84,13 +84,14 @@ def free_fit(
       num_spans: how often the pieces are made, first by the hypothesis, then by the last fit.
     """
     extended, theta = trials, trials.theta(z, free)
-    for _ in range(num_spans):
+    for again in range(num_spans):
         problems = []
         for clip, problem in enumerate(extended.problems):
             spans = spans_of(problem, extended.of_clip(theta, clip))
             problems.append(with_free_acceleration(problem, spans))
         extended = JointProblem(tuple(problems))
-        found = _fitted(extended, [embedded(trials, extended, z, free)])
+        is_last = again == num_spans - 1
+        found = _fitted(extended, [embedded(trials, extended, z, free)], in_all_valleys=is_last)
         theta = extended.theta(found.z, found.free)
     return found
 
@@ -123,7 +124,10 @@ def embedded(
 
 
 def _fitted(
-    extended: JointProblem, starts: Sequence[np.ndarray], free: np.ndarray | None = None
+    extended: JointProblem,
+    starts: Sequence[np.ndarray],
+    free: np.ndarray | None = None,
+    in_all_valleys: bool = True,
 ) -> FreeFit:
     """The best fit from several starts `[parameter]`, z."""
     free = np.isfinite(starts[0]) if free is None else free
@@ -131,8 +135,9 @@ def _fitted(
     fitter, count = GradientFitter(extended, SETTINGS), len(extended.model_parameters)
     is_free = np.tile(free[:count], (len(tried), 1))
     fits = fitter.fit_from(tried[:, :count], is_free, np.arange(len(tried)))
-    # The start is of a wrong model, whose restitution may be in another valley.
-    fit = fitter.refit(max(fits, key=lambda fit: fit.log_evidence))
+    fit = max(fits, key=lambda fit: fit.log_evidence)
+    if in_all_valleys:  # the start is of a wrong model, whose restitution may be in another one
+        fit = fitter.refit(fit)
     theta = extended.theta(fit.z, fit.free)
     residual = [
         problem.whiten(
