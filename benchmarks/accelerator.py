@@ -3,7 +3,8 @@
 Runs on whatever `jax.devices()` has. By size of the batch, rollouts of a ramp clip of 1.2 s per
 minute: the rigid engine and MJX on the device, and MuJoCo's C engine (`mujoco.batch`) on all cores
 of the machine beside it. Then simulated tracks one after the other: fits per second and diagnoses
-per minute, programs compiled. The last line is JSON.
+per minute, programs compiled; and fits per second of as many tracks at once, their batches merged
+(`galileo sweep --together`). The last line is JSON.
 """
 
 import argparse
@@ -21,6 +22,8 @@ import tables
 import galileo_jax as gx
 from galileo_jax.commands import command
 from galileo_jax.runtime import compilation_cache
+from galileo_jax.sweeping.engine_together import EngineTogether
+from galileo_jax.sweeping.task import Task
 
 ENGINES = ("rigid", "mjx", "c")
 SIZES = (1, 16, 256, 4096, 65536)
@@ -45,8 +48,11 @@ def main(argv: Sequence[str]) -> int | None:
         clips = [_track(Path(folder), call.seed + i) for i in range(most + (most > 0))]
         figures["fits_per_s"] = _rate(gx.fit, clips[: call.fits + 1])
         figures["diagnoses_per_minute"] = 60 * _rate(gx.diagnose, clips[: call.diagnoses + 1])
-    for name in ("fits_per_s", "diagnoses_per_minute"):
-        tables.row(name, [figures[name]])
+        for num in call.together:
+            figures[f"fits_per_s_together_{num}"] = _rate_together(Path(folder), call.seed, num)
+    for name in figures:
+        if name.startswith(("fits_per_s", "diagnoses_per_minute")):
+            tables.row(name, [figures[name]])
     tables.finish("accelerator", figures)
     return None
 
@@ -76,6 +82,20 @@ def _rate(function: Callable[..., Any], clips: Sequence[Path]) -> float:
     return (len(clips) - 1) / (time.perf_counter() - began)
 
 
+def _rate_together(folder: Path, seed: int, num: int) -> float:
+    """Fits per second of that many tracks at once, after a first time that compiles."""
+    tasks = [Task(str(i), _fitted, (_track(folder, seed + i),)) for i in range(num)]
+    for _ in range(2):
+        began = time.perf_counter()
+        failed = [one for one in EngineTogether(num).outcomes(tasks) if one.failure is not None]
+        assert not failed, failed
+    return num / (time.perf_counter() - began)
+
+
+def _fitted(path: Path) -> dict[str, Any]:
+    return gx.fit(path).result["parameters"]
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = command.Parser(prog="accelerator.py", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
@@ -84,6 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--fits", type=int, default=20, help="tracks that are fitted")
     parser.add_argument("--diagnoses", type=int, default=5, help="tracks that are diagnosed")
+    parser.add_argument("--together", nargs="*", type=int, default=[8, 64], metavar="N")
     parser.add_argument("--seed", type=int, default=7100, help="of the first track")
     return parser
 

@@ -55,7 +55,7 @@ def _parser() -> command.Parser:
     add = adder(parser.add_argument_group("where it is computed"), "sweep")
     add("engine")
     add("address", metavar="HOST:PORT")
-    add("workers", "cpus_per_worker", "gpus_per_worker")
+    add("workers", "cpus_per_worker", "gpus_per_worker", "together")
     parser.examples(
         "galileo sweep thesis_ablation                         a ready config",
         "galileo sweep class.yaml --set common.method=mh       your own, with another value",

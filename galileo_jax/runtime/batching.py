@@ -10,6 +10,8 @@ from typing import Any
 import jax
 import numpy as np
 
+from galileo_jax.runtime import together
+
 # Sizes are rounded up to multiples of these, so that few programs serve all clips.
 FRAMES, RECORDS = 64, 512
 SPARE_MODES = 128  # beside one per object and frame
@@ -62,8 +64,10 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
 
     if len(cuts) == 1:
         return jax.tree.map(np.array, part(*cuts[0]))  # JAX's own cannot be written to
-    # XLA runs small operations, one after the other, on a single core.
-    parts = list(_pool(os.getpid()).map(lambda cut: part(*cut), cuts))
+    if together.current() is not None:  # its calls are made with those of other threads
+        parts = [part(*cut) for cut in cuts]
+    else:  # XLA runs small operations, one after the other, on a single core
+        parts = list(_pool(os.getpid()).map(lambda cut: part(*cut), cuts))
     return jax.tree.map(lambda *leaves: np.concatenate(leaves), *parts)
 
 
@@ -99,6 +103,8 @@ def one_at_a_time(function: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     def alone(*args: Any) -> Any:
+        if together.current() is not None:  # one thread makes all calls, and all others wait
+            return function(*args)
         with _LAPACK:
             return jax.block_until_ready(function(*args))
 

@@ -13,15 +13,17 @@ import functools
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
+from galileo_jax.runtime import together
 from galileo_jax.runtime.atomic_write import replacing
 
 FOLDER = "traces"  # in that of JAX's cache
@@ -58,14 +60,41 @@ class TraceCached:
 
     def __call__(self, *args: Any) -> Any:
         """Runs the function."""
-        static, traced = args[: self._num_static], args[self._num_static :]
-        leaves, tree = jax.tree.flatten(traced)
+        leaves, key = self._split(args)
         if any(isinstance(leaf, Tracer) for leaf in leaves):
             return self._jitted(*args)
-        leaves = [leaf if isinstance(leaf, jax.Array) else np.asarray(leaf) for leaf in leaves]
-        shapes = tuple((leaf.shape, leaf.dtype) for leaf in leaves)
+        group = together.current()
+        if group is not None:
+            return group.call(self, args)
+        return self._held(key)([_array(leaf) for leaf in leaves])
+
+    def key_of(self, args: tuple[Any, ...]) -> Any:
+        """What calls have in common that can be made together."""
+        return self._split(args)[1]
+
+    def of_many(self, calls: Sequence[tuple[Any, ...]]) -> Sequence[Any]:
+        """The results of several calls of the same shapes, made in one."""
+        split = [self._split(args) for args in calls]
+        key = split[0][1]
+        if len(calls) == 1:
+            return [self._held(key)([_array(leaf) for leaf in split[0][0]])]
+        # Few sizes: every one of them costs a compilation. The first call fills what is empty.
+        many = 1 << (len(calls) - 1).bit_length()
+        rows = [leaves for leaves, _ in split] + [split[0][0]] * (many - len(calls))
+        found = self._held(key, many)([jnp.stack(own) for own in zip(*rows, strict=True)])
+        return [jax.tree.map(lambda leaf, i=i: leaf[i], found) for i in range(len(calls))]
+
+    def _split(self, args: tuple[Any, ...]) -> tuple[list[Any], Any]:
+        """The arrays of a call, and what its program is found by."""
+        static, traced = args[: self._num_static], args[self._num_static :]
+        leaves, tree = jax.tree.flatten(traced)
+        shapes = tuple((np.shape(leaf), _dtype(leaf)) for leaf in leaves)
         # The setting may be the calling thread's own; dtypes of constants follow it.
-        key = (static, tree, shapes, _setting("jax_enable_x64"))
+        return leaves, (static, tree, shapes, _setting("jax_enable_x64"))
+
+    def _held(self, key: Any, many: int | None = None) -> Callable[..., Any]:
+        """The program of a key; of `many` calls at once."""
+        key = (*key, many)
         program = self._programs.get(key)
         if program is None:
             with self._lock:  # parts of a batch come on threads: one of them traces
@@ -76,19 +105,21 @@ class TraceCached:
         else:
             with contextlib.suppress(KeyError):  # another thread has just dropped it
                 self._programs.move_to_end(key)
-        return program(leaves)
+        return program
 
     def _program(self, key: Any) -> Callable[..., Any]:
         """Reads the program, or traces and writes it; maps leaves to the function's result."""
-        static, tree, shapes, is_64_bit = key
+        static, tree, shapes, is_64_bit, many = key
 
         def flat(leaves: list[Any]) -> Any:
             return self._function(*static, *jax.tree.unflatten(tree, leaves))
 
+        if many is not None:
+            flat, shapes = jax.vmap(flat), [((many, *shape), dtype) for shape, dtype in shapes]
         folder, text = _folder(), _text(static)
         if folder is None or text is None:
             return jax.jit(flat)
-        names = (self._function.__module__, self._function.__qualname__, text, str(tree))
+        names = (self._function.__module__, self._function.__qualname__, text, str(tree), many)
         wanted = repr((*names, [(s, str(d)) for s, d in shapes], is_64_bit, _code()))
         path = (
             folder / f"{self._function.__name__}-{hashlib.sha256(wanted.encode()).hexdigest()[:32]}"
@@ -100,6 +131,14 @@ class TraceCached:
 
         call.__name__ = self._function.__name__  # for JAX's logs and profiles
         return jax.jit(call)
+
+
+def _array(leaf: Any) -> Any:
+    return leaf if isinstance(leaf, jax.Array) else np.asarray(leaf)
+
+
+def _dtype(leaf: Any) -> Any:
+    return leaf.dtype if hasattr(leaf, "dtype") else np.asarray(leaf).dtype
 
 
 def _folder() -> Path | None:

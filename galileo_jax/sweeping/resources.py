@@ -32,6 +32,7 @@ class Resources:
         return threads | platform | ({"XLA_FLAGS": flags} if flags else {})
 
 
+NUM_TOGETHER = 64  # cells whose program calls an accelerator makes at once
 SINGLE_THREAD = "--xla_cpu_multi_thread_eigen=false"
 
 
@@ -41,6 +42,15 @@ def num_workers(each: Resources) -> int:
     if each.gpus:
         room = min(room, len(local_gpus()) // each.gpus)
     return max(room, 1)
+
+
+def num_together() -> int:
+    """How many cells one process computes together: 1 on a CPU, many on an accelerator."""
+    if not local_gpus():
+        return 1
+    import jax
+
+    return NUM_TOGETHER if jax.default_backend() != "cpu" else 1
 
 
 def local_gpus() -> list[str]:

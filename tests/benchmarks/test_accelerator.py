@@ -18,7 +18,7 @@ def test_it_times_rollouts_and_fits(
     few = ["--engine", "rigid", "c", "--batch", "2", "4", "--repeats", "1"]
     was_64_bit = jax.config.jax_enable_x64  # pyright: ignore
     try:
-        assert script.main([*few, "--fits", "1", "--diagnoses", "0"]) is None
+        assert script.main([*few, "--fits", "1", "--diagnoses", "0", "--together", "2"]) is None
     finally:
         jax.config.update("jax_enable_x64", was_64_bit)
     said = json.loads(capsys.readouterr().out.splitlines()[-1])
@@ -27,4 +27,5 @@ def test_it_times_rollouts_and_fits(
         assert set(rates) == {"rigid", "c"}
         assert all(rate > 0 for rate in rates.values())
     assert said["fits_per_s"] > 0
+    assert said["fits_per_s_together_2"] > 0
     assert said["diagnoses_per_minute"] == 0
