@@ -9,9 +9,10 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 from galileo_jax.inference.fits import weighed as weighed_module
+from galileo_jax.inference.fits.cloud import Cloud
 from galileo_jax.inference.fits.evidence import Code, GradientFit
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
-from galileo_jax.inference.fits.weighed import weighed
+from galileo_jax.inference.fits.weighed import ENOUGH_ESS, weighed
 
 STEP = 1e-5
 AGREES_NATS = 0.1  # four errors of 4096 draws
@@ -131,7 +132,40 @@ def test_the_same_seed_gives_the_same_and_few_draws_say_that_they_are_few():
     assert weighed([fit], BENT, 3).log_evidence == weighed([fit], BENT, 3).log_evidence
     assert weighed([fit], BENT, 3).is_sure
     narrow = replace(fit, covariance=fit.covariance * 1e-4)
-    assert not weighed([narrow], BENT, 3, num=12).is_sure
+    assert not weighed([narrow], BENT, 3, num=12, most=12).is_sure
+
+
+@pytest.mark.parametrize("squeezed", [(0.4, 0.02), (0.1, 1.0)])
+def test_further_draws_come_from_where_the_posterior_is(squeezed):
+    """From a normal that is too narrow in one direction: more draws count, the error falls."""
+    fit, exact, root = BENT.best((0.3, 0.1)), BENT.exact(), np.diag(np.sqrt(squeezed))
+    narrow = replace(fit, covariance=root @ fit.covariance @ root)
+    few, more = (
+        [weighed([narrow], BENT, seed, num=64, most=most) for seed in range(10)]
+        for most in (64, 2048)
+    )
+    assert all(one.ess > ENOUGH_ESS for one in more)
+    error, left = (
+        np.sqrt(np.mean([(one.log_evidence - exact) ** 2 for one in found]))
+        for found in (few, more)
+    )
+    assert left < 0.6 * error
+
+
+def test_a_cloud_has_the_mean_and_the_covariance_of_what_was_drawn():
+    """Draws from N(0, 1), weighed as of N(mean, 0.25); and its density is one of all there is."""
+    generator, mean = np.random.default_rng(2), np.array([0.5, -0.3])
+    z = np.zeros((20_000, 3))
+    z[:, [0, 2]] = generator.standard_normal((20_000, 2))
+    log_weights = -2 * np.sum((z[:, [0, 2]] - mean) ** 2, axis=1) + 0.5 * np.sum(z**2, axis=1)
+    cloud = Cloud.of(z, log_weights, np.array([True, False, True]))
+    np.testing.assert_allclose(cloud.mean, mean, atol=0.03)
+    np.testing.assert_allclose(cloud.root @ cloud.root.T, 0.25 * np.eye(2), atol=0.03)
+    axis = np.linspace(-12, 12, 601)
+    grid = np.zeros((601**2, 3))
+    grid[:, [0, 2]] = np.stack([each.ravel() for each in np.meshgrid(axis, axis)], axis=1)
+    volume = (axis[1] - axis[0]) ** 2
+    assert np.exp(cloud.log_density(grid)).sum() * volume == pytest.approx(1.0, abs=2e-3)
 
 
 def test_a_draw_from_which_no_map_finds_back_has_the_density_it_was_drawn_with(monkeypatch):

@@ -12,6 +12,9 @@ without its last effect, a quarter of the draws come from there: all else along 
 the effect's own parameters from their priors. While an effect is too weak to show, its place or its
 speed may be anything, and Laplace at the best of them sees nothing of that.
 
+Where few draws count all the same, half of the further ones come from a t that fits those that were
+made (`cloud.py`), a new one every time. Every draw is weighed by the mixture of all that drew.
+
 Source: A. B. Owen, Monte Carlo theory, methods and examples (2013), ch. 9 (mixtures); J. Geweke,
 Bayesian inference in econometric models using Monte Carlo integration, Econometrica 57 (1989), 1317
 (the t).
@@ -25,6 +28,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import gammaln, logsumexp
 
+from galileo_jax.inference.fits.cloud import DEGREES_OF_FREEDOM, Cloud
 from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD
@@ -33,12 +37,12 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 if TYPE_CHECKING:
     from galileo_jax.inference.fits.valley import Valley
 
-NUM_DRAWS, MOST_DRAWS = 256, 1024  # at once, and in all where few of them count
+NUM_DRAWS, MOST_DRAWS = 256, 1536  # at once, and in all where few of them count
 ENOUGH_ESS = 40.0  # the error is a sixth of a nat
 LEAST_ESS = 10.0  # of so many the error is a third of a nat; of fewer nobody knows it
 BETTER_NATS = 0.5  # by which a draw beats all fits where these are not at their best
-DEGREES_OF_FREEDOM = 5.0
 SHARE_WITHOUT = 0.25  # of the draws, from the hypothesis without its last effect
+SHARE_ADAPTED = 0.5  # of further draws, from where those before say that the posterior is
 HARDLY_BETTER = 10.0  # nats: beyond, an effect too weak to show is e^-10 of the evidence
 
 
@@ -124,28 +128,66 @@ def weighed(
     if without is not None and fit.log_evidence < without.log_evidence + HARDLY_BETTER:
         parts.append(_part(without, fit, residuals, width))
         shares = np.append((1 - SHARE_WITHOUT) * shares, SHARE_WITHOUT)
-    counts = np.diff(np.rint(num * np.append(0.0, np.cumsum(shares))).astype(int))
-    of = np.repeat(np.arange(len(parts)), counts)
     # The prior's constant; that of the data is the same for all hypotheses.
     constant = np.sum(fit.free) / 2 * np.log(2 * np.pi)
     modes = np.stack([one.z for one in fits])
-    best, better, log_weights, ess = -np.inf, None, np.empty(0), 0.0
-    while len(log_weights) < num or (ess < ENOUGH_ESS and len(log_weights) < most):
-        drawn = [p.draw(generator, n) for p, n in zip(parts, counts, strict=True)]
-        z = np.concatenate([own for own, _ in drawn])
-        log_parts = np.stack([p.log_density(z) for p in parts])
+    best, better, made = -np.inf, None, _Mixture(parts)
+    while len(made.z) < num or (made.ess < ENOUGH_ESS and len(made.z) < most):
+        new = made.draw(generator, num, shares, fit.free)
+        both = _log_densities(fit, residuals, np.concatenate([new, modes]))
+        made.add(both[:num] - constant)
+        best = max(best, both[num:].max() + BETTER_NATS)
+        if both[:num].max() > best:
+            best, better = float(both[:num].max()), new[np.argmax(both[:num])]
+    log_evidence = float(logsumexp(made.log_weights) - np.log(len(made.z)))
+    return Weighed(log_evidence, made.log_weights, made.ess, better)
+
+
+class _Mixture:
+    """Draws from parts along valleys and, after the first, from clouds that fit those before.
+
+    Attributes:
+      z: `[draw, parameter]`.
+      log_weights: `[draw]`; each by the mixture of all that have drawn.
+      ess: how many draws of the posterior itself these are worth.
+    """
+
+    def __init__(self, parts: Sequence[_Part]):
+        self._parts, self._clouds = tuple(parts), list[Cloud]()
+        self.z, self.log_weights, self.ess = np.empty((0, 0)), np.empty(0), 0.0
+        self._of, self._own, self._log_p = np.empty(0, int), np.empty(0), np.empty(0)
+
+    def draw(
+        self, generator: np.random.Generator, num: int, shares: np.ndarray, free: np.ndarray
+    ) -> np.ndarray:
+        """Further draws, `[draw, parameter]`; `shares`: of the parts, `free`: of the clouds."""
+        which = np.arange(len(self._parts))
+        if self._log_p.size:
+            self._clouds.append(Cloud.of(self.z, self.log_weights, free))
+            which = np.append(which, len(self._parts) + len(self._clouds) - 1)
+            shares = np.append((1 - SHARE_ADAPTED) * shares, SHARE_ADAPTED)
+        counts = np.diff(np.rint(num * np.append(0.0, np.cumsum(shares))).astype(int))
+        drawn = [p.draw(generator, n) for p, n in zip(self._parts, counts, strict=False)]
+        if self._clouds:
+            points = self._clouds[-1].draw(generator, int(counts[-1]))
+            drawn.append((points, np.zeros(len(points))))  # their density is computed with all
+        new = np.concatenate([points for points, _ in drawn])
+        self.z = np.concatenate([self.z.reshape(-1, new.shape[1]), new])
+        self._own = np.append(self._own, np.concatenate([density for _, density in drawn]))
+        self._of = np.append(self._of, np.repeat(which, counts))
+        return new
+
+    def add(self, log_p: np.ndarray) -> None:
+        """The log density of the draws made last, `[draw]`: all are weighed anew."""
+        self._log_p = np.append(self._log_p, log_p)
+        log_parts = np.stack([q.log_density(self.z) for q in (*self._parts, *self._clouds)])
         # A valley that bends much takes a draw so far that no map finds its way back from there.
-        log_parts[of, np.arange(num)] = np.concatenate([density for _, density in drawn])
-        log_q = logsumexp(log_parts, axis=0, b=(counts / num)[:, None])
-        both = _log_densities(fit, residuals, np.concatenate([z, modes]))
-        log_p, of_modes = both[: len(z)], both[len(z) :].max()
-        best = max(best, of_modes + BETTER_NATS)
-        if log_p.max() > best:
-            best, better = float(log_p.max()), z[np.argmax(log_p)]
-        log_weights = np.append(log_weights, log_p - constant - log_q)
-        total = logsumexp(log_weights)
-        ess = float(np.exp(2 * total - logsumexp(2 * log_weights)))
-    return Weighed(float(total - np.log(len(log_weights))), log_weights, ess, better)
+        along = np.flatnonzero(self._of < len(self._parts))
+        log_parts[self._of[along], along] = self._own[along]
+        shares = np.bincount(self._of, minlength=len(log_parts)) / len(self.z)
+        self.log_weights = self._log_p - logsumexp(log_parts, axis=0, b=shares[:, None])
+        total = logsumexp(self.log_weights)
+        self.ess = float(np.exp(2 * total - logsumexp(2 * self.log_weights)))
 
 
 def _part(one: GradientFit, whose: GradientFit, residuals: Residuals, width: float) -> _Part:

@@ -1,0 +1,69 @@
+"""Student's t that fits weighted draws: where a posterior is that no fit describes.
+
+Draws whose weights are too unequal say, all the same, where the posterior is. With its mean and
+covariance by weights that are flattened until enough draws count, a t covers it better than what
+the draws were made from, and so on from there.
+
+Source: O. Cappé, R. Douc, A. Guillin, J.-M. Marin, C. P. Robert, Adaptive importance sampling in
+general mixture classes, Stat. Comput. 18 (2008), 447 (10.1007/s11222-008-9059-x).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.special import gammaln, logsumexp
+
+DEGREES_OF_FREEDOM = 5.0
+POWERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)  # of the weights, until enough draws count
+DRAWS_PER_PARAMETER = 4.0
+LEAST_VARIANCE = 1e-10  # in z, of a direction in which draws do not differ
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Student's t of the free parameters.
+
+    Attributes:
+      mean: `[free]`, z.
+      root: `[free, free]`, R; R R^T is the covariance of a normal of the same width.
+      free: `[parameter]`, which those are; the others are 0.
+    """
+
+    mean: Float[np.ndarray, " free"]
+    root: Float[np.ndarray, "free free"]
+    free: Bool[np.ndarray, " parameter"]
+
+    @classmethod
+    def of(
+        cls,
+        z: Float[np.ndarray, "draw parameter"],
+        log_weights: Float[np.ndarray, " draw"],
+        free: Bool[np.ndarray, " parameter"],
+    ) -> "Cloud":
+        """The t round weighted draws."""
+        own = z[:, free]
+        for power in POWERS:
+            weights = np.exp(power * log_weights - logsumexp(power * log_weights))
+            if 1 / np.sum(weights**2) > DRAWS_PER_PARAMETER * own.shape[1]:
+                break
+        mean = weights @ own
+        far = own - mean
+        variance, vectors = np.linalg.eigh((weights * far.T) @ far)
+        return cls(mean, vectors * np.sqrt(np.maximum(variance, LEAST_VARIANCE)), free)
+
+    def draw(self, generator: np.random.Generator, num: int) -> np.ndarray:
+        """Points, `[draw, parameter]`, z."""
+        u = generator.standard_normal((num, len(self.mean)))
+        chi = generator.chisquare(DEGREES_OF_FREEDOM, num) / DEGREES_OF_FREEDOM
+        z = np.zeros((num, len(self.free)))
+        z[:, self.free] = self.mean + (u / np.sqrt(chi)[:, None]) @ self.root.T
+        return z
+
+    def log_density(self, z: Float[np.ndarray, "draw parameter"]) -> np.ndarray:
+        """Of the free parameters, `[draw]`."""
+        u = np.linalg.solve(self.root, (z[:, self.free] - self.mean).T)
+        nu, dim = DEGREES_OF_FREEDOM, len(self.mean)
+        constant = gammaln((nu + dim) / 2) - gammaln(nu / 2) - dim / 2 * np.log(np.pi * nu)
+        constant -= np.linalg.slogdet(self.root)[1]
+        return constant - (nu + dim) / 2 * np.log1p(np.sum(u**2, axis=0) / nu)
