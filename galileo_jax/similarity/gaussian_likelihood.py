@@ -85,8 +85,7 @@ class GaussianLikelihood:
         patterns = np.einsum("oijt,mojt->moit", inverse_root, patterns)
         flat = patterns.reshape(len(patterns), -1)
         _, gain, basis = np.linalg.svd(flat, full_matrices=False)
-        if scene.is_level:  # long tracks, most of whose patterns are alike
-            gain, basis = gain[gain > IDLE], basis[gain > IDLE]
+        gain, basis = gain[gain > IDLE], basis[gain > IDLE]  # many patterns are alike
         return Whitening(
             np.where(mask[:, None], observation.position_m, 0.0),
             inverse_root,

@@ -79,11 +79,11 @@ def _padded(problem: Problem) -> Padded:
     """Pads with frames that count for nothing and modes without gain."""
     times, data = problem.observation.times_s, problem.data
     frames = rounded_up(len(times), FRAMES) - len(times)
-    # A wobble has as many modes as frames; the others are fewer than those to spare.
-    usual = len(data.observed_m) * (len(times) + frames) + SPARE_MODES
-    if problem.model.scene.surroundings.is_level:
-        usual = SPARE_MODES
-    modes = max(rounded_up(len(data.gain), FRAMES), usual) - len(data.gain)
+    # A camera's wobble has as many modes as frames; all else has fewer than those to spare.
+    most = len(data.observed_m) * (len(times) + frames) + SPARE_MODES
+    is_few = len(data.gain) <= SPARE_MODES
+    modes = SPARE_MODES if is_few else max(rounded_up(len(data.gain), FRAMES), most)
+    modes -= len(data.gain)
     whitening = Whitening(
         np.pad(data.observed_m, [(0, 0), (0, 0), (0, frames)]),
         np.pad(data.inverse_root, [(0, 0), (0, 0), (0, 0), (0, frames)]),

@@ -185,9 +185,9 @@ class _Mixture:
         along = np.flatnonzero(self._of < len(self._parts))
         log_parts[self._of[along], along] = self._own[along]
         shares = np.bincount(self._of, minlength=len(log_parts)) / len(self.z)
-        self.log_weights = self._log_p - logsumexp(log_parts, axis=0, b=shares[:, None])
-        total = logsumexp(self.log_weights)
-        self.ess = float(np.exp(2 * total - logsumexp(2 * self.log_weights)))
+        self.log_weights = self._log_p - np.asarray(logsumexp(log_parts, axis=0, b=shares[:, None]))
+        weights = np.exp(self.log_weights - self.log_weights.max())
+        self.ess = float(weights.sum() ** 2 / np.sum(weights**2))
 
 
 def _part(one: GradientFit, whose: GradientFit, residuals: Residuals, width: float) -> _Part:
