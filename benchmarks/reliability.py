@@ -154,18 +154,21 @@ def judged(entry: Mapping[str, Any], library: Sequence[str], least: float) -> ve
 
 
 @in_float64
-def traces(yaml: Path, kind: str) -> dict[str, float]:
+def traces(yaml: Path, kind: str) -> tuple[dict[str, float], float]:
     """By how many nats the track's evidence is better with all hidden effects than without each.
 
     Without one: with all others, or with none, whichever is better.
 
     The fit with all is looked for from the truth, too, so that no narrow valley hides one. What is
     outside the library always leaves one: infinite.
+
+    Returns:
+      By effect, and of all over none: what the truth must have in a table in which it was found.
     """
     record = json.loads(yaml.with_suffix(".truth.json").read_text())
     hidden = tuple(record["effect"].split("+"))
     if kind == "outside":
-        return {record["effect"]: np.inf}
+        return {record["effect"]: np.inf}, np.inf
     clip = load_clip(yaml)
     observation = measure(clip).observation
     trials = make_joint_problem([clip], [observation], effects=make_effects(hidden))
@@ -179,14 +182,15 @@ def traces(yaml: Path, kind: str) -> dict[str, float]:
     without = {name: tuple(other for other in hidden if other != name) for name in hidden}
     evidence = {rest: fitter.fit(0, effects=rest).log_evidence for rest in {(), *without.values()}}
     less = {name: max(evidence[rest], evidence[()]) for name, rest in without.items()}
-    return {name: whole - less[name] for name in hidden}
+    return {name: whole - less[name] for name in hidden}, whole - evidence[()]
 
 
 def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
     entry: dict[str, Any] = {"case": name, "kind": kind, "diagnosis": None, "error": None}
     yaml = out / "clips" / f"{name}.yaml"
-    found = traces(yaml, kind)
+    found, whole = traces(yaml, kind)
     entry["truth"] = seen_truth(found)
+    entry["truth_nats"] = whole if np.isfinite(whole) else None
     entry["traces_nats"] = {name: nats for name, nats in found.items() if np.isfinite(nats)}
     try:
         run = hidden_effects.run_diagnosis([yaml], out / "runs" / name, 0)

@@ -226,6 +226,30 @@ def contested(best: Candidate, rival: Candidate, needed: float) -> Reason:
     )
 
 
+def contested_together(
+    best: Candidate, others: Sequence[Candidate], ahead: float, needed: float
+) -> Reason:
+    """Each rival is given up, but not all together.
+
+    Args:
+      best: the most probable that explains the data.
+      others: the most probable of the rivals, which explain the data, too.
+      ahead: nats by which the best is more probable than all rivals together.
+      needed: nats by which it must be.
+    """
+    return Reason(
+        "contested_together",
+        f"{best.title} is {times_text(ahead)} as probable as all others together that explain the "
+        f"data, {', '.join(c.title for c in others)} first; {times_text(needed)} would decide.",
+        {
+            "hypothesis": best.name,
+            "rival": others[0].name,
+            "log_odds_behind": ahead,
+            "least_log_odds": needed,
+        },
+    )
+
+
 def _before_the_data(best: Candidate, rival: Candidate) -> str:
     """How much of a lead is prior; empty where that is little."""
     ahead = best.log_prior - rival.log_prior

@@ -134,6 +134,46 @@ def test_the_only_one_that_explains_is_named():
     assert rules(found) == ["explains", "decisive"]
 
 
+@pytest.mark.parametrize(
+    ("behind", "p_values", "also"),
+    [
+        ((3.5, 3.6, 9.0), (0.5, 0.5, 0.5), ("rolling",)),  # 0.030 + 0.027 > 0.050
+        ((3.1, 3.6, 3.6), (0.5, 0.5, 0.5), ("rolling", "restitution")),
+        ((3.5, 3.6, 9.0), (0.5, None, 0.5), ("rolling",)),  # it was not compared
+        ((3.8, 3.8, 9.0), (0.5, 0.5, 0.5), ()),  # 0.022 + 0.022 < 0.050
+        ((3.5, 3.6, 9.0), (0.5, 1e-9, 0.5), ()),  # contradicted
+    ],
+)
+def test_rivals_that_are_given_up_one_by_one_are_not_all_together(behind, p_values, also):
+    names = ("rolling", "restitution", "stribeck")
+    others = [
+        candidate(name, 40.0 - by, p)
+        for name, by, p in zip(names, behind, p_values, strict=True)
+    ]
+    found = verdict(candidate("air_drag", 40.0), *others)
+    expected = ("ambiguous", ("air_drag", *also)) if also else ("named", ("air_drag",))
+    assert told(found) == (*expected, None)
+    if also:
+        assert rules(found) == ["explains", "contested_together"]
+        share = -np.log(np.sum(np.exp(-np.array(behind))))
+        assert found.reasons[-1].numbers["log_odds_behind"] == pytest.approx(share)
+
+
+def test_pairs_with_what_is_named_do_not_contest_it_together():
+    others = [f"air_drag+{name}" for name in ("rolling", "restitution", "stribeck")]
+    found = verdict(candidate("air_drag", 40.0), *(candidate(pair, 36.5) for pair in others))
+    assert told(found) == ("named", ("air_drag",), None)
+
+
+def test_all_that_may_contest_together_are_compared():
+    table = ranked(
+        [candidate("air_drag", 40.0), candidate("rolling", 36.5), candidate("restitution", 36.4)]
+        + [candidate("stribeck", 36.4), candidate("air_drag+rolling", 36.6)]
+    )
+    names = [c.name for c in to_compare(table, DECISIVE)]
+    assert names == ["air_drag", "rolling", "restitution"]
+
+
 def test_one_that_was_not_compared_is_no_rival():
     found = verdict(candidate("air_drag", 40.0), candidate("rolling", 39.0, None))
     assert told(found) == ("named", ("air_drag",), None)
