@@ -314,7 +314,9 @@ def _claims(
 
 def _is_unnamed(hypothesis: str) -> bool:
     """Whether it is a form without a name, or a law."""
-    return hypothesis.startswith("law_") or any(part in FORM_NAMES for part in hypothesis.split("+"))
+    return hypothesis.startswith("law_") or any(
+        part in FORM_NAMES for part in hypothesis.split("+")
+    )
 
 
 def _weakest(entry: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """The sentences that say why a verdict is what it is: one for each rule that fired."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import exp, log
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
@@ -119,6 +119,27 @@ def pairs_promised(single: Candidate, second: Promise, count: int) -> Reason:
             "nats": second.nats,
             "price": second.price,
             "num_pairs": count,
+        },
+    )
+
+
+def second_possible(named: Candidate, shares: Mapping[str, float]) -> Reason:
+    """Another effect may be there beside the one that is named, too weak to be told.
+
+    Args:
+      named: a single effect.
+      shares: of each other effect, how probable it is that it is there, too.
+    """
+    total, likeliest = sum(shares.values()), max(shares, key=lambda name: shares[name])
+    return Reason(
+        "second_possible",
+        f"That another effect is there beside {named.title}, too weak to be told here, has a "
+        f"probability of {100 * total:.0f} %, {likeliest} first ({100 * shares[likeliest]:.0f} %).",
+        {
+            "hypothesis": named.name,
+            "second": likeliest,
+            "probability": total,
+            "probability_of_second": shares[likeliest],
         },
     )
 

@@ -203,8 +203,8 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     Returns:
       Named: one hypothesis explains the data, and nothing else does about as well, nor all others
       together. Ambiguous: several do; a form without a name stands last, and an effect that
-      explains the data alone is not repeated with others. Unknown: only a form does, or nothing, or what does is far
-      behind what does not.
+      explains the data alone is not repeated with others. Unknown: only a form does, or nothing,
+      or what does is far behind what does not.
     """
     best, explaining = candidates[0], _explaining(candidates)
     if not explaining:

@@ -147,8 +147,7 @@ def test_the_only_one_that_explains_is_named():
 def test_rivals_that_are_given_up_one_by_one_are_not_all_together(behind, p_values, also):
     names = ("rolling", "restitution", "stribeck")
     others = [
-        candidate(name, 40.0 - by, p)
-        for name, by, p in zip(names, behind, p_values, strict=True)
+        candidate(name, 40.0 - by, p) for name, by, p in zip(names, behind, p_values, strict=True)
     ]
     found = verdict(candidate("air_drag", 40.0), *others)
     expected = ("ambiguous", ("air_drag", *also)) if also else ("named", ("air_drag",))
@@ -166,10 +165,9 @@ def test_pairs_with_what_is_named_do_not_contest_it_together():
 
 
 def test_all_that_may_contest_together_are_compared():
-    table = ranked(
-        [candidate("air_drag", 40.0), candidate("rolling", 36.5), candidate("restitution", 36.4)]
-        + [candidate("stribeck", 36.4), candidate("air_drag+rolling", 36.6)]
-    )
+    odds = {"air_drag": 40.0, "air_drag+rolling": 36.6}
+    odds |= {"rolling": 36.5, "restitution": 36.4, "stribeck": 36.4}
+    table = ranked([candidate(name, nats) for name, nats in odds.items()])
     names = [c.name for c in to_compare(table, DECISIVE)]
     assert names == ["air_drag", "rolling", "restitution"]
 
