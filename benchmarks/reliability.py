@@ -194,7 +194,7 @@ def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
     entry["traces_nats"] = {name: nats for name, nats in found.items() if np.isfinite(nats)}
     try:
         run = hidden_effects.run_diagnosis([yaml], out / "runs" / name, 0)
-        keys = ("verdict", "probability_none", "history", "p_value")
+        keys = ("verdict", "reasons", "probability_none", "history", "p_value")
         brief = ("effect", "law", "probability", "log_evidence", "log_prior", "p_value")
         entry["diagnosis"] = {key: run.get(key) for key in keys}
         entry["diagnosis"]["candidates"] = [
@@ -292,7 +292,8 @@ def _claims(
     """Of every hypothesis in a verdict its probability, and whether it is the truth.
 
     A form without a name, and a law, say that it is something outside of the library, and no more:
-    all of the table are one claim.
+    all of the table are one claim. Where every effect counts, one that is named is all there is
+    only as far as the diagnosis says that no second one may be there unseen.
     """
     diagnosis = entry["diagnosis"]
     verdict, table = diagnosis["verdict"], diagnosis["candidates"]
@@ -305,11 +306,18 @@ def _claims(
     parts = [frozenset(each.split("+")) for each in answers]
     named = [each for each in parts if each <= {*library}]
     odds = {frozenset(c["effect"].split("+")): c["probability"] for c in table}
-    claims = [(odds.get(each, 0.0), each in truths) for each in named]
+    seen = 1.0 if least else 1.0 - _second(diagnosis)
+    claims = [(seen * odds.get(each, 0.0), each in truths) for each in named]
     if verdict["status"] == "law" or verdict.get("law") or len(named) < len(parts):
         unnamed = [c["probability"] for c in table if _is_unnamed(c["effect"])]
         claims.append((min(sum(unnamed), 1.0), is_outside))
     return claims
+
+
+def _second(diagnosis: Mapping[str, Any]) -> float:
+    """The probability that a second effect is there, too weak to be told, as far as it is said."""
+    said = [why for why in diagnosis.get("reasons", ()) if why["rule"] == "second_possible"]
+    return said[0]["probability"] if said else 0.0
 
 
 def _is_unnamed(hypothesis: str) -> bool:

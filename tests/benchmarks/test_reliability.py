@@ -81,6 +81,13 @@ def test_all_that_has_no_name_is_one_claim(reliability):
     assert reliability._claims(case, LIBRARY, 0.0) == [(pytest.approx(0.45), False)]
 
 
+def test_a_second_effect_that_may_be_there_unseen_counts_where_every_effect_does(reliability):
+    case = entry(BOTH, "named", "air_drag", air_drag=0.9)
+    case["diagnosis"]["reasons"] = [{"rule": "second_possible", "probability": 0.2}]
+    assert reliability._claims(case, LIBRARY, 0.0) == [(pytest.approx(0.72), False)]
+    assert reliability._claims(case, LIBRARY, 3.0) == [(0.9, True)]
+
+
 def test_calibration_error(reliability):
     probability = np.array([0.92, 0.98, 0.25, 0.25])
     assert reliability.calibration_error(probability, np.ones(4)) == pytest.approx(0.4)
