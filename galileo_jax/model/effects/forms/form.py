@@ -7,7 +7,7 @@ from typing import ClassVar
 from galileo_jax.model.effects.effect import Effect, Surroundings, Theta
 
 # Against an effect of the library. Who looks for what is missing has no reason to believe that the
-# library holds it: each form is as probable as an effect, all seven nearly half of the library.
+# library holds it: each form is as probable as an effect, all seven a third of the library.
 UNNAMED_ODDS = 1.0
 
 
