@@ -13,7 +13,7 @@ from dataclasses import replace
 from math import comb, log, sqrt
 
 import numpy as np
-from scipy.special import logsumexp, softmax
+from scipy.special import softmax
 
 from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.diagnosis import reasons
@@ -134,7 +134,7 @@ def _without(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate
 
 def _sum_of(candidates: Sequence[Candidate]) -> float:
     """Log odds of several hypotheses together."""
-    return float(logsumexp([c.log_odds for c in candidates]))
+    return float(np.logaddexp.reduce([c.log_odds for c in candidates]))
 
 
 def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]:
