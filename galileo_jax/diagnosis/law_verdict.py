@@ -156,6 +156,8 @@ def law_contested(candidates: Sequence[Candidate], decisive: float) -> tuple[Rea
     others = [c for c in other_formulas(best, candidates) if c.effects != best.effects]
     ahead = [c for c in others if best.log_odds - c.log_odds < decisive]
     alike = [c for c in ahead if explains(c)]
-    if ahead and not alike:
+    if not ahead:  # no other alone, but all together
+        return verdict_of((best, *others), decisive).reasons[1:]
+    if not alike:
         return (reasons.better_but_contradicted(ahead[0], best),)
     return tuple(reasons.contested(best, c, decisive) for c in alike[:1])

@@ -91,6 +91,10 @@ def test_reasons_say_why_there_is_no_law():
     assert [why.rule for why in law_contested(ahead_but_wrong, DECISIVE)] == [
         "better_but_contradicted"
     ]
+    names = ("friction_patch", "magnetic_brake", "stribeck")
+    many = ranked([law(50.0), *(candidate(name, 46.5) for name in names)])
+    assert law_verdict(many, DECISIVE) is None
+    assert [why.rule for why in law_contested(many, DECISIVE)] == ["contested_together"]
     none = ranked([candidate("air_drag", 10.0)])
     assert [why.rule for why in law_contested(none, DECISIVE)] == ["no_formula"]
 
