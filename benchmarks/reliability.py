@@ -32,6 +32,7 @@ import verdicts
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
+from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
@@ -291,6 +292,9 @@ def _claims(
 ) -> list[tuple[float, bool]]:
     """Of every hypothesis in a verdict its probability, and whether it is the truth.
 
+    The probability is that among the hypotheses that the data do not contradict: a verdict is on
+    these alone.
+
     A form without a name, and a law, say that it is something outside of the library, and no more:
     all of the table are one claim. Where every effect counts, one that is named is all there is
     only as far as the diagnosis says that no second one may be there unseen.
@@ -305,13 +309,25 @@ def _claims(
     answers = ["+".join(verdict["effects"])] if is_one else verdict["effects"]
     parts = [frozenset(each.split("+")) for each in answers]
     named = [each for each in parts if each <= {*library}]
-    odds = {frozenset(c["effect"].split("+")): c["probability"] for c in table}
+    left = _not_contradicted(diagnosis)
+    odds = {frozenset(c["effect"].split("+")): c["probability"] / left for c in table}
     seen = 1.0 if least else 1.0 - _second(diagnosis)
     claims = [(seen * odds.get(each, 0.0), each in truths) for each in named]
     if verdict["status"] == "law" or verdict.get("law") or len(named) < len(parts):
-        unnamed = [c["probability"] for c in table if _is_unnamed(c["effect"])]
-        claims.append((min(sum(unnamed), 1.0), is_outside))
+        unnamed = [
+            c["probability"]
+            for c in table
+            if _is_unnamed(c["effect"]) and (c.get("p_value") or 1.0) >= ADEQUATE_P
+        ]
+        claims.append((min(sum(unnamed) / left, 1.0), is_outside))
     return claims
+
+
+def _not_contradicted(diagnosis: Mapping[str, Any]) -> float:
+    """The probability of all that the data do not contradict, as far as it was compared."""
+    p_values = [(c["probability"], c.get("p_value")) for c in diagnosis["candidates"]]
+    p_values.append((diagnosis.get("probability_none", 0.0), diagnosis.get("p_value")))
+    return 1.0 - sum(p for p, by_data in p_values if by_data is not None and by_data < ADEQUATE_P)
 
 
 def _second(diagnosis: Mapping[str, Any]) -> float:

@@ -206,6 +206,29 @@ def better_but_contradicted(better: Candidate, best: Candidate) -> Reason:
     )
 
 
+def out_of_the_race(better: Candidate, best: Candidate, needed: float) -> Reason:
+    """A hypothesis that the data contradict is a little more probable than the best that explains.
+
+    Args:
+      better: the most probable.
+      best: the most probable of those that explain the data.
+      needed: the p-value that the first lacks.
+    """
+    ahead = better.log_odds - best.log_odds
+    return Reason(
+        "out_of_the_race",
+        f"{better.title} would be {times_text(ahead)} as probable as {best.title}, yet leaves "
+        f"{p_equals(better.p_value or 0.0)}, and {needed:g} is needed.",
+        {
+            "hypothesis": best.name,
+            "rival": better.name,
+            "log_odds_behind": -ahead,
+            "p_value": better.p_value,
+            "least_p_value": needed,
+        },
+    )
+
+
 def only_a_form(form: Candidate, name: Candidate | None) -> Reason:
     """A form without a name explains the data, and no name does as well.
 
@@ -282,12 +305,12 @@ def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) ->
 
     Args:
       best: the hypothesis that is named.
-      candidates: all, ranked.
+      candidates: ranked; none that the data contradict stands near the best.
       needed: nats by which the next must be behind.
     """
     others = [c for c in candidates if c.effects != best.effects]
     if not others:
-        return Reason("no_rival", f"Nothing but {best.title} could be tried.", {})
+        return Reason("no_rival", f"Nothing but {best.title} leaves only noise.", {})
     behind = best.log_odds - others[0].log_odds
     return Reason(
         "decisive",

@@ -155,9 +155,13 @@ def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]
 
 def explains(candidate: Candidate) -> bool:
     """Whether a candidate was compared with the data and leaves nothing but noise."""
+    return candidate.p_value is not None and candidate.p_value >= _least_p(candidate)
+
+
+def _least_p(candidate: Candidate) -> float:
+    """The p-value from which on a hypothesis explains the data."""
     num_surprising = len(candidate.effects) - candidate.num_expected
-    least = ADEQUATE_P if num_surprising <= 1 else PAIR_P
-    return candidate.p_value is not None and candidate.p_value >= least
+    return ADEQUATE_P if num_surprising <= 1 else PAIR_P
 
 
 def _explaining(candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -229,8 +233,11 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
         alike = [top, *_without_more(named), *forms[:1]]
         return Verdict("ambiguous", tuple(c.name for c in alike), reasons=why)
     if len(equal) == 1:
-        others = [c for c in candidates if c.effects != top.effects]
-        return Verdict("named", top.effects, reasons=(why, reasons.decisive(top, others, decisive)))
+        out = [reasons.out_of_the_race(best, top, _least_p(best))] if best is not top else []
+        behind = [c for c in candidates if c in possible or top.log_odds - c.log_odds >= decisive]
+        others = [c for c in behind if c.effects != top.effects]
+        lead = reasons.decisive(top, others, decisive)
+        return Verdict("named", top.effects, reasons=(why, *out, lead))
     alike = [*_without_more(names), *forms[:1]]
     if len(alike) == 1:
         alike = names

@@ -88,6 +88,16 @@ def test_a_second_effect_that_may_be_there_unseen_counts_where_every_effect_does
     assert reliability._claims(case, LIBRARY, 3.0) == [(0.9, True)]
 
 
+def test_a_claim_is_among_what_the_data_do_not_contradict(reliability):
+    table = {"viscous_drag": 0.6, "air_drag": 0.2, "force_at_a_time": 0.15}
+    case = entry({"air_drag": 40.0}, "ambiguous", "air_drag|force_at_a_time", **table)
+    case["diagnosis"]["candidates"][0]["p_value"] = 0.007
+    said = reliability._claims(case, LIBRARY, 0.0)
+    assert said == [(pytest.approx(0.5), True), (pytest.approx(0.375), False)]
+    case["diagnosis"]["candidates"][0]["p_value"] = 0.02
+    assert reliability._claims(case, LIBRARY, 0.0) == [(0.2, True), (0.15, False)]
+
+
 def test_calibration_error(reliability):
     probability = np.array([0.92, 0.98, 0.25, 0.25])
     assert reliability.calibration_error(probability, np.ones(4)) == pytest.approx(0.4)

@@ -131,7 +131,7 @@ def test_what_ranks_is_evidence_and_prior_together():
 def test_the_only_one_that_explains_is_named():
     found = verdict(candidate("air_drag", 40.0), candidate("rolling", 39.0, p_value=1e-9))
     assert told(found) == ("named", ("air_drag",), None)
-    assert rules(found) == ["explains", "decisive"]
+    assert rules(found) == ["explains", "no_rival"]
 
 
 @pytest.mark.parametrize(
@@ -170,6 +170,17 @@ def test_all_that_may_contest_together_are_compared():
     table = ranked([candidate(name, nats) for name, nats in odds.items()])
     names = [c.name for c in to_compare(table, DECISIVE)]
     assert names == ["air_drag", "rolling", "restitution"]
+
+
+def test_a_more_probable_one_that_is_contradicted_is_said_to_be_out_of_the_race():
+    better, best = candidate("rolling", 41.0, p_value=0.0099), candidate("air_drag", 40.0)
+    found = verdict(better, best, candidate("stribeck", 30.0))
+    assert told(found) == ("named", ("air_drag",), None)
+    assert rules(found) == ["explains", "out_of_the_race", "decisive"]
+    assert found.reasons[1].numbers["rival"] == "rolling"
+    assert found.reasons[1].numbers["least_p_value"] == 0.01
+    assert found.reasons[2].numbers["log_odds_behind"] == pytest.approx(10.0)
+    assert "2.7 times as probable as air_drag" in found.reasons[1].sentence
 
 
 def test_one_that_was_not_compared_is_no_rival():
