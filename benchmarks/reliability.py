@@ -8,11 +8,14 @@ library does not have, one hides one of the library's and one hides two. An effe
 trace (static friction where a push starts the motion; a wrong scale that friction makes up for) is
 not counted. Every verdict that names effects (`named`, `ambiguous`) is a claim with a probability
 for each hypothesis; the reliability curve compares the probabilities with how often the hypothesis
-was the truth. What is finished stays in DIR/results.jsonl and is not done again. The last line is
-JSON.
+was the truth. All figures are given twice: with every effect counted that leaves any trace, and
+with only those that must be said (by more than 3 nats, the factor of 20 that a name needs), where a
+weaker one may be said or not. What is finished stays in DIR/results.jsonl and is not done again.
+The last line is JSON.
 """
 
 import argparse
+import itertools
 import json
 import multiprocessing
 import zlib
@@ -29,9 +32,12 @@ import verdicts
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
+from galileo_jax.comparison.compare import ADEQUATE_P
+from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.measurement.measure import measure
+from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.model.parameters import inverse
 from galileo_jax.runtime.errors import InputError
@@ -44,6 +50,7 @@ NOISE_M = (0.1e-3, 0.4e-3)
 ANGLES_DEG = (8.0, 30.0)
 STRENGTHS = (0.3, 1.0)
 TRIES = 8  # not every effect has a place in every scene
+NUM_DRAWN = 1000  # of the claims, for the error that right ones have
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -67,9 +74,14 @@ def main(argv: Sequence[str]) -> int | None:
             says = done[name]["diagnosis"]["verdict"] if done[name]["diagnosis"] else {}
             words = f"{says.get('status')} {' | '.join(says.get('effects', ()))}"
             tables.row(name, (done[name]["kind"], done[name]["truth"], words))
-    figures = summary([entry for entry in entries if entry["diagnosis"]], library)
-    figures["tracebacks"] = [entry["error"] for entry in entries if not entry["diagnosis"]]
+    said = [entry for entry in entries if entry["diagnosis"]]
+    figures = summary(said, library)
     _print(figures)
+    print(f"\nWhat shows by more than {DECISIVE:g} nats must be said, weaker effects may be:")
+    figures["if_it_shows"] = summary(said, library, DECISIVE)
+    _print(figures["if_it_shows"])
+    figures["tracebacks"] = [entry["error"] for entry in entries if not entry["diagnosis"]]
+    print(*figures["tracebacks"], sep="\n")
     tables.finish("reliability", figures)
     return None
 
@@ -108,24 +120,56 @@ def make_clip(folder: Path, name: str, kind: str, library: Sequence[str]) -> Non
             continue
 
 
-def seen_truth(traces: Mapping[str, float]) -> str:
-    """The hidden effects that leave a trace in a track, joined by +; none: "none"."""
-    return "+".join(name for name, nats in traces.items() if nats > 0) or "none"
+def seen_truth(traces: Mapping[str, float], least: float = 0.0) -> str:
+    """The hidden effects that leave a trace in a track, joined by +; none: "none".
+
+    Args:
+      traces: of each effect, by how many nats it shows.
+      least: nats that it must show by.
+    """
+    return "+".join(name for name, nats in traces.items() if nats > least) or "none"
+
+
+def right_answers(entry: Mapping[str, Any], least: float) -> list[str]:
+    """What may be said of a case: the effects that must be said first, with some that may be.
+
+    Args:
+      entry: of the journal.
+      least: nats by which an effect shows that must be said; one that shows less may be.
+    """
+    if not least or entry["kind"] == "outside":
+        return [entry["truth"]]
+    shows = entry["traces_nats"]
+    must = [name for name, nats in shows.items() if nats > least]
+    may = [name for name, nats in shows.items() if 0 < nats <= least]
+    some = itertools.chain.from_iterable(
+        itertools.combinations(may, size) for size in range(len(may) + 1)
+    )
+    return ["+".join((*must, *more)) or "none" for more in some]
+
+
+def judged(entry: Mapping[str, Any], library: Sequence[str], least: float) -> verdicts.Score:
+    """The score of a case, by that of its right answers that is nearest to what was said."""
+    scores = [verdicts.judge(t, library, entry["diagnosis"]) for t in right_answers(entry, least)]
+    return max(scores, key=lambda s: (s.is_named_right, s.set_size == s.set_size))
 
 
 @in_float64
-def traces(yaml: Path, kind: str) -> dict[str, float]:
+def traces(yaml: Path, kind: str) -> tuple[dict[str, float], float]:
     """By how many nats the track's evidence is better with all hidden effects than without each.
 
     Without one: with all others, or with none, whichever is better.
 
     The fit with all is looked for from the truth, too, so that no narrow valley hides one. What is
     outside the library always leaves one: infinite.
+
+    Returns:
+      By effect, and of all over none: what the truth must have in a table in which it was found.
     """
     record = json.loads(yaml.with_suffix(".truth.json").read_text())
     hidden = tuple(record["effect"].split("+"))
     if kind == "outside":
-        return {record["effect"]: np.inf}
+        return {record["effect"]: np.inf}, np.inf
     clip = load_clip(yaml)
     observation = measure(clip).observation
     trials = make_joint_problem([clip], [observation], effects=make_effects(hidden))
@@ -139,22 +183,23 @@ def traces(yaml: Path, kind: str) -> dict[str, float]:
     without = {name: tuple(other for other in hidden if other != name) for name in hidden}
     evidence = {rest: fitter.fit(0, effects=rest).log_evidence for rest in {(), *without.values()}}
     less = {name: max(evidence[rest], evidence[()]) for name, rest in without.items()}
-    return {name: whole - less[name] for name in hidden}
+    return {name: whole - less[name] for name in hidden}, whole - evidence[()]
 
 
 def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
     entry: dict[str, Any] = {"case": name, "kind": kind, "diagnosis": None, "error": None}
     yaml = out / "clips" / f"{name}.yaml"
-    found = traces(yaml, kind)
+    found, whole = traces(yaml, kind)
     entry["truth"] = seen_truth(found)
+    entry["truth_nats"] = whole if np.isfinite(whole) else None
     entry["traces_nats"] = {name: nats for name, nats in found.items() if np.isfinite(nats)}
     try:
         run = hidden_effects.run_diagnosis([yaml], out / "runs" / name, 0)
-        keys = ("verdict", "probability_none", "history", "p_value")
-        brief = ("effect", "probability", "log_evidence", "p_value")
+        keys = ("verdict", "reasons", "probability_none", "history", "p_value")
+        brief = ("effect", "law", "probability", "log_evidence", "log_prior", "p_value")
         entry["diagnosis"] = {key: run.get(key) for key in keys}
         entry["diagnosis"]["candidates"] = [
-            {key: candidate[key] for key in brief} for candidate in run["candidates"][:12]
+            {key: candidate[key] for key in brief} for candidate in run["candidates"]
         ]
     except Exception as error:  # one case must not end hours of others; it is reported
         entry["error"] = f"{type(error).__name__}: {error}"
@@ -163,31 +208,35 @@ def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
     return entry
 
 
-def summary(entries: Sequence[Mapping[str, Any]], library: Sequence[str]) -> dict[str, Any]:
-    """The curve, its expected calibration error, and the rates that the docs state."""
-    claims = [claim for entry in entries for claim in _claims(entry, library)]
+def summary(
+    entries: Sequence[Mapping[str, Any]], library: Sequence[str], least: float = 0.0
+) -> dict[str, Any]:
+    """The curve, its expected calibration error, and the rates that the docs state.
+
+    Args:
+      entries: of the journal.
+      library: names of its effects.
+      least: nats by which an effect shows that must be said.
+    """
+    claims = [claim for entry in entries for claim in _claims(entry, library, least)]
     probability, is_true = (np.array([c[i] for c in claims], float) for i in range(2))
-    place = np.clip(np.digitize(probability, EDGES) - 1, 0, len(EDGES) - 2)
-    curve = [
-        (float(probability[place == b].mean()), float(is_true[place == b].mean()), int(count))
-        for b, count in enumerate(np.bincount(place, minlength=len(EDGES) - 1))
-        if count
-    ]
-    scored = [(e, verdicts.judge(e["truth"], library, e["diagnosis"])) for e in entries]
+    scored = [(e, judged(e, library, least)) for e in entries]
     ambiguous = [(e, s) for e, s in scored if e["diagnosis"]["verdict"]["status"] == "ambiguous"]
     inside = [s for e, s in scored if e["kind"] != "outside"]
     outside = [s for e, s in scored if e["kind"] == "outside"]
     return {
         "cases": len(scored),
         "claims": len(claims),
-        "curve": curve,
-        "expected_calibration_error": sum(abs(p - share) * n for p, share, n in curve)
-        / max(len(claims), 1),
+        "curve": curve(probability, is_true),
+        "expected_calibration_error": calibration_error(probability, is_true),
+        "of_right_claims": _error_if_right(probability),
+        "brier": float(np.mean((probability - is_true) ** 2)) if claims else float("nan"),
         "ambiguous": len(ambiguous),
         "ambiguous_inside": sum(e["kind"] != "outside" for e, _ in ambiguous),
         "ambiguous_inside_holds_truth": _mean(
             [s.set_size == s.set_size for e, s in ambiguous if e["kind"] != "outside"]
         ),
+        "named_right_inside": _mean([s.is_named_right for s in inside]),
         "wrong_inside": _mean([s.is_confident_wrong for s in inside]),
         "wrong_outside": _mean([s.is_confident_wrong for s in outside]),
         "statuses": {
@@ -201,29 +250,97 @@ def summary(entries: Sequence[Mapping[str, Any]], library: Sequence[str]) -> dic
             for e, s in scored
             if s.is_confident_wrong
         ],
+        "ambiguous_without_truth": [
+            f"{e['case']}: {e['truth']} said {s.label}; {_weakest(e)}"
+            for e, s in ambiguous
+            if e["kind"] != "outside" and s.set_size != s.set_size
+        ],
     }
 
 
-def _claims(entry: Mapping[str, Any], library: Sequence[str]) -> list[tuple[float, bool]]:
+def curve(probability: np.ndarray, is_true: np.ndarray) -> list[tuple[float, float, int]]:
+    """Of each class of claims the mean probability, the share that is true, and how many.
+
+    Args:
+      probability: `[claim]`.
+      is_true: `[claim]`, 0 or 1.
+    """
+    place = np.clip(np.digitize(probability, EDGES) - 1, 0, len(EDGES) - 2)
+    return [
+        (float(probability[place == b].mean()), float(is_true[place == b].mean()), int(count))
+        for b, count in enumerate(np.bincount(place, minlength=len(EDGES) - 1))
+        if count
+    ]
+
+
+def calibration_error(probability: np.ndarray, is_true: np.ndarray) -> float:
+    """Mean distance of claimed probability and share of truth, over the classes; 0 is best."""
+    classes = curve(probability, is_true)
+    return sum(abs(p - share) * n for p, share, n in classes) / max(len(probability), 1)
+
+
+def _error_if_right(probability: np.ndarray) -> tuple[float, float]:
+    """The calibration error of so many claims if all were right: the mean, and 95 % are below."""
+    rng = np.random.default_rng(0)
+    drawn = rng.random((NUM_DRAWN, len(probability))) < probability
+    errors = [calibration_error(probability, each.astype(float)) for each in drawn]
+    return float(np.mean(errors)), float(np.quantile(errors, 0.95))
+
+
+def _claims(
+    entry: Mapping[str, Any], library: Sequence[str], least: float
+) -> list[tuple[float, bool]]:
     """Of every hypothesis in a verdict its probability, and whether it is the truth.
 
-    A form without a name, and a law, say that it is something outside of the library, and no more.
+    The probability is that among the hypotheses that the data do not contradict: a verdict is on
+    these alone.
+
+    A form without a name, and a law, say that it is something outside of the library, and no more:
+    all of the table are one claim. Where every effect counts, one that is named is all there is
+    only as far as the diagnosis says that no second one may be there unseen.
     """
-    diagnosis, truth = entry["diagnosis"], set(entry["truth"].split("+"))
-    is_outside = not truth <= {*library, "none"}
-    verdict = diagnosis["verdict"]
-    if verdict["status"] not in ("named", "ambiguous"):
+    diagnosis = entry["diagnosis"]
+    verdict, table = diagnosis["verdict"], diagnosis["candidates"]
+    if verdict["status"] not in ("named", "ambiguous", "law"):
         return []
-    named = verdict["status"] == "named"
-    answers = ["+".join(verdict["effects"])] if named else verdict["effects"]
-    odds = {frozenset(c["effect"].split("+")): c["probability"] for c in diagnosis["candidates"]}
-    if verdict.get("law"):
-        laws = [c["effect"] for c in diagnosis["candidates"] if c["effect"].startswith("law_")]
-        answers = [*answers, *laws[:1]]
+    truths = [frozenset(each.split("+")) for each in right_answers(entry, least)]
+    is_outside = not truths[0] <= {*library, "none"}
+    is_one = verdict["status"] == "named"
+    answers = ["+".join(verdict["effects"])] if is_one else verdict["effects"]
     parts = [frozenset(each.split("+")) for each in answers]
-    return [
-        (odds.get(each, 0.0), each == truth if each <= {*library} else is_outside) for each in parts
-    ]
+    named = [each for each in parts if each <= {*library}]
+    left = _not_contradicted(diagnosis)
+    odds = {frozenset(c["effect"].split("+")): c["probability"] / left for c in table}
+    seen = 1.0 if least else 1.0 - _second(diagnosis)
+    claims = [(seen * odds.get(each, 0.0), each in truths) for each in named]
+    if verdict["status"] == "law" or verdict.get("law") or len(named) < len(parts):
+        unnamed = [
+            c["probability"]
+            for c in table
+            if _is_unnamed(c["effect"]) and (c.get("p_value") or 1.0) >= ADEQUATE_P
+        ]
+        claims.append((min(sum(unnamed) / left, 1.0), is_outside))
+    return claims
+
+
+def _not_contradicted(diagnosis: Mapping[str, Any]) -> float:
+    """The probability of all that the data do not contradict, as far as it was compared."""
+    p_values = [(c["probability"], c.get("p_value")) for c in diagnosis["candidates"]]
+    p_values.append((diagnosis.get("probability_none", 0.0), diagnosis.get("p_value")))
+    return 1.0 - sum(p for p, by_data in p_values if by_data is not None and by_data < ADEQUATE_P)
+
+
+def _second(diagnosis: Mapping[str, Any]) -> float:
+    """The probability that a second effect is there, too weak to be told, as far as it is said."""
+    said = [why for why in diagnosis.get("reasons", ()) if why["rule"] == "second_possible"]
+    return said[0]["probability"] if said else 0.0
+
+
+def _is_unnamed(hypothesis: str) -> bool:
+    """Whether it is a form without a name, or a law."""
+    return hypothesis.startswith("law_") or any(
+        part in FORM_NAMES for part in hypothesis.split("+")
+    )
 
 
 def _weakest(entry: Mapping[str, Any]) -> str:
@@ -256,8 +373,10 @@ def _print(figures: Mapping[str, Any]) -> None:
     for name, value in figures.items():
         if isinstance(value, int | float):
             tables.row(name, [value])
-    for line in (*figures["named_wrong"], *figures["tracebacks"], figures["statuses"]):
-        print(line)
+    tables.row("of_right_claims", figures["of_right_claims"])
+    for key in ("named_wrong", "ambiguous_without_truth"):
+        print(f"{key}:", *figures[key], sep="\n  ")
+    print(figures["statuses"])
 
 
 def _parser() -> command.Parser:

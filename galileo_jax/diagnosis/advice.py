@@ -66,11 +66,15 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
             "takes ten lines (docs/how-to/write_an_effect.md), then run diagnose with "
             "--effects-from",
         )
-    if verdict.status != "ambiguous":
-        return ()
     motion = "slide" if scene.has_surface else free_phase(scene)
     motion = "level" if scene.is_level else motion
     again = ANOTHER_RUN[motion]
+    if verdict.status == "named":
+        seconds = [why for why in verdict.reasons if why.rule == "second_possible"]
+        others = (why.numbers["second"] for why in seconds)
+        return tuple(f"to see whether {other} is there, too: {again}" for other in others)
+    if verdict.status != "ambiguous":
+        return ()
     groups = [(group, how.format(again=again)) for group, how in SEPARATES]
     if motion in GRAVITY:
         groups.insert(1, (LIKE_GRAVITY, GRAVITY[motion]))

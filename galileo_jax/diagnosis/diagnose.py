@@ -36,7 +36,11 @@ from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.library_again import singles_beside, singles_of_pairs
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.race import Race
-from galileo_jax.diagnosis.second_effect import promised_by_a_second
+from galileo_jax.diagnosis.second_effect import (
+    promised_by_a_second,
+    promises_of_seconds,
+    with_second,
+)
 from galileo_jax.diagnosis.slow_errors import unless_slow_errors
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
@@ -116,7 +120,8 @@ def diagnose(
     decisive = decisive_margin(is_adequate)
     candidates = _compared(trials, candidates, decisive, seed, compared)
     must = needs_pairs(candidates)
-    second = None if must else promised_by_a_second(race, candidates, library)
+    promises = [] if must else promises_of_seconds(race, candidates, library)
+    second = promised_by_a_second(promises)
     if must or second is not None:
         on_stage("fitting pairs of effects")
         pairs = fitted_pairs(race, candidates, library)
@@ -170,6 +175,7 @@ def diagnose(
             why = (*why, reasons.library_says_it(best_named(candidates), law))
         verdict = unless_slow_errors(trials, base, verdict, candidates, decisive)
     verdict = with_known_constants(trials, verdict, candidates, seed)
+    verdict = with_second(verdict, candidates, promises)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:

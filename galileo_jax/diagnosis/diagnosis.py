@@ -104,12 +104,14 @@ class Promise:
       effect: its own.
       nats: by which both have more evidence than the best single one.
       price: nats by which two effects are less probable than one, before the data.
+      gain: by which both have more evidence than the one that it stands beside.
     """
 
     beside: str
     effect: str
     nats: float
     price: float
+    gain: float
 
 
 @dataclass(frozen=True)

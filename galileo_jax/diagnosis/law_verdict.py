@@ -9,9 +9,11 @@ from dataclasses import replace
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason, Verdict
 from galileo_jax.diagnosis.verdict import best_named, explains, verdict_of
-from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 
-# A formula of two factors is a tenth as probable as one of one factor, which has a form's odds.
+# Against an effect of the library. There are some sixty formulas of one factor: all together come
+# to as much as the library.
+FORMULA_ODDS = 0.25
+# A formula of two factors is a tenth as probable as one of one factor.
 LENGTH_ODDS = 0.1
 # An effect of so many constants (how strong, where, how wide) can imitate many motions.
 MANY_CONSTANTS = 3
@@ -19,7 +21,7 @@ MANY_CONSTANTS = 3
 
 def law_odds(num_factors: int) -> float:
     """How many times as likely as an effect with a name a formula is, before the data."""
-    return UNNAMED_ODDS * LENGTH_ODDS ** (num_factors - 1)
+    return FORMULA_ODDS * LENGTH_ODDS ** (num_factors - 1)
 
 
 def needs_laws(verdict: Verdict, candidates: Sequence[Candidate]) -> bool:
@@ -154,6 +156,8 @@ def law_contested(candidates: Sequence[Candidate], decisive: float) -> tuple[Rea
     others = [c for c in other_formulas(best, candidates) if c.effects != best.effects]
     ahead = [c for c in others if best.log_odds - c.log_odds < decisive]
     alike = [c for c in ahead if explains(c)]
-    if ahead and not alike:
+    if not ahead:  # no other alone, but all together
+        return verdict_of((best, *others), decisive).reasons[1:]
+    if not alike:
         return (reasons.better_but_contradicted(ahead[0], best),)
     return tuple(reasons.contested(best, c, decisive) for c in alike[:1])

@@ -1,6 +1,6 @@
 """The sentences that say why a verdict is what it is: one for each rule that fired."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import exp, log
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
@@ -123,6 +123,27 @@ def pairs_promised(single: Candidate, second: Promise, count: int) -> Reason:
     )
 
 
+def second_possible(named: Candidate, shares: Mapping[str, float]) -> Reason:
+    """Another effect may be there beside the one that is named, too weak to be told.
+
+    Args:
+      named: a single effect.
+      shares: of each other effect, how probable it is that it is there, too.
+    """
+    total, likeliest = sum(shares.values()), max(shares, key=lambda name: shares[name])
+    return Reason(
+        "second_possible",
+        f"That another effect is there beside {named.title}, too weak to be told here, has a "
+        f"probability of {100 * total:.0f} %, {likeliest} first ({100 * shares[likeliest]:.0f} %).",
+        {
+            "hypothesis": named.name,
+            "second": likeliest,
+            "probability": total,
+            "probability_of_second": shares[likeliest],
+        },
+    )
+
+
 def explains(best: Candidate) -> Reason:
     """The best hypothesis of those that leave only noise."""
     return Reason(
@@ -185,6 +206,29 @@ def better_but_contradicted(better: Candidate, best: Candidate) -> Reason:
     )
 
 
+def out_of_the_race(better: Candidate, best: Candidate, needed: float) -> Reason:
+    """A hypothesis that the data contradict is a little more probable than the best that explains.
+
+    Args:
+      better: the most probable.
+      best: the most probable of those that explain the data.
+      needed: the p-value that the first lacks.
+    """
+    ahead = better.log_odds - best.log_odds
+    return Reason(
+        "out_of_the_race",
+        f"{better.title} would be {times_text(ahead)} as probable as {best.title}, yet leaves "
+        f"{p_equals(better.p_value or 0.0)}, and {needed:g} is needed.",
+        {
+            "hypothesis": best.name,
+            "rival": better.name,
+            "log_odds_behind": -ahead,
+            "p_value": better.p_value,
+            "least_p_value": needed,
+        },
+    )
+
+
 def only_a_form(form: Candidate, name: Candidate | None) -> Reason:
     """A form without a name explains the data, and no name does as well.
 
@@ -226,6 +270,30 @@ def contested(best: Candidate, rival: Candidate, needed: float) -> Reason:
     )
 
 
+def contested_together(
+    best: Candidate, others: Sequence[Candidate], ahead: float, needed: float
+) -> Reason:
+    """Each rival is given up, but not all together.
+
+    Args:
+      best: the most probable that explains the data.
+      others: the most probable of the rivals, which explain the data, too.
+      ahead: nats by which the best is more probable than all rivals together.
+      needed: nats by which it must be.
+    """
+    return Reason(
+        "contested_together",
+        f"{best.title} is {times_text(ahead)} as probable as all others together that explain the "
+        f"data, {', '.join(c.title for c in others)} first; {times_text(needed)} would decide.",
+        {
+            "hypothesis": best.name,
+            "rival": others[0].name,
+            "log_odds_behind": ahead,
+            "least_log_odds": needed,
+        },
+    )
+
+
 def _before_the_data(best: Candidate, rival: Candidate) -> str:
     """How much of a lead is prior; empty where that is little."""
     ahead = best.log_prior - rival.log_prior
@@ -237,12 +305,12 @@ def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) ->
 
     Args:
       best: the hypothesis that is named.
-      candidates: all, ranked.
+      candidates: ranked; none that the data contradict stands near the best.
       needed: nats by which the next must be behind.
     """
     others = [c for c in candidates if c.effects != best.effects]
     if not others:
-        return Reason("no_rival", f"Nothing but {best.title} could be tried.", {})
+        return Reason("no_rival", f"Nothing but {best.title} leaves only noise.", {})
     behind = best.log_odds - others[0].log_odds
     return Reason(
         "decisive",

@@ -27,13 +27,13 @@ from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 from galileo_jax.observation.observation import Observation
 from galileo_jax.observation.random_patterns import random_patterns
 
 SIZES = (0.35, 0.7, 1.4)  # times what is stated of a point
 LENGTHS = (0.05, 0.1, 0.2)  # of the time that an object is seen: at least `LEAST_ROWS` rows
 LEAST_ROWS = 2.0
+ERRORS_ODDS = 0.25  # of there being such errors, against none
 NUM_TRIED = 12  # hypotheses, the most probable with a name
 
 
@@ -102,7 +102,7 @@ def _beside(trials: JointProblem, fit: GradientFit) -> SlowErrors:
         sizes.extend(SIZES)
         lasts.extend([lasts_s] * len(SIZES))
     best = int(np.argmax(log_odds))
-    adds = float(np.logaddexp.reduce(log_odds)) + math.log(UNNAMED_ODDS / len(log_odds))
+    adds = float(np.logaddexp.reduce(log_odds)) + math.log(ERRORS_ODDS / len(log_odds))
     return SlowErrors(adds, sizes[best], lasts[best])
 
 

@@ -104,7 +104,7 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
     """The candidates whose fits are to be compared with the data, the best first.
 
     Always the best, the best with a name and the best formula; beyond these what could be confused
-    with the best.
+    with the best, alone or together: all others together come to less than a twentieth of it.
 
     Args:
       candidates: ranked.
@@ -112,8 +112,29 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
     """
     best = candidates[0]
     law = next((c for c in candidates if c.law is not None), None)
-    always = [id(c) for c in (best, best_named(candidates), law)]
+    always = [id(c) for c in (best, best_named(candidates), law, *_in_sum(best, candidates))]
     return tuple(c for c in candidates if id(c) in always or best.log_odds - c.log_odds < margin)
+
+
+def _in_sum(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """As few hypotheses as must be looked at, that the others together are given up.
+
+    Args:
+      best: the one that they may contest.
+      candidates: ranked.
+    """
+    others = _without(best, candidates)
+    return [c for i, c in enumerate(others) if best.log_odds - _sum_of(others[i:]) < DECISIVE]
+
+
+def _without(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Hypotheses by which not all of the best one's effects are there."""
+    return [c for c in candidates if not set(best.effects) <= set(c.effects)]
+
+
+def _sum_of(candidates: Sequence[Candidate]) -> float:
+    """Log odds of several hypotheses together."""
+    return float(np.logaddexp.reduce([c.log_odds for c in candidates]))
 
 
 def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]:
@@ -134,9 +155,13 @@ def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]
 
 def explains(candidate: Candidate) -> bool:
     """Whether a candidate was compared with the data and leaves nothing but noise."""
+    return candidate.p_value is not None and candidate.p_value >= _least_p(candidate)
+
+
+def _least_p(candidate: Candidate) -> float:
+    """The p-value from which on a hypothesis explains the data."""
     num_surprising = len(candidate.effects) - candidate.num_expected
-    least = ADEQUATE_P if num_surprising <= 1 else PAIR_P
-    return candidate.p_value is not None and candidate.p_value >= least
+    return ADEQUATE_P if num_surprising <= 1 else PAIR_P
 
 
 def _explaining(candidates: Sequence[Candidate]) -> list[Candidate]:
@@ -180,10 +205,10 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
       decisive: difference in log odds, nats, at which one hypothesis rules out another.
 
     Returns:
-      Named: one hypothesis explains the data, and nothing else does about as well. Ambiguous:
-      several do; a form without a name stands last, and an effect that explains the data alone
-      is not repeated with others. Unknown: only a form does, or nothing, or what does is far
-      behind what does not.
+      Named: one hypothesis explains the data, and nothing else does about as well, nor all others
+      together. Ambiguous: several do; a form without a name stands last, and an effect that
+      explains the data alone is not repeated with others. Unknown: only a form does, or nothing,
+      or what does is far behind what does not.
     """
     best, explaining = candidates[0], _explaining(candidates)
     if not explaining:
@@ -199,9 +224,20 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
         name = next((c for c in explaining if not c.is_form), None)
         return Verdict("unknown", (), forms[0].name, reasons=(reasons.only_a_form(top, name),))
     why = reasons.explains(names[0])
+    possible = [c for c in candidates if c.p_value is None or c in explaining]
+    together = [c for c in _in_sum(top, possible) if c in explaining and len(equal) == 1]
+    if together:
+        ahead = top.log_odds - _sum_of(_without(top, possible))
+        why = (why, reasons.contested_together(top, together, ahead, DECISIVE))
+        named, forms = [[c for c in together if c.is_form is it] for it in (False, True)]
+        alike = [top, *_without_more(named), *forms[:1]]
+        return Verdict("ambiguous", tuple(c.name for c in alike), reasons=why)
     if len(equal) == 1:
-        others = [c for c in candidates if c.effects != top.effects]
-        return Verdict("named", top.effects, reasons=(why, reasons.decisive(top, others, decisive)))
+        out = [reasons.out_of_the_race(best, top, _least_p(best))] if best is not top else []
+        behind = [c for c in candidates if c in possible or top.log_odds - c.log_odds >= decisive]
+        others = [c for c in behind if c.effects != top.effects]
+        lead = reasons.decisive(top, others, decisive)
+        return Verdict("named", top.effects, reasons=(why, *out, lead))
     alike = [*_without_more(names), *forms[:1]]
     if len(alike) == 1:
         alike = names

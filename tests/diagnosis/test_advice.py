@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from galileo_jax.diagnosis.advice import advice
-from galileo_jax.diagnosis.diagnosis import Verdict
+from galileo_jax.diagnosis.diagnosis import Reason, Verdict
 from galileo_jax.model.effects.forms import FORM_NAMES
 from tests.ramp_model import HIT, make_surroundings
 
@@ -56,3 +56,11 @@ def test_what_is_sure_is_told_from_nothing():
     assert not any("table_tilt" in line for line in advice(sure, RAMP, 1))
     open_ = Verdict("ambiguous", ("table_tilt", "surface_friction"))
     assert "to tell surface_friction, table_tilt apart" in advice(open_, RAMP, 1)[0]
+
+
+def test_a_name_is_followed_by_how_to_see_a_second_effect_that_may_be_there():
+    named = Verdict("named", ("air_drag",))
+    assert advice(named, RAMP, 1) == ()
+    why = Reason("second_possible", "", {"second": "frame_rate"})
+    (said,) = advice(replace(named, reasons=(why,)), FALL, 1)
+    assert "frame_rate" in said and "another height" in said

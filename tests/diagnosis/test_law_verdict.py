@@ -17,7 +17,6 @@ from galileo_jax.diagnosis.law_verdict import (
     other_formulas,
 )
 from galileo_jax.diagnosis.verdict import best_named, looked_at_again, ranked, to_compare
-from galileo_jax.model.effects.forms.form import UNNAMED_ODDS
 from tests.diagnosis.test_verdict import DECISIVE, EDGE, candidate
 
 FORM_OF_POWER_V, FORM_OF_PULSE_T = "drag_of_a_power", "force_at_a_time"
@@ -92,6 +91,10 @@ def test_reasons_say_why_there_is_no_law():
     assert [why.rule for why in law_contested(ahead_but_wrong, DECISIVE)] == [
         "better_but_contradicted"
     ]
+    names = ("friction_patch", "magnetic_brake", "stribeck")
+    many = ranked([law(50.0), *(candidate(name, 46.5) for name in names)])
+    assert law_verdict(many, DECISIVE) is None
+    assert [why.rule for why in law_contested(many, DECISIVE)] == ["contested_together"]
     none = ranked([candidate("air_drag", 10.0)])
     assert [why.rule for why in law_contested(none, DECISIVE)] == ["no_formula"]
 
@@ -165,8 +168,8 @@ def test_formulas_are_tried_where_nothing_explains_or_only_what_could_explain_mu
 
 
 def test_a_second_factor_makes_a_formula_a_tenth_as_probable():
-    assert law_odds(1) == pytest.approx(UNNAMED_ODDS)
-    assert law_odds(2) == pytest.approx(UNNAMED_ODDS / 10)
+    assert law_odds(1) == pytest.approx(0.25)
+    assert law_odds(2) == pytest.approx(0.025)
 
 
 @pytest.mark.parametrize(("ahead", "expected"), [(0.0, "law"), (-EDGE, "law"), (EDGE, None)])

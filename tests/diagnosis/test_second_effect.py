@@ -12,14 +12,21 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.diagnosis import Promise, Verdict
 from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.score_tests import average_gain
-from galileo_jax.diagnosis.second_effect import promised_by_a_second
+from galileo_jax.diagnosis.second_effect import (
+    promised_by_a_second,
+    promises_of_seconds,
+    shares_of_seconds,
+    with_second,
+)
 from galileo_jax.diagnosis.verdict import DECISIVE, log_prior, ranked
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import LogNormal, Normal
+from tests.diagnosis.test_verdict import candidate
 from tests.precision import in_64_bit
 
 LIBRARY = ("air_drag", "frame_rate", "restitution")
@@ -40,7 +47,8 @@ def promise_in(tmp_path, effects):
         base = Hypothesis((), fitter.fit(0, effects=()))
         race = Race(fitter, base, False, 0, lambda _: None)
         singles = ranked(race([base] * len(LIBRARY), [(name,) for name in LIBRARY]))
-        return promised_by_a_second(race, singles, LIBRARY), singles[0]
+        promises = promises_of_seconds(race, singles, LIBRARY)
+        return promised_by_a_second(promises), singles[0]
 
 
 @pytest.fixture(scope="module")
@@ -95,3 +103,36 @@ def test_the_reason_names_the_second_effect_and_its_price(two_effects):
     assert f"{promise.beside} with {promise.effect}" in why.sentence
     assert "6 pairs" in why.sentence
     assert why.numbers["nats"] == promise.nats and why.numbers["price"] == promise.price
+
+
+NAMED = candidate("air_drag", 40.0)
+PROMISES = [
+    Promise("air_drag", "frame_rate", nats=-1.0, price=2.0, gain=0.5),
+    Promise("air_drag", "restitution", nats=-3.5, price=2.0, gain=-2.0),
+    Promise("rolling", "restitution", nats=5.0, price=2.0, gain=9.0),  # beside another
+]
+
+
+def test_the_probability_of_a_second_effect_is_that_of_all_pairs_with_what_is_named():
+    shares = shares_of_seconds(NAMED, [NAMED], PROMISES)
+    weights = np.exp([-1.5, -4.0])
+    assert list(shares) == ["frame_rate", "restitution"]
+    assert list(shares.values()) == pytest.approx(weights / (1 + weights.sum()))
+
+
+def test_a_pair_that_was_fitted_is_worth_its_fit():
+    others = [candidate("restitution+air_drag", 39.0), candidate("rolling+frame_rate", 39.5)]
+    shares = shares_of_seconds(NAMED, [NAMED, *others], PROMISES)
+    weights = np.exp([-1.5, -1.0])
+    assert list(shares.values()) == pytest.approx(weights / (1 + weights.sum()))
+
+
+def test_a_second_effect_is_said_beside_a_name_if_it_is_probable_enough():
+    named = Verdict("named", ("air_drag",))
+    (why,) = with_second(named, [NAMED], PROMISES).reasons
+    assert why.rule == "second_possible" and why.numbers["second"] == "frame_rate"
+    assert why.numbers["probability"] == pytest.approx(0.195, abs=0.001)
+    assert "probability of 19 %, frame_rate first (18 %)" in why.sentence
+    assert with_second(named, [NAMED], PROMISES[1:]) == named
+    for other in (Verdict("ambiguous", ("air_drag", "rolling")), Verdict("none", ())):
+        assert with_second(other, [NAMED], PROMISES) == other

@@ -131,7 +131,56 @@ def test_what_ranks_is_evidence_and_prior_together():
 def test_the_only_one_that_explains_is_named():
     found = verdict(candidate("air_drag", 40.0), candidate("rolling", 39.0, p_value=1e-9))
     assert told(found) == ("named", ("air_drag",), None)
-    assert rules(found) == ["explains", "decisive"]
+    assert rules(found) == ["explains", "no_rival"]
+
+
+@pytest.mark.parametrize(
+    ("behind", "p_values", "also"),
+    [
+        ((3.5, 3.6, 9.0), (0.5, 0.5, 0.5), ("rolling",)),  # 0.030 + 0.027 > 0.050
+        ((3.1, 3.6, 3.6), (0.5, 0.5, 0.5), ("rolling", "restitution")),
+        ((3.5, 3.6, 9.0), (0.5, None, 0.5), ("rolling",)),  # it was not compared
+        ((3.8, 3.8, 9.0), (0.5, 0.5, 0.5), ()),  # 0.022 + 0.022 < 0.050
+        ((3.5, 3.6, 9.0), (0.5, 1e-9, 0.5), ()),  # contradicted
+    ],
+)
+def test_rivals_that_are_given_up_one_by_one_are_not_all_together(behind, p_values, also):
+    names = ("rolling", "restitution", "stribeck")
+    others = [
+        candidate(name, 40.0 - by, p) for name, by, p in zip(names, behind, p_values, strict=True)
+    ]
+    found = verdict(candidate("air_drag", 40.0), *others)
+    expected = ("ambiguous", ("air_drag", *also)) if also else ("named", ("air_drag",))
+    assert told(found) == (*expected, None)
+    if also:
+        assert rules(found) == ["explains", "contested_together"]
+        share = -np.log(np.sum(np.exp(-np.array(behind))))
+        assert found.reasons[-1].numbers["log_odds_behind"] == pytest.approx(share)
+
+
+def test_pairs_with_what_is_named_do_not_contest_it_together():
+    others = [f"air_drag+{name}" for name in ("rolling", "restitution", "stribeck")]
+    found = verdict(candidate("air_drag", 40.0), *(candidate(pair, 36.5) for pair in others))
+    assert told(found) == ("named", ("air_drag",), None)
+
+
+def test_all_that_may_contest_together_are_compared():
+    odds = {"air_drag": 40.0, "air_drag+rolling": 36.6}
+    odds |= {"rolling": 36.5, "restitution": 36.4, "stribeck": 36.4}
+    table = ranked([candidate(name, nats) for name, nats in odds.items()])
+    names = [c.name for c in to_compare(table, DECISIVE)]
+    assert names == ["air_drag", "rolling", "restitution"]
+
+
+def test_a_more_probable_one_that_is_contradicted_is_said_to_be_out_of_the_race():
+    better, best = candidate("rolling", 41.0, p_value=0.0099), candidate("air_drag", 40.0)
+    found = verdict(better, best, candidate("stribeck", 30.0))
+    assert told(found) == ("named", ("air_drag",), None)
+    assert rules(found) == ["explains", "out_of_the_race", "decisive"]
+    assert found.reasons[1].numbers["rival"] == "rolling"
+    assert found.reasons[1].numbers["least_p_value"] == 0.01
+    assert found.reasons[2].numbers["log_odds_behind"] == pytest.approx(10.0)
+    assert "2.7 times as probable as air_drag" in found.reasons[1].sentence
 
 
 def test_one_that_was_not_compared_is_no_rival():

@@ -6,8 +6,9 @@ from typing import ClassVar
 
 from galileo_jax.model.effects.effect import Effect, Surroundings, Theta
 
-# Against an effect that is met again and again; the seven forms together come to 1.5 of those.
-UNNAMED_ODDS = 0.25
+# Against an effect of the library. Who looks for what is missing has no reason to believe that the
+# library holds it: each form is as probable as an effect, all seven a third of the library.
+UNNAMED_ODDS = 1.0
 
 
 class Form(Effect):
