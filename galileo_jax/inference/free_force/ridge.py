@@ -12,6 +12,7 @@ from their normal distribution given k.
 
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 import numpy as np
 from scipy.linalg import block_diag, solve_triangular
 from scipy.special import softmax
@@ -126,7 +127,9 @@ class Frictions:
         names = [f"k{i + 1}" for i in range(len(trials.problems[0].observation.names))]
         found = [trials.names.index(name) for name in names if name in trials.names]
         where = [i for i in found if free[i]]
-        table = [np.asarray(trials.parameters[i].prior.forward(TABLE_Z)) for i in where]
+        table = [
+            np.asarray(trials.parameters[i].prior.forward(jnp.asarray(TABLE_Z))) for i in where
+        ]
         return cls(np.array(where, dtype=int), np.reshape(table, (len(where), len(TABLE_Z))))
 
     def value(self, z: np.ndarray) -> np.ndarray:
