@@ -36,14 +36,15 @@ def main(argv: Sequence[str]) -> int | None:
     tables.row("track", ("k1 true", "plain", "sd", "holds", "with gp", "sd", "holds", "cpu s"))
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(call.seed, call.seed + call.num):
-            for effect in (EXOTICS[seed % len(EXOTICS)], NO_EFFECT):
+            for effect in (EXOTICS[seed % len(EXOTICS)], NO_EFFECT)[: 1 + call.none]:
                 rows.append(_one(Path(folder), effect, seed, call))
                 _show(rows[-1])
     figures = {}
     for is_hidden, title in ((True, "hidden"), (False, NO_EFFECT)):
         own = [row for row in rows if (row["effect"] != NO_EFFECT) == is_hidden]
         for name in SHOWN:
-            figures[f"{title}_{name}"] = _summary([row for row in own if name in row], name)
+            if shown := [row for row in own if name in row]:
+                figures[f"{title}_{name}"] = _summary(shown, name)
     print()
     columns = ("plain in 95%", "gp in 95%", "plain sd", "gp sd", "times as wide")
     tables.row("of", columns)
@@ -121,6 +122,9 @@ def _parser() -> command.Parser:
     parser.add_argument("--num", type=command.whole_number(1), default=NUM, help="of each kind")
     parser.add_argument("--seed", type=command.whole_number(0), default=0, help="of the first")
     parser.add_argument("--strength", type=float, default=STRENGTH, help="0 to 1")
+    parser.add_argument(
+        "--none", action=argparse.BooleanOptionalAction, default=True, help="tracks without effects"
+    )
     parser.add_argument("--noise-px", type=float, default=0.3, help="at 900 px/m")
     return parser
 

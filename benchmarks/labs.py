@@ -28,6 +28,7 @@ SETTINGS = {
 NOISES = ("px", "speed")
 PIXEL_M = 0.3 / 900  # 0.3 px at 900 px/m
 SPEED_SHARE = 0.075  # of the range of object 1's speed, as the noise of a velocity
+LEAST_NOISE_M = 1e-5  # where static friction holds all
 NONE = "none"
 HIDDEN = "hidden_"  # what the effects of `hidden_laws.py` are called before their names
 LAW_STRENGTH = 0.5  # as in laws.py
@@ -91,6 +92,7 @@ class SimulatedLab:
             made = self._simulate(path, **options)
             speed = np.hypot(*(made.truths[0]["trajectory"]["object1"][v] for v in ("vy", "vz")))
             noise_m = SPEED_SHARE * float(np.ptp(speed)) / (math.sqrt(2) * options["fps"])
+            noise_m = max(noise_m, LEAST_NOISE_M)
         self._simulate(path, **options, track_noise=noise_m)
         return path.read_text()
 

@@ -273,7 +273,7 @@ class _Loop:
         """Why it ends; None where it goes on."""
         rounds = self._journal.rounds
         if stands(rounds):
-            return f"the verdict ({rounds[-1]['status']}) has stood"
+            return f"the verdict ({rounds[-1]['status']}) is the same in successive rounds"
         if len(self._journal.experiments) >= self._budget:
             return f"the budget of {self._budget} experiments is spent"
         return None
@@ -312,7 +312,10 @@ class _Loop:
                 "as can be from those so far, to see whether the verdict holds"
             )
         odds = ", ".join(f"{name} {p:.2f}" for name, p in list(ahead.hypotheses.items())[:3])
-        return dict(best.setting), f"{ahead.sentence}; now: {odds}"
+        return dict(best.setting), (
+            f"it is expected to tell most: {best.gain_nats:.2f} nats, and the true one of the "
+            f"hypotheses is then named with probability {best.named:.2f}; until now: {odds}"
+        )
 
 
 def _line(error: Exception) -> str:

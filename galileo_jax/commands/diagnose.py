@@ -100,7 +100,7 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
     lines += ["", found.sentence]
     if hidden is not None:
         lines.append(f"truth: {hidden}")
-    lines += [f"why: {why.sentence}" for why in found.verdict.reasons]
+    lines += [f"why: {sentence}" for sentence in diagnosis_text.why(found.verdict.reasons)]
     if found.verdict.status == "unknown":
         lines.append(diagnosis_text.formula_text(record))
     if "each_clip" in record:

@@ -1,6 +1,5 @@
 """`galileo discover`: a lab and a loop: measure, diagnose, choose the next setting."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 from galileo_jax.commands import command
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
+from galileo_jax.experiment.settings import text_of
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -19,7 +19,7 @@ def main(argv: Sequence[str]) -> int | None:
     with progress_display() as display:
         found = discover(**asked, out=out, on_progress=_Printer(display))
     print(found.sentence)
-    print(f"{found.document['ended']}")
+    print(f"It ended because {found.document['ended']}.")
     command.say(f"{out}/discover.json, {out}/report.html")
     return None
 
@@ -39,9 +39,8 @@ class _Printer:
 
 
 def _experiment(row: Mapping[str, Any]) -> str:
-    settings = json.dumps(row["settings"])
     became = "" if row["outcome"] == "track" else f"\n  lost: {row['line']}"
-    return f"experiment {row['number']}: {settings}\n  why: {row['reason']}{became}"
+    return f"experiment {row['number']}: {text_of(row['settings'])}\n  why: {row['reason']}{became}"
 
 
 def _parser() -> command.Parser:

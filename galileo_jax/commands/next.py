@@ -14,6 +14,12 @@ if TYPE_CHECKING:
 
 NUM_SETTINGS = 8
 LARGE = 1000.0
+LEGEND = (
+    "gain: what the experiment is expected to tell, in nats (0.69 tell between two hypotheses that "
+    "are as probable)",
+    "named: how probably the true hypothesis is then named; lead: by how much, in log odds",
+    "hit: how probably object 1 reaches object 2",
+)
 NUMBERS = {"gain_nats": "gain nats", "named": "named", "lead_nats": "lead nats", "hit": "hit"}
 
 
@@ -42,13 +48,13 @@ def _lines(ahead: "NextExperiment") -> list[str]:
     odds = ", ".join(f"{name} {p:.3f}" for name, p in ahead.hypotheses.items())
     rows = ahead.document["settings"][:NUM_SETTINGS]
     names = [name for name in rows[0] if name not in NUMBERS]
-    lines = [f"open: {odds}", ""]
+    lines = [f"still possible: {odds}", ""]
     lines.append("".join(f"{name:>10}" for name in (*names, *NUMBERS.values())))
     for row in rows:
         cells = [f"{row[name]:g}" for name in names]
         cells += ["-" if row[key] is None else _number(row[key]) for key in NUMBERS]
         lines.append("".join(f"{cell:>10}" for cell in cells))
-    return [*lines, "", ahead.sentence]
+    return [*lines, "", *LEGEND, "", ahead.sentence]
 
 
 def _number(value: float) -> str:

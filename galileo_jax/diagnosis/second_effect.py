@@ -32,6 +32,8 @@ def promises_of_seconds(
       candidates: ranked, single effects.
       library: names of the effects.
     """
+    if len(library) < 2:
+        return None
     best = best_named(candidates)
     one, two = (log_prior([1.0] * count, len(library)) for count in (1, 2))
     promises = []

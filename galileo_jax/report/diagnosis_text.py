@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.comparison.compare import Comparison
-from galileo_jax.diagnosis.diagnosis import Diagnosis
+from galileo_jax.diagnosis.diagnosis import Diagnosis, Reason
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
@@ -14,6 +14,7 @@ from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fit_text import number
 
 NO_EFFECTS = "no effects"
+MOST_APART = 2  # that are said one by one
 PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis whose verdict is a law
 
 
@@ -46,6 +47,15 @@ def noise_text(comparison: Comparison) -> str:
         return ""
     size = " and ".join(f"{scale:.1f}" for scale in comparison.noise_scale)
     return f"The tracking errors are {size} times what was stated."
+
+
+def why(found: Sequence[Reason]) -> list[str]:
+    """The rules that fired, one sentence each; of hypotheses that could not be confused, one."""
+    apart = [one for one in found if one.rule == "told_apart"]
+    if len(apart) <= MOST_APART:
+        return [one.sentence for one in found]
+    said = [one.sentence for one in found if one.rule != "told_apart"]
+    return [*said, f"A clip like this one would rule out {len(apart)} others (report.html)."]
 
 
 def verdict(diagnosis: Diagnosis) -> str:

@@ -154,7 +154,18 @@ def fit_quality(result: dict[str, Any]) -> str:
     else:
         text = f"The model misses the data by {size}; do not trust its parameters"
     text = f"{text} (chi2 per degree of freedom {chi2:.2f})."
+    if found := result.get("discrepancy"):
+        text = f"{text} {discrepancy_text(found)}"
     return " ".join([text, *map(pull_text, result.get("pulls", []))])
+
+
+def discrepancy_text(found: Mapping[str, Any]) -> str:
+    """What was allowed for besides the model (`discrepancy` of result.json), in a sentence."""
+    sizes = [f"{size:.1g} m/s² on {name}" for name, size in found["size_m_s2"].items()]
+    return (
+        "Besides the model, an acceleration of any form was allowed for, about "
+        f"{' and '.join(sizes)}; the intervals are so wide because it may stand in for friction."
+    )
 
 
 def pull_text(pull: Mapping[str, Any]) -> str:
@@ -219,6 +230,8 @@ def fit_command(run: Run) -> str:
     if result.get("free"):
         words.append(f"--free {','.join(result['free'])}")
     words += [f"--{key} {result[key]}" for key in ("preset", "sampler") if result.get(key)]
+    if result.get("discrepancy"):
+        words.append(f"--discrepancy {result['discrepancy']['kind']}")
     if run.problem.model.motion != "planar":
         words.append(f"--motion {run.problem.model.motion}")
     return " ".join([*words, f"--engine {run.problem.engine.name}", f"--seed {result['seed']}"])

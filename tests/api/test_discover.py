@@ -79,9 +79,7 @@ def verdicts(monkeypatch):
     def rehearsed(found, settings, seed):
         rows = [Expected(one, one["height_m"], 0.9, 1.0, None) for one in settings]
         rows.sort(key=lambda one: -one.gain_nats)
-        return types.SimpleNamespace(
-            expected=rows, hypotheses={"air_drag": 0.6, "rolling": 0.4}, sentence="from above"
-        )
+        return types.SimpleNamespace(expected=rows, hypotheses={"air_drag": 0.6, "rolling": 0.4})
 
     monkeypatch.setattr(module, "diagnose", diagnose)
     monkeypatch.setattr(module, "rehearsed", rehearsed)
@@ -101,8 +99,11 @@ def test_it_ends_when_the_verdict_has_stood(verdicts, tmp_path):
     document = json.loads((tmp_path / "run" / "discover.json").read_text())
     assert [one["outcome"] for one in document["experiments"]] == ["track"] * 3
     assert "nothing is known yet" in document["experiments"][0]["reason"]
-    assert document["experiments"][1]["reason"] == "from above; now: air_drag 0.60, rolling 0.40"
-    assert document["ended"] == "the verdict (named) has stood"
+    assert document["experiments"][1]["reason"] == (
+        "it is expected to tell most: 0.50 nats, and the true one of the hypotheses is then named "
+        "with probability 0.90; until now: air_drag 0.60, rolling 0.40"
+    )
+    assert document["ended"] == "the verdict (named) is the same in successive rounds"
     assert "it is named" in (tmp_path / "run" / "report.html").read_text()
     shares = [share for share, _ in told]
     assert shares == sorted(shares) and shares[-1] == 1.0
@@ -118,7 +119,10 @@ def test_a_law_is_left_with_its_formula(verdicts, tmp_path):
         None,
         *[{"text": LAW.text, "family": "power_v", "constants": {"c": 0.8, "n": 1.5}}] * 2,
     ]
-    assert document["ended"] == "the verdict (law) has stood" and found.status == "law"
+    assert (
+        document["ended"] == "the verdict (law) is the same in successive rounds"
+        and found.status == "law"
+    )
     assert "a = -0.8 |v|^1.5" in (tmp_path / "report.html").read_text()
 
 

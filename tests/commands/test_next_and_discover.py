@@ -31,7 +31,7 @@ def test_next_prints_the_table_and_the_sentence(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(module, "next_experiment", fake)
     assert galileo("next", tmp_path, "--can", "height=0.1:0.5", "--about", "k2") == 0
     out = capsys.readouterr().out
-    assert "open: air_drag 0.700, none 0.300" in out and "0.93" in out
+    assert "still possible: air_drag 0.700, none 0.300" in out and "0.93" in out
     assert out.splitlines()[-1].startswith("release object 1 from 0.15 m")
     assert asked["runs"] == [tmp_path]
     assert (asked["can"], asked["about"], asked["seed"]) == ("height=0.1:0.5", "k2", 0)

@@ -59,6 +59,17 @@ def test_starts_are_apart():
     assert min(abs(a - b) for i, a in enumerate(powers) for b in powers[:i]) > 0.4
 
 
+def test_a_wave_starts_at_several_lengths():
+    """And not at one length with opposite phases, which is one formula twice."""
+    wave = np.sin(6.283 * (TIMES - 0.5) / 0.2 + 1.0) + 0.8 * np.sin(6.283 * (TIMES - 0.5) / 0.29)
+    found = suggestion_of([sight(wave)], Structure("push", False, (FACTOR["wave_q"],)), RANGES)
+    assert found is not None
+    lengths = [start["length"] for start in found.starts]
+    assert min(abs(length - 0.2) for length in lengths) < 0.02
+    assert min(abs(length - 0.29) for length in lengths) < 0.02
+    assert min(abs(a / b - 1) for i, a in enumerate(lengths) for b in lengths[:i]) > 0.05
+
+
 @pytest.mark.parametrize(("k", "change"), [(0.5, -0.612), (0.1, -0.25)])
 def test_no_friction_becomes_negative(k, change):
     push = 6.0 * np.exp(-(((TIMES - 0.4) / 0.06) ** 2))

@@ -1,5 +1,7 @@
 """A second effect is looked for where its slope promises it, though one effect is enough."""
 
+from typing import Any
+
 import hypothesis.strategies as st
 import jax.numpy as jnp
 import numpy as np
@@ -95,6 +97,11 @@ def test_the_second_of_two_effects_promises_more_than_it_costs(two_effects):
 def test_beside_the_only_effect_nothing_promises_more(tmp_path):
     promise, best = promise_in(tmp_path, {"air_drag": {"air_drag": 1.0}})
     assert promise is None and best.name == "air_drag"
+
+
+def test_a_library_of_one_effect_has_no_second():
+    race: Any = None
+    assert promised_by_a_second(race, [], ["air_drag"]) is None
 
 
 def test_the_reason_names_the_second_effect_and_its_price(two_effects):

@@ -11,7 +11,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import Place
 from galileo_jax.comparison.path_residuals import failing_interval, path_residuals
 from galileo_jax.comparison.phases import PHASES
-from galileo_jax.diagnosis.diagnosis import Law, Verdict
+from galileo_jax.diagnosis.diagnosis import Law, Reason, Verdict
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.comparison_page import ComparisonReport, write_comparison_page
@@ -173,6 +173,17 @@ def test_a_formula_that_does_as_well_is_shown(trials, clip, tmp_path):
     report = DiagnosisReport(found, record, GO_ON, None, (clip,), AGAIN, 0)
     write_diagnosis_page(page, "clip", trials, report)
     assert page.read_text(encoding="utf-8").count(escape(law.text)) >= 2  # verdict, candidates
+
+
+def test_what_could_not_be_confused_is_one_line():
+    """A formula is looked at beside every hypothesis: twenty lines that say the same."""
+    apart = [Reason("told_apart", f"rival {i}", {}) for i in range(20)]
+    found = [Reason("explains", "only noise is left", {}), *apart]
+    found.append(Reason("not_told_apart", "one could be confused", {}))
+    said = diagnosis_text.why(found)
+    assert said[:2] == ["only noise is left", "one could be confused"]
+    assert len(said) == 3 and "20 others" in said[2]
+    assert diagnosis_text.why(found[:2]) == ["only noise is left", "rival 0"]
 
 
 @pytest.mark.parametrize(

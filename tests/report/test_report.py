@@ -222,6 +222,13 @@ def test_a_misfit_of_a_nuisance_alone_is_put_in_words():
     assert "galileo diagnose" in said
 
 
+def test_an_acceleration_of_any_form_is_said_to_be_there():
+    found = {"kind": "gp", "size_m_s2": {"object1": 0.482, "object2": 0.053}}
+    said = fit_quality({"error": {"chi2_per_dof": 1.0}, "discrepancy": found})
+    assert "about 0.5 m/s² on object1 and 0.05 m/s² on object2" in said
+    assert "acceleration" not in fit_quality({"error": {"chi2_per_dof": 1.0}})
+
+
 def test_numbers_have_the_places_their_uncertainty_allows():
     assert number(0.151812, 0.00036) == "0.15181"
     assert number(123.4, 17.0) == "123"

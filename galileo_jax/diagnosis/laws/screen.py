@@ -187,17 +187,39 @@ def suggestion_of(
 
 
 def _apart(gain: np.ndarray, grid: Mapping[str, np.ndarray]) -> list[int]:
-    """The best points of a grid, the best first, none beside another."""
-    found: list[int] = []
+    """The best points of a grid, the best first, none beside another.
+
+    They are the tops of hills along the first constant, whatever the others are there: the lengths
+    of a wave between which nothing fits may differ by little. Where the hills are few, points far
+    from them are taken, too.
+    """
     if not grid:
         return [0]
+    found = _hilltops(gain, next(iter(grid.values())))[:NUM_STARTS]
     unit = np.stack([(values - values.min()) / np.ptp(values) for values in grid.values()], axis=1)
     for i in np.argsort(-gain):
-        if all(np.abs(unit[i] - unit[j]).max() > APART for j in found):
-            found.append(int(i))
         if len(found) == NUM_STARTS:
             break
+        if all(np.abs(unit[i] - unit[j]).max() > APART for j in found):
+            found.append(int(i))
     return found
+
+
+def _hilltops(gain: np.ndarray, along: np.ndarray) -> list[int]:
+    """The points of a grid that are the best at their value of one constant and beat both beside.
+
+    Args:
+      gain: `[point of the grid]`.
+      along: `[point of the grid]`, the constant.
+
+    Returns:
+      Points, the best first.
+    """
+    values = np.unique(along)
+    best = [max(np.flatnonzero(along == value), key=lambda i: gain[i]) for value in values]
+    profile = np.concatenate([[-np.inf], gain[best], [-np.inf]])
+    is_top = (profile[1:-1] > profile[:-2]) & (profile[1:-1] >= profile[2:])
+    return sorted((int(best[i]) for i in np.flatnonzero(is_top)), key=lambda i: -gain[i])
 
 
 def _gains(
