@@ -157,6 +157,11 @@ def spin_told(folder: Path, out: Path, flights: slice) -> str:
     paths = []
     for path, spin in _flights(folder / "spin_flights", out)[flights]:
         if np.linalg.norm(spin) < MOST_RAD_S:
+            try:
+                gx.load(path)
+            except InputError as error:
+                print(f"spin_told: {error}")
+                continue
             told = ", ".join(f"{value:.1f}" for value in spin)
             text = path.read_text().replace("0.0027", f"0.0027, spin_rad_s: [{told}]")
             path.write_text(text)

@@ -42,6 +42,7 @@ from galileo_jax.clip.fields import (
     one_of,
 )
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.walls import Walls
 
 
 class ClipObject(BaseModel):
@@ -132,6 +133,7 @@ class ClipFile(BaseModel):
     liquid_density: LiquidDensity | None = None
     thread_m: Thread | None = None
     pivot_m: Point | None = None
+    walls: Walls = ()
     objects: tuple[ClipObject, ...]
 
 
@@ -172,6 +174,7 @@ class Clip(ClipFile):
       liquid_density: liquid: kg/m^3; None = not known.
       thread_m: pendulum: from the pivot to the bob's centre, m; None = not known.
       pivot_m: pendulum: (x, y) of the pivot from the origin, m; None = not known.
+      walls: from_above: straight walls off which pucks bounce.
       objects: at least one, names unique.
       is_scale_assumed: lengths are in units of something in the picture, which a
         `pixels_per_metre` that means nothing else gives a size.

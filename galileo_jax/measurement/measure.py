@@ -17,7 +17,12 @@ from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.errors_in_time import with_errors_in_time
 from galileo_jax.measurement.errors_of_clock import with_errors_of_clock
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
-from galileo_jax.measurement.infer_radii import from_first_common_frame, is_level, told_by_hit
+from galileo_jax.measurement.infer_radii import (
+    from_first_common_frame,
+    is_level,
+    told_by_hit,
+    with_walls_in_metres,
+)
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
@@ -215,6 +220,7 @@ def _with_pucks(measured: Measurement, remarks: list[str]) -> Measurement:
     """The measurement from where all pucks are seen on, with the scale or radii from a hit."""
     observation = from_first_common_frame(measured.clip, measured.observation)
     clip, observation, found, said = told_by_hit(measured.clip, observation)
+    clip = with_walls_in_metres(clip, measured.pixels)
     remarks.extend(f"{clip.path}: {line}" for line in said)
     return replace(measured, clip=clip, observation=observation, whole=observation, inferred=found)
 
