@@ -275,7 +275,7 @@ class GradientFitter:
         return Ends.of(found)
 
     def _starts_by_phases(self, free: np.ndarray, num: int, seed: int) -> np.ndarray:
-        """Starts that suit what was seen before each further object moved, or bounced off a wall."""
+        """Starts that suit what was seen before each further object moved, or a bounce."""
         is_main = free & np.array([p.role != "nuisance" for p in self.trials.model_parameters])
         centres, is_open = absent_z(self.trials)[None], is_main[None]
         for short in phases(self.trials):

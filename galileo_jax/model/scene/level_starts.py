@@ -50,9 +50,7 @@ def level_starts(
     return found
 
 
-def _turning(
-    observation: Observation, i: int, walls: Sequence[Wall]
-) -> tuple[float, float] | None:
+def _turning(observation: Observation, i: int, walls: Sequence[Wall]) -> tuple[float, float] | None:
     """How fast a puck turns at the start by its picture, and sd, rad/s; None where unknown.
 
     Friction acts against sliding and turning together: who turns slides farther.
