@@ -117,8 +117,8 @@ def check_camera(file: ClipFile, fail: Any) -> None:
     """Refuses two scales, and a camera's geometry where there is no picture."""
     if file.rectangle is not None and file.pixels_per_metre is not None:
         fail("rectangle", "given together with pixels_per_metre; leave one of them out")
-    for key in ("rectangle", "lens"):
-        if getattr(file, key) is not None and file.video is None:
+    for key in ("rectangle", "lens", "turning"):
+        if getattr(file, key) not in (None, False) and file.video is None:
             fail(key, "means nothing beside a track, only beside a video; leave it out")
 
 

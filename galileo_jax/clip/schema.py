@@ -134,6 +134,7 @@ class ClipFile(BaseModel):
     thread_m: Thread | None = None
     pivot_m: Point | None = None
     walls: Walls = ()
+    turning: Annotated[bool, Field(strict=True)] = False
     objects: tuple[ClipObject, ...]
 
 
@@ -175,6 +176,7 @@ class Clip(ClipFile):
       thread_m: pendulum: from the pivot to the bob's centre, m; None = not known.
       pivot_m: pendulum: (x, y) of the pivot from the origin, m; None = not known.
       walls: from_above: straight walls off which pucks bounce.
+      turning: from_above: the turning that a video shows is part of the data.
       objects: at least one, names unique.
       is_scale_assumed: lengths are in units of something in the picture, which a
         `pixels_per_metre` that means nothing else gives a size.

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Annotated, Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 
 from galileo_jax.clip.fields import Point, short, wrong
@@ -20,6 +20,7 @@ from galileo_jax.clip.fields import Point, short, wrong
 MOST_WALLS = 12
 FARTHEST_M = 100.0
 SHORTEST_M, SHORTEST_PX = 0.005, 4.0
+NEAR = 1.15  # of a radius: so near is a puck that bounces off a wall in some frame
 PAIRS = (("from_m", "to_m"), ("from_px", "to_px"))
 
 
@@ -91,6 +92,19 @@ def distance_to_wall(
     start, along = np.asarray(ends_m[0], float), np.subtract(ends_m[1], ends_m[0])
     share = np.clip((places_m - start) @ along / (along @ along), 0.0, 1.0)
     return np.linalg.norm(places_m - start - share[..., None] * along, axis=-1)
+
+
+def bounces(
+    place_m: Float[np.ndarray, "2 frame"],
+    is_seen: Bool[np.ndarray, " frame"],
+    ends_m: Sequence[Sequence[float]],
+    radius_m: float,
+) -> list[int]:
+    """The frames in which a puck is nearest to a wall, one for each stay beside it."""
+    away = distance_to_wall(np.moveaxis(np.nan_to_num(place_m), 0, -1), ends_m)
+    away = np.where(is_seen, away, np.inf)
+    near = np.flatnonzero(np.diff(np.concatenate([[False], away < NEAR * radius_m, [False]])))
+    return [a + int(np.argmin(away[a:b])) for a, b in zip(near[::2], near[1::2], strict=True)]
 
 
 Walls = Annotated[tuple[Wall, ...], BeforeValidator(_walls)]

@@ -27,6 +27,7 @@ from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_si
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.track_cache import track_once
+from galileo_jax.measurement.turning import with_turning
 from galileo_jax.measurement.wander_size import with_wander
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
@@ -110,7 +111,8 @@ def measure(clip: Clip) -> Measurement:
     if is_level(measured.clip) or clip.scenario == "toss":
         # The places of a ball in space are as uncertain along its way as its times, which a wander
         # that is told by the track would take for it.
-        observation = with_wander(observation)
+        pucks = measured.clip
+        observation = with_wander(observation, pucks.objects, pucks.walls)
     if pixels is None and observation.position_m.shape[1] == 2:
         # In space and from above the likelihood lets every track wander.
         observation, said = with_errors_in_time(observation)
@@ -144,7 +146,8 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         return _to_last(clip, read_track(clip.path, clip.track, clip, clip.fps).observation), None
     pixels = track_once(clip)
     observation = with_noise_at_rest(observe(clip, pixels))
-    return with_camera_modes(clip, observation, pixels), pixels
+    observation = with_camera_modes(clip, observation, pixels)
+    return with_turning(observation) if clip.turning else observation, pixels
 
 
 def _to_last(clip: Clip, observation: Observation) -> Observation:

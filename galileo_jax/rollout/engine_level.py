@@ -62,12 +62,14 @@ class Table(NamedTuple):
       rims: what a hit does.
       radius_m: `[object]`, true.
       walls: true; None where there are none.
+      pressure: `[object, 2]`, where discs press on the table, see `Effect.pressure`.
     """
 
     law: Dynamics
     rims: Rims
     radius_m: jax.Array
     walls: Walls | None
+    pressure: jax.Array | float
 
 
 def roll_out(
@@ -95,7 +97,8 @@ def roll_out(
     walls = next((found for e in effects if (found := e.walls(named, scene)) is not None), None)
     if walls is not None:
         walls = walls._replace(ends_m=seen[0, :2] + (walls.ends_m - seen[0, :2]) / shown)
-    table = Table(law, rims, jnp.asarray(scene.half_length_m), walls)
+    beside = sum((p for e in effects if (p := e.pressure(named, scene)) is not None), start=0.0)
+    table = Table(law, rims, jnp.asarray(scene.half_length_m), walls, beside)
     # Starts and turning as the camera's scale will show them.
     start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
     discs = Discs(
@@ -149,10 +152,10 @@ def _to_next_event(
 ) -> tuple[Discs, jax.Array]:
     """Moves on to the next event, or by `left_s`; returns the discs and the time it took."""
     pairs = np.array(list(combinations(range(len(scene.names)), 2)), int).reshape(-1, 2)
-    a = _acceleration(discs, time_s, table.law, scene)
+    a = _acceleration(discs, time_s, table, scene)
     half = 0.5 * jnp.minimum(left_s, jnp.min(_stops(discs, a)))
     middle = discs.after(a, half)
-    a = _acceleration(middle, time_s + half, table.law, scene)
+    a = _acceleration(middle, time_s + half, table, scene)
     # What rests stays, whatever the half step before it rounds to.
     rests = (_length(discs.speed_m_s) == 0) & (_length(a) == 0)
     a = jnp.where(rests[:, None], 0.0, a)
@@ -174,11 +177,14 @@ def _to_next_event(
     return moved._replace(place_m=place, speed_m_s=speed), t
 
 
-def _acceleration(discs: Discs, time_s: jax.Array, law: Dynamics, scene: Surroundings) -> jax.Array:
+def _acceleration(discs: Discs, time_s: jax.Array, table: Table, scene: Surroundings) -> jax.Array:
     """Of every disc, `[object, 3]`."""
-    speed = discs.speed_m_s
-    size, along = _length(speed), _length(speed[:, :2])
+    law, speed = table.law, discs.speed_m_s
+    along = _length(speed[:, :2])
     forward = speed[:, :2] / jnp.where(along > 0, along, 1.0)[:, None]
+    lever = _lever(discs, table)
+    slip = speed.at[:, :2].add(speed[:, 2:] * lever)
+    size = _length(slip)
     drive = law.drive(state_at(discs.way_m, along, time_s, scene)) / law.inertia
     brake = law.brake(state_at(discs.way_m, size, time_s, scene)) / law.inertia
     downhill = law.gravity * jnp.stack([jnp.sin(law.ramp_rad), jnp.sin(law.table_rad)])
@@ -188,11 +194,22 @@ def _acceleration(discs: Discs, time_s: jax.Array, law: Dynamics, scene: Surroun
     strength = _length(pull)
     against = jnp.where(
         (size > 0)[:, None],
-        speed / jnp.where(size > 0, size, 1.0)[:, None],
+        slip / jnp.where(size > 0, size, 1.0)[:, None],
         pull / jnp.where(strength > 0, strength, 1.0)[:, None],
     )
+    against = against.at[:, 2].add(jnp.sum(lever * against[:, :2], axis=1))
     held = (size == 0) & (strength <= brake)
     return jnp.where(held[:, None], 0.0, pull - brake[:, None] * against)
+
+
+def _lever(discs: Discs, table: Table) -> jax.Array:
+    """How fast the centre of the pressure moves beside the middle per r turning / sqrt(2)."""
+    if isinstance(table.pressure, float):
+        return jnp.zeros((len(table.radius_m), 2))
+    turned = ROOT2 * discs.place_m[:, 2] / table.radius_m
+    cos, sin = jnp.cos(turned), jnp.sin(turned)
+    x, y = table.pressure.T
+    return ROOT2 * jnp.stack([-(sin * x + cos * y), cos * x - sin * y], axis=1)
 
 
 def _stops(discs: Discs, a: jax.Array) -> jax.Array:

@@ -10,7 +10,7 @@ from itertools import combinations, product
 
 import numpy as np
 
-from galileo_jax.clip.walls import distance_to_wall
+from galileo_jax.clip.walls import bounces
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import (
@@ -50,9 +50,8 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
                 step[k, axis, hit + 1 :] = HIT_STEP_SD_M
                 found.append(step)
     for i, ends in product(range(len(position)), scene.walls_m):
-        away = distance_to_wall(np.moveaxis(position[i, :2], 0, -1), ends)
-        away = np.where(observation.mask[i], away, np.inf)
-        for hit in nearest_frames(away, NEAR * scene.half_length_m[i]):
+        seen = observation.mask[i]
+        for hit in bounces(position[i, :2], seen, ends, scene.half_length_m[i]):
             for axis in range(2):
                 step = np.zeros_like(position)
                 step[i, axis, hit + 1 :] = HIT_STEP_SD_M
@@ -61,12 +60,6 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
     if turned is not None:
         found.extend(_off_centre(position, turned, scene))
     return np.stack(found)
-
-
-def nearest_frames(away_m: np.ndarray, within_m: float) -> list[int]:
-    """The frame of every stay within a distance in which it is least; `away_m` is `[frame]`."""
-    near = np.flatnonzero(np.diff(np.concatenate([[False], away_m < within_m, [False]])))
-    return [a + int(np.argmin(away_m[a:b])) for a, b in zip(near[::2], near[1::2], strict=True)]
 
 
 def _off_centre(

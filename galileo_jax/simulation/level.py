@@ -149,6 +149,10 @@ def solve_level(truth: LevelTruth) -> tuple[Motion, tuple[float, ...]]:
     speed[0] = [truth.values[f"{name}1"] for name in START]
     speed[:, 2] *= radii / math.sqrt(2)
     rails = Rails.of(truth.walls_m)
+    beside = np.zeros((count, 2))
+    for effect in effects:
+        if (pressure := effect.pressure(theta, scene)) is not None:
+            beside = np.stack([-pressure[:, 1], pressure[:, 0]], axis=1)
     way, hits, rows = np.zeros(count), [], []
     last = round(LONGEST_S / STEP_S)
     for index in range(last + 1):
@@ -160,7 +164,9 @@ def solve_level(truth: LevelTruth) -> tuple[Motion, tuple[float, ...]]:
             break
         left = STEP_S
         for _ in range(MOST_EVENTS):
-            ended = _rubbed(speed, way, index * STEP_S, left, law, scene)
+            turned = math.sqrt(2) * place[:, 2] / radii
+            lever = math.sqrt(2) * (_turner(turned) @ beside[..., None])[..., 0]
+            ended = _rubbed(speed, way, lever, index * STEP_S, left, law, scene)
             mean = (speed + ended) / 2
             spent, struck = _soonest(place, mean, radii, rails, left)
             place, way = place + spent * mean, way + spent * np.hypot(*mean[:, :2].T)
@@ -200,13 +206,14 @@ def _soonest(
 def _rubbed(
     speed: np.ndarray,
     way: np.ndarray,
+    lever: np.ndarray,
     time_s: float,
     spent_s: float,
     law: Dynamics,
     scene: Surroundings,
 ) -> np.ndarray:
     """Speeds after a time's forces; friction ends a motion, and does not turn it round."""
-    along, size = np.hypot(*speed[:, :2].T), np.linalg.norm(speed, axis=1)
+    along, size = np.hypot(*speed[:, :2].T), np.linalg.norm(_slip(speed, lever), axis=1)
     drive = law.drive(state_at(way, along, np.asarray(time_s), scene)) / law.inertia
     brake = law.brake(state_at(way, size, np.asarray(time_s), scene)) / law.inertia
     pushed = speed.copy()
@@ -215,9 +222,33 @@ def _rubbed(
     )
     pushed[:, 0] += spent_s * law.gravity * np.sin(law.ramp_rad)
     pushed[:, 1] += spent_s * law.gravity * np.sin(law.table_rad)
+    lost = (spent_s * brake)[:, None]
+    half_way = pushed - 0.5 * lost * _against(pushed, lever)
+    against = _against(half_way, lever)
     size = np.linalg.norm(pushed, axis=1)
-    left = np.maximum(size - spent_s * brake, 0.0)
-    return pushed * (left / np.where(size > 0, size, 1.0))[:, None]
+    stops = (lost[:, 0] * (against * pushed).sum(axis=1) >= size**2) | (lost[:, 0] >= 2 * size)
+    return np.where(stops[:, None], 0.0, pushed - lost * against)
+
+
+def _slip(speed: np.ndarray, lever: np.ndarray) -> np.ndarray:
+    """Of the centre of the pressure, `[object, 3]`."""
+    return np.concatenate([speed[:, :2] + speed[:, 2:] * lever, speed[:, 2:]], axis=1)
+
+
+def _against(speed: np.ndarray, lever: np.ndarray) -> np.ndarray:
+    """Friction's direction, reversed, on the speeds of the middle, `[object, 3]`."""
+    slip = _slip(speed, lever)
+    size = np.linalg.norm(slip, axis=1, keepdims=True)
+    slip = slip / np.where(size > 0, size, 1.0)
+    return np.concatenate(
+        [slip[:, :2], slip[:, 2:] + (lever * slip[:, :2]).sum(axis=1, keepdims=True)], axis=1
+    )
+
+
+def _turner(turned: np.ndarray) -> np.ndarray:
+    """Of every disc the matrix that turns counter-clockwise, `[object, 2, 2]`."""
+    cos, sin = np.cos(turned), np.sin(turned)
+    return np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
 
 
 def _meets_s(apart: np.ndarray, u: np.ndarray, reach: float) -> float:

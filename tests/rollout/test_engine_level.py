@@ -173,6 +173,50 @@ def test_what_passes_beside_a_wall_or_is_slow_does_not_bounce() -> None:
     assert np.abs(np.asarray(speed[0, :2, -1])).max() < 0.02
 
 
+def uneven(one: LevelTruth, *shares: float) -> LevelTruth:
+    """With the pressure's centres of both pucks beside the middle, x and y of each."""
+    names = [f"uneven_pressure_{axis}{i}" for i in (1, 2) for axis in "xy"]
+    values = {**one.values, **dict(zip(names, shares, strict=True))}
+    effects = make_effects(["uneven_pressure"])
+    return LevelTruth(one.things, values, one.start_m, effects, walls_m=one.walls_m)
+
+
+@pytest.mark.usefixtures("x64")
+def test_pressure_beside_the_middle_turns_a_puck() -> None:
+    """At first by 2 k g c / r^2, by nothing where it trails; energy goes by k m g |W|."""
+    still = alone(k1=0.3, start_turning1=0.0)
+    radius = (still.things[0].size_m or (0.0,))[0]
+    _, velocity = rolled(uneven(still, 0.0, -0.2, 0.0, 0.0), 0.5)
+    rate = np.asarray(velocity[0, 2, 1]) / DT_S
+    assert rate == pytest.approx(2 * 0.3 * G * -0.2 / radius, rel=0.05)
+    place, _ = rolled(uneven(still, -0.2, 0.0, 0.0, 0.0), 0.5)
+    assert np.asarray(place[0, 2]) == pytest.approx(np.zeros(121), abs=EXACT)
+    one = uneven(alone(k1=0.3, start_turning1=9.0), 0.15, -0.2, 0.0, 0.0)
+    place, velocity = (np.asarray(each)[0] for each in rolled(one, 0.3))
+    rim = radius / math.sqrt(2)
+    energy = 0.5 * (velocity[0] ** 2 + velocity[1] ** 2 + (rim * velocity[2]) ** 2)
+    x, y = (
+        0.15 * np.cos(place[2]) + 0.2 * np.sin(place[2]),
+        (0.15 * np.sin(place[2]) - 0.2 * np.cos(place[2])),
+    )
+    slip = velocity[:2] + radius * velocity[2] * np.stack([-y, x])
+    size = np.sqrt((slip**2).sum(axis=0) + (rim * velocity[2]) ** 2)
+    lost = 0.3 * G * DT_S * (size[1:] + size[:-1]) / 2
+    assert -np.diff(energy)[:60] == pytest.approx(lost[:60], rel=2e-3)
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("seed", [0, 2])
+def test_uneven_pressure_agrees_with_the_fine_solver(seed: int) -> None:
+    drawn = draw_level(np.random.default_rng(seed), {}, has_walls=True)
+    one = uneven(drawn, 0.2, -0.1, 0.05, 0.2)
+    motion, _ = solve_level(one)
+    position, _ = rolled(one, 1.2)
+    fine = motion.at(DT_S * np.arange(position.shape[-1]))
+    assert np.median(np.abs(np.asarray(position[:, :2]) - fine.position_m)) < 1e-5
+    assert np.abs(np.asarray(position[:, 2]) - fine.pitch_rad).max() < 5e-3
+
+
 @pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("seed", [0, 2, 4])
 def test_walls_agree_with_the_fine_solver(seed: int) -> None:

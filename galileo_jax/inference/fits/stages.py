@@ -13,10 +13,9 @@ from itertools import product
 
 import numpy as np
 
-from galileo_jax.clip.walls import distance_to_wall
+from galileo_jax.clip.walls import bounces
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
-from galileo_jax.similarity.level_discrepancy import NEAR, nearest_frames
 
 MOVED_SD, MOVED_M = 6.0, 3e-4  # an object farther than both from where it stood has moved
 STANDING_FRAMES = 5  # that say where it stood
@@ -32,12 +31,12 @@ def phases(trials: JointProblem) -> Iterator[JointProblem]:
     for index in range(1, len(trials.problems[0].observation.names)):
         if (short := before_moving(trials, index)) is not None:
             yield short
-    bounces = [_bounces(problem) for problem in trials.problems]
-    for k in range(min(MOST_BOUNCES, max(map(len, bounces)))):
+    frames = [_bounces(problem) for problem in trials.problems]
+    for k in range(min(MOST_BOUNCES, max(map(len, frames)))):
         yield JointProblem(
             tuple(
                 _until(problem, own[k]) if k < len(own) else problem
-                for problem, own in zip(trials.problems, bounces, strict=True)
+                for problem, own in zip(trials.problems, frames, strict=True)
             )
         )
 
@@ -47,9 +46,7 @@ def _bounces(problem: Problem) -> list[int]:
     seen, scene = problem.observation, problem.model.scene.surroundings
     found = set()
     for i, ends in product(range(len(seen.names)), scene.walls_m):
-        away = distance_to_wall(np.moveaxis(seen.position_m[i, :2], 0, -1), ends)
-        away = np.where(seen.mask[i], away, np.inf)
-        found |= {*nearest_frames(away, NEAR * scene.half_length_m[i])}
+        found |= {*bounces(seen.position_m[i, :2], seen.mask[i], ends, scene.half_length_m[i])}
     return sorted(frame for frame in found if frame >= LEAST_FRAMES)
 
 

@@ -331,6 +331,14 @@ class Effect:
         """Returns what hits of discs do that are seen from above, or None."""
         return None
 
+    def pressure(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns where discs that are seen from above press on the table, or None.
+
+        Beside their middles, `[..., object, 2]`, as shares of their radii along x and y when they
+        are first seen.
+        """
+        return None
+
     def walls(self, theta: Theta, scene: Surroundings) -> Walls | None:
         """Returns the walls off which discs bounce that are seen from above, or None."""
         return None
