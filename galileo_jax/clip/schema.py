@@ -36,6 +36,7 @@ from galileo_jax.clip.fields import (
     Scale,
     ScaleSd,
     Shape,
+    Spin,
     Thread,
     UpAxis,
     YAxis,
@@ -82,7 +83,7 @@ class ClipObject(BaseModel):
     corrections: Corrections = ()
     rolls: Rolls = None
     z_m: Across = 0.0
-    spin_rad_s: tuple[Number, Number, Number] | None = None
+    spin_rad_s: Spin = None
     track_name: OneLine | None = None
 
     @property

@@ -84,6 +84,8 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
             continue
         if (frame := _leapt(clip, observation, i, seen)) is not None:
             why = "what is tracked there moves as nothing can that hits nothing: something else"
+            if SCENARIOS[clip.scenario].is_level:
+                why += ", or the puck after a blow by what is not in the scene"
             # Where it is lost soon after, what led there was no longer the puck, either.
             is_left_out = SCENARIOS[clip.scenario].is_level
         elif _is_lost(track, i, last, clip.objects[i].last_frame):
