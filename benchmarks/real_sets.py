@@ -80,7 +80,11 @@ def main() -> None:
                 print(f"{name}: skipped; {', '.join(missing)} not in {asked.folder}", flush=True)
                 continue
             (out / name).mkdir(parents=True, exist_ok=True)
-            print(f"{name}: {row(asked.folder, out / name, flights)}", flush=True)
+            try:
+                told = row(asked.folder, out / name, flights)
+            except InputError as error:  # the other rows are made all the same
+                told = f"refused; {error}"
+            print(f"{name}: {told}", flush=True)
 
 
 def falling_balls(folder: Path, out: Path, _: slice) -> str:

@@ -62,14 +62,15 @@ class Table(NamedTuple):
       rims: what a hit does.
       radius_m: `[object]`, true.
       walls: true; None where there are none.
-      pressure: `[object, 2]`, where discs press on the table, see `Effect.pressure`.
+      pressure: `[object, 2]`, where discs press on the table, see `Effect.pressure`; None: in the
+        middle.
     """
 
     law: Dynamics
     rims: Rims
     radius_m: jax.Array
     walls: Walls | None
-    pressure: jax.Array | float
+    pressure: Any | None
 
 
 def roll_out(
@@ -94,10 +95,11 @@ def roll_out(
     assert velocity is not None  # the pucks' law gives one
     seen = jnp.asarray(scene.start_m)
     shown = _magnified(effects, named, scene)
-    walls = next((found for e in effects if (found := e.walls(named, scene)) is not None), None)
+    walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
     if walls is not None:
         walls = walls._replace(ends_m=seen[0, :2] + (walls.ends_m - seen[0, :2]) / shown)
-    beside = sum((p for e in effects if (p := e.pressure(named, scene)) is not None), start=0.0)
+    pressures = [p for e in effects if (p := e.pressure(named, scene)) is not None]
+    beside = sum(pressures[1:], pressures[0]) if pressures else None
     table = Table(law, rims, jnp.asarray(scene.half_length_m), walls, beside)
     # Starts and turning as the camera's scale will show them.
     start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
@@ -204,7 +206,7 @@ def _acceleration(discs: Discs, time_s: jax.Array, table: Table, scene: Surround
 
 def _lever(discs: Discs, table: Table) -> jax.Array:
     """How fast the centre of the pressure moves beside the middle per r turning / sqrt(2)."""
-    if isinstance(table.pressure, float):
+    if table.pressure is None:
         return jnp.zeros((len(table.radius_m), 2))
     turned = ROOT2 * discs.place_m[:, 2] / table.radius_m
     cos, sin = jnp.cos(turned), jnp.sin(turned)
