@@ -61,7 +61,7 @@ def standstill_frame(observation: Observation) -> int | None:
     if (away & ended).any() or not away.any():
         return None
     last = int(np.flatnonzero(away)[-1])
-    before = max(last - ENOUGH, 0)
+    before = min(max(last - ENOUGH, 0), int(np.searchsorted(times, times[last] - SOON_S / 2)))
     if last == before:
         return None
     way = float(np.linalg.norm(place[:, last] - place[:, before]))
