@@ -125,6 +125,79 @@ def test_what_grips_or_slips_is_told_as_two_solutions(tmp_path: Path) -> None:
     assert any("2 solutions" in line and "restitution" in line for line in result["warnings"])
 
 
+def walled(folder: Path, walls: Any, **keys) -> Path:
+    """A track with walls as given, and other keys of the clip."""
+    path, _ = made(folder, 54)
+    at = path.with_suffix(".yaml")
+    content = yaml.safe_load(at.read_text()) | {"walls": walls} | keys
+    at.write_text(yaml.safe_dump(content))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("walls", "said"),
+    [
+        ("right", "walls: 'right' is no list of walls, such as"),
+        ([{"from_m": [0.0, 1.0]}], "walls[0]: to_m is missing; both ends"),
+        ([{"from_m": [0.0, 1.0], "to_px": [9.0, 9.0]}], "either as from_m and to_m or as from_px"),
+        ([{"from_m": [0, 900], "to_m": [1200, 900]}], "are these millimetres or pixels?"),
+        ([{"from_m": [0.0, 1.0], "to_m": [0.0, 1.0]}], "no line; two ends that lie apart"),
+        ([{"from_m": [0.0, "x"], "to_m": [0.0, 1.0]}], "walls[0].from_m[1]: 'x' is not a number"),
+        ([{"from": [0.0, 1.0], "to_m": [0.0, 1.0]}], "walls[0].from: unknown key"),
+        ([[0.0, 1.0]], "walls[0]: [0.0, 1.0] is not a mapping; from_m, to_m expected"),
+        ([{"from_px": [0.0, 1.0], "to_px": [90.0, 1.0]}], "the clip is a track in metres"),
+        ([{"from_m": [-1.0, 0.0], "to_m": [1.0, 0.0]}], "object1 reaches into it by"),
+        ([{"from_m": [k, 2.0], "to_m": [k, 3.0]} for k in range(13)], "13 walls; 12 at most"),
+    ],
+)
+def test_wrong_walls_are_one_line(tmp_path: Path, walls: Any, said: str) -> None:
+    with pytest.raises(InputError) as caught:
+        gx.load(walled(tmp_path, walls))
+    assert said in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_walls_are_of_this_scenario_only(tmp_path: Path) -> None:
+    path = tmp_path / "ball.csv"
+    gx.simulate(path, scenario="flight", seed=1, track_only=True)
+    at = path.with_suffix(".yaml")
+    wall = [{"from_m": [0.0, 1.0], "to_m": [1.0, 1.0]}]
+    at.write_text(yaml.safe_dump(yaml.safe_load(at.read_text()) | {"walls": wall}))
+    with pytest.raises(InputError, match="walls: means nothing in scenario flight, only in from_a"):
+        gx.load(path)
+    with pytest.raises(InputError, match="--walls: of scenario from_above only"):
+        gx.simulate(tmp_path / "no.csv", scenario="flight", walls=True, track_only=True)
+
+
+def test_bounces_off_walls_are_found(tmp_path: Path) -> None:
+    """Also where the first search ends in a wrong valley: it goes on from bounce to bounce."""
+    path, true = made(tmp_path, 304, walls=True)
+    result = gx.fit(path).result
+    assert result["converged"] and result["error"]["chi2_per_dof"] < 1.3
+    told = result["parameters"]
+    for name in ("k1", "k2", "restitution", "wall_restitution"):
+        assert abs(told[name]["mean"] - true[name]) < 3.5 * told[name]["sd"], name
+    assert told["wall_restitution"]["sd"] < 0.01
+
+
+def test_walls_are_marked_in_a_film(tmp_path: Path) -> None:
+    """In pixels and in metres they are the same walls, and a bounce is no track gone astray."""
+    path = tmp_path / "walls.mp4"
+    gx.simulate(path, scenario="from_above", seed=304, fps=120.0, size=(960, 540), walls=True)
+    one = measure(gx.load(path))
+    assert not one.astray
+    at = path.with_suffix(".yaml")
+    content = yaml.safe_load(at.read_text())
+    scale, (x0, y0) = content["pixels_per_metre"], content["origin_px"]
+    for wall in content["walls"]:
+        for end in ("from", "to"):
+            x, y = wall.pop(f"{end}_m")
+            wall[f"{end}_px"] = [x0 + scale * x, y0 - scale * y]
+    at.write_text(yaml.safe_dump(content))
+    other = measure(gx.load(path))
+    ends = [np.array([wall.ends_m for wall in each.clip.walls]) for each in (one, other)]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+
+
 @pytest.mark.slow
 def test_intervals_hold_the_truth(tmp_path: Path) -> None:
     z = []

@@ -66,6 +66,7 @@ def simulate(
     solver: Solver = "rigid",
     values: Mapping[str, float] | None = None,
     floor: bool = False,
+    walls: bool = False,
     release: float | None = None,
     like: str | Path | None = None,
     series: int | None = None,
@@ -113,6 +114,7 @@ def simulate(
       values: further parameters of the scenario, such as {"k3": 0.2} or
         {"floor_restitution": 0.7}, SI units (the command's --set).
       floor: of a fall or a flight: the object bounces.
+      walls: of pucks seen from above: four walls stand round them, off which they bounce.
       release: of a ramp: how far up it object 1 is released, from the foot to the point under its
         centre, m. None: drawn.
       like: NAME.truth.json of a clip on a ramp: the same objects in the same places, and what was
@@ -171,6 +173,7 @@ def simulate(
         solver=solver,
         values=values or {},
         floor=floor,
+        walls=walls,
         release=release,
         like=like,
         series=series,

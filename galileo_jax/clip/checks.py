@@ -11,7 +11,11 @@ from galileo_jax.clip import placement
 from galileo_jax.clip.fields import MAX_SCALE_SD_SHARE, SIZE_MEANING, short
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile, ClipObject
+from galileo_jax.clip.walls import distance_to_wall
 from galileo_jax.observation.observation import Observation
+
+INTO_WALL = 0.25
+"""Of a radius: as deep a puck may seem to reach into a wall, by errors of marking and of size."""
 
 
 def check_objects(file: ClipFile, fail: Any) -> None:
@@ -100,6 +104,7 @@ def check_against_source(clip: Clip, observation: Observation | None, fail: Any)
     if clip.origin_px is not None and clip.frame_size_px is not None:
         # The foot may lie outside the picture, but not by more than its own size.
         _check_in_frame("origin_px", clip.origin_px, clip.frame_size_px, 1, fail)
+    check_walls(clip, observation, fail)
     centres_m = (
         _first_positions(observation) if observation else placement.centres_from_pixels(clip)
     )
@@ -112,9 +117,41 @@ def check_camera(file: ClipFile, fail: Any) -> None:
     """Refuses two scales, and a camera's geometry where there is no picture."""
     if file.rectangle is not None and file.pixels_per_metre is not None:
         fail("rectangle", "given together with pixels_per_metre; leave one of them out")
-    for key in ("rectangle", "lens"):
-        if getattr(file, key) is not None and file.video is None:
+    for key in ("rectangle", "lens", "turning"):
+        if getattr(file, key) not in (None, False) and file.video is None:
             fail(key, "means nothing beside a track, only beside a video; leave it out")
+
+
+def check_walls(clip: Clip, observation: Observation | None, fail: Any) -> None:
+    """Refuses walls in units that the clip does not have, outside its frame, or inside a puck."""
+    if clip.walls and len(clip.objects) == 1 and clip.objects[0].size_m is None:
+        fail("objects[0].size_m", "null, but a puck bounces off a wall one radius before it")
+    for index, wall in enumerate(clip.walls):
+        key = f"walls[{index}]"
+        if wall.is_in_pixels and clip.frame_size_px is None:
+            fail(key, "in pixels, but the clip is a track in metres; from_m and to_m expected")
+        if not wall.is_in_pixels and not clip.is_scale_known:
+            fail(
+                key,
+                "in metres, but pixels_per_metre is null; from_px and to_px expected, or the scale",
+            )
+        if wall.is_in_pixels:
+            assert clip.frame_size_px is not None
+            for end in ("from_px", "to_px"):
+                # A wall may go on beside the picture, but not by more than the picture's own size.
+                _check_in_frame(f"{key}.{end}", getattr(wall, end), clip.frame_size_px, 1, fail)
+            continue
+        places = _first_positions(observation) if observation else {}
+        for item in clip.objects:
+            if item.size_m is None or item.name not in places:
+                continue
+            apart = float(distance_to_wall(places[item.name][:2], wall.ends_m))
+            if apart < (1 - INTO_WALL) * item.size_m[0]:
+                fail(
+                    key,
+                    f"{item.name} reaches into it by {1000 * (item.size_m[0] - apart):.0f} mm at "
+                    "the start; the line that rims touch, in metres from the origin, expected",
+                )
 
 
 def check_frames(key: str, item: ClipObject, clip: Clip, fail: Any) -> None:

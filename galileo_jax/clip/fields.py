@@ -28,6 +28,7 @@ MIN_SCALE_PX_PER_M, MAX_SCALE_PX_PER_M = 5.0, 100_000.0
 MIN_MASS_KG, MAX_MASS_KG = 1e-5, 100.0
 MIN_GRAVITY, MAX_GRAVITY = 0.1, 30.0
 MIN_DENSITY, MAX_DENSITY = 100.0, 20_000.0  # kg/m^3, of a liquid
+MAX_SPIN_RAD_S = 5000.0  # of a table-tennis ball 1000
 MIN_FPS, MAX_FPS = 1.0, 1_000_000.0
 MAX_FLOOR_M = 1e6
 MAX_ANGLE_SD_DEG = 10.0
@@ -196,6 +197,27 @@ def _point_px(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
+def _spin(value: Any) -> Any:
+    """Three numbers, rad/s."""
+    if value is None:
+        return None
+    is_list = isinstance(value, list | tuple)
+    if not is_list or len(value) != 3 or not all(map(_is_real, value)):
+        has = f"has {len(value)} values" if is_list and len(value) != 3 else "is no list of numbers"
+        raise wrong(f"{short(value)} {has}; [x, y, z] in rad/s expected")
+    if max(map(abs, value)) > MAX_SPIN_RAD_S:
+        raise wrong(
+            f"{short(list(value))} is faster than anything thrown; rad/s expected; are these "
+            "turns per minute or degrees per second?"
+        )
+    return tuple(map(float, value))
+
+
+def _is_real(value: Any) -> bool:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_number and math.isfinite(value)
+
+
 def _name(value: str) -> str:
     if not value.isidentifier():
         raise wrong(f"{short(value)} is no name; letters, digits and _ expected, such as object1")
@@ -267,6 +289,7 @@ OriginSd = Annotated[Number, AfterValidator(_origin_sd_px)]
 LiquidDensity = Annotated[Number, AfterValidator(_liquid_density)]
 MarkedPoint = Annotated[Point, AfterValidator(_point_px)]
 Corrections = Annotated[tuple[Correction, ...], BeforeValidator(_corrections)]
+Spin = Annotated[tuple[float, float, float] | None, BeforeValidator(_spin)]
 Rolls = Annotated[bool | float | None, BeforeValidator(_rolls)]
 Floor = Annotated[bool | float | None, BeforeValidator(_floor)]
 ObjectName = Annotated[str, Field(strict=True), AfterValidator(_name)]

@@ -36,12 +36,14 @@ from galileo_jax.clip.fields import (
     Scale,
     ScaleSd,
     Shape,
+    Spin,
     Thread,
     UpAxis,
     YAxis,
     one_of,
 )
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.walls import Walls
 
 
 class ClipObject(BaseModel):
@@ -81,7 +83,7 @@ class ClipObject(BaseModel):
     corrections: Corrections = ()
     rolls: Rolls = None
     z_m: Across = 0.0
-    spin_rad_s: tuple[Number, Number, Number] | None = None
+    spin_rad_s: Spin = None
     track_name: OneLine | None = None
 
     @property
@@ -132,6 +134,8 @@ class ClipFile(BaseModel):
     liquid_density: LiquidDensity | None = None
     thread_m: Thread | None = None
     pivot_m: Point | None = None
+    walls: Walls = ()
+    turning: Annotated[bool, Field(strict=True)] = False
     objects: tuple[ClipObject, ...]
 
 
@@ -172,6 +176,8 @@ class Clip(ClipFile):
       liquid_density: liquid: kg/m^3; None = not known.
       thread_m: pendulum: from the pivot to the bob's centre, m; None = not known.
       pivot_m: pendulum: (x, y) of the pivot from the origin, m; None = not known.
+      walls: from_above: straight walls off which pucks bounce.
+      turning: from_above: the turning that a video shows is part of the data.
       objects: at least one, names unique.
       is_scale_assumed: lengths are in units of something in the picture, which a
         `pixels_per_metre` that means nothing else gives a size.

@@ -7,6 +7,7 @@ from pydantic_core import ErrorDetails
 
 from galileo_jax.clip.fields import short
 from galileo_jax.clip.schema import ClipFile, ClipObject
+from galileo_jax.clip.walls import Wall
 from galileo_jax.runtime.known_names import did_you_mean
 
 EXAMPLES: dict[str, str] = {
@@ -20,6 +21,8 @@ EXAMPLES: dict[str, str] = {
     "k1": "k1: -0.05",
 }
 """What to write for the keys that have no default."""
+MODELS: dict[int | str, type[BaseModel]] = {"objects": ClipObject, "walls": Wall}
+"""Of lists in the yaml, what each entry is."""
 
 
 def first_problem(error: ValidationError) -> tuple[str, str]:
@@ -43,7 +46,7 @@ def _key(loc: tuple[int | str, ...]) -> str:
 def _problem(error: ErrorDetails) -> str:
     loc, value = error["loc"], error["input"]
     found = short(value)
-    model = ClipObject if loc and loc[0] == "objects" else ClipFile
+    model = MODELS.get(loc[0] if loc else "", ClipFile)
     match error["type"]:
         case "clip":
             return error["msg"]
@@ -58,7 +61,8 @@ def _problem(error: ErrorDetails) -> str:
         case "tuple_type":
             return f"{found} is not a list; {_expected_list(loc)} expected"
         case "model_type" | "dict_type" | "model_attributes_type":
-            return f"{found} is not a mapping; name, shape, size_m, point_px expected"
+            keys = "from_m, to_m" if model is Wall else "name, shape, size_m, point_px"
+            return f"{found} is not a mapping; {keys} expected"
         case "string_type":
             return f"{found} is not text"
         case "int_type" | "int_from_float":

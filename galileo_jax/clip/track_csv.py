@@ -36,6 +36,7 @@ MIN_ROWS = 4
 """Three differences: the fewest that show whether a speed changes."""
 
 MAX_POSITION_M = 100.0
+MAX_SPEED_M_S = 100.0  # nothing that is dropped or thrown is as fast; in millimetres 0.1 m/s is
 MAX_SD_M = 1.0
 MAX_SD_RAD = 1.0
 MAX_STEP_S = 1.0
@@ -83,6 +84,7 @@ def read_observation_csv(path: Path) -> Observation:
         column = {field: table[title] for field, title in columns[name].items()}
         places = [column[field] for field in ("x_m", "y_m", third)[:axes]]
         position[index] = _positions(path, name, places, lines)
+        _check_speed(path, name, times, position[index, : 2 if is_turning else axes])
         if is_turning:
             covariance[index] = _with_turning(path, name, column, times, position[index], lines)
             continue
@@ -271,6 +273,22 @@ def _positions(
             "are these pixels or millimetres?"
         )
     return position
+
+
+def _check_speed(path: Path, name: str, times: np.ndarray, position: np.ndarray) -> None:
+    """Refuses a track that is much too fast over several tenths of it: lengths in other units."""
+    seen = np.flatnonzero(np.isfinite(position[0]))
+    step = max(len(seen) // 10, 2)
+    if len(seen) <= step:
+        return
+    way = np.linalg.norm(position[:, seen[step:]] - position[:, seen[:-step]], axis=0)
+    speed = way / (times[seen[step:]] - times[seen[:-step]])
+    usual = float(np.quantile(speed, 0.8))
+    if usual > MAX_SPEED_M_S:
+        raise InputError(
+            f"{path}: {name}: moves at {usual:.3g} m/s; metres and seconds expected; are these "
+            "places in millimetres (divide them by 1000) or pixels?"
+        )
 
 
 def _with_turning(

@@ -54,7 +54,7 @@ def _parser() -> command.Parser:
         help="a parameter of the scenario, such as k3=0.2 or floor_restitution=0.7 (default: "
         "drawn; may be given several times)",
     )
-    add("floor", "track_only", "track_noise")
+    add("floor", "walls", "track_only", "track_noise")
     add = adder(parser.add_argument_group("on a ramp"), "simulate")
     add("shapes", type=_shapes, metavar="SHAPE,...", action=None, default=None)
     add("angle", "release", "m1", "k1", "m2", "k2")

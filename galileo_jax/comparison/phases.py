@@ -4,10 +4,11 @@ In which phase a model fails is a strong hint at what it lacks.
 """
 
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 
 import numpy as np
 
+from galileo_jax.clip.walls import distance_to_wall
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.effect import Surroundings
 
@@ -65,8 +66,10 @@ def phases(problem: Problem, theta: np.ndarray) -> np.ndarray:
     position, velocity = (a[0] for a in problem.engine.simulate(theta[None]))
     recorded = np.arange(position.shape[-1]) * model.record_dt_s
     label = np.empty((len(scene.names), len(times)), int)
-    find_hits = _level_hit_s if scene.is_level else _hit_s
-    hit_s = find_hits(position, recorded, scene.half_length_m)
+    if scene.is_level:
+        hit_s = _level_hit_s(position, recorded, scene)
+    else:
+        hit_s = _hit_s(position, recorded, scene.half_length_m)
     for i in range(len(scene.names)):
         x = np.interp(times, recorded, position[i, 0])
         speed = np.interp(times, recorded, np.linalg.norm(velocity[i], axis=0))
@@ -110,10 +113,11 @@ def _hit_s(
 
 
 def _level_hit_s(
-    position: np.ndarray, times_s: np.ndarray, radius_m: tuple[float, ...]
+    position: np.ndarray, times_s: np.ndarray, scene: Surroundings
 ) -> list[float | None]:
-    """As `_hit_s`, of discs seen from above: any two may touch."""
+    """As `_hit_s`, of discs seen from above: any two may touch, or one a wall."""
     found: list[float | None] = [None] * len(position)
+    radius_m = scene.half_length_m
     for i, j in combinations(range(len(position)), 2):
         apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
         # Between two records they come nearer than in either.
@@ -123,4 +127,11 @@ def _level_hit_s(
             hit_s = float(times_s[touching[0]])
             for k in (i, j):
                 found[k] = min(hit_s, found[k] or hit_s)
+    for i, ends in product(range(len(position)), scene.walls_m):
+        away = distance_to_wall(np.moveaxis(position[i, :2], 0, -1), ends)
+        step = np.abs(np.diff(away, append=away[-1:]))
+        touching = np.flatnonzero(away - radius_m[i] < 1e-4 + step)
+        if touching.size:
+            hit_s = float(times_s[touching[0]])
+            found[i] = min(hit_s, found[i] or hit_s)
     return found

@@ -19,6 +19,7 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
+from galileo_jax.clip.walls import distance_to_wall
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 
@@ -83,6 +84,8 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
             continue
         if (frame := _leapt(clip, observation, i, seen)) is not None:
             why = "what is tracked there moves as nothing can that hits nothing: something else"
+            if SCENARIOS[clip.scenario].is_level:
+                why += ", or the puck after a blow by what is not in the scene"
             # Where it is lost soon after, what led there was no longer the puck, either.
             is_left_out = SCENARIOS[clip.scenario].is_level
         elif _is_lost(track, i, last, clip.objects[i].last_frame):
@@ -180,12 +183,15 @@ def _meets(
     place: np.ndarray,
     way: np.ndarray,
 ) -> bool:
-    """Whether puck `i`, at a place in the first of these frames, may meet another one on its way.
+    """Whether puck `i`, at a place in the first of these frames, may meet another, or a wall.
 
     One that is not seen there may be anywhere.
     """
     size = _size_m(clip.objects[i])
     on_way = place[:, None] + way[:, None] * np.linspace(0.0, 1.0, STEPS_ON_WAY)
+    for wall in clip.walls:
+        if distance_to_wall(on_way.T, wall.ends_m).min() < NEAR * size / 2:
+            return True
     for j, other in enumerate(clip.objects):
         if j == i:
             continue

@@ -7,8 +7,10 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
                              off; to a stop, a blow, or the rest after which it is carried away
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
     toss                     to the first impact
+    pendulum, spring, liquid from where it is let go, to a blow or a stop
     ramp                     to where a box tips over, or two that touch turn aside
-    from_above               to a quarter of a second after everything has come to rest
+    from_above               to a blow where neither another puck nor a declared wall is, or to a
+                             quarter of a second after everything has come to rest
 """
 
 from collections.abc import Callable, Sequence
@@ -24,9 +26,11 @@ from galileo_jax.measurement.find_blow import blow_frame, goes_on
 from galileo_jax.measurement.find_bounce import bounce_frame
 from galileo_jax.measurement.find_fold import fold_frame
 from galileo_jax.measurement.find_hand import hand_frame
+from galileo_jax.measurement.find_held import let_go_frame, standstill_frame
 from galileo_jax.measurement.find_placed import placed_frames
 from galileo_jax.measurement.find_rest import rest_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
+from galileo_jax.measurement.find_stranger import stranger_frame
 from galileo_jax.measurement.find_tip import tip
 from galileo_jax.measurement.toss_flight import last_free_frame
 from galileo_jax.observation.observation import Observation
@@ -39,7 +43,10 @@ PLACED = "is put into its place by a hand until then"
 TAKEN = "is taken away by a hand from then on"
 TIPS_OVER = "tips over, and goes on on another face"
 FOLDS = "turns aside and slides past what it pushes: their centres come closer than when they hit"
+IS_HELD = "is held until then"
 HELD = "is moved by a hand until then: it accelerates otherwise than on its way"
+
+SWINGS = ("pendulum", "spring", "liquid")
 
 
 @dataclass(frozen=True)
@@ -72,11 +79,16 @@ def is_board(clip: Clip) -> bool:
 def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:
     """The observation with what is not of the scene masked, and where and why, in time's order."""
     if SCENARIOS[clip.scenario].is_level:
-        return _to_rest(clip, observation)
+        return _of_pucks(clip, observation)
     if SCENARIOS[clip.scenario].has_table:
         return _of_a_ramp(clip, observation)
     is_let_go = is_board(clip) and not clip.starts_moving
     observation, cuts = _left_to_itself(observation) if is_let_go else (observation, [])
+    swings = clip.scenario in SWINGS
+    if swings and (first := let_go_frame(observation)) is not None:
+        observation = _without(observation, slice(None, first))
+        time_s = float(observation.times_s[first])
+        cuts.append(Cut(observation.names[0], time_s, "before", IS_HELD))
     ends = [
         (frame, why)
         for frame, why in (
@@ -138,6 +150,8 @@ def _ends(clip: Clip, is_in_space: bool) -> list[tuple[Callable[[Observation], i
         return [(lambda _: last_free_frame(poses, clip.objects[0].size_m), LANDED)]
     if clip.scenario == "flight" and not clip.has_floor:
         return [(bounce_frame if is_in_space else blow_frame, STRUCK)]
+    if clip.scenario in SWINGS:
+        return [(standstill_frame, STOPPED), (blow_frame, STRUCK)]
     return []
 
 
@@ -152,6 +166,19 @@ def _left_to_itself(observation: Observation) -> tuple[Observation, list[Cut]]:
         observation = _without(observation, slice(last + 1, None))
         found.append(Cut(name, float(times[last]), "after", TAKEN))
     return observation, found
+
+
+def _of_pucks(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:
+    """To the first blow by a stranger, or to when all that is seen has come to rest.
+
+    Of a film, tracks that leap are looked at by themselves: they may be of something else.
+    """
+    struck = stranger_frame(clip, observation) if clip.video is None else None
+    if struck is None:
+        return _to_rest(clip, observation)
+    last, which = struck
+    found = Cut(observation.names[which], float(observation.times_s[last]), "after", STRUCK)
+    return _without(observation, slice(last + 1, None), slice(None)), (found,)
 
 
 def _to_rest(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, ...]]:

@@ -33,15 +33,22 @@ AS_WELL = 9.0  # in -2 log likelihood: three standard deviations
 FLOOR = 0.01  # of the track's variance: a few points may leave nothing in some direction
 
 
-def blow_frame(observation: Observation) -> int | None:
-    """The last frame before object 1 is struck; None where nothing strikes it."""
-    seen = np.flatnonzero(observation.mask[0])
+def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False) -> int | None:
+    """The last frame before an object is struck; None where nothing strikes it.
+
+    Args:
+      observation: its x and y count, and z in space.
+      index: of the object.
+      from_rest: whether what is at rest may be struck; else it is let go.
+    """
+    seen = np.flatnonzero(observation.mask[index])
+    axes = 2 if observation.is_turning else observation.position_m.shape[1]
     if len(seen) < 2 * STEPS + SMEARED + 2:
         return None
-    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
+    times_s, place_m = observation.times_s[seen], observation.position_m[index][:axes, seen]
     step_s = np.diff(times_s)
     velocity = np.diff(place_m) / step_s
-    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
+    variance = np.einsum("iit->t", observation.covariance_m2[index][:axes, :axes, seen]) / 2
     sd = np.sqrt(variance[1:] + variance[:-1]) / step_s
     middle_s = times_s[:-1] + step_s / 2
     windows = np.lib.stride_tricks.sliding_window_view(velocity, STEPS, axis=1)
@@ -60,7 +67,8 @@ def blow_frame(observation: Observation) -> int | None:
     beyond = size - steady
     is_blow = (beyond > HIT_M_S2 * jump_s) & (size > USUAL * steady) & (beyond > clear)
     is_blow &= size > SHARE * np.maximum(speed[:-apart], speed[apart:])
-    is_blow &= speed[:-apart] > clear  # what is at rest is let go, not struck
+    if not from_rest:
+        is_blow &= speed[:-apart] > clear  # what is at rest is let go, not struck
     if not is_blow.any():
         return None
     first = int(np.argmax(is_blow))

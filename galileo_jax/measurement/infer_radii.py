@@ -13,10 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.walls import Wall
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.tracking.to_metres import origin_of
+from galileo_jax.tracking.track import Track
 
 UNKNOWN_RADIUS_M = 0.02
 HEIGHT_M = 0.01  # of a puck of which only the radius matters
@@ -44,6 +48,20 @@ def from_first_common_frame(clip: Clip, observation: Observation) -> Observation
     mask = observation.mask.copy()
     mask[:, : common[0]] = False
     return replace(observation, mask=mask)
+
+
+def with_walls_in_metres(clip: Clip, pixels: Track | None) -> Clip:
+    """The clip with walls that were marked in the picture in metres, where its scale is known."""
+    if pixels is None or not any(wall.is_in_pixels for wall in clip.walls):
+        return clip
+    plane = picture_plane(clip, origin_of(clip, pixels))
+    walls = []
+    for wall in clip.walls:
+        if wall.is_in_pixels:
+            (x, y), (u, v) = plane.to_metres(np.array([wall.from_px, wall.to_px])).tolist()
+            wall = Wall(from_m=(x, y), to_m=(u, v))
+        walls.append(wall)
+    return clip.model_copy(update={"walls": tuple(walls)})
 
 
 def told_by_hit(clip: Clip, observation: Observation) -> Found:

@@ -17,11 +17,17 @@ from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.errors_in_time import with_errors_in_time
 from galileo_jax.measurement.errors_of_clock import with_errors_of_clock
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
-from galileo_jax.measurement.infer_radii import from_first_common_frame, is_level, told_by_hit
+from galileo_jax.measurement.infer_radii import (
+    from_first_common_frame,
+    is_level,
+    told_by_hit,
+    with_walls_in_metres,
+)
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.track_cache import track_once
+from galileo_jax.measurement.turning import with_turning
 from galileo_jax.measurement.wander_size import with_wander
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
@@ -105,7 +111,8 @@ def measure(clip: Clip) -> Measurement:
     if is_level(measured.clip) or clip.scenario == "toss":
         # The places of a ball in space are as uncertain along its way as its times, which a wander
         # that is told by the track would take for it.
-        observation = with_wander(observation)
+        pucks = measured.clip
+        observation = with_wander(observation, pucks.objects, pucks.walls)
     if pixels is None and observation.position_m.shape[1] == 2:
         # In space and from above the likelihood lets every track wander.
         observation, said = with_errors_in_time(observation)
@@ -139,7 +146,8 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         return _to_last(clip, read_track(clip.path, clip.track, clip, clip.fps).observation), None
     pixels = track_once(clip)
     observation = with_noise_at_rest(observe(clip, pixels))
-    return with_camera_modes(clip, observation, pixels), pixels
+    observation = with_camera_modes(clip, observation, pixels)
+    return with_turning(observation) if clip.turning else observation, pixels
 
 
 def _to_last(clip: Clip, observation: Observation) -> Observation:
@@ -215,6 +223,7 @@ def _with_pucks(measured: Measurement, remarks: list[str]) -> Measurement:
     """The measurement from where all pucks are seen on, with the scale or radii from a hit."""
     observation = from_first_common_frame(measured.clip, measured.observation)
     clip, observation, found, said = told_by_hit(measured.clip, observation)
+    clip = with_walls_in_metres(clip, measured.pixels)
     remarks.extend(f"{clip.path}: {line}" for line in said)
     return replace(measured, clip=clip, observation=observation, whole=observation, inferred=found)
 

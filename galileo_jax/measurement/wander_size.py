@@ -15,6 +15,7 @@ Limits: between 1/300 of the largest wander, from which on nothing in an interva
 largest. Where a track is too short to tell, it is taken to be the largest.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 
@@ -22,6 +23,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
 
+from galileo_jax.clip.schema import ClipObject
+from galileo_jax.clip.walls import Wall, bounces
 from galileo_jax.measurement.errors_in_time import smooth_path
 from galileo_jax.observation.observation import Observation
 
@@ -40,18 +43,32 @@ PIECE, LEAST_FRAMES = 40, 8
 BESIDE_HIT = 1
 
 
-def with_wander(observation: Observation) -> Observation:
+def with_wander(
+    observation: Observation, objects: Sequence[ClipObject] = (), walls: Sequence[Wall] = ()
+) -> Observation:
     """The observation with the size of its wander, `wander_m`.
 
     Args:
       observation: of pucks in a plane, or of one body in space; its errors as stated.
+      objects: pucks that may bounce off walls.
+      walls: in metres.
     """
     num_axes = len([axis for axis in observation.axes if axis != "turning"])
     largest_m, lasts_s = (LARGEST_M, LASTS_S) if num_axes == 2 else (IN_SPACE_M, IN_SPACE_S)
     sizes_m = largest_m * SIZES
     evidence = np.zeros(len(SIZES))
     for i, axis in product(range(len(observation.names)), range(num_axes)):
-        for piece in _pieces(observation, i):
+        bounced = [
+            frame
+            for wall in walls
+            for frame in bounces(
+                observation.position_m[i, :2],
+                observation.mask[i],
+                wall.ends_m,
+                (objects[i].size_m or (0.0,))[0],
+            )
+        ]
+        for piece in _pieces(observation, i, bounced):
             if len(piece) >= LEAST_FRAMES:
                 variance = observation.covariance_m2[i, axis, axis, piece]
                 place = observation.position_m[i, axis, piece]
@@ -63,11 +80,11 @@ def with_wander(observation: Observation) -> Observation:
     return replace(observation, wander_m=float(np.sqrt(weight @ sizes_m**2)))
 
 
-def _pieces(observation: Observation, i: int) -> list[np.ndarray]:
+def _pieces(observation: Observation, i: int, bounced: Sequence[int]) -> list[np.ndarray]:
     """Frames of puck `i` between hits, in pieces; a hit's own, and those beside it, are in none."""
     frames = np.flatnonzero(observation.mask[i])
     place = observation.position_m[:, :2]
-    ends = []
+    ends = [*bounced]
     for j in range(len(place)):
         both = observation.mask[i] & observation.mask[j]
         if j != i and both.any():

@@ -115,6 +115,8 @@ def _legend(problem: Problem, models: list[str], video: VideoFrames | None) -> s
         scene = problem.model.scene.surroundings
         if scene.has_surface and not scene.is_level:
             entries.append(("line", "soft", "ramp and table as declared"))
+        if scene.walls_m:
+            entries.append(("line", "soft", "walls as declared"))
     else:
         entries.append(("line", "ink", "measured (outline; its path dotted)"))
     return legend(entries)

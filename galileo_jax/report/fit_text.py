@@ -24,6 +24,8 @@ MEANINGS = {
     "floor_restitution": "share of the speed left after a bounce",
     "floor_height": "height of the centre at a bounce",
     "floor_grip": "share of the speed along the floor that a bounce takes",
+    "wall_restitution": "share of the speed against a wall left after a bounce",
+    "wall_grip": "most of the impulse along a wall, over that against it",
     "period": "period of the swing without damping",
     "damping": "rate at which the swing dies away",
     "rest": "place of rest, below the first",
@@ -44,6 +46,8 @@ OF_OBJECTS = (  # what parameters' names with numbers in them mean
     (re.compile(r"m(\d+)"), "mass of object {}"),
     (re.compile(r"k(\d+)"), "friction of object {}"),
     (re.compile(r"mass_ratio_(\d+)_(\d+)"), "m{} / m{}"),
+    (re.compile(r"wall_offset_from(\d+)"), "first end of wall {}, to the left of where it is said"),
+    (re.compile(r"wall_offset_to(\d+)"), "second end of wall {}, to the left of where it is said"),
     (re.compile(r"start_offset_object(\d+)"), "start of object {}, from where it was marked"),
 )
 OUTSIDE = (  # what nuisances mean that are far from what is usual

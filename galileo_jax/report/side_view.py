@@ -17,6 +17,7 @@ from galileo_jax.rollout.motion import pitch
 LARGEST_PX = 960
 MARGIN_M = 0.08
 SLAB_M = 0.012  # how thick ramp and table are drawn
+RAIL_M = 0.001  # half a wall's width, seen from above
 CIRCLE_CORNERS = 72
 SUBPIXEL_BITS = 4
 
@@ -69,14 +70,14 @@ def view_of(clip: Clip, scene: Scene, positions_m: np.ndarray) -> View:
 def surfaces(scene: Scene, view: View) -> list[np.ndarray]:
     """Ramp and table as slabs, corners `[4, 2]`, m; none where nothing carries the objects.
 
-    Nor where the table is seen from above.
+    Of a table seen from above its walls.
 
     The first two corners are the ends of the surface; slabs reach to the edges of the view.
     """
     surroundings = scene.surroundings
     angle = surroundings.angle_rad
     if not surroundings.has_surface or surroundings.is_level:
-        return []
+        return [_rail(np.array(ends)) for ends in surroundings.walls_m]
     if scene.has_table:
         start_x = surroundings.start_m[0][0]
         length = min(
@@ -95,6 +96,13 @@ def surfaces(scene: Scene, view: View) -> list[np.ndarray]:
 def _slab(start: tuple[float, float], end: tuple[float, float]) -> np.ndarray:
     upper = np.array([start, end])
     return np.concatenate([upper, upper[::-1] - (0.0, SLAB_M)])
+
+
+def _rail(ends: np.ndarray) -> np.ndarray:
+    """A wall seen from above, as wide on either side of its line."""
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    aside = RAIL_M * np.array([-along[1], along[0]])
+    return np.concatenate([ends + aside, ends[::-1] - aside])
 
 
 def outline(clip: Clip, scene: Scene, index: int) -> np.ndarray:

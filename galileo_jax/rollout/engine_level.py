@@ -6,7 +6,8 @@ for constant friction on a level table, and second order for every other law; a 
 met at its time, by Newton's method on the step itself, so that the motion is a continuous function
 of the parameters with the right derivatives, as in `engine_rigid`.
 
-Discs that touch and press are held apart by small plastic impacts.
+Discs that touch and press, or are pressed against a wall, are held apart by small plastic impacts.
+Walls have no thickness: a disc is on that side on which its centre is.
 """
 
 import math
@@ -18,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from galileo_jax.model.effects.effect import Effect, Rims, Surroundings
+from galileo_jax.model.effects.effect import Effect, Rims, Surroundings, Walls
 from galileo_jax.rollout.engine_free import start_velocity
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.event_loop import recorded, step_by_events
@@ -60,11 +61,16 @@ class Table(NamedTuple):
       law: the equations of motion.
       rims: what a hit does.
       radius_m: `[object]`, true.
+      walls: true; None where there are none.
+      pressure: `[object, 2]`, where discs press on the table, see `Effect.pressure`; None: in the
+        middle.
     """
 
     law: Dynamics
     rims: Rims
     radius_m: jax.Array
+    walls: Walls | None
+    pressure: Any | None
 
 
 def roll_out(
@@ -89,7 +95,12 @@ def roll_out(
     assert velocity is not None  # the pucks' law gives one
     seen = jnp.asarray(scene.start_m)
     shown = _magnified(effects, named, scene)
-    table = Table(law, rims, jnp.asarray(scene.half_length_m))
+    walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
+    if walls is not None:
+        walls = walls._replace(ends_m=seen[0, :2] + (walls.ends_m - seen[0, :2]) / shown)
+    pressures = [p for e in effects if (p := e.pressure(named, scene)) is not None]
+    beside = sum(pressures[1:], pressures[0]) if pressures else None
+    table = Table(law, rims, jnp.asarray(scene.half_length_m), walls, beside)
     # Starts and turning as the camera's scale will show them.
     start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
     discs = Discs(
@@ -143,29 +154,39 @@ def _to_next_event(
 ) -> tuple[Discs, jax.Array]:
     """Moves on to the next event, or by `left_s`; returns the discs and the time it took."""
     pairs = np.array(list(combinations(range(len(scene.names)), 2)), int).reshape(-1, 2)
-    a = _acceleration(discs, time_s, table.law, scene)
+    a = _acceleration(discs, time_s, table, scene)
     half = 0.5 * jnp.minimum(left_s, jnp.min(_stops(discs, a)))
     middle = discs.after(a, half)
-    a = _acceleration(middle, time_s + half, table.law, scene)
+    a = _acceleration(middle, time_s + half, table, scene)
     # What rests stays, whatever the half step before it rounds to.
     rests = (_length(discs.speed_m_s) == 0) & (_length(a) == 0)
     a = jnp.where(rests[:, None], 0.0, a)
     stops, hits = _stops(discs, a), _hits(discs, a, pairs, left_s, table)
-    soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([stops, hits])))
+    bounces = _bounces(discs, a, left_s, table)
+    soonest = jnp.minimum(left_s, jnp.min(jnp.concatenate([stops, hits, bounces.ravel()])))
     t = jnp.where(is_last, left_s, soonest)
     moved = discs.after(a, t)
     speed = jnp.where((stops <= t)[:, None], 0.0, moved.speed_m_s)
     for k, pair in enumerate(pairs):
         struck = _struck(moved.place_m, speed, pair, table)
         speed = jnp.where(hits[k] <= t, struck, speed)
-    return moved._replace(speed_m_s=speed), t
+    place = moved.place_m
+    for wall in range(bounces.shape[0]):
+        is_hit = bounces[wall] <= t
+        back, bounced = _bounced(place, speed, wall, table)
+        place = jnp.where(is_hit[:, None], back, place)
+        speed = jnp.where(is_hit[:, None], bounced, speed)
+    return moved._replace(place_m=place, speed_m_s=speed), t
 
 
-def _acceleration(discs: Discs, time_s: jax.Array, law: Dynamics, scene: Surroundings) -> jax.Array:
+def _acceleration(discs: Discs, time_s: jax.Array, table: Table, scene: Surroundings) -> jax.Array:
     """Of every disc, `[object, 3]`."""
-    speed = discs.speed_m_s
-    size, along = _length(speed), _length(speed[:, :2])
+    law, speed = table.law, discs.speed_m_s
+    along = _length(speed[:, :2])
     forward = speed[:, :2] / jnp.where(along > 0, along, 1.0)[:, None]
+    lever = _lever(discs, table)
+    slip = speed.at[:, :2].add(speed[:, 2:] * lever)
+    size = _length(slip)
     drive = law.drive(state_at(discs.way_m, along, time_s, scene)) / law.inertia
     brake = law.brake(state_at(discs.way_m, size, time_s, scene)) / law.inertia
     downhill = law.gravity * jnp.stack([jnp.sin(law.ramp_rad), jnp.sin(law.table_rad)])
@@ -175,11 +196,22 @@ def _acceleration(discs: Discs, time_s: jax.Array, law: Dynamics, scene: Surroun
     strength = _length(pull)
     against = jnp.where(
         (size > 0)[:, None],
-        speed / jnp.where(size > 0, size, 1.0)[:, None],
+        slip / jnp.where(size > 0, size, 1.0)[:, None],
         pull / jnp.where(strength > 0, strength, 1.0)[:, None],
     )
+    against = against.at[:, 2].add(jnp.sum(lever * against[:, :2], axis=1))
     held = (size == 0) & (strength <= brake)
     return jnp.where(held[:, None], 0.0, pull - brake[:, None] * against)
+
+
+def _lever(discs: Discs, table: Table) -> jax.Array:
+    """How fast the centre of the pressure moves beside the middle per r turning / sqrt(2)."""
+    if table.pressure is None:
+        return jnp.zeros((len(table.radius_m), 2))
+    turned = ROOT2 * discs.place_m[:, 2] / table.radius_m
+    cos, sin = jnp.cos(turned), jnp.sin(turned)
+    x, y = table.pressure.T
+    return ROOT2 * jnp.stack([-(sin * x + cos * y), cos * x - sin * y], axis=1)
 
 
 def _stops(discs: Discs, a: jax.Array) -> jax.Array:
@@ -237,6 +269,59 @@ def _struck(place_m: jax.Array, speed_m_s: jax.Array, pair: np.ndarray, table: T
     change = jnp.concatenate([impulse, -ROOT2 * rub[None]])
     back = jnp.concatenate([-impulse, -ROOT2 * rub[None]])
     return speed_m_s.at[other].add(change / mass[1]).at[one].add(back / mass[0])
+
+
+def _before_wall(place_m: jax.Array, ends_m: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """How far centres `[object, 3]` are from a wall, m; across it towards them; along it `[2]`."""
+    along = ends_m[1] - ends_m[0]
+    along = along / _length(along)
+    left = jnp.stack([-along[1], along[0]])
+    beside = (place_m[:, :2] - ends_m[0]) @ left
+    side = jnp.where(beside < 0, -1.0, 1.0)
+    return side * beside, side[:, None] * left, along
+
+
+def _bounces(discs: Discs, a: jax.Array, left_s: jax.Array, table: Table) -> jax.Array:
+    """When each disc meets each wall, s `[wall, object]`; inf where not within `left_s`."""
+    if table.walls is None:
+        return jnp.zeros((0, len(table.radius_m)))
+    found = []
+    for ends in table.walls.ends_m:
+        away, normal, along = _before_wall(discs.place_m, ends)
+        gap = away - table.radius_m
+        closing = jnp.sum(discs.speed_m_s[:, :2] * normal, axis=1)
+        half = 0.5 * jnp.sum(a[:, :2] * normal, axis=1)
+        # gap + closing t + half t^2 = 0, the first time from now on.
+        root2 = closing**2 - 4 * half * gap
+        meets = (closing < -TOUCH_M_S) & ((root2 > 0) | (gap <= 0))
+        is_ahead = meets & (gap > 0)
+        root = jnp.sqrt(jnp.where(is_ahead, root2, 1.0))
+        at = jnp.where(is_ahead, 2 * gap / jnp.where(is_ahead, root - closing, 1.0), 0.0)
+        there = discs.after(a, at[:, None]).place_m[:, :2] - ends[0]
+        passes = (there @ along >= 0) & (there @ along <= _length(ends[1] - ends[0]))
+        found.append(jnp.where(meets & passes & (at <= left_s), at, jnp.inf))
+    return jnp.stack(found)
+
+
+def _bounced(
+    place_m: jax.Array, speed_m_s: jax.Array, wall: int, table: Table
+) -> tuple[jax.Array, jax.Array]:
+    """Places and speeds `[object, 3]` of all discs, were they to strike a wall here."""
+    assert table.walls is not None
+    away, normal, along = _before_wall(place_m, table.walls.ends_m[wall])
+    # What was pressed into the wall within the step, by a thousandth of a millimetre, comes back.
+    into = jnp.maximum(table.radius_m - away, 0.0)
+    approach = -jnp.sum(speed_m_s[:, :2] * normal, axis=1)
+    e = jnp.where(approach > PLASTIC_M_S, table.walls.restitution, 0.0)
+    push = jnp.maximum((1.0 + e) * approach, 0.0)
+    # The rim is one radius behind the centre, seen from the wall's normal: it turns against `side`.
+    side = jnp.sign(along[0] * normal[:, 1] - along[1] * normal[:, 0])
+    slip = speed_m_s[:, :2] @ along + side * ROOT2 * speed_m_s[:, 2]
+    most = table.walls.grip * push
+    rub = jnp.clip(-slip / 3.0, -most, most)  # J = m r^2 / 2, as in `_struck`
+    change = push[:, None] * normal + rub[:, None] * along
+    change = jnp.concatenate([change, (side * ROOT2 * rub)[:, None]], axis=1)
+    return place_m.at[:, :2].add(into[:, None] * normal), speed_m_s + change
 
 
 def _length(vectors: jax.Array) -> jax.Array:

@@ -6,10 +6,11 @@ round it. All of the wander counts: at hundreds of frames per second even its fa
 as the scatter, and neighbouring errors of what lies still go together.
 """
 
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
+from galileo_jax.clip.walls import bounces
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import (
@@ -47,6 +48,13 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
             for axis in range(2):
                 step = np.zeros_like(position)
                 step[k, axis, hit + 1 :] = HIT_STEP_SD_M
+                found.append(step)
+    for i, ends in product(range(len(position)), scene.walls_m):
+        seen = observation.mask[i]
+        for hit in bounces(position[i, :2], seen, ends, scene.half_length_m[i]):
+            for axis in range(2):
+                step = np.zeros_like(position)
+                step[i, axis, hit + 1 :] = HIT_STEP_SD_M
                 found.append(step)
     turned = position[:, 2] if observation.is_turning else observation.turned_rad
     if turned is not None:

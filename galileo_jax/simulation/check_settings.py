@@ -78,6 +78,8 @@ def options_without_part(settings: Settings) -> Iterator[tuple[tuple[str, ...], 
         yield RAMP_ONLY, f"of a ramp only, not of scenario {settings.scenario}"
     if settings.has_ramp:
         yield ("floor",), "not of a ramp"
+    if settings.scenario in SCENARIO_NAMES and settings.scenario != "from_above":
+        yield ("walls",), f"of scenario from_above only, not of {settings.scenario}"
     if settings.scenario == "incline":
         yield ("m2", "k2"), "an incline has one object"
     if settings.track_only:

@@ -1,14 +1,14 @@
 """Pucks on a table seen from above, with known truth.
 
-The laws are the effects'; the motion is stepped finely (`STEP_S`), hits are met within a step, so
-that a clip is no copy of the engine that fits it.
+The laws are the effects'; the motion is stepped finely (`STEP_S`, of second order), hits are met
+within a step, so that a clip is no copy of the engine that fits it.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,16 +16,21 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
+from galileo_jax.model.effects.laws.walls import ENDS as WALL_ENDS
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
 
-STEP_S, STEPS_PER_RECORD = 1e-4, 10
+STEP_S, STEPS_PER_RECORD = 1e-4, 2
 PLASTIC_M_S = 0.02  # slower impacts are plastic, as in every engine
 LONGEST_S = 4.0
 REST_S = 0.2  # looked at so long after everything has come to rest
+MOST_EVENTS = 20  # within one step
+ROOM_M = (0.01, 0.06)  # between a puck's start and the wall behind it
 SCENARIO = "from_above"
+
+Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,7 @@ class LevelTruth:
       values: every parameter by name, those of `effects` too.
       start_m: `[object]`, (x, y) of the centres at the start.
       effects: what is hidden in the clip.
+      walls_m: the ends of every wall.
     """
 
     things: tuple[ClipObject, ...]
@@ -45,6 +51,7 @@ class LevelTruth:
     effects: tuple[Effect, ...] = field(default=())
     scenario: str = SCENARIO
     gravity: float = GRAVITY_M_S2
+    walls_m: tuple[tuple[Point, Point], ...] = ()
 
     @property
     def surroundings(self) -> Surroundings:
@@ -64,13 +71,18 @@ class LevelTruth:
             has_table=False,
             comes_down=(False,) * count,
             moves_in_plane=True,
-            laws=("pucks",),
+            laws=("pucks", "walls") if self.walls_m else ("pucks",),
             expected=dict.fromkeys([*moving, OFFSET], (0.0, 1.0)),
+            walls_m=self.walls_m,
         )
 
 
-def draw_level(rng: np.random.Generator, given: Mapping[str, float]) -> LevelTruth:
+def draw_level(
+    rng: np.random.Generator, given: Mapping[str, float], has_walls: bool = False
+) -> LevelTruth:
     """Draws two pucks, the first on its way to the second, with what `given` leaves open.
+
+    Where there are walls, four of them stand round the pucks, nearer than these can go.
 
     Raises:
       InputError: a given name is no parameter of the scenario.
@@ -93,6 +105,11 @@ def draw_level(rng: np.random.Generator, given: Mapping[str, float]) -> LevelTru
         "restitution": rng.uniform(0.4, 0.95),
         "grip": rng.uniform(0.05, 0.35),
     }
+    if has_walls:  # drawn last: the same pucks as without walls
+        values |= {
+            "wall_restitution": rng.uniform(0.4, 0.95),
+            "wall_grip": rng.uniform(0.05, 0.35),
+        }
     for name in given:
         if name not in values:
             known = ", ".join(values)
@@ -107,7 +124,16 @@ def draw_level(rng: np.random.Generator, given: Mapping[str, float]) -> LevelTru
         ClipObject(name=f"object{i + 1}", shape="cylinder", size_m=(float(r), 0.01))
         for i, r in enumerate(radii)
     )
-    return LevelTruth(things, values, ((0.0, 0.0), (round(x, 4), round(y, 4))))
+    start = ((0.0, 0.0), (round(x, 4), round(y, 4)))
+    if not has_walls:
+        return LevelTruth(things, values, start)
+    room = radii.max() + rng.uniform(*ROOM_M, 4)
+    low, high = np.min(start, axis=0) - room[:2], np.max(start, axis=0) + room[2:]
+    corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+    corners = [(round(float(x), 4), round(float(y), 4)) for x, y in corners]
+    walls = tuple(zip(corners, corners[1:] + corners[:1], strict=True))
+    values |= {f"wall_offset_{end}{i + 1}": 0.0 for i in range(len(walls)) for end in WALL_ENDS}
+    return LevelTruth(things, values, start, walls_m=walls)
 
 
 def solve_level(truth: LevelTruth) -> tuple[Motion, tuple[float, ...]]:
@@ -122,6 +148,11 @@ def solve_level(truth: LevelTruth) -> tuple[Motion, tuple[float, ...]]:
     place[:, :2] = truth.start_m
     speed[0] = [truth.values[f"{name}1"] for name in START]
     speed[:, 2] *= radii / math.sqrt(2)
+    rails = Rails.of(truth.walls_m)
+    beside = np.zeros((count, 2))
+    for effect in effects:
+        if (pressure := effect.pressure(theta, scene)) is not None:
+            beside = np.stack([-pressure[:, 1], pressure[:, 0]], axis=1)
     way, hits, rows = np.zeros(count), [], []
     last = round(LONGEST_S / STEP_S)
     for index in range(last + 1):
@@ -131,38 +162,93 @@ def solve_level(truth: LevelTruth) -> tuple[Motion, tuple[float, ...]]:
             last = min(last, index + round(REST_S / STEP_S))
         if index == last:
             break
-        speed = _rubbed(speed, way, index * STEP_S, law, scene)
         left = STEP_S
-        for i, j in combinations(range(count), 2):
-            meets = _meets_s(place[j] - place[i], speed[j] - speed[i], radii[i] + radii[j])
-            if meets <= left:
-                place, left = place + meets * speed, left - meets
-                _strike(place, speed, i, j, law, truth.values)
-                hits.append(index * STEP_S + meets)
-        place = place + left * speed
-        way = way + STEP_S * np.hypot(*speed[:, :2].T)
+        for _ in range(MOST_EVENTS):
+            turned = math.sqrt(2) * place[:, 2] / radii
+            lever = math.sqrt(2) * (_turner(turned) @ beside[..., None])[..., 0]
+            ended = _rubbed(speed, way, lever, index * STEP_S, left, law, scene)
+            mean = (speed + ended) / 2
+            spent, struck = _soonest(place, mean, radii, rails, left)
+            place, way = place + spent * mean, way + spent * np.hypot(*mean[:, :2].T)
+            speed = ended if struck is None else speed + (ended - speed) * (spent / left)
+            left -= spent
+            if struck is None:
+                break
+            i, other, is_wall = struck
+            if is_wall:
+                _strike_wall(place[i], speed[i], rails, other, truth.values)
+            else:
+                _strike(place, speed, i, other, law, truth.values)
+                hits.append((index + 1) * STEP_S - left)
     places, speeds = (np.moveaxis(np.array(each), 0, -1) for each in zip(*rows, strict=True))
     times = STEP_S * STEPS_PER_RECORD * np.arange(len(rows))
     turned = places[:, 2] * math.sqrt(2) / radii[:, None]
     return Motion(times, places[:, :2], speeds[:, :2], turned), tuple(hits)
 
 
+def _soonest(
+    place: np.ndarray, mean: np.ndarray, radii: np.ndarray, rails: "Rails", left_s: float
+) -> tuple[float, tuple[int, int, bool] | None]:
+    """When the first hit within `left_s` is, s, and what hits what: a puck, or a wall."""
+    soonest, struck = left_s, None
+    for i, j in combinations(range(len(radii)), 2):
+        meets = _meets_s(place[j] - place[i], mean[j] - mean[i], radii[i] + radii[j])
+        if meets < soonest:
+            soonest, struck = meets, (i, j, False)
+    for i in range(len(radii)) if len(rails.length) else ():
+        meets = rails.meets_s(place[i], mean[i], radii[i])
+        wall = int(np.argmin(meets))
+        if meets[wall] < soonest:
+            soonest, struck = float(meets[wall]), (i, wall, True)
+    return soonest, struck
+
+
 def _rubbed(
-    speed: np.ndarray, way: np.ndarray, time_s: float, law: Dynamics, scene: Surroundings
+    speed: np.ndarray,
+    way: np.ndarray,
+    lever: np.ndarray,
+    time_s: float,
+    spent_s: float,
+    law: Dynamics,
+    scene: Surroundings,
 ) -> np.ndarray:
-    """Speeds after a step's forces; friction ends a motion, and does not turn it round."""
-    along, size = np.hypot(*speed[:, :2].T), np.linalg.norm(speed, axis=1)
+    """Speeds after a time's forces; friction ends a motion, and does not turn it round."""
+    along, size = np.hypot(*speed[:, :2].T), np.linalg.norm(_slip(speed, lever), axis=1)
     drive = law.drive(state_at(way, along, np.asarray(time_s), scene)) / law.inertia
     brake = law.brake(state_at(way, size, np.asarray(time_s), scene)) / law.inertia
     pushed = speed.copy()
     pushed[:, :2] += (
-        STEP_S * drive[:, None] * speed[:, :2] / np.where(along > 0, along, 1.0)[:, None]
+        spent_s * drive[:, None] * speed[:, :2] / np.where(along > 0, along, 1.0)[:, None]
     )
-    pushed[:, 0] += STEP_S * law.gravity * np.sin(law.ramp_rad)
-    pushed[:, 1] += STEP_S * law.gravity * np.sin(law.table_rad)
+    pushed[:, 0] += spent_s * law.gravity * np.sin(law.ramp_rad)
+    pushed[:, 1] += spent_s * law.gravity * np.sin(law.table_rad)
+    lost = (spent_s * brake)[:, None]
+    half_way = pushed - 0.5 * lost * _against(pushed, lever)
+    against = _against(half_way, lever)
     size = np.linalg.norm(pushed, axis=1)
-    left = np.maximum(size - STEP_S * brake, 0.0)
-    return pushed * (left / np.where(size > 0, size, 1.0))[:, None]
+    stops = (lost[:, 0] * (against * pushed).sum(axis=1) >= size**2) | (lost[:, 0] >= 2 * size)
+    return np.where(stops[:, None], 0.0, pushed - lost * against)
+
+
+def _slip(speed: np.ndarray, lever: np.ndarray) -> np.ndarray:
+    """Of the centre of the pressure, `[object, 3]`."""
+    return np.concatenate([speed[:, :2] + speed[:, 2:] * lever, speed[:, 2:]], axis=1)
+
+
+def _against(speed: np.ndarray, lever: np.ndarray) -> np.ndarray:
+    """Friction's direction, reversed, on the speeds of the middle, `[object, 3]`."""
+    slip = _slip(speed, lever)
+    size = np.linalg.norm(slip, axis=1, keepdims=True)
+    slip = slip / np.where(size > 0, size, 1.0)
+    return np.concatenate(
+        [slip[:, :2], slip[:, 2:] + (lever * slip[:, :2]).sum(axis=1, keepdims=True)], axis=1
+    )
+
+
+def _turner(turned: np.ndarray) -> np.ndarray:
+    """Of every disc the matrix that turns counter-clockwise, `[object, 2, 2]`."""
+    cos, sin = np.cos(turned), np.sin(turned)
+    return np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
 
 
 def _meets_s(apart: np.ndarray, u: np.ndarray, reach: float) -> float:
@@ -173,6 +259,50 @@ def _meets_s(apart: np.ndarray, u: np.ndarray, reach: float) -> float:
     square, gap = float(u[:2] @ u[:2]), float(apart[:2] @ apart[:2]) - reach**2
     root2 = closing**2 - square * gap
     return max(gap, 0.0) / (math.sqrt(root2) - closing) if root2 > 0 else math.inf
+
+
+class Rails(NamedTuple):
+    """Walls: where each begins, its direction, that to its left, and its length."""
+
+    start_m: np.ndarray
+    along: np.ndarray
+    left: np.ndarray
+    length: np.ndarray
+
+    @classmethod
+    def of(cls, walls_m: Sequence[tuple[Point, Point]]) -> "Rails":
+        """Of walls between two ends."""
+        ends = np.array(walls_m, float).reshape(-1, 2, 2)
+        along = ends[:, 1] - ends[:, 0]
+        length = np.linalg.norm(along, axis=1)
+        along = along / length[:, None]
+        return cls(ends[:, 0], along, np.stack([-along[:, 1], along[:, 0]], axis=1), length)
+
+    def meets_s(self, place: np.ndarray, u: np.ndarray, radius: float) -> np.ndarray:
+        """When a puck meets each wall at a constant speed, s; inf if never."""
+        away, closing = (place[:2] - self.start_m) * self.left, self.left @ u[:2]
+        away = away.sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            meets = np.maximum(np.abs(away) - radius, 0.0) / np.abs(closing)
+            reached = ((place[:2] + meets[:, None] * u[:2] - self.start_m) * self.along).sum(axis=1)
+        ahead = (away * closing < 0) & (reached >= 0) & (reached <= self.length)
+        return np.where(ahead, meets, np.inf)
+
+
+def _strike_wall(
+    place: np.ndarray, speed: np.ndarray, rails: Rails, wall: int, values: Mapping[str, float]
+) -> None:
+    """Changes the speed of a puck by the impulse of a wall."""
+    along, across = rails.along[wall], rails.left[wall]
+    if (place[:2] - rails.start_m[wall]) @ across < 0:  # it is on the wall's other side
+        along, across = -along, -across
+    approach = float(-speed[:2] @ across)
+    e = values["wall_restitution"] if approach > PLASTIC_M_S else 0.0
+    push = (1 + e) * approach
+    slip = float(speed[:2] @ along + math.sqrt(2) * speed[2])
+    rub = float(np.clip(-slip / 3, -values["wall_grip"] * push, values["wall_grip"] * push))
+    speed[:2] += push * across + rub * along
+    speed[2] += math.sqrt(2) * rub
 
 
 def _strike(

@@ -33,7 +33,7 @@ def level_clips(settings: Settings, hidden: Sequence[Hidden]) -> list[WriteClip]
     if settings.floor:
         raise InputError(f"--floor: there is none in scenario {SCENARIO}")
     things, secrets, looks = np.random.default_rng(settings.seed).spawn(3)
-    truth = draw_level(things, settings.values)
+    truth = draw_level(things, settings.values, settings.walls)
     for each in hidden:
         truth = hide_free(truth, each, secrets)
     return [partial(_write, settings, truth, looks)]
@@ -57,6 +57,10 @@ def _write(settings: Settings, truth: LevelTruth, looks: np.random.Generator, ou
             for item in truth.things
         ],
     }
+    if truth.walls_m:
+        content["walls"] = [
+            {"from_m": list(one), "to_m": list(other)} for one, other in truth.walls_m
+        ]
     scene = truth.surroundings
     names = [parameter.name for e in truth.effects for parameter in e.parameters(scene)]
     record = {

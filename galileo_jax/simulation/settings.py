@@ -42,6 +42,7 @@ class Settings:
     solver: Solver = "rigid"
     values: Mapping[str, float] = field(default_factory=dict)
     floor: bool = False
+    walls: bool = False
     release: float | None = None
     like: str | Path | None = None
     series: int | None = None

@@ -108,6 +108,136 @@ def test_agrees_with_the_fine_solver(seed: int) -> None:
     assert np.abs(np.asarray(position[:, 2]) - fine.pitch_rad).max() < 0.05
 
 
+def beside(
+    ends: tuple[tuple[float, float], tuple[float, float]], wall_restitution: float, **values: float
+) -> LevelTruth:
+    """The first puck alone with a wall; the other one is far away and lies still."""
+    grip = values.pop("wall_grip", 0.0)
+    one = alone(**values)
+    walls = {"wall_restitution": wall_restitution, "wall_grip": grip}
+    walls |= {f"wall_offset_{end}1": 0.0 for end in ("from", "to")}
+    return LevelTruth(one.things, {**one.values, **walls}, one.start_m, walls_m=(ends,))
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("wall", [((0.2, -0.5), (0.4, 0.5)), ((0.4, 0.5), (0.2, -0.5))])
+def test_an_elastic_wall_is_a_mirror(wall: tuple[tuple[float, float], tuple[float, float]]) -> None:
+    """Reflected at the line one radius before the wall, the way is that without the wall."""
+    one = beside(wall, 1.0, k1=0.1, start_turning1=0.0)
+    radius = (one.things[0].size_m or (0.0,))[0]
+    position, velocity = (np.asarray(each) for each in rolled(one, 1.5))
+    free = np.asarray(rolled(alone(k1=0.1, start_turning1=0.0), 1.5)[0])
+    start, along = np.array(wall[0]), np.subtract(wall[1], wall[0])
+    normal = np.array([-along[1], along[0]]) / np.hypot(*along)
+    normal = -normal if normal[0] > 0 else normal  # towards the puck
+    beyond = np.minimum((free[0, :2].T - start) @ normal - radius, 0.0)
+    expected = free[0, :2].T - 2 * beyond[:, None] * normal
+    assert (beyond < 0).any()
+    assert pytest.approx(expected, abs=EXACT) == position[0, :2].T
+    assert np.abs(velocity[0, 1]).max() > 0.2
+
+
+@pytest.mark.usefixtures("x64")
+def test_a_wall_gives_back_and_rubs_as_it_should() -> None:
+    """Head-on e is left; a turning puck gets r turning / 3 along the wall, if grip allows."""
+    wall = ((0.2, -1.0), (0.2, 1.0))
+    _, velocity = rolled(beside(wall, 0.6, k1=1e-5, start_turning1=9.0, wall_grip=0.9), 0.5)
+    speed = np.asarray(velocity[0, :, -1])
+    radius = (alone().things[0].size_m or (0.0,))[0]
+    rim = radius * 9.0
+    assert speed[0] == pytest.approx(-0.6, abs=1e-4)
+    # The wall is to the right of what comes: a rim that turns to the left runs up it, and is held.
+    assert speed[1] == pytest.approx(-rim / 3, abs=1e-4)
+    assert radius * speed[2] == pytest.approx(rim / 3, abs=1e-4)
+    _, velocity = rolled(beside(wall, 0.6, k1=1e-5, start_turning1=9.0, wall_grip=0.01), 0.5)
+    assert np.asarray(velocity[0, 1, -1]) == pytest.approx(-0.016, abs=1e-4)  # 0.01 (1 + e) v
+
+
+@pytest.mark.usefixtures("x64")
+def test_what_passes_beside_a_wall_or_is_slow_does_not_bounce() -> None:
+    ended = rolled(beside(((0.2, 0.01), (0.2, 0.5)), 1.0, k1=0.1), 1.0)[0]
+    free = rolled(alone(k1=0.1), 1.0)[0]
+    assert np.asarray(ended) == pytest.approx(np.asarray(free), abs=1e-12)
+    one = beside(((0.2, -1.0), (0.2, 1.0)), 0.9, k1=0.1, start_turning1=0.0)
+    tilted = LevelTruth(
+        one.things,
+        {**one.values, "table_tilt": 0.15, "table_tilt_y": 0.0},
+        one.start_m,
+        make_effects(["table_tilt"]),
+        walls_m=one.walls_m,
+    )
+    place, speed = rolled(tilted, 4.0)  # slides down against the wall, and stays there
+    radius = (one.things[0].size_m or (0.0,))[0]
+    assert np.asarray(place[0, 0]).max() < 0.2 - radius + 1e-4
+    assert np.asarray(place[0, 0, -1]) == pytest.approx(0.2 - radius, abs=1e-4)
+    assert np.abs(np.asarray(speed[0, :2, -1])).max() < 0.02
+
+
+def uneven(one: LevelTruth, *shares: float) -> LevelTruth:
+    """With the pressure's centres of both pucks beside the middle, x and y of each."""
+    names = [f"uneven_pressure_{axis}{i}" for i in (1, 2) for axis in "xy"]
+    values = {**one.values, **dict(zip(names, shares, strict=True))}
+    effects = make_effects(["uneven_pressure"])
+    return LevelTruth(one.things, values, one.start_m, effects, walls_m=one.walls_m)
+
+
+@pytest.mark.usefixtures("x64")
+def test_pressure_beside_the_middle_turns_a_puck() -> None:
+    """At first by 2 k g c / r^2, by nothing where it trails; energy goes by k m g |W|."""
+    still = alone(k1=0.3, start_turning1=0.0)
+    radius = (still.things[0].size_m or (0.0,))[0]
+    _, velocity = rolled(uneven(still, 0.0, -0.2, 0.0, 0.0), 0.5)
+    rate = np.asarray(velocity[0, 2, 1]) / DT_S
+    assert rate == pytest.approx(2 * 0.3 * G * -0.2 / radius, rel=0.05)
+    place, _ = rolled(uneven(still, -0.2, 0.0, 0.0, 0.0), 0.5)
+    assert np.asarray(place[0, 2]) == pytest.approx(np.zeros(121), abs=EXACT)
+    one = uneven(alone(k1=0.3, start_turning1=9.0), 0.15, -0.2, 0.0, 0.0)
+    place, velocity = (np.asarray(each)[0] for each in rolled(one, 0.3))
+    rim = radius / math.sqrt(2)
+    energy = 0.5 * (velocity[0] ** 2 + velocity[1] ** 2 + (rim * velocity[2]) ** 2)
+    x, y = (
+        0.15 * np.cos(place[2]) + 0.2 * np.sin(place[2]),
+        (0.15 * np.sin(place[2]) - 0.2 * np.cos(place[2])),
+    )
+    slip = velocity[:2] + radius * velocity[2] * np.stack([-y, x])
+    size = np.sqrt((slip**2).sum(axis=0) + (rim * velocity[2]) ** 2)
+    lost = 0.3 * G * DT_S * (size[1:] + size[:-1]) / 2
+    assert -np.diff(energy)[:60] == pytest.approx(lost[:60], rel=2e-3)
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("seed", [0, 2])
+def test_uneven_pressure_agrees_with_the_fine_solver(seed: int) -> None:
+    drawn = draw_level(np.random.default_rng(seed), {}, has_walls=True)
+    one = uneven(drawn, 0.2, -0.1, 0.05, 0.2)
+    motion, _ = solve_level(one)
+    position, _ = rolled(one, 1.2)
+    fine = motion.at(DT_S * np.arange(position.shape[-1]))
+    assert np.median(np.abs(np.asarray(position[:, :2]) - fine.position_m)) < 1e-5
+    assert np.abs(np.asarray(position[:, 2]) - fine.pitch_rad).max() < 5e-3
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_walls_agree_with_the_fine_solver(seed: int) -> None:
+    one = draw_level(np.random.default_rng(seed), {}, has_walls=True)
+    motion, _ = solve_level(one)
+    position, _ = rolled(one, 1.2)
+    fine = motion.at(DT_S * np.arange(position.shape[-1]))
+    apart = np.abs(np.asarray(position[:, :2]) - fine.position_m)
+    assert apart.max() < FINE_M  # in the frame of a hit; beside it
+    assert np.median(apart) < 1e-6
+    assert np.abs(np.asarray(position[:, 2]) - fine.pitch_rad).max() < 0.05
+    free, _ = rolled(truth(seed), 1.2)
+    assert np.abs(np.asarray(position - free)).max() > 10 * FINE_M
+    (x, y), (u, v) = np.min(one.walls_m, axis=(0, 1)), np.max(one.walls_m, axis=(0, 1))
+    for at, item in zip(np.asarray(position[:, :2]), one.things, strict=True):
+        radius = (item.size_m or (0.0,))[0]
+        low, high = at.min(axis=1) - radius, at.max(axis=1) + radius
+        assert low[0] > x - 1e-6 and low[1] > y - 1e-6
+        assert high[0] < u + 1e-6 and high[1] < v + 1e-6
+
+
 @pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("name", ["table_tilt", "air_drag", "viscous_drag", "stribeck"])
 def test_effects_agree_with_the_fine_solver(name: str) -> None:
@@ -126,9 +256,9 @@ def test_effects_agree_with_the_fine_solver(name: str) -> None:
 
 
 @pytest.mark.usefixtures("x64")
-@pytest.mark.parametrize("seed", [0, 5])
-def test_slopes_agree_with_differences(seed: int) -> None:
-    one = truth(seed)
+@pytest.mark.parametrize(("seed", "has_walls"), [(0, False), (5, False), (2, True)])
+def test_slopes_agree_with_differences(seed: int, has_walls: bool) -> None:
+    one = draw_level(np.random.default_rng(seed), {}, has_walls)
     names = tuple(one.values)
     theta = np.array([one.values[name] for name in names])
 

@@ -34,7 +34,7 @@ from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.polish import BEHIND as BEHIND
 from galileo_jax.inference.fits.polish import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
-from galileo_jax.inference.fits.stages import before_moving
+from galileo_jax.inference.fits.stages import phases
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
 from galileo_jax.runtime.batching import side_by_side
@@ -277,13 +277,10 @@ class GradientFitter:
         return Ends.of(found)
 
     def _starts_by_phases(self, free: np.ndarray, num: int, seed: int) -> np.ndarray:
-        """Starts that suit what was seen before each further object moved, `[start, z]`."""
+        """Starts that suit what was seen before each further object moved, or a bounce."""
         is_main = free & np.array([p.role != "nuisance" for p in self.trials.model_parameters])
         centres, is_open = absent_z(self.trials)[None], is_main[None]
-        for index in range(1, len(self.trials.problems[0].observation.names)):
-            short = before_moving(self.trials, index)
-            if short is None:
-                continue
+        for short in phases(self.trials):
             phase = GradientFitter(short, self.settings)
             starts = scattered_round(short, centres, is_open, self.settings.num_starts, seed)
             ends = phase._ends(starts, free, self.settings.num_refined)

@@ -7,16 +7,53 @@ equations that no start is near enough to (C. Michalik, R. Hannemann, W. Marquar
 single shooting, preprint AICES-2009-8, RWTH Aachen, 2009).
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
+from galileo_jax.clip.walls import bounces
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 
 MOVED_SD, MOVED_M = 6.0, 3e-4  # an object farther than both from where it stood has moved
 STANDING_FRAMES = 5  # that say where it stood
+MOST_BOUNCES = 4  # off walls, before which a search stops on its way
 LEAST_FRAMES = 4  # before it moves: from fewer nothing is fitted
+
+
+def phases(trials: JointProblem) -> Iterator[JointProblem]:
+    """The trials as they were seen before each further object moved, then before each bounce.
+
+    Spans that grow; of bounces off walls the first few of all clips.
+    """
+    for index in range(1, len(trials.problems[0].observation.names)):
+        if (short := before_moving(trials, index)) is not None:
+            yield short
+    frames = [_bounces(problem) for problem in trials.problems]
+    for k in range(min(MOST_BOUNCES, max(map(len, frames)))):
+        yield JointProblem(
+            tuple(
+                _until(problem, own[k]) if k < len(own) else problem
+                for problem, own in zip(trials.problems, frames, strict=True)
+            )
+        )
+
+
+def _bounces(problem: Problem) -> list[int]:
+    """Frames in which discs are nearest to a wall, in order, without the first few."""
+    seen, scene = problem.observation, problem.model.scene.surroundings
+    found = set()
+    for i, ends in product(range(len(seen.names)), scene.walls_m):
+        found |= {*bounces(seen.position_m[i, :2], seen.mask[i], ends, scene.half_length_m[i])}
+    return sorted(frame for frame in found if frame >= LEAST_FRAMES)
+
+
+def _until(problem: Problem, end: int) -> Problem:
+    before = np.arange(len(problem.observation.times_s)) < end
+    seen = problem.observation
+    return replace(problem, observation=replace(seen, mask=seen.mask & before))
 
 
 def before_moving(trials: JointProblem, index: int) -> JointProblem | None:
@@ -47,5 +84,4 @@ def _before_moving(problem: Problem, index: int) -> Problem | None:
     first = int(away[0]) - 1 if away.size else len(seen.times_s)
     if first < LEAST_FRAMES:
         return None
-    before = np.arange(len(seen.times_s)) < first
-    return replace(problem, observation=replace(seen, mask=seen.mask & before))
+    return _until(problem, first)

@@ -73,6 +73,20 @@ class Rims(NamedTuple):
     offset_m: Float[AnyArray, "... object 2"]
 
 
+class Walls(NamedTuple):
+    """Straight walls off which discs bounce that are seen from above.
+
+    Attributes:
+      ends_m: `[..., wall, end, 2]`, the lines that rims touch, as measured.
+      restitution: `[...]`, of the speed against a wall.
+      grip: `[...]`, the most that the impulse along a wall is, as a share of that against it.
+    """
+
+    ends_m: Float[AnyArray, "... wall end 2"]
+    restitution: Array
+    grip: Array
+
+
 # In `Surroundings.expected`: of a high fall; how well the angle and the origin are known.
 FALL_LENGTH, ANGLE, ORIGIN = "fall_length", "declared_angle", "origin_m"
 PENDULUM = "pendulum"  # the law under which the path is a circle
@@ -94,6 +108,7 @@ _ARRAYS = (
     "roll_inertia",
     "release_s",
     "expected",
+    "walls_m",
 )
 _STATIC = (
     "names",
@@ -138,6 +153,7 @@ class Surroundings:
       expected: by name the two numbers of a prior: of the laws' parameters what a look at the
         clip suggests, wide against what the fit will tell; of the angle, scale and origin how
         well they are declared, where not taken at their word.
+      walls_m: `[wall, end, 2]`, on a table that is seen from above: the declared walls' ends.
     """
 
     names: tuple[str, ...]
@@ -159,6 +175,7 @@ class Surroundings:
     moves_in_plane: bool = False
     laws: tuple[str, ...] = ()
     expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    walls_m: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
 
     @property
     def is_level(self) -> bool:
@@ -312,6 +329,18 @@ class Effect:
 
     def rims(self, theta: Theta, scene: Surroundings) -> Rims | None:
         """Returns what hits of discs do that are seen from above, or None."""
+        return None
+
+    def pressure(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns where discs that are seen from above press on the table, or None.
+
+        Beside their middles, `[..., object, 2]`, as shares of their radii along x and y when they
+        are first seen.
+        """
+        return None
+
+    def walls(self, theta: Theta, scene: Surroundings) -> Walls | None:
+        """Returns the walls off which discs bounce that are seen from above, or None."""
         return None
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:

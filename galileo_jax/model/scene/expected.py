@@ -54,7 +54,7 @@ def expected(
         is_board = not SCENARIOS[clip.scenario].has_table
         return declared | (board_shape(clip, observation) if is_board else {})
     if SCENARIOS[clip.scenario].is_level:
-        return declared | level_starts(observation, half_height_m)
+        return declared | level_starts(observation, half_height_m, clip.walls)
     down_m = place_m[1, 0] - place_m[1]
     velocity = _start_velocity(times_s, place_m)
     middle = (float(down_m.min()) + float(down_m.max())) / 2

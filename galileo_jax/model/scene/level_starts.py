@@ -1,10 +1,12 @@
 """How pucks seen from above move when they are first seen: priors of their start velocities."""
 
 import math
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
 
+from galileo_jax.clip.walls import Wall, distance_to_wall
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.observation.observation import Observation
 
@@ -16,12 +18,15 @@ TURNING_S, TURNING_SD, TURNED_SD_RAD = 0.1, (0.05, 0.02), 2e-3  # rad/s and a sh
 OFFSET_SHARE = 0.1  # of a radius: a point that was marked is the centre within this
 
 
-def level_starts(observation: Observation, radius_m: float) -> dict[str, tuple[float, float]]:
+def level_starts(
+    observation: Observation, radius_m: float, walls: Sequence[Wall] = ()
+) -> dict[str, tuple[float, float]]:
     """The two numbers of each prior, by the parameter's name; nothing of pucks that rest.
 
     Args:
       observation: its first frames are the begin of the motion.
       radius_m: of the first puck.
+      walls: off which pucks bounce.
     """
     found = {OFFSET: (0.0, OFFSET_SHARE * radius_m)}
     for i, (place, mask) in enumerate(zip(observation.position_m, observation.mask, strict=True)):
@@ -40,12 +45,12 @@ def level_starts(observation: Observation, radius_m: float) -> dict[str, tuple[f
         for axis, name in enumerate(START[: len(place)]):
             width = widths[axis] + (SHARE * abs(speed[axis]) if axis == 2 else 0.0)
             found[f"{name}{i + 1}"] = float(speed[axis]), float(width)
-        if (turning := _turning(observation, i)) is not None:
+        if (turning := _turning(observation, i, walls)) is not None:
             found[f"{START[2]}{i + 1}"] = turning
     return found
 
 
-def _turning(observation: Observation, i: int) -> tuple[float, float] | None:
+def _turning(observation: Observation, i: int, walls: Sequence[Wall]) -> tuple[float, float] | None:
     """How fast a puck turns at the start by its picture, and sd, rad/s; None where unknown.
 
     Friction acts against sliding and turning together: who turns slides farther.
@@ -53,7 +58,7 @@ def _turning(observation: Observation, i: int) -> tuple[float, float] | None:
     if observation.turned_rad is None:
         return None
     seen = np.flatnonzero(observation.mask[i] & np.isfinite(observation.turned_rad[i]))
-    times, seen = observation.times_s, seen[seen < _first_hit(observation)]
+    times, seen = observation.times_s, seen[seen < _first_hit(observation, i, walls)]
     is_early = times[seen] <= times[seen[:1]] + TURNING_S
     seen = seen[is_early | (np.arange(len(seen)) < FRAMES)]
     if len(seen) <= 3:
@@ -67,8 +72,10 @@ def _turning(observation: Observation, i: int) -> tuple[float, float] | None:
     return speed, math.hypot(math.sqrt(variance), least + share * abs(speed))
 
 
-def _first_hit(observation: Observation) -> int:
-    """The frame in which two pucks are nearest to each other; behind the last where there is one.
+def _first_hit(observation: Observation, own: int, walls: Sequence[Wall]) -> int:
+    """The frame in which two pucks are nearest to each other, or one to a wall.
+
+    Behind the last where there is nothing to hit.
 
     After it another turning may have begun.
     """
@@ -78,4 +85,7 @@ def _first_hit(observation: Observation) -> int:
         apart = np.linalg.norm(place[j] - place[i], axis=0)
         if (both := mask[i] & mask[j]).any():
             nearest.append(int(np.argmin(np.where(both, apart, np.inf))))
+    for wall in walls:
+        away = distance_to_wall(np.moveaxis(place[own], 0, -1), wall.ends_m)
+        nearest.append(int(np.argmin(np.where(mask[own], away, np.inf))))
     return min(nearest)

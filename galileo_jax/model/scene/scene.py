@@ -19,6 +19,7 @@ from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.files.package_data import scene_path
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.laws.start_velocity import StartVelocity
+from galileo_jax.model.effects.laws.walls import StraightWalls
 from galileo_jax.model.scene.expected import expected
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
@@ -176,13 +177,18 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         moves_in_plane=scenario.moves_in_plane,
         laws=laws_of(clip),
         expected=expected(clip, observation, half[0][int(not scenario.is_level)]),
+        walls_m=tuple(wall.ends_m for wall in clip.walls),
     )
     return compile_scene(surroundings, [declared.shape for declared in clip.objects], clip.objects)
 
 
 def laws_of(clip: Clip) -> tuple[str, ...]:
     """The scenario's laws, and those that the clip's keys bring."""
-    declared = (("floor", clip.has_floor), (StartVelocity.name, clip.starts_moving))
+    declared = (
+        ("floor", clip.has_floor),
+        (StartVelocity.name, clip.starts_moving),
+        (StraightWalls.name, bool(clip.walls)),
+    )
     return SCENARIOS[clip.scenario].laws + tuple(name for name, is_there in declared if is_there)
 
 

@@ -42,7 +42,10 @@ LIBRARY = (
     "viscous_drag",
 )
 # Listed there, too, and without a place on a ramp: of falls, flights and pendulums.
-OFF_THE_RAMP = ("added_mass", "magnus", "bearing_friction", "rod_mass", "thread_stretch")
+OFF_THE_RAMP = (
+    *("added_mass", "magnus", "bearing_friction", "rod_mass", "thread_stretch"),
+    "uneven_pressure",
+)
 ALONE = replace(HIT, object2_x_m=None)
 # Object 2 stands where nothing comes, so that one compiled program serves all experiments.
 LONG_RAMP = replace(HIT, release_m=20.0, object2_x_m=50.0)  # the foot is not reached in time

@@ -66,7 +66,9 @@ def test_effects_are_made_by_name_in_one_order():
 def test_an_unknown_name_lists_the_known():
     with pytest.raises(InputError, match="unknown effect 'drga'; known: added_mass, air_drag"):
         make_effects(["drga"])
-    with pytest.raises(InputError, match=r"thread_stretch, viscous_drag; did you mean air_drag\?$"):
+    with pytest.raises(
+        InputError, match=r"uneven_pressure, viscous_drag; did you mean air_drag\?$"
+    ):
         make_effects(["airdrag"])
 
 

@@ -23,5 +23,6 @@ register(
             "spring_tether",  # along the velocity
             "static_friction",  # what rests is pushed by nothing
         ),
+        keys=("walls", "turning"),
     )
 )

@@ -11,5 +11,9 @@ from galileo_jax.model.effects.laws.pendulum import Pendulum
 from galileo_jax.model.effects.laws.pucks import Pucks
 from galileo_jax.model.effects.laws.spring import Spring
 from galileo_jax.model.effects.laws.start_velocity import StartVelocity
+from galileo_jax.model.effects.laws.walls import StraightWalls
 
-LAWS: tuple[Effect, ...] = (Spring(), Liquid(), Pendulum(), StartVelocity(), Floor(), Pucks())
+LAWS: tuple[Effect, ...] = (
+    *(Spring(), Liquid(), Pendulum(), StartVelocity(), Floor()),
+    *(Pucks(), StraightWalls()),
+)

@@ -1,0 +1,53 @@
+"""Uneven pressure: a puck presses on the table beside its middle.
+
+    u = v + w x c,    W = (u, r w / sqrt(2)),    F = -k m g u / |W|
+    moment about the middle = c x F - k m g r^2 w / (2 |W|)
+
+c: the centre of the pressure, fixed in the puck, so that it goes round with it; as shares of the
+radius r along x and y of the track when the puck is first seen. It is the friction of
+`laws/pucks.py` with its centre at c in place of the middle: what slides without turning is turned
+until c trails behind the middle. Friction takes k m g |W| of the energy per second.
+
+Closed form: where c is across the way of a puck that does not turn, w' = 2 k g c / r^2; where it is
+ahead or behind, none.
+
+Source: Howe and Cutkosky (1996), Practical force-motion models for sliding manipulation, Int. J.
+Robotics Res. 15, 557 (a limit surface about the centre of pressure).
+Confused with: nothing where the turning is in the data; else hardly seen at all.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import Normal, Parameter
+
+PRIOR = Normal(0.0, 0.15)  # of a radius: a felt or a burr on one side
+
+
+@register
+class UnevenPressure(Effect):
+    """Where pucks that are seen from above press on the table."""
+
+    name: ClassVar[str] = "uneven_pressure"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Two of every puck; none of what is not seen from above."""
+        if not scene.is_level:
+            return ()
+        return tuple(
+            Parameter(name, "1", PRIOR, 0.0, "effect", 0.05, per_clip=True)
+            for i in range(len(scene.names))
+            for name in self._names(i)
+        )
+
+    def pressure(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Shares of the radii."""
+        if not scene.is_level:
+            return None
+        rows = [[theta[name] for name in self._names(i)] for i in range(len(scene.names))]
+        xp = rows[0][0].__array_namespace__()
+        return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+
+    def _names(self, i: int) -> tuple[str, ...]:
+        return tuple(f"{self.name}_{axis}{i + 1}" for axis in "xy")
