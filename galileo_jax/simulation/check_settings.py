@@ -208,7 +208,7 @@ def _size(size: Any) -> tuple[int, int]:
     sides: list[Any] = [] if isinstance(size, str) or not isinstance(size, Sequence) else [*size]
     if len(sides) != 2 or not all(map(_is_side, sides)):
         text = "x".join(map(str, sides)) if sides else str(size)
-        raise InputError(f"--size: {text!r} is no size; even numbers such as 640x360 expected")
+        raise InputError(f"--size: {text!r} is not a size; even numbers such as 640x360 expected")
     return int(sides[0]), int(sides[1])
 
 

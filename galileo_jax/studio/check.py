@@ -37,7 +37,8 @@ def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple
         found.extend(_of_rectangle(marks))
     elif marks.has_table and marks.stick_m is None:
         found.append(
-            Remark("missing", "The scale is unknown. Lay the stick on a known length, and type it.")
+            Remark("missing", "The scale is unknown. Drag the ruler onto a known length and type "
+            "the length.")
         )
     if problem:
         found.append(Remark("missing", problem))
@@ -73,7 +74,7 @@ def _of_rectangle(marks: Marks) -> list[Remark]:
     assert marks.rectangle is not None
     found = []
     if not marks.has_scale:
-        text = "Type the rectangle's width and height, or turn back to the stick."
+        text = "Type the rectangle's width and height, or switch back to the ruler."
         found.append(Remark("missing", text))
     turns = []
     for i in range(4):

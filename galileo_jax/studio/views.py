@@ -93,10 +93,10 @@ def track_view(track: gx.Track) -> dict[str, Any]:
 def in_words(line: str) -> str:
     """A remark without the names of files and keys, which the page does not show."""
     text = line.split(": ", 1)[-1]
-    size = re.fullmatch(r"(.+): size_m: null; \[(.+)\] is taken, (.+)", text)
+    size = re.fullmatch(r"(.+): size_m: null; \[(.+)\] is used, (.+)", text)
     if size:
         name, sides, source = size.groups()
-        return f"{name}: no size given; {sides.replace(', ', ' x ')} m is taken, {source}."
+        return f"{name}: no size given; {sides.replace(', ', ' x ')} m is used, {source}."
     return text
 
 

@@ -1,4 +1,4 @@
-"""`sweep`: many clips, many ways, from one config; stopped and taken up again at will."""
+"""`sweep`: evaluate many clips, with several methods; can be stopped and resumed."""
 
 import os
 import shlex
@@ -224,7 +224,7 @@ def _check(engine: str, address: str | None, workers: int | None, cpus: int, gpu
         ("gpus-per-worker", gpus, 0),
     ):
         if value < least:
-            raise InputError(f"--{name}: {value} is no whole number, {least} or more")
+            raise InputError(f"--{name}: {value} is not a whole number, {least} or more")
 
 
 def _plain(value: Any) -> Any:

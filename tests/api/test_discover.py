@@ -174,7 +174,7 @@ def test_a_lab_that_never_gives_a_track_ends_with_the_budget(verdicts):
     lab = Lab(*[LabError("out of order")] * 9)
     found = gx.discover(lab, budget=4)
     assert len(lab.asked) == 4 and found.status is None and found.found is None
-    assert found.sentence == "After 4 experiments: No experiment gave a track."
+    assert found.sentence == "After 4 experiments: No experiment delivered a track."
     assert len({one["height_m"] for one in lab.asked}) == 4, "always somewhere else"
 
 

@@ -103,7 +103,7 @@ def test_chi2_in_the_thousands_sends_to_the_overlay(measured) -> None:
     hidden = replace(measured, observation=replace(measured.observation, mask=mask))
     found = with_track_doubts([hidden], result(5303.4))
     assert found["status"] == (
-        "the fit converged; but no motion of this model comes near the track (chi2 5303)"
+        "the fit converged; but no motion of this model comes close to the track (chi2 5303)"
     )
     (warning,) = found["warnings"]
     assert "object1 from 0.60 s on above all: it was not seen for 0.40 s" in warning

@@ -153,7 +153,7 @@ def test_lost_comments_are_noted(tmp_path: Path, capsys) -> None:
     objects = objects.replace("  - name: object2", "  - <<: *first\n    name: object2")
     path.write_text(f"{before}objects:{objects}")
     assert run(path, "--first-frame", "object1", 2) == 0
-    assert "clip.yaml was written afresh; its comments are lost" in capsys.readouterr().err
+    assert "clip.yaml was written anew; its comments are lost" in capsys.readouterr().err
     assert [item.first_frame for item in load_clip(path).objects] == [2, 0]
 
 

@@ -71,6 +71,6 @@ def test_discover_prints_every_experiment(tmp_path, monkeypatch, capsys):
     assert galileo("discover", lab, "--budget", 2, "--out", tmp_path / "run") == 0
     out = capsys.readouterr().out
     assert out.count("lost: exit code 1: out of order") == 2
-    assert "No experiment gave a track." in out
+    assert "No experiment delivered a track." in out
     assert (tmp_path / "run" / "report.html").is_file()
     assert len(json.loads((tmp_path / "run" / "discover.json").read_text())["experiments"]) == 2

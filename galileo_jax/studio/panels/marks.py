@@ -162,7 +162,7 @@ def _size(tab: "Tab", name: str, text: str) -> None:
     try:
         size = tuple(float(part) for part in text.replace(",", " ").split())
     except ValueError:
-        tab.session.error = f"{name}: {text[:30]!r} is no size; metres expected"
+        tab.session.error = f"{name}: {text[:30]!r} is not a size; metres expected"
         tab.redraw()
         return
     _change(tab, name, size_m=size or None)
