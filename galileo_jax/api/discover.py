@@ -302,7 +302,7 @@ class _Loop:
             with progress.part(self._share(DIAGNOSED), self._share(1.0)):
                 ahead = rehearsed(found, settings, journal.seed)
         except InputError as error:  # of scenes that nobody can set up here
-            said = f"could not be simulated ({_line(error)}): as different as possible from those so far"
+            said = f"not simulated ({_line(error)}): as different as possible from those so far"
             return farthest(self._can, settings, tried), said
         best = ahead.expected[0]
         journal.rounds[-1]["hypotheses"] = dict(ahead.hypotheses)

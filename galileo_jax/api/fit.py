@@ -163,13 +163,15 @@ def _check(options: FitOptions) -> None:
         check_known("--sampler", "sampler", options.sampler, sampler_names())
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
-            f"--max-steps: {options.max_steps} is not a multiple of {BLOCK_STEPS}, {BLOCK_STEPS} or "
+            f"--max-steps: {options.max_steps} is not a multiple of {BLOCK_STEPS}, "
+            f"{BLOCK_STEPS} or "
             "more"
         )
     if options.motion == "free":
         if options.engine not in ("auto", "c"):
             raise InputError(
-                f"--engine {options.engine}: it moves objects in a plane only; --motion free needs c"
+                f"--engine {options.engine}: it moves objects in a plane only; --motion free "
+                "needs c"
             )
         for name in ("method", "init"):
             if getattr(options, name) == "cnn":

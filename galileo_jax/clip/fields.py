@@ -172,7 +172,8 @@ def _rolls(value: Any) -> Any:
     if isinstance(value, int | float) and 0 < value <= 1:
         return float(value)
     raise wrong(
-        f"{short(value)} is not a share J / (m r^2) in (0, 1]; a share such as 0.667 (hollow ball), "
+        f"{short(value)} is not a share J / (m r^2) in (0, 1]; a share such as 0.667 (hollow "
+        "ball), "
         "or true (solid), expected"
     )
 
@@ -198,7 +199,9 @@ def _point_px(value: tuple[float, float]) -> tuple[float, float]:
 
 def _name(value: str) -> str:
     if not value.isidentifier():
-        raise wrong(f"{short(value)} is not a name; letters, digits and _ expected, such as object1")
+        raise wrong(
+            f"{short(value)} is not a name; letters, digits and _ expected, such as object1"
+        )
     return value
 
 

@@ -29,9 +29,7 @@ TOLERANCE_PER_DISTANCE = 0.06
 
 MEND_PIXELS = "correct point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre"
 MEND_LENGTHS = "correct track_origin, ramp_angle_deg, direction, size_m or track_units"
-MEND_OWN_CSV = (
-    "correct ramp_angle_deg, size_m or the csv (x along the travel, y up, from the foot of the ramp)"
-)
+MEND_OWN_CSV = "correct ramp_angle_deg, size_m or the csv (x along, y up, from the foot)"
 
 MIN_SIZE_PX = 2.0
 """An object that would appear smaller cannot be followed: its size or the scale is wrong."""

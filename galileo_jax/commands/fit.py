@@ -44,7 +44,8 @@ def main(argv: Sequence[str]) -> int | None:
     print(table(found, truth))
     if had_prediction and not (out / PREDICTION).is_file():
         command.say(
-            f"{out}: the prediction of the earlier fit was removed; make it again: galileo predict {out} "
+            f"{out}: the prediction of the earlier fit was removed; make it again: galileo "
+            f"predict {out} "
             "--seconds S"
         )
     warn(stale_documents(out, [one.observation for one in measured]))

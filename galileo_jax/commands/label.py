@@ -39,8 +39,9 @@ def main(argv: Sequence[str]) -> int | None:
 def _parser() -> command.Parser:
     parser = command.Parser(
         prog="galileo label",
-        description="Write what is known about a clip into the yaml beside it; what is not given\n"
-        "stays as it is there. Pixels: x right, y down, as any image viewer shows them.",
+        description="Write what is known about a clip into the yaml beside it; everything "
+        "else in it\n"
+        "stays as it is. Pixels: x to the right, y down, as in any image viewer.",
     )
     parser.examples(
         "galileo label clip.mp4 --scenario ramp --ramp 60 114 150 146 --origin 160 150 \\\n"

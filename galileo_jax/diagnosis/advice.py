@@ -94,6 +94,7 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
     if not said:
         said = [f"{again}, or use another angle of the ramp" if motion == "slide" else again]
     if num_clips == 1:
-        said.append("diagnose several clips of the same objects together: they share masses and "
-        "friction")
+        said.append(
+            "diagnose several clips of the same objects together: they share masses and friction"
+        )
     return tuple(said)

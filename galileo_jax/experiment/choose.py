@@ -114,9 +114,7 @@ def sentence_of(best: Expected, about: str | None = None) -> str:
             "about a parameter (--about)"
         )
     if best.gain_nats < LITTLE:
-        return (
-            f"no setting is expected to help: at best {best.gain_nats:.2f} nats, with {where}"
-        )
+        return f"no setting is expected to help: at best {best.gain_nats:.2f} nats, with {where}"
     return (
         f"{where}: named with probability {best.named:.2f} "
         f"({best.gain_nats:.2f} nats expected about which hypothesis holds)"

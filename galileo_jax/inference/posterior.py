@@ -21,7 +21,9 @@ class Status(StrEnum):
     """How a sampling ended; the value is the sentence for the user."""
 
     CONVERGED = "R-hat and effective sample size reached their targets"
-    STEP_LIMIT = "the chains did not converge within the step limit; allow more steps or fix parameters"
+    STEP_LIMIT = (
+        "the chains did not converge within the step limit; allow more steps or fix parameters"
+    )
     STUCK_CHAIN = "a chain never moved; check its start and the scale of the proposals"
     FIXED_LENGTH = "ran its fixed number of steps; convergence was not tested"
 

@@ -78,7 +78,7 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
         last = int(seen[-1])
         if (shared := _shared(clip, observation, i)) is not None:
             frame, other = shared
-            why = f"from there on it has the same place as {other}; both tracks are left out from there on"
+            why = f"it is then in the same place as {other}; both are left out from there on"
             found.append(Astray(name, float(observation.times_s[frame]), why, True))
             continue
         if (frame := _leapt(clip, observation, i, seen)) is not None:

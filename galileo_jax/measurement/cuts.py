@@ -38,7 +38,7 @@ RESTS = "is at rest, and so is everything else that is still seen"
 PLACED = "is put into its place by a hand before that"
 TAKEN = "is taken away by a hand from then on"
 TIPS_OVER = "tips over onto another face"
-FOLDS = "turns aside and slides past the object that it pushes: their centres come closer than at the hit"
+FOLDS = "turns aside and slides past what it pushes: their centres come closer than at the hit"
 HELD = "is moved by a hand before that: it accelerates differently from later"
 
 

@@ -66,7 +66,11 @@ def write_diagnosis_page(
             _fitted(trials, diagnosis),
             {_title(one): one.hypothesis.of(trials) for one in diagnosis.rounds},
         ),
-        failures(f"Where the model fails: {_title(diagnosis.rounds[0])}", shown[0]),
+        failures(
+            f"{'Residuals' if diagnosis.base.is_adequate else 'Where the model fails'}: "
+            f"{_title(diagnosis.rounds[0])}",
+            shown[0],
+        ),
         *(_added(name, charts) for name, charts in _before_after(diagnosis, shown)),
         _missing(report, trials.problems[0].observation.names),
         cells(diagnosis.base, several=len(trials.problems) > 1),

@@ -116,7 +116,7 @@ def formula_text(record: Mapping[str, Any]) -> str:
     )
     if not best["explains"]:
         return (
-            "No formula explains the missing force. The best one, {best['law']}, leaves more "
+            f"No formula explains the missing force. The best one, {best['law']}, leaves more "
             f"than noise ({leaves})."
         )
     doubt = "" if record["verdict"]["status"] == "law" else ", but it is not certain (see why)"

@@ -74,7 +74,11 @@ def _render(run: Run, fitted: PosteriorPredictive, charts: Mapping[str, Sequence
         _undetermined(run, fitted),
         _motion(run, fitted),
         chart_section("Velocity", VELOCITY, charts["velocity"], legend=key),
-        chart_section("Where the model fails", _failure(fitted), charts["residuals"]),
+        chart_section(
+            "Residuals" if failing_interval_of(fitted) is None else "Where the model fails",
+            _failure(fitted),
+            charts["residuals"],
+        ),
         _table("Parameters", shown_parameters(run.result)),
         details("Nuisance parameters", _table("", run.result.get("nuisances", {}), NUISANCES)),
         chart_section("Posterior", _draws_caption(run), charts["draws"], "stack"),

@@ -42,7 +42,7 @@ MEANINGS = {
 }
 OF_OBJECTS = (  # what parameters' names with numbers in them mean
     (re.compile(r"m(\d+)"), "mass of object {}"),
-    (re.compile(r"k(\d+)"), "friction of object {}"),
+    (re.compile(r"k(\d+)"), "friction coefficient of object {}"),
     (re.compile(r"mass_ratio_(\d+)_(\d+)"), "m{} / m{}"),
     (re.compile(r"start_offset_object(\d+)"), "start of object {}, from where it was marked"),
 )
@@ -90,8 +90,7 @@ def _reason(name: str, run: Run, fitted: PosteriorPredictive) -> str:
     if not fitted.moves.any():
         limit = math.tan(surroundings.angle_rad)
         if name == "k1":
-            return f"nothing moves: all that is known is that k1 is at least tan(angle) = "
-            f"{limit:.3f}"
+            return f"nothing moves: all that is known is k1 >= tan(angle) = {limit:.3f}"
         return "nothing moves"
     confounded, reason = confounded_with_gravity(run.result["parameters"], surroundings.has_surface)
     if reason is not None and name in confounded:
@@ -153,8 +152,7 @@ def fit_quality(result: dict[str, Any]) -> str:
             "effect; galileo compare tests which"
         )
     else:
-        text = f"The residuals are {size}: the model does not describe the data, do not trust "
-        "its parameters"
+        text = f"The residuals are {size}: the model does not describe the data"
     text = f"{text} (chi2 per degree of freedom {chi2:.2f})."
     return " ".join([text, *map(pull_text, result.get("pulls", []))])
 

@@ -161,7 +161,7 @@ def _confusion(rows: Sequence[Row]) -> list[str]:
     return [
         f"<h2>Hidden and named</h2>\n<p>Rows: the effect hidden in the clip. Columns: the "
         f"verdict of the diagnosis. {right} of {len(known)} are correct; none means that no "
-        "effect is missing.</p>\n{table(['', *verdicts], lines)}"
+        f"effect is missing.</p>\n{table(['', *verdicts], lines)}"
     ]
 
 

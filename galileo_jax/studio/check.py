@@ -37,8 +37,10 @@ def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple
         found.extend(_of_rectangle(marks))
     elif marks.has_table and marks.stick_m is None:
         found.append(
-            Remark("missing", "The scale is unknown. Drag the ruler onto a known length and type "
-            "the length.")
+            Remark(
+                "missing",
+                "The scale is unknown. Drag the ruler onto a known length and type the length.",
+            )
         )
     if problem:
         found.append(Remark("missing", problem))

@@ -57,7 +57,9 @@ def test_a_new_yaml_is_the_commands(tmp_path: Path, capsys) -> None:
     assert done.path == paths[0].with_suffix(".yaml")
     assert done.path.read_bytes() == paths[1].with_suffix(".yaml").read_bytes()
     assert done.clip.pixels_per_metre == 300
-    assert done.notes == ("fps: 30 taken from the video file; slow-motion files often state a wrong rate",)
+    assert done.notes == (
+        "fps: 30 taken from the video file; slow-motion files often state a wrong rate",
+    )
     assert f"note: {done.notes[0]}\n" in capsys.readouterr().err
 
 

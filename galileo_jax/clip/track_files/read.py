@@ -240,7 +240,9 @@ def _in_declared_order(
         order = list(range(len(wanted)))
         pairs = zip(wanted, table.names, strict=True)
         taken = [f"{theirs!r} as {ours}" for ours, theirs in pairs if theirs != ours]
-        warnings = (f"{path}: {', '.join(taken)}: assigned in this order",) if len(taken) > 1 else ()
+        warnings = (
+            (f"{path}: {', '.join(taken)}: assigned in this order",) if len(taken) > 1 else ()
+        )
     chosen = [index for index in order if index is not None]
     names = tuple(table.names[index] for index in chosen)
     return replace(table, names=names, position=table.position[chosen]), warnings

@@ -20,7 +20,9 @@ class Code(StrEnum):
     """How a fit ended; the value is the sentence for the user."""
 
     CONVERGED = "the fit converged"
-    MISFIT = "the fit converged, but does not describe the data to within the noise, even after a second search; try galileo diagnose"
+    MISFIT = (
+        "the fit converged, but noise does not explain the residuals, even after a second search"
+    )
     STEP_LIMIT = "the fit has not converged; try another --seed or --method mh"
     FAILED = "no simulation succeeded; check the clip's geometry"
 

@@ -68,9 +68,7 @@ def _put_right(tab: "Tab", marks: Marks) -> None:
         ui.label(f"Click on the middle of {tab.placing} in the video.").classes("say")
         plain_button("Never mind", lambda: _place(tab, ""), "place-none")
         return
-    ui.label("If a path leaves its object, go to the first wrong frame:").classes(
-        "soft small"
-    )
+    ui.label("If a path leaves its object, go to the first wrong frame:").classes("soft small")
     with ui.element("div").classes("rowline"):
         for one in marks.objects:
             plain_button(
