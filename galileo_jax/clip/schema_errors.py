@@ -12,7 +12,7 @@ from galileo_jax.runtime.known_names import did_you_mean
 EXAMPLES: dict[str, str] = {
     "scenario": "scenario: ramp",
     "fps": "fps: 30.0",
-    "objects": "objects: with one entry per object",
+    "objects": "objects: with one entry per object (galileo label: --size NAME, --shape NAME)",
     "name": "name: object1",
     "shape": "shape: box",
     "corners_px": "corners_px: [[20, 400], [600, 400], [600, 50], [20, 50]]",

@@ -67,9 +67,7 @@ def write_comparison_page(path: Path, title: str, report: ComparisonReport) -> N
     lead = diagnosis_text.adequacy(comparison, report.effects)
     sections = [
         header("comparison", title, lead, more, comparison.is_adequate),
-        failures(
-            "Residuals" if comparison.is_adequate else "Where the model fails", report.paths
-        ),
+        failures("Residuals" if comparison.is_adequate else "Where the model fails", report.paths),
         motion(report.clips, report.trials, {"fitted": report.theta}),
         cells(comparison, several=len(report.clips) > 1),
         provenance(

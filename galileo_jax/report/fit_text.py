@@ -51,11 +51,11 @@ OUTSIDE = (  # what nuisances mean that are far from what is usual
     (re.compile(r"foot_transition"), "the foot of the ramp multiplies the speed by {value:.3f}"),
     (
         re.compile(r"release_instant(?:_\d+)?"),
-        "object 1 is released {thousandths:+.0f} ms from the first frame",
+        "object 1 is released {size:.0f} ms {side} the first frame",
     ),
     (
         re.compile(r"start_offset_object(\d+)(?:_\d+)?"),
-        "object {} starts {thousandths:.1f} mm from where it was marked",
+        "object {} starts {size:.1f} mm from where it was marked",
     ),
 )
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
@@ -165,7 +165,8 @@ def pull_text(pull: Mapping[str, Any]) -> str:
     )
     for pattern, phrase in OUTSIDE:
         if found := pattern.fullmatch(name):
-            text = phrase.format(*found.groups(), value=value, thousandths=1e3 * value)
+            side = "before" if value < 0 else "after"
+            text = phrase.format(*found.groups(), value=value, size=1e3 * abs(value), side=side)
     return (
         f"{text[0].upper()}{text[1:]}, {abs(pull['z']):.0f} standard deviations from the "
         "expected value; galileo diagnose looks for the cause."

@@ -120,7 +120,7 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
         wanted = ", ".join(f"{key}: {words}" for key, words in zip(keys, choices, strict=True))
         raise InputError(
             f"{yaml_path}: {', '.join(keys)}: missing; {path.name} does not state "
-            f"{' and '.join(what)}; write {wanted}"
+            f"{' and '.join(what)}; write {wanted} (or give it to galileo label)"
         )
     if unit == "px":
         scale, origin = _scale(yaml_path, path, file, table.calibration), _origin(file, table)
