@@ -245,8 +245,8 @@ BROKEN = {
     "table_without_unit": ("a.csv", TABLE, "track_y: up", "a.yaml: track_units: missing"),
     "table_without_axis": ("a.csv", TABLE, "track_units: mm", "a.yaml: track_y: missing"),
     "table_without_both": ("a.csv", TABLE, "", "track_units, track_y: missing; a.csv does not "
-                           "state its unit of length and which way its y axis points; write track_units: "
-                           "m | cm | mm | km | in | ft | px, track_y: up | down"),
+                           "state its unit of length and which way its y axis points; write "
+                           "track_units: m | cm | mm | km | in | ft | px, track_y: up | down"),
     "table_in_wrong_unit": ("a.csv", TABLE, "track_units: m; track_y: down", "correct track_units"),
     "table_of_two_units": ("a.csv", broken(make.plain_table(True), "x (mm)", "x (m)"), "",
                            "in different units: m, mm"),
