@@ -93,8 +93,9 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
     by = " and ".join(f"{abs(change[key]):.2g}" for key in exact)
     keys = " and ".join(UNCERTAINTY_OF[key] for key in exact)
     return (
-        f"{text}; half a pixel at either end of a line as long as object 1's way down the ramp "
-        f"({way_px:.0f} px) changes k1 by {by}: declare {keys} to include that in its interval"
+        f"{text}. If they were read off the picture, half a pixel at either end of a line as long "
+        f"as object 1's way down the ramp ({way_px:.0f} px) would change k1 by {by}: declare "
+        f"{keys} to include that in its interval"
     )
 
 

@@ -190,7 +190,7 @@ def _number(name: str, value: Any, limit: Limit) -> float | int:
         within = f"at least {limit.low:g}" if high == math.inf else f"in [{limit.low:g}, {high:g}]"
         noun = "whole number" if limit.is_whole else "number"
         text = f"{value:g}" if isinstance(value, float) else str(value)
-        raise InputError(f"{name}: {text!r} is no {noun} {within}")
+        raise InputError(f"{name}: {text!r} is not a {noun} {within}")
     return int(value) if isinstance(value, Integral) and limit.is_whole else number
 
 

@@ -102,7 +102,7 @@ def test_it_ends_when_the_verdict_has_stood(verdicts, tmp_path):
     assert [one["outcome"] for one in document["experiments"]] == ["track"] * 3
     assert "nothing is known yet" in document["experiments"][0]["reason"]
     assert document["experiments"][1]["reason"] == "from above; now: air_drag 0.60, rolling 0.40"
-    assert document["ended"] == "the verdict (named) has stood"
+    assert document["ended"] == "the verdict (named) is settled"
     assert "it is named" in (tmp_path / "run" / "report.html").read_text()
     shares = [share for share, _ in told]
     assert shares == sorted(shares) and shares[-1] == 1.0
@@ -118,7 +118,7 @@ def test_a_law_is_left_with_its_formula(verdicts, tmp_path):
         None,
         *[{"text": LAW.text, "family": "power_v", "constants": {"c": 0.8, "n": 1.5}}] * 2,
     ]
-    assert document["ended"] == "the verdict (law) has stood" and found.status == "law"
+    assert document["ended"] == "the verdict (law) is settled" and found.status == "law"
     assert "a = -0.8 |v|^1.5" in (tmp_path / "report.html").read_text()
 
 
@@ -229,7 +229,7 @@ def test_what_cannot_be_rehearsed_is_tried_all_the_same(verdicts, monkeypatch):
     monkeypatch.setattr(module, "rehearsed", refuse)
     lab = Lab()
     found = gx.discover(lab, budget=3)
-    assert "not rehearsed (--can: height has no place" in found.experiments["reason"][1]
+    assert "not simulated (--can: height has no place" in found.experiments["reason"][1]
     assert len({one["height_m"] for one in lab.asked}) == 3
 
 
@@ -278,8 +278,8 @@ def test_wrong_calls(verdicts, tmp_path):
     mute = Lab()
     mute.describe = lambda: (_ for _ in ()).throw(LabError("--describe: a JSON object expected"))
     for lab, options, line in (
-        (Lab(), {"budget": 0}, "--budget: 0 is no number of experiments"),
-        (Lab(), {"timeout": 0.0}, "--timeout: 0 is no time"),
+        (Lab(), {"budget": 0}, "--budget: 0 is not a number of experiments"),
+        (Lab(), {"timeout": 0.0}, "--timeout: 0 is not a time"),
         (Lab(), {"out": tmp_path / "file"}, "a file; a folder expected|is a file"),
         (mute, {}, "LAB: --describe: a JSON object expected"),
         (tmp_path / "none", {}, "no such program"),

@@ -88,8 +88,8 @@ def test_a_correction_is_replaced_and_taken_back(tmp_path: Path) -> None:
     found = label(path, correct={"object1": [(12, 81, 113), (9,)]}).clip
     assert found.objects[0].corrections == ((12, 81, 113),)
     for wrong, words in (
-        ({"object1": [(3, 1)]}, "no frame, x and y"),
-        ({"object1": [(2.5, 1, 1)]}, "no frame, x and y"),
+        ({"object1": [(3, 1)]}, "not a frame, x and y"),
+        ({"object1": [(2.5, 1, 1)]}, "not a frame, x and y"),
         ({"object7": [(2, 1, 1)]}, "no 'object7' there"),
     ):
         with pytest.raises(InputError, match=words):

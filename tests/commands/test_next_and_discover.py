@@ -43,7 +43,7 @@ def test_next_prints_the_table_and_the_sentence(tmp_path, monkeypatch, capsys):
         (("next", "nowhere"), "nowhere: no result.json"),
         (("next", "nowhere", "--can", "hight=1:2"), "--can: unknown setting 'hight'"),
         (("discover", "nowhere"), "LAB: nowhere: no such program"),
-        (("discover", "nowhere", "--budget", "0"), "no whole number, 1 or more"),
+        (("discover", "nowhere", "--budget", "0"), "not a whole number, 1 or more"),
     ],
 )
 def test_wrong_calls_are_one_line(words, line, tmp_path, monkeypatch, capsys):

@@ -92,6 +92,6 @@ def test_beside_the_only_effect_nothing_promises_more(tmp_path):
 def test_the_reason_names_the_second_effect_and_its_price(two_effects):
     promise, best = two_effects
     why = reasons.pairs_promised(best, promise, 6)
-    assert f"{promise.beside} with {promise.effect}" in why.sentence
+    assert f"{promise.beside} together with {promise.effect}" in why.sentence
     assert "6 pairs" in why.sentence
     assert why.numbers["nats"] == promise.nats and why.numbers["price"] == promise.price
