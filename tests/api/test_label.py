@@ -90,7 +90,7 @@ def test_a_correction_is_replaced_and_taken_back(tmp_path: Path) -> None:
     for wrong, words in (
         ({"object1": [(3, 1)]}, "not a frame, x and y"),
         ({"object1": [(2.5, 1, 1)]}, "not a frame, x and y"),
-        ({"object7": [(2, 1, 1)]}, "no 'object7' there"),
+        ({"object7": [(2, 1, 1)]}, "there is no 'object7' to correct"),
     ):
         with pytest.raises(InputError, match=words):
             label(path, correct=wrong)

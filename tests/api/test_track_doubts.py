@@ -118,4 +118,4 @@ def test_the_run_says_what_is_taken_as_exact(tmp_path: Path, capsys) -> None:
     (told,) = json.loads((out / "result.json").read_text())["taken_as_exact"]
     assert "the fit takes ramp_angle_deg and pixels_per_metre as exact" in told
     assert f"note: {told}" in capsys.readouterr().err
-    assert "pixels_per_metre taken as exact" in (out / "report.html").read_text()
+    assert "pixels_per_metre as exact" in (out / "report.html").read_text()
