@@ -78,8 +78,7 @@ def with_errors_in_time(observation: Observation) -> tuple[Observation, list[str
             lasts = float(np.trapezoid(together[0] / together[0, 0], times))
             said.append(
                 f"{name}: errors in {axis} resemble those before them: {100 * share:.0f} % of "
-                "their "
-                f"variance, for {lasts:.2g} s; taken into account"
+                f"their variance, for {lasts:.2g} s; taken into account"
             )
     if not found:
         return observation, []

@@ -75,8 +75,8 @@ def told_by_hit(clip: Clip, observation: Observation) -> Found:
     update: dict[str, Any] = {"pixels_per_metre": scale, "is_scale_assumed": not is_known}
     if not is_known:
         line = (
-            "pixels_per_metre, size_m: null; lengths are counted in radii of the pucks, taken for "
-            "equal: frictions are not known, decelerations in radii/s^2 are"
+            "pixels_per_metre, size_m: null; lengths are in radii of the pucks, assumed equal: "
+            "friction coefficients are not known, decelerations in radii/s^2 are"
         )
         return _scaled(_with_radii(clip, radii), observation, larger, update, {}, line)
     update["pixels_per_metre_sd"] = scale * sd / apart

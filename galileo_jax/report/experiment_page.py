@@ -37,7 +37,7 @@ def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
         chart_section(
             "What each setting is expected to show",
             f"The expected gain in nats about {about}, against each of the settings; one point for "
-            "every combination that was looked at, the best in colour.",
+            "every combination that was tried, the best in colour.",
             [gains_chart(record)],
             "stack",
         ),

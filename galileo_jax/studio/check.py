@@ -53,8 +53,8 @@ def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple
         found.append(
             Remark(
                 "odd",
-                f"{marks.fps:.4g} frames per second is what the file says; slow-motion files "
-                "often say a wrong rate.",
+                f"{marks.fps:.4g} frames per second is the rate in the file; slow-motion files "
+                "often state a wrong one.",
             )
         )
     if marks.has_ramp and marks.upper and marks.foot:

@@ -116,7 +116,7 @@ def comparison_view(check: gx.Comparison) -> dict[str, Any]:
                 "start": one.failing_s[0],
                 "end": one.failing_s[1],
                 "sentence": (
-                    f"{one.title} misses the model most from {one.failing_s[0]:.2f} to "
+                    f"{one.title}: the model fails most from {one.failing_s[0]:.2f} to "
                     f"{one.failing_s[1]:.2f} s, in {one.worst.axis} {where}, by "
                     f"{one.worst.z:.0f} standard deviations."
                 ),

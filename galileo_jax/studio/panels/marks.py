@@ -52,7 +52,7 @@ def build(tab: "Tab") -> None:
     with ui.element("div").classes("rowline"):
         text = "Click on the object" if tab.placing else "Add object"
         plain_button(text, lambda: _place(tab), "add-object")
-        plain_button("Propose", session.propose, "propose", session.job is None)
+        plain_button("Find objects", session.propose, "propose", session.job is None)
     title("Check")
     place = ui.element("div").style("display: contents")
 
