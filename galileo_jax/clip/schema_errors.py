@@ -29,7 +29,10 @@ def first_problem(error: ValidationError) -> tuple[str, str]:
     """
     errors = error.errors(include_url=False)
     first = next((e for e in errors if e["type"] in ("extra_forbidden", "invalid_key")), errors[0])
-    return _key(first["loc"]), _problem(first)
+    missing = [e for e in errors if e["type"] == "missing"] if first["type"] == "missing" else []
+    others = [_key(e["loc"]) for e in missing[1:]]
+    more = f"; also missing: {', '.join(others)}" if others else ""
+    return _key(first["loc"]), _problem(first) + more
 
 
 def _key(loc: tuple[int | str, ...]) -> str:
