@@ -92,7 +92,7 @@ def ambiguity(rivals: Sequence[str]) -> str:
     alone = "" if len(others) == len(rest) else "alone or "
     return (
         f"{' and '.join(common)} explains the data {alone}together with {one_of}; "
-        f"this clip cannot show which."
+        f"this clip cannot tell which."
     )
 
 

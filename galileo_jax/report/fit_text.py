@@ -90,7 +90,7 @@ def _reason(name: str, run: Run, fitted: PosteriorPredictive) -> str:
     if not fitted.moves.any():
         limit = math.tan(surroundings.angle_rad)
         if name == "k1":
-            return f"nothing moves: all that is known is k1 >= tan(angle) = {limit:.3f}"
+            return f"nothing moves, so k1 is at least tan(angle) = {limit:.3f}; no more is known"
         return "nothing moves"
     confounded, reason = confounded_with_gravity(run.result["parameters"], surroundings.has_surface)
     if reason is not None and name in confounded:
@@ -152,7 +152,10 @@ def fit_quality(result: dict[str, Any]) -> str:
             "effect; galileo compare tests which"
         )
     else:
-        text = f"The residuals are {size}: the model does not describe the data"
+        text = (
+            f"The residuals are {size}: the model does not describe the data, so do not trust its "
+            "parameters"
+        )
     text = f"{text} (chi2 per degree of freedom {chi2:.2f})."
     return " ".join([text, *map(pull_text, result.get("pulls", []))])
 

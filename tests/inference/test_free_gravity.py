@@ -161,7 +161,12 @@ def test_without_a_scale_nothing_is_told(tmp_path):
         ({"m1": False}, False, set(), None),
         ({"gravity": True, "k1": False}, True, set(), None),
         ({"gravity": False, "k1": True}, True, {"gravity", "k1"}, "one slope"),
-        ({"gravity": False, "period": True}, False, {"gravity"}, "does not depend enough on gravity"),
+        (
+            {"gravity": False, "period": True},
+            False,
+            {"gravity"},
+            "does not depend enough on gravity",
+        ),
         ({"gravity": True, "rolling": False}, False, {"gravity", "rolling"}, "rolling cannot"),
         ({"gravity": True, "rolling": True}, False, set(), None),
         ({"gravity": False, "density_ratio": True}, False, {"gravity", "density_ratio"}, "mass"),
