@@ -13,22 +13,22 @@ from galileo_jax.runtime.jax_import import without_search_for_rocm
 from galileo_jax.runtime.known_names import did_you_mean
 
 VERBS = (
-    ("fit", "estimate masses and friction from clips"),
-    ("compare", "see whether the model is adequate, and where it fails"),
-    ("diagnose", "learn which effect is missing, add it, watch the error fall"),
-    ("track", "follow the objects of a clip; csv and an overlay to check by eye"),
-    ("studio", "do all of this in one page: film, mark, fit, add what is missing"),
+    ("fit", "estimate masses and friction coefficients from clips"),
+    ("compare", "test whether the model describes a clip, and where it fails"),
+    ("diagnose", "find the missing effect, add it, watch the error fall"),
+    ("track", "track the objects of a clip; check the overlay by eye"),
+    ("studio", "the same with the mouse, on a page in your browser"),
     ("label", "write points and scale into a clip's yaml"),
-    ("simulate", "make a clip with known truth"),
-    ("predict", "continue a fitted scene beyond its clip"),
-    ("toss", "estimate friction and bounce of a cube from tosses with measured poses"),
-    ("next", "choose the experiment that would tell most"),
-    ("discover", "let a lab measure until the verdict stands"),
+    ("simulate", "simulate a clip whose truth is known"),
+    ("predict", "predict how a fitted scene goes on after its clip"),
+    ("toss", "estimate friction and bounce of a cube from measured tosses"),
+    ("next", "choose the most informative next experiment"),
+    ("discover", "let a lab run experiments until the verdict is settled"),
     ("export", "write tracks and fits as csv, parquet or netCDF"),
-    ("train", "train and test the neural estimators"),
-    ("sweep", "many clips, many ways, from one config"),
-    ("effects", "list the effects that a model can have"),
-    ("scenarios", "list the scenes that a clip can show"),
+    ("train", "train and test the neural networks"),
+    ("sweep", "evaluate many clips, with several methods, from one config"),
+    ("effects", "list the effects that a model can contain"),
+    ("scenarios", "list the kinds of motion that a clip can show"),
 )
 
 USAGE = "usage: galileo VERB ..., galileo VERB --help, galileo --version"

@@ -60,7 +60,8 @@ def as_clip(clip: ClipLike, pixels_per_metre: float | None = None) -> Clip:
             return clip
         if clip.rectangle is not None:
             raise InputError(
-                f"{clip.path}: pixels_per_metre (given in the call): its rectangle tells it; "
+                f"{clip.path}: pixels_per_metre (given in the call): its rectangle already "
+                "gives the scale; "
                 "leave one of them out"
             )
         try:

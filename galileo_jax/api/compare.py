@@ -149,7 +149,7 @@ def compare(
       fit: a fit or the folder of a saved one; or tracks, clips or files, which are fitted first.
       effects: in the model of that fit, names ("a,b" or a sequence); a finished fit has its own.
       effects_from: Python files that register more effects.
-      engine: what rolls the model out: "auto" (rigid), "rigid", "c" or "mjx".
+      engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
       pixels_per_metre: overrides the clips' scale; None: the yaml's.
       seed: of starts and replicates; None: the fit's own, or 0.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
@@ -173,7 +173,7 @@ def compare(
             if effects or effects_from or pixels_per_metre:
                 where = fit if is_folder else ", ".join(fit.names)  # pyright: ignore
                 raise InputError(
-                    f"{where}: a run has its own effects and scale; give its clip to change"
+                    f"{where}: a run has its own effects and scale; give its clip instead to change"
                 )
             if is_folder:
                 fit = load_run(fit, engine=engine)  # pyright: ignore

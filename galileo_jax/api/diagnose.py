@@ -306,10 +306,11 @@ def diagnose(
 
     Args:
       tracks: a track or several (trials of the same objects); a clip or a file is tracked first.
-      add: "auto": what the verdict names; "none": nothing; or an effect's name.
+      add: what is added to the model: "auto": what the verdict names; "none": nothing; or the name
+        of an effect.
       effects_from: Python files that register more candidates.
-      engine: what rolls the model out: "auto" (rigid), "rigid", "c" or "mjx".
-      seed: of everything random; the same seed gives the same numbers.
+      engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
+      seed: of all random numbers; the same seed gives the same result.
       pixels_per_metre: overrides the clips' scale; None: the yaml's.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
         `{"round": row}` for the base model and for what is added, as in diagnosis.json's history,

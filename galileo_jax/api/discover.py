@@ -1,4 +1,4 @@
-"""`discover`: measure, diagnose, choose the next setting, until the verdict stands."""
+"""`discover`: measure, diagnose, choose the next setting, until the verdict is settled."""
 
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -59,7 +59,7 @@ class Discovery:
         """The result in one sentence."""
         made = len(self.document["experiments"])
         rounds = self.document["rounds"]
-        said = rounds[-1]["sentence"] if rounds else "No experiment gave a track."
+        said = rounds[-1]["sentence"] if rounds else "No experiment delivered a track."
         return f"After {made} experiment{'' if made == 1 else 's'}: {said}"
 
     @property
@@ -109,11 +109,11 @@ def discover(
     Args:
       lab: a program (docs/how-to/discover.md has the protocol), or an object with its two methods
         `describe` and `measure`.
-      budget: at most so many experiments, 1 to 999.
+      budget: the largest number of experiments, 1 to 999.
       out: folder for clips, verdicts and pages. None: nothing is left on disk.
-      timeout: after so long the lab is taken to hang, s.
+      timeout: how long to wait for an answer of the lab, s.
       effects_from: Python files that register more candidates.
-      seed: of everything random; the same seed gives the same numbers.
+      seed: of all random numbers; the same seed gives the same result.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
         `{"experiment": row}` when one is made, `{"round": row}` for each verdict.
       cancel: a flag with `is_set`, such as `threading.Event`.
@@ -129,9 +129,9 @@ def discover(
       ('named', ('air_drag',))
     """
     if not 1 <= budget <= 999:
-        raise InputError(f"--budget: {budget} is no number of experiments; 1 to 999 expected")
+        raise InputError(f"--budget: {budget} is not a number of experiments; 1 to 999 expected")
     if not 0 < timeout < float("inf"):
-        raise InputError(f"--timeout: {timeout:g} is no time; seconds above 0 expected")
+        raise InputError(f"--timeout: {timeout:g} is not a time; seconds above 0 expected")
     if isinstance(lab, str | Path):
         lab = program_of(lab, timeout)
     with ExitStack() as stack:
@@ -184,7 +184,7 @@ class _Loop:
         self._journal, self._budget, self._effects_from = journal, budget, effects_from
 
     def run(self) -> Diagnosis | None:
-        """Goes on until the verdict stands or the budget is spent."""
+        """Goes on until the verdict is settled or the budget is spent."""
         journal, found = self._journal, None
         while True:
             experiments = journal.experiments
@@ -288,13 +288,13 @@ class _Loop:
             if one["outcome"] == "lost"
         ]
         if not self._can:
-            return {}, "the lab has nothing to set that is known here: the same again"
+            return {}, "the lab has no setting that is known here: the same experiment again"
         if not tried:
             return middle(self._can), "nothing is known yet: the middle of what the lab allows"
         settings = candidates(self._can, lost, journal.seed)
         if not journal.tracks:
             return farthest(self._can, settings, tried), (
-                "no track yet: as different as can be from what came to nothing"
+                "no track yet: as different as possible from what failed"
             )
         if found is None:  # begun again after the budget was spent
             found = self.diagnosed_again()
@@ -302,14 +302,14 @@ class _Loop:
             with progress.part(self._share(DIAGNOSED), self._share(1.0)):
                 ahead = rehearsed(found, settings, journal.seed)
         except InputError as error:  # of scenes that nobody can set up here
-            said = f"not rehearsed ({_line(error)}): as different as can be from those so far"
+            said = f"not simulated ({_line(error)}): as different as possible from those so far"
             return farthest(self._can, settings, tried), said
         best = ahead.expected[0]
         journal.rounds[-1]["hypotheses"] = dict(ahead.hypotheses)
         if best.gain_nats < LITTLE:
             return farthest(self._can, settings, tried), (
-                f"no setting is expected to tell more than {best.gain_nats:.2f} nats: as different "
-                "as can be from those so far, to see whether the verdict holds"
+                f"no setting is expected to gain more than {best.gain_nats:.2f} nats: as different "
+                "as possible from those so far, to see whether the verdict holds"
             )
         odds = ", ".join(f"{name} {p:.2f}" for name, p in list(ahead.hypotheses.items())[:3])
         return dict(best.setting), (

@@ -33,7 +33,7 @@ from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
 THESIS_CHAINS = 16
 TRACKED, FITTED = 0.4, 0.6  # shares of the work, for progress
-OFF_THE_PLANE = "an object has a z_m: motion in a plane takes no notice; see --motion free"
+OFF_THE_PLANE = "an object has a z_m, which motion in a plane ignores; see --motion free"
 
 
 @in_float64
@@ -67,27 +67,27 @@ def fit(
     Args:
       tracks: a track or several (trials of the same objects: one joint fit); a clip or a file is
         tracked first.
-      method: "grad": Levenberg-Marquardt and a normal approximation, seconds; "mh":
-        Metropolis-Hastings, started from it; "cnn": a trained network, at once.
+      method: "grad": best fit and normal approximation (seconds); "mh": Metropolis-Hastings chains,
+        started from it; "cnn": a trained network (at once).
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
       free: declared quantities to infer instead, such as "gravity".
-      discrepancy: what no model explains: "none", or "gp": an acceleration of any form, whose size
-        and smoothness are inferred, is allowed for (method "grad").
+      discrepancy: "none", or "gp": allow for an acceleration of unknown form, whose size and
+        smoothness are inferred (method "grad").
       motion: "planar", or "free": from the first hit on objects turn and tip (MuJoCo's C engine).
-      engine: what rolls the model out: "auto" (rigid), "rigid", "c" or "mjx".
-      noise: the errors a track is taken to have: "camera", "bodies" or "tracker"; None: as the
-        clip was measured.
-      seed: of everything random; the same seed gives the same numbers.
+      engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
+      noise: the errors that a track is assumed to have: "camera", "bodies" or "tracker"; None: as
+        the clip was measured.
+      seed: of all random numbers; the same seed gives the same result.
       pixels_per_metre: overrides the clips' scale; None: the yaml's.
-      sampler: of method "mh": proposals.
-      max_steps: of method "mh", per chain, after the warm-up, a multiple of 25.
-      chains: of method "mh", how many; None: 8 (preset "thesis": 16).
-      init: of method "mh": what chains start from, "grad" or "cnn".
-      preset: of method "mh": "galileo", or "thesis": the sampler this project began with.
-      similarity: of preset "thesis": of velocity profiles.
-      acceptance: of preset "thesis": of a worse proposal, "coin" or "metropolis".
-      selection: of preset "thesis": how the answer is taken from the chains, "best" or
+      sampler: for method "mh": how steps are proposed.
+      max_steps: for method "mh": steps of each chain after the warm-up, a multiple of 25.
+      chains: for method "mh": number of chains; None: 8 (preset "thesis": 16).
+      init: for method "mh": where the chains start from, "grad" or "cnn".
+      preset: for method "mh": "galileo", or "thesis": the sampler that this project began with.
+      similarity: for preset "thesis": how velocity profiles are compared.
+      acceptance: for preset "thesis": how a worse proposal is accepted, "coin" or "metropolis".
+      selection: for preset "thesis": which sample of the chains is the answer, "best" or
         "least_variance".
       checkpoint: a file; chains that were interrupted go on from it.
       on_progress: called with the stage, the share done (0 to 1) and what there is of the result:
@@ -163,13 +163,15 @@ def _check(options: FitOptions) -> None:
         check_known("--sampler", "sampler", options.sampler, sampler_names())
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
-            f"--max-steps: {options.max_steps} is no multiple of {BLOCK_STEPS}, {BLOCK_STEPS} or "
+            f"--max-steps: {options.max_steps} is not a multiple of {BLOCK_STEPS}, "
+            f"{BLOCK_STEPS} or "
             "more"
         )
     if options.motion == "free":
         if options.engine not in ("auto", "c"):
             raise InputError(
-                f"--engine {options.engine}: it moves objects in a plane; --motion free takes c"
+                f"--engine {options.engine}: it moves objects in a plane only; --motion free "
+                "needs c"
             )
         for name in ("method", "init"):
             if getattr(options, name) == "cnn":
@@ -255,7 +257,7 @@ def _fitted(
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
         if options.discrepancy == "gp":
-            progress.report("allowing for what no model explains", FITTED)
+            progress.report("fitting an acceleration of unknown form", FITTED)
             found = fit_discrepancy(problem, gradient.z, gradient.free, options.seed)
             problem, gradient, posterior = found.free.trials, found.free.gradient, found.posterior
             extra |= {"discrepancy": found.summary}
@@ -309,7 +311,7 @@ def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:
     """Theirs, and the fit's that they began from where it leaves a misfit."""
     if gradient.code is not Code.MISFIT:
         return posterior.status.value
-    return f"{posterior.status.value}; where the chains began, {gradient.code.value}"
+    return f"{posterior.status.value}; at the start of the chains: {gradient.code.value}"
 
 
 def _by_chains(

@@ -127,7 +127,7 @@ def next_experiment(
         m, angles in degrees, masses in kg); known: height, release, angle, fps, place2, swap,
         mass1, mass2. None: other heights, and angles, near those of the first clip.
       about: a parameter, such as k2 or mass_ratio. None: which hypothesis holds.
-      seed: of everything random; the same seed gives the same numbers.
+      seed: of all random numbers; the same seed gives the same result.
       on_progress: called with the stage, the share done (0 to 1) and None.
       cancel: a flag with `is_set`, such as `threading.Event`.
 
@@ -205,7 +205,7 @@ def _loaded(
     """The first clip, the joint problem, the hypotheses and the clips' names."""
     given = [found] if isinstance(found, str | Path | Diagnosis) else list(found)
     if not given:
-        raise InputError("no run given; one or more expected")
+        raise InputError("no run given; at least one expected")
     if len(given) == 1 and not isinstance(given[0], Diagnosis):
         folder = _diagnosis_folder(Path(given[0]))
         if folder is not None:

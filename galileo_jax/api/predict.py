@@ -134,7 +134,7 @@ def predict(
     Args:
       fit: of one clip, or the folder of a run.
       seconds: how long beyond the clip's end, s, in (0, 60].
-      draws: how many rollouts of posterior draws, 2 to 10000.
+      draws: number of posterior draws that are simulated, 2 to 10000.
       seed: of the choice of draws.
       on_progress: called with the stage, the share done (0 to 1) and None.
       cancel: a flag with `is_set`, such as `threading.Event`.
@@ -151,9 +151,9 @@ def predict(
       True
     """
     if not 0 < seconds <= LONGEST_S:
-        raise InputError(f"--seconds: {seconds!r} is no time; seconds in (0, {LONGEST_S:g}]")
+        raise InputError(f"--seconds: {seconds!r} is not a time; seconds in (0, {LONGEST_S:g}]")
     if not 2 <= draws <= MOST_DRAWS:
-        raise InputError(f"--draws: {draws!r} is no whole number, 2 to {MOST_DRAWS}")
+        raise InputError(f"--draws: {draws!r} is not a whole number, 2 to {MOST_DRAWS}")
     with progress.scope(on_progress, cancel):
         fit = fit if isinstance(fit, Fit) else load_run(fit)
         if len(fit.measurements) > 1:

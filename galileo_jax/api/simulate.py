@@ -95,7 +95,7 @@ def simulate(
 
     Args:
       out: DIR/NAME.mp4, or DIR/NAME.csv for a track.
-      seed: of everything that is drawn, 0 or more.
+      seed: of all random numbers, 0 or more.
       scenario: "ramp", "multi" or "incline"; "fall", "flight", "spring", "liquid",
         "pendulum" or "from_above".
       shapes: of the objects on a ramp, in the order of the travel (box, cylinder, torus,
@@ -110,7 +110,7 @@ def simulate(
       motion: "planar"; "free": objects that are hit turn and tip (tracks only).
       z2: how far object 2 stands off the plane of the motion, towards the camera, m (free
         motion only).
-      solver: "rigid": the engine that also fits; "fine": small steps, not the engine that fits.
+      solver: "rigid": the engine that also fits; "fine": an independent one with small steps.
       values: further parameters of the scenario, such as {"k3": 0.2} or
         {"floor_restitution": 0.7}, SI units (the command's --set).
       floor: of a fall or a flight: the object bounces.
@@ -120,10 +120,10 @@ def simulate(
       like: NAME.truth.json of a clip on a ramp: the same objects in the same places, and what was
         hidden, filmed once more at this call's angle, frame rate, release and noise. None: other
         objects.
-      series: so many trials of the same objects: NAME_1, NAME_2, ...
+      series: number of trials of the same objects: NAME_1, NAME_2, ...
       track_only: a csv track in place of the video.
       track_noise: standard deviation of a track's coordinates, m.
-      effects: what is hidden, in the truth and not in the yaml: names, or name to
+      effects: what is hidden (written to the truth, not to the yaml): names, or name to
         {parameter: value} in SI units; what is left out is drawn (the command's --effect).
       strength: of the hidden effects, 0 (weak) to 1 (strong). None: drawn.
       effects_from: Python files that register further effects.

@@ -124,7 +124,7 @@ class Track:
 
         pixels, video = self.pixels, self.clip.video
         if pixels is None or video is None:
-            raise InputError(f"{self.clip.path}: video: missing; a csv track is tracked already")
+            raise InputError(f"{self.clip.path}: video: missing; a csv track is already tracked")
         picture, film = Path(folder) / "overlay.png", Path(folder) / "overlay.mp4"
         drawn = itertools.count(1)
         write_overlay_picture(picture, decode.frames(video), pixels)
@@ -223,7 +223,7 @@ def as_measurements(
     """
     given = as_list(tracks)
     if not given:
-        raise InputError("no clip given; one or more expected")
+        raise InputError("no clip given; at least one expected")
     clips = [
         as_clip(one.clip if isinstance(one, Track) else one, pixels_per_metre) for one in given
     ]

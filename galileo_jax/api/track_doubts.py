@@ -32,7 +32,7 @@ def with_track_doubts(
     if not lost and not is_far:
         return dict(result)
     found = dict(result)
-    found_wrong = lost or [f"no motion of this model comes near the track (chi2 {chi2:.0f})"]
+    found_wrong = lost or [f"no motion of this model comes close to the track (chi2 {chi2:.0f})"]
     found["status"] = "; but ".join([*filter(None, [result.get("status")]), ", ".join(found_wrong)])
     if is_far and not lost:
         found["warnings"] = [*result.get("warnings", []), _far(measurements, chi2)]
@@ -42,8 +42,8 @@ def with_track_doubts(
 def _far(measurements: Sequence[Measurement], chi2: float) -> str:
     """What to look at where chi2 is in the thousands and no track is seen to go astray."""
     text = (
-        f"chi2 per degree of freedom is {chi2:.0f}: before you believe that a force is missing, "
-        "see whether the objects are what is tracked"
+        f"chi2 per degree of freedom is {chi2:.0f}: before you conclude that a force is missing, "
+        "check that the track follows the objects"
     )
     absences = [
         (back - gone, name, back)
@@ -51,10 +51,10 @@ def _far(measurements: Sequence[Measurement], chi2: float) -> str:
     ]
     if absences:
         away_s, name, back = max(absences)
-        text += f", {name} from {back:.2f} s on above all: it was not seen for {away_s:.2f} s"
+        text += f", above all {name} from {back:.2f} s on: it had not been seen for {away_s:.2f} s"
     videos = [m.clip.source or str(m.clip.path) for m in measurements if m.clip.video is not None]
     if videos:
-        text += "; the overlay shows it: galileo track " + shlex.quote(videos[0])
+        text += "; see the overlay: galileo track " + shlex.quote(videos[0])
     return text
 
 
@@ -84,7 +84,7 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
         exact.append("pixels_per_metre")
     if not exact:
         return None
-    text = f"{clip.path}: {' and '.join(exact)} taken as exact"
+    text = f"{clip.path}: the fit takes {' and '.join(exact)} as exact"
     way_px = _way_px(measured)
     if k1 is None or clip.ramp_angle_deg is None or way_px < 1:
         return text
@@ -93,8 +93,9 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
     by = " and ".join(f"{abs(change[key]):.2g}" for key in exact)
     keys = " and ".join(UNCERTAINTY_OF[key] for key in exact)
     return (
-        f"{text}; half a pixel at either end of a line as long as object 1's way down the ramp "
-        f"({way_px:.0f} px) changes k1 by {by}: declare {keys} to have that in its interval"
+        f"{text}. If they were read off the picture, half a pixel at either end of a line as long "
+        f"as object 1's way down the ramp ({way_px:.0f} px) would change k1 by {by}: declare "
+        f"{keys} to include that in its interval"
     )
 
 

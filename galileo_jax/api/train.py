@@ -97,7 +97,7 @@ def train(
         value = overrides[name]
         if value is not None and not (isinstance(value, int) and value >= least):
             option = name.replace("_", "-")
-            raise InputError(f"--{option}: '{value}' is no whole number, {least} or more")
+            raise InputError(f"--{option}: '{value}' is not a whole number, {least} or more")
     out = Path(out)
     if out.exists() and not out.is_dir():
         raise InputError(f"--out: {out} is a file; a folder expected")

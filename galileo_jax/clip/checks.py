@@ -82,7 +82,7 @@ def _check_rolls(key: str, item: ClipObject, scenario: str, fail: Any) -> None:
     if not SCENARIOS[scenario].has_ramp:
         fail(key, f"{given} means nothing in scenario {scenario}, where nothing is touched")
     if item.shape == "box" and item.rolls:
-        fail(key, f"{given}, but a box slides; leave it out, or mend shape")
+        fail(key, f"{given}, but a box slides; leave it out, or correct shape")
     if item.shape == "sphere" and item.rolls is False:
         fail(key, "false, but a sphere rolls as far as friction lets it; leave it out")
 

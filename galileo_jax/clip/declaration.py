@@ -160,7 +160,7 @@ class Declaration:
         found = {one[0]: list(one) for one in listed or ()}
         for one in self.correct.get(name, ()):
             if len(one) not in (1, 3) or one[0] != int(one[0]):
-                raise InputError(f"--correct {name}: {list(one)} is no frame, x and y")
+                raise InputError(f"--correct {name}: {list(one)} is not a frame, x and y")
             found.pop(int(one[0]), None)
             if len(one) == 3:
                 found[int(one[0])] = [int(one[0]), *_numbers(f"--correct {name}", one[1:], 2)]

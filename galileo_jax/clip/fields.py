@@ -70,7 +70,7 @@ def _thread(value: float) -> float:
     if not MIN_THREAD_M <= value <= MAX_THREAD_M:
         hint = "; " + _suggestion(value, (0.01, "cm")) if value > MAX_THREAD_M else ""
         raise wrong(
-            f"{value:g} m is no length of a thread; {MIN_THREAD_M:g} to {MAX_THREAD_M:g} m "
+            f"{value:g} m is not a length of a thread; {MIN_THREAD_M:g} to {MAX_THREAD_M:g} m "
             f"expected{hint}"
         )
     return value
@@ -164,7 +164,7 @@ def _floor(value: Any) -> Any:
     # Integers of YAML may be larger than any float.
     if isinstance(value, int | float) and abs(value) < MAX_FLOOR_M:
         return float(value)
-    raise wrong(f"{short(value)} is no height; metres above the origin, or true, expected")
+    raise wrong(f"{short(value)} is not a height; metres above the origin, or true, expected")
 
 
 def _rolls(value: Any) -> Any:
@@ -173,7 +173,8 @@ def _rolls(value: Any) -> Any:
     if isinstance(value, int | float) and 0 < value <= 1:
         return float(value)
     raise wrong(
-        f"{short(value)} is no share J / (m r^2) in (0, 1]; a share such as 0.667 (hollow ball), "
+        f"{short(value)} is not a share J / (m r^2) in (0, 1]; a share such as 0.667 (hollow "
+        "ball), "
         "or true (solid), expected"
     )
 
@@ -220,7 +221,9 @@ def _is_real(value: Any) -> bool:
 
 def _name(value: str) -> str:
     if not value.isidentifier():
-        raise wrong(f"{short(value)} is no name; letters, digits and _ expected, such as object1")
+        raise wrong(
+            f"{short(value)} is not a name; letters, digits and _ expected, such as object1"
+        )
     return value
 
 
@@ -228,7 +231,7 @@ def _corrections(value: Any) -> Any:
     """A list of [frame, x, y]; pydantic sees to the numbers."""
     is_list = isinstance(value, list | tuple)
     if not is_list or not all(isinstance(one, list | tuple) and len(one) == 3 for one in value):
-        raise wrong(f"{short(value)} is no list of [frame, x, y], such as [[24, 312.0, 221.5]]")
+        raise wrong(f"{short(value)} is not a list of [frame, x, y], such as [[24, 312.0, 221.5]]")
     frames = [one[0] for one in value]
     if len({*map(str, frames)}) < len(frames):
         raise wrong(f"{short(value)} has a frame twice; one place for each frame expected")

@@ -122,7 +122,7 @@ def updated_file(path: Path, content: Mapping[str, Any]) -> tuple[str, tuple[str
     old_text = path.read_text(encoding="utf-8-sig")
     text, has_comments = updated_text(old_text, content, KEY_ORDER)
     is_lost = not has_comments and "#" in old_text
-    return text, (f"{path} was written afresh; its comments are lost",) if is_lost else ()
+    return text, (f"{path} was written anew; its comments are lost",) if is_lost else ()
 
 
 def _yaml_path(clip_path: Path) -> Path:
@@ -139,7 +139,7 @@ def _defaults(clip_path: Path, declared: Declaration) -> tuple[dict[str, Any], t
     if declared.fps is not None:
         return {"video": clip_path.name}, ()
     fps = round(probe(clip_path).fps, 4)
-    note = f"fps: {fps:g} taken from the container; slow-motion clips often lie about it"
+    note = f"fps: {fps:g} taken from the video file; slow-motion files often state a wrong rate"
     return {"video": clip_path.name, "fps": fps}, (note,)
 
 
@@ -152,7 +152,7 @@ def _listed(yaml_path: Path, listed: Any, name: str) -> Mapping[str, Any]:
     for item in listed if isinstance(listed, list) else ():
         if isinstance(item, dict) and item.get("name") == name:
             return item
-    raise InputError(f"{yaml_path}: objects: no {name!r} there to put right")
+    raise InputError(f"{yaml_path}: objects: there is no {name!r} to correct")
 
 
 def _with_objects(

@@ -138,7 +138,7 @@ def find_yaml(path: Path) -> Path:
             return path.with_suffix(suffix)
     raise InputError(
         f"{path}: no {path.with_suffix('.yaml').name} beside it; "
-        f"write one: galileo label {path} --help"
+        "describe the scene with galileo label (see galileo label --help) or galileo studio"
     )
 
 

@@ -27,11 +27,9 @@ TOLERANCE_PER_SIZE = 0.125
 TOLERANCE_PER_DISTANCE = 0.06
 """Error of height per metre from the foot: a declared angle that is off by 3.4 degrees."""
 
-MEND_PIXELS = "mend point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre"
-MEND_LENGTHS = "mend track_origin, ramp_angle_deg, direction, size_m or track_units"
-MEND_OWN_CSV = (
-    "mend ramp_angle_deg, size_m or the csv (x along the travel, y up, from the foot of the ramp)"
-)
+MEND_PIXELS = "correct point_px, origin_px, ramp_angle_deg, direction, size_m or pixels_per_metre"
+MEND_LENGTHS = "correct track_origin, ramp_angle_deg, direction, size_m or track_units"
+MEND_OWN_CSV = "correct ramp_angle_deg, size_m or the csv (x along, y up, from the foot)"
 
 MIN_SIZE_PX = 2.0
 """An object that would appear smaller cannot be followed: its size or the scale is wrong."""
@@ -104,11 +102,11 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
         SCENARIOS[clip.scenario].has_ramp and has_origin and clip.ramp_angle_deg is not None
     )
     if clip.is_own_track:
-        mend, mend_pair = MEND_OWN_CSV, "mend size_m or the csv's columns"
+        mend, mend_pair = MEND_OWN_CSV, "correct size_m or the csv's columns"
     elif in_pixels:
-        mend, mend_pair = MEND_PIXELS, "mend point_px, size_m or pixels_per_metre"
+        mend, mend_pair = MEND_PIXELS, "correct point_px, size_m or pixels_per_metre"
     else:
-        mend, mend_pair = MEND_LENGTHS, "mend size_m or track_units"
+        mend, mend_pair = MEND_LENGTHS, "correct size_m or track_units"
     angle = math.radians(clip.ramp_angle_deg or 0.0)
     placed = [
         (index, item, _outline(item, centres_m[item.name], angle if is_on_ramp else 0.0))
@@ -146,7 +144,7 @@ def find_odd_size(clip: Clip) -> tuple[str, str] | None:
             return (
                 f"objects[{index}].size_m ({item.name})",
                 f"{list(item.size_m)} m would be {size_px:.3g} px at {clip.pixels_per_metre:g} "
-                f"pixels per metre, in a frame of {width} x {height}; mend size_m or "
+                f"pixels per metre, in a frame of {width} x {height}; correct size_m or "
                 "pixels_per_metre",
             )
     return None

@@ -13,7 +13,7 @@ from galileo_jax.runtime.known_names import did_you_mean
 EXAMPLES: dict[str, str] = {
     "scenario": "scenario: ramp",
     "fps": "fps: 30.0",
-    "objects": "objects: with one entry per object",
+    "objects": "objects: with one entry per object (galileo label: --size NAME, --shape NAME)",
     "name": "name: object1",
     "shape": "shape: box",
     "corners_px": "corners_px: [[20, 400], [600, 400], [600, 50], [20, 50]]",
@@ -32,7 +32,10 @@ def first_problem(error: ValidationError) -> tuple[str, str]:
     """
     errors = error.errors(include_url=False)
     first = next((e for e in errors if e["type"] in ("extra_forbidden", "invalid_key")), errors[0])
-    return _key(first["loc"]), _problem(first)
+    missing = [e for e in errors if e["type"] == "missing"] if first["type"] == "missing" else []
+    others = [_key(e["loc"]) for e in missing[1:]]
+    more = f"; also missing: {', '.join(others)}" if others else ""
+    return _key(first["loc"]), _problem(first) + more
 
 
 def _key(loc: tuple[int | str, ...]) -> str:

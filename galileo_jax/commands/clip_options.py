@@ -62,5 +62,5 @@ def corrections(given: Sequence[Sequence[str]]) -> dict[str, list[list[float]]]:
             found.setdefault(name, []).append([float(value) for value in values])
         except ValueError:
             text = " ".join(values)
-            raise InputError(f"--correct {name}: {text!r} is no frame, x and y") from None
+            raise InputError(f"--correct {name}: {text!r} is not a frame, x and y") from None
     return found

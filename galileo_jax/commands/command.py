@@ -40,7 +40,7 @@ def whole_number(least: int) -> Callable[[str], int]:
         except ValueError:
             value = least - 1
         if value < least:
-            raise argparse.ArgumentTypeError(f"{text!r} is no whole number, {least} or more")
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, {least} or more")
         return value
 
     return parse
@@ -88,7 +88,7 @@ def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None 
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("stopped; what was finished is kept", file=sys.stderr)
+        print("stopped; what was finished is saved", file=sys.stderr)
         return 130
     except BrokenPipeError:
         # What is still in the buffer has nowhere to go, either: no second complaint at the exit.

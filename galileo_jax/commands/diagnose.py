@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from galileo_jax.api.diagnose import Diagnosis
 
 NUM_CANDIDATES = 5
+NAME_WIDTH = 26  # at least, of the column of effects
 FRICTIONS = ("k1", "k2")
 
 
@@ -83,20 +84,21 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
     from galileo_jax.report import diagnosis_text
 
     diagnosis, record = found.found, found.document
-    lines = ["", f"{'candidates':<26}{'probability':>12}{'evidence':>12}{'p':>9}  strength"]
     shown = list(zip(diagnosis.candidates, record["candidates"], strict=True))[:NUM_CANDIDATES]
+    width = max(NAME_WIDTH, *(len(entry["effect"]) + 2 for _, entry in shown))
+    lines = ["", f"{'candidates':<{width}}{'probability':>12}{'evidence':>12}{'p':>9}  strength"]
     for made, entry in shown:
         strengths = diagnosis_text.strength_texts(made.effects, entry).values()
         is_behind = diagnosis.candidates[0].log_evidence - made.log_evidence > BEHIND
         is_settled = made.hypothesis.fit.code in SETTLED
         evidence = "far behind" if is_behind and not is_settled else f"{made.log_evidence:+.1f}"
         lines.append(
-            f"{entry['effect']:<26}{entry['probability']:>12.3f}{evidence:>12}"
+            f"{entry['effect']:<{width}}{entry['probability']:>12.3f}{evidence:>12}"
             f"{diagnosis_text.p_text(entry['p_value']):>9}  "
             + (entry["law"] or ", ".join(strengths))
         )
     p_none = diagnosis_text.p_text(diagnosis.base.p_value)
-    lines.append(f"{'none':<26}{record['probability_none']:>12.3f}{'+0.0':>12}{p_none:>9}")
+    lines.append(f"{'none':<{width}}{record['probability_none']:>12.3f}{'+0.0':>12}{p_none:>9}")
     lines += ["", found.sentence]
     if hidden is not None:
         lines.append(f"truth: {hidden}")
@@ -107,8 +109,8 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
         lines += diagnosis_text.each_clip(record["each_clip"])
     for row in record.get("left_one_out", []):
         lines.append(
-            f"{row['clip']} predicted from the others: {row['rmse_before']:.4f} m/s, with what was "
-            f"added {row['rmse_after']:.4f}"
+            f"{row['clip']}, predicted from the other clips: off by {row['rmse_before']:.4f} m/s, "
+            f"with what was added by {row['rmse_after']:.4f} m/s"
         )
     lines += [f"- {sentence}" for sentence in found.verdict.advice]
     return [*lines, f"next: {found.next_command(out)}"]

@@ -48,13 +48,13 @@ def _parser() -> command.Parser:
     parser.add_argument("lab", metavar="LAB", help="a program; protocol: docs/how-to/discover.md")
     add = adder(parser, "discover")
     add("budget", type=command.whole_number(1))
-    parser.add_argument("--out", metavar="DIR", help="folder (default runs/LAB); called again with "
-                        "the same, an interrupted discovery goes on")  # fmt: skip
+    parser.add_argument("--out", metavar="DIR", help="folder (default runs/LAB); with the same "
+    "folder, an interrupted discovery continues")  # fmt: skip
     add("timeout", metavar="S")
     add("effects_from", metavar="FILE.py")
     add("seed", type=command.whole_number(0))
     parser.examples(
-        "galileo discover examples/lab.py                      until the verdict stands",
-        "galileo discover ./my_lab --budget 8 --out runs/lab   again: goes on where it was",
+        "galileo discover examples/lab.py                      until the verdict is settled",
+        "galileo discover ./my_lab --budget 8 --out runs/lab   again: continues where it was",
     )
     return parser

@@ -44,7 +44,8 @@ def main(argv: Sequence[str]) -> int | None:
     print(table(found, truth))
     if had_prediction and not (out / PREDICTION).is_file():
         command.say(
-            f"{out}: the earlier fit's prediction is gone; make it again: galileo predict {out} "
+            f"{out}: the prediction of the earlier fit was removed; make it again: galileo "
+            f"predict {out} "
             "--seconds S"
         )
     warn(stale_documents(out, [one.observation for one in measured]))
@@ -85,8 +86,9 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
 
     if not error["chi2_per_dof"] <= CHI2_HIGH:
         lines.append(
-            "The model misses the data by more than noise explains: do not trust its parameters. "
-            f"See where it fails: galileo compare {shlex.join(result['clips'])}"
+            "The model does not describe the data: do not trust its parameters. See where it "
+            f"fails: galileo compare {shlex.join(result['clips'])}; find what is missing: "
+            f"galileo diagnose {shlex.join(result['clips'])}"
         )
     return "\n".join(lines)
 

@@ -39,8 +39,9 @@ def main(argv: Sequence[str]) -> int | None:
 def _parser() -> command.Parser:
     parser = command.Parser(
         prog="galileo label",
-        description="Write what is known about a clip into the yaml beside it; what is not given\n"
-        "stays as it is there. Pixels: x right, y down, as any image viewer shows them.",
+        description="Write what is known about a clip into the yaml beside it; everything "
+        "else in it\n"
+        "stays as it is. Pixels: x to the right, y down, as in any image viewer.",
     )
     parser.examples(
         "galileo label clip.mp4 --scenario ramp --ramp 60 114 150 146 --origin 160 150 \\\n"
@@ -62,7 +63,8 @@ def _parser() -> command.Parser:
         "--level",
         default=LEVELS[-1],
         metavar="FOLDER",
-        help=f"Physics 101: about which folder this is declared, {', '.join(LEVELS)}; points are "
+        help=f"Physics 101: the folder that this is declared for, {', '.join(LEVELS)}; points "
+        "are "
         "always of the trial, sizes of the object (default %(default)s)",
     )
     _add_object_options(
@@ -83,7 +85,7 @@ def _add_object_options(objects: Any) -> None:
         "--point",
         ("NAME", "X", "Y"),
         3,
-        "its centre in its first frame, pixels (default: unchanged)",
+        "its centre in its first frame, in pixels (default: unchanged)",
     )
     add(
         "--size",
@@ -102,21 +104,21 @@ def _add_object_options(objects: Any) -> None:
         "--first-frame",
         ("NAME", "FRAME"),
         2,
-        "first frame in which it moves by itself, from 0; null: to be found (default of a new "
-        "object: 0)",
+        "first frame in which it moves freely, counted from 0; null: to be found (default of a "
+        "new object: 0)",
     )
     add(
         "--last-frame",
         ("NAME", "FRAME"),
         2,
-        "last frame that is used; null: that of the clip (default: unchanged)",
+        "last frame that is used; null: the clip's last (default: unchanged)",
     )
     add(
         "--correct",
         ("NAME", "FRAME"),
         "+",
-        "NAME FRAME X Y: where it is in a frame in which it was lost, pixels; it is followed on "
-        "from there. NAME FRAME takes that back (default: unchanged)",
+        "NAME FRAME X Y: where it is (pixels) in a frame in which it was lost; tracking "
+        "continues from there. NAME FRAME removes that correction (default: unchanged)",
     )
 
 
@@ -127,15 +129,15 @@ def _add_scene_options(scene: Any) -> None:
         "--pixels-per-metre-sd",
         type=float,
         metavar="PX",
-        help="how well that is known, one standard deviation (default: of --scale, by half a pixel "
-        "at either end; else unchanged)",
+        help="its uncertainty, one standard deviation (default: with --scale, that of half a "
+        "pixel at either end; else unchanged)",
     )
     add(
         "--scale",
         nargs=5,
         type=float,
         metavar=(*LINE, "METRES"),
-        help="two pixels and the distance between them, in place of --pixels-per-metre "
+        help="two pixels and the distance between them in metres, instead of --pixels-per-metre "
         "(default: unchanged)",
     )
     add(
@@ -143,46 +145,46 @@ def _add_scene_options(scene: Any) -> None:
         nargs=10,
         type=float,
         metavar=("X1", "Y1", "X2", "Y2", "X3", "Y3", "X4", "Y4", "WIDTH", "HEIGHT"),
-        help="corners of a rectangle in the plane of the motion, from the bottom left one "
-        "counter-clockwise, pixels, and its sides, metres, in place of --scale where the camera is "
-        "not square to the plane (default: unchanged)",
+        help="corners of a rectangle in the plane of the motion (pixels, counter-clockwise from "
+        "the bottom left) and its sides (metres), instead of --scale if the camera is not "
+        "square to the plane (default: unchanged)",
     )
     add(
         "--lens",
         nargs="+",
         type=float,
         metavar=("K1", "SD"),
-        help="how it bends straight lines: r half diagonals from the middle are drawn at "
-        "r (1 + K1 r^2) (default: unchanged)",
+        help="its radial distortion: a point r half diagonals from the middle appears at r (1 + "
+        "K1 r^2) (default: unchanged)",
     )
     add("--ramp-angle", type=float, metavar="DEG", help="of the ramp, degrees (default: unchanged)")
     add(
         "--ramp-angle-sd",
         type=float,
         metavar="DEG",
-        help="how well that is known, one standard deviation (default: of --ramp, by half a pixel "
-        "at either end; else unchanged)",
+        help="its uncertainty, one standard deviation (default: with --ramp, that of half a "
+        "pixel at either end; else unchanged)",
     )
     add(
         "--ramp",
         nargs=4,
         type=float,
         metavar=LINE,
-        help="two pixels on the ramp: its angle and direction, in place of --ramp-angle "
-        "(default: unchanged)",
+        help="two pixels on the ramp, which give its angle and direction, instead of "
+        "--ramp-angle (default: unchanged)",
     )
     add(
         "--origin",
         nargs=2,
         type=float,
         metavar=("X", "Y"),
-        help="foot of the ramp, pixels (default: unchanged)",
+        help="foot of the ramp, in pixels (default: unchanged)",
     )
     add(
         "--origin-sd",
         type=float,
         metavar="PX",
-        help="how well either coordinate is known, one standard deviation (default: of --origin, "
+        help="uncertainty of either coordinate, one standard deviation (default: with --origin, "
         "half a pixel; else unchanged)",
     )
 

@@ -32,8 +32,8 @@ def main(argv: Sequence[str]) -> int | None:
 def _parser() -> command.Parser:
     parser = command.Parser(
         prog="galileo predict",
-        description="Continue a fitted scene beyond its clip, with 95 % intervals from the "
-        "posterior: will it move, how far, where does it stop, does it hit.",
+        description="Predict how a fitted scene goes on after its clip, with 95 % intervals: do "
+        "the objects move, how far, where do they stop, do they hit each other.",
     )
     parser.add_argument("run", type=Path, metavar="RUN", help="the folder that fit wrote")
     parser.add_argument("--out", type=Path, metavar="DIR", help="where to write (default: RUN)")

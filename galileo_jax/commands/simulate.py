@@ -1,4 +1,4 @@
-"""`galileo simulate`: make a clip with known truth (video or track, yaml, truth)."""
+"""`galileo simulate`: simulate a clip whose truth is known (video or track, yaml, truth)."""
 
 import argparse
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""`galileo sweep`: many clips, many ways, from one config; stopped and taken up again at will."""
+"""`galileo sweep`: evaluate many clips, with several methods; can be stopped and resumed."""
 
 from collections import Counter
 from collections.abc import Sequence

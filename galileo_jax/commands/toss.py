@@ -37,7 +37,7 @@ def _lines(found: "TossFit") -> list[str]:
     if left_out:
         lines.append(f"{left_out} without a flight before the first impact: left out")
     if not found.document["converged"]:
-        lines.append("the search did not come to an end; take a shorter --window")
+        lines.append("the search did not end; use a shorter --window")
     if (rest := found.document.get("second_half")) is not None:
         place = 100 * rest["median_place_over_edge"]
         lines.append(

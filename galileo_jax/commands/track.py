@@ -1,4 +1,4 @@
-"""`galileo track`: follow the objects of a clip; csv and an overlay to check by eye."""
+"""`galileo track`: track the objects of a clip; check the overlay by eye."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ def main(argv: Sequence[str]) -> int | None:
     clip = load_clip(call.clip, pixels_per_metre=call.pixels_per_metre)
     warn(clip.warnings)
     if clip.video is None:
-        raise InputError(f"{clip.path}: video: missing; a csv track is tracked already")
+        raise InputError(f"{clip.path}: video: missing; a csv track is already tracked")
     out: Path = call.out or Path(f"{clip.path.stem}_track")
     from galileo_jax.api.track import track
 
@@ -44,7 +44,7 @@ def main(argv: Sequence[str]) -> int | None:
         command.say(line)
     if clip.pixels_per_metre is None:
         command.say(
-            "note: no csv in metres: pixels_per_metre is not known; give --pixels-per-metre"
+            "note: no csv in metres, because pixels_per_metre is not known; give --pixels-per-metre"
         )
     for name in [*written, "overlay.png", "overlay.mp4"]:
         print(out / name)
@@ -71,8 +71,8 @@ def _summary(track: Track) -> list[str]:
 def _parser() -> command.Parser:
     parser = command.Parser(
         prog="galileo track",
-        description="Follow the objects of a clip. Writes csv tracks in pixels and, if the scale "
-        "is known, in metres, and the paths drawn over the video.",
+        description="Track the objects of a clip. Writes csv tracks in pixels and, if the scale "
+        "is known, in metres, and a video with the paths drawn over it.",
     )
     parser.add_argument("clip", type=Path, metavar="CLIP", help="video or its yaml")
     parser.add_argument(
@@ -85,8 +85,8 @@ def _parser() -> command.Parser:
         action="append",
         default=[],
         metavar=("NAME", "FRAME"),
-        help="NAME FRAME X Y: where it is in a frame in which it was lost, pixels; it is followed "
-        "on from there, besides the yaml's corrections",
+        help="NAME FRAME X Y: where it is (pixels) in a frame in which it was lost; tracking "
+        "continues from there, in addition to the yaml's corrections",
     )
     parser.examples(
         "galileo track clip.mp4",

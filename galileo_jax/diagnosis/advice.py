@@ -19,15 +19,15 @@ BESIDE_THE_CLIP = "measure a known length in the picture and the frame rate"
 LIKE_GRAVITY = {"ramp_angle", "scale_error", "frame_rate", "constant_force"}
 GRAVITY = {
     "slide": "film the same objects at another ramp angle, and measure the angle, a known length "
-    "in the picture and the frame rate: each of them acts like another gravity",
-    "fall": f"{BESIDE_THE_CLIP}: each of them acts like another gravity",
-    "flight": f"{BESIDE_THE_CLIP}: each of them acts like another gravity",
+    "in the picture and the frame rate: an error in any of them acts like a different gravity",
+    "fall": f"{BESIDE_THE_CLIP}: an error in any of them acts like a different gravity",
+    "flight": f"{BESIDE_THE_CLIP}: an error in any of them acts like a different gravity",
 }
 # Other groups of effects that imitate each other, and what separates them; {again} is another run.
 SEPARATES = (
     (
         {"air_drag", "viscous_drag", "stribeck"},
-        "{again}, as different as can be: quadratic drag grows with the square of the speed, "
+        "{again}, as different as possible: quadratic drag grows with the square of the speed, "
         "linear drag with the speed, and Stribeck friction falls with it",
     ),
     (
@@ -36,8 +36,8 @@ SEPARATES = (
     ),
     (
         {"friction_patch", "magnetic_brake", "surface_friction"},
-        "{again}: a brake takes force in proportion to the speed, a patch of friction does not, "
-        "and neither moves with the release",
+        "{again}: the force of a brake grows with the speed, that of a patch of friction does "
+        "not, and both stay in their place",
     ),
     (
         {"table_tilt", "constant_force", "surface_friction"},
@@ -46,7 +46,8 @@ SEPARATES = (
     ),
     (
         {"rolling", "constant_force", "surface_friction"},
-        "film at a steeper angle: inertia takes a share of every acceleration, a force does not",
+        "film at a steeper angle: rolling reduces every acceleration by the same share, a force "
+        "does not",
     ),
     (
         {"spring_tether", "constant_force"},
@@ -59,12 +60,12 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
     """Sentences for the user: what would tell more. Empty where nothing is open."""
     if verdict.status == "unknown":
         form = verdict.form
-        known = () if form is None else (f"it has the form of {FORM_MEANINGS[form]} ({form})",)
+        known = () if form is None else (f"it looks like {FORM_MEANINGS[form]} ({form})",)
         return (
             *known,
-            "look at the missing acceleration against time, speed and place: an effect of your own "
-            "takes ten lines (docs/how-to/write_an_effect.md), then run diagnose with "
-            "--effects-from",
+            "look at the missing acceleration against time, speed and place; if you recognise "
+            "it, write it as an effect of your own (ten lines of Python: "
+            "docs/how-to/write_an_effect.md) and run diagnose again with --effects-from",
         )
     motion = "slide" if scene.has_surface else free_phase(scene)
     motion = "level" if scene.is_level else motion
@@ -89,13 +90,15 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
     if forms := named & set(FORM_MEANINGS):
         meant = " or ".join(FORM_MEANINGS[form] for form in sorted(forms))
         said.append(
-            f"it may as well be {meant}: {again}, for what belongs to a place "
-            "stays there, and what belongs to a speed comes with it"
+            f"it may also be {meant}: {again}; an effect of a place stays in its place, an "
+            "effect of the speed moves with the speed"
         )
     if verdict.law is not None:
-        said.append(f"it may as well be {verdict.law.text} (proposed_effect.py): {again}")
+        said.append(f"it may also be {verdict.law.text} (proposed_effect.py): {again}")
     if not said:
         said = [f"{again}, or use another angle of the ramp" if motion == "slide" else again]
     if num_clips == 1:
-        said.append("give several clips of the same objects together: they share their parameters")
+        said.append(
+            "diagnose several clips of the same objects together: they share masses and friction"
+        )
     return tuple(said)

@@ -150,7 +150,7 @@ def diagnose(
     verdict = _judged(trials, candidates, decisive, on_stage)
     views: list[View] = []
     if needs_laws(verdict, candidates):
-        on_stage("inferring the missing force without a form")
+        on_stage("inferring the missing force")
         # Where much is missing, friction without it is far from the truth: to 0, say. Beside a
         # wrong effect it may be so, too.
         near = reduced(trials, candidates[0].hypothesis, ())
@@ -163,7 +163,7 @@ def diagnose(
         law = law_to_doubt(both)
         better = []
         if law is not None:
-            on_stage("fitting the library's effects from where the law has all else")
+            on_stage("fitting the library's effects again, starting from the law")
             better = singles_beside(race, law, candidates)
         if better:
             candidates = _improved(trials, candidates, better, decisive, seed, compared)

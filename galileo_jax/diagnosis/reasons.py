@@ -9,8 +9,8 @@ from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.model.effects.forms.form import Form
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
-NOTABLE_NATS = 1.0  # a prior that is more of a lead than this is told
-PLAIN_ODDS = 1000.0  # larger odds are told as a power of ten
+NOTABLE_NATS = 1.0  # a prior that is more of a lead than this is mentioned
+PLAIN_ODDS = 10_000.0  # larger odds are written as a power of ten
 
 
 def p_text(p: float | None) -> str:
@@ -26,7 +26,9 @@ def p_equals(p: float) -> str:
 
 
 def times_text(nats: float) -> str:
-    """How many times as probable: '20 times', '10^31 times'."""
+    """How many times as probable: '20 times', '10^31 times', '1/13' for less than once."""
+    if nats < 0:
+        return f"1/{times_text(-nats).removesuffix(' times')}"
     if nats < log(PLAIN_ODDS):
         return f"{float(f'{exp(nats):.2g}'):g} times"  # 130, not 1.3e+02
     return f"10^{nats / log(10):.0f} times"
@@ -43,8 +45,8 @@ def without_effects(comparison: Comparison) -> tuple[Reason, ...]:
     said = "do not contradict" if is_adequate else "contradict"
     found = Reason(
         "adequate_without_effects" if is_adequate else "contradicted_without_effects",
-        f"The data {said} the model without effects: {p_equals(p_value)}, "
-        f"and {ADEQUATE_P:g} is needed.",
+        f"The data {said} the model without effects: {p_equals(p_value)} "
+        f"(at least {ADEQUATE_P:g} is needed).",
         {"p_value": p_value, "least_p_value": ADEQUATE_P},
     )
     scales, (low, high) = comparison.noise_scale, NOISE_SCALE_RANGE
@@ -62,7 +64,7 @@ def noise_misstated(noise_scale: Sequence[float]) -> Reason:
     times = f"{high:.2g}" if f"{low:.2g}" == f"{high:.2g}" else f"{low:.2g} to {high:.2g}"
     return Reason(
         "noise_misstated",
-        f"The errors of the positions look like noise {times} times as large as was stated.",
+        f"The position errors look like noise, but {times} times as large as stated.",
         {"noise_scale_least": low, "noise_scale_largest": high},
     )
 
@@ -71,8 +73,8 @@ def nothing_convinces(best: Candidate, needed: float) -> Reason:
     """Where the model without effects will do, the best effect does not convince."""
     return Reason(
         "nothing_convinces",
-        f"The best effect, {best.title}, is {times_text(best.log_odds)} as probable as none; "
-        f"{times_text(needed)} are needed where the model without effects will do.",
+        f"The best effect, {best.title}, is {times_text(best.log_odds)} as probable as no effect; "
+        f"{times_text(needed)} are needed, because the model without effects describes the data.",
         {"hypothesis": best.name, "log_odds": best.log_odds, "least_log_odds": needed},
     )
 
@@ -86,13 +88,14 @@ def pairs_tried(single: Candidate, form: Candidate | None, count: int) -> Reason
       count: how many pairs.
     """
     said = (
-        f"The best single effect, {single.title}, leaves {p_equals(single.p_value or 0.0)}"
+        f"The best single effect, {single.title}, leaves more than noise "
+        f"({p_equals(single.p_value or 0.0)})"
         if form is None
         else f"{form.title} explains the data better than any single effect"
     )
     return Reason(
         "pairs_tried",
-        f"{said}: {count} pairs of effects were tried.",
+        f"{said}, so {count} pairs of effects were tried.",
         {"hypothesis": single.name, "p_value": single.p_value, "num_pairs": count},
     )
 
@@ -107,10 +110,10 @@ def pairs_promised(single: Candidate, second: Promise, count: int) -> Reason:
     """
     return Reason(
         "pairs_promised",
-        f"{single.title} leaves {p_equals(single.p_value or 0.0)}, but {second.beside} "
-        f"with {second.effect} promises {second.nats:.1f} nats more evidence "
-        f"(two effects are {second.price:.1f} nats less probable than one): {count} pairs of "
-        "effects were tried.",
+        f"{single.title} explains the data ({p_equals(single.p_value or 0.0)}), but "
+        f"{second.beside} together with {second.effect} may make them "
+        f"{times_text(second.nats)} as probable (two effects are {times_text(second.price)} less "
+        f"probable than one before the data), so {count} pairs of effects were tried.",
         {
             "hypothesis": single.name,
             "p_value": single.p_value,
@@ -148,7 +151,7 @@ def explains(best: Candidate) -> Reason:
     """The best hypothesis of those that leave only noise."""
     return Reason(
         "explains",
-        f"With {best.title} only noise is left: {p_equals(best.p_value or 0.0)}; "
+        f"With {best.title} only noise is left ({p_equals(best.p_value or 0.0)}); "
         f"it is {times_text(best.log_odds)} as probable as no effect.",
         {"hypothesis": best.name, "p_value": best.p_value, "log_odds": best.log_odds},
     )
@@ -159,8 +162,8 @@ def nothing_explains(best: Candidate) -> Reason:
     p_value = best.p_value or 0.0
     return Reason(
         "nothing_explains",
-        f"No effect, pair or form leaves only noise: the most probable, {best.title}, leaves "
-        f"{p_equals(p_value)}.",
+        f"No effect, pair of effects or form without a name explains the data: with the most "
+        f"probable, {best.title}, {p_equals(p_value)}.",
         {"hypothesis": best.name, "p_value": p_value},
     )
 
@@ -170,7 +173,7 @@ def no_law_explains(best: Candidate) -> Reason:
     law = best.law.text if best.law is not None else best.name
     return Reason(
         "no_law_explains",
-        f"No formula leaves only noise: the most probable, {law}, leaves "
+        f"No formula explains the data: with the most probable, {law}, "
         f"{p_equals(best.p_value or 0.0)}.",
         {"hypothesis": best.name, "p_value": best.p_value},
     )
@@ -178,14 +181,17 @@ def no_law_explains(best: Candidate) -> Reason:
 
 def no_formula() -> Reason:
     """The missing force suggested no formula."""
-    return Reason("no_formula", "No short formula promised to explain the missing force.", {})
+    return Reason(
+        "no_formula", "No short formula was found that could explain the missing force.", {}
+    )
 
 
 def less_probable_than_none(best: Candidate) -> Reason:
     """What explains the data is less probable than no effect at all."""
     return Reason(
         "less_probable_than_none",
-        f"{best.title} is less probable than no effect: luck would do as well.",
+        f"{best.title} explains the data, but is less probable than no effect: chance would "
+        "explain them as well.",
         {"hypothesis": best.name, "log_odds": best.log_odds},
     )
 
@@ -195,8 +201,8 @@ def better_but_contradicted(better: Candidate, best: Candidate) -> Reason:
     ahead = better.log_odds - best.log_odds
     return Reason(
         "better_but_contradicted",
-        f"{better.title} is {times_text(ahead)} as probable as {best.title}, yet leaves "
-        f"{p_equals(better.p_value or 0.0)}: neither is the truth.",
+        f"{better.title} is {times_text(ahead)} as probable as {best.title}, but leaves more than "
+        f"noise ({p_equals(better.p_value or 0.0)}): neither can be the truth.",
         {
             "hypothesis": best.name,
             "rival": better.name,
@@ -239,14 +245,14 @@ def only_a_form(form: Candidate, name: Candidate | None) -> Reason:
     if name is None:
         return Reason(
             "only_a_form",
-            f"Only {form.title}, a form without a name, leaves nothing but noise.",
+            f"Only {form.title}, a form without a name, explains the data.",
             {"hypothesis": form.name, "p_value": form.p_value},
         )
     ahead = form.log_odds - name.log_odds
     return Reason(
         "only_a_form",
         f"{form.title}, a form without a name, is {times_text(ahead)} as probable as {name.title}, "
-        "the best with a name.",
+        "the best effect with a name.",
         {"hypothesis": form.name, "rival": name.name, "log_odds_behind": ahead},
     )
 
@@ -259,8 +265,8 @@ def contested(best: Candidate, rival: Candidate, needed: float) -> Reason:
     return Reason(
         "contested" if is_close else "less_probable",
         f"{rival.title} explains the data, too: {first.title} is {times_text(abs(behind))} as "
-        f"probable as {second.title}, and {'only ' if is_close else ''}{times_text(needed)} would "
-        "decide.",
+        f"probable as {second.title}; {times_text(needed)} "
+        f"{'would be needed to decide' if is_close else 'decide'}.",
         {
             "hypothesis": best.name,
             "rival": rival.name,
@@ -295,9 +301,13 @@ def contested_together(
 
 
 def _before_the_data(best: Candidate, rival: Candidate) -> str:
-    """How much of a lead is prior; empty where that is little."""
+    """How much of a lead is prior, a sentence; empty where that is little."""
     ahead = best.log_prior - rival.log_prior
-    return f", and was {times_text(ahead)} before the data" if ahead > NOTABLE_NATS else ""
+    return (
+        f" Before the data it was already {times_text(ahead)} as probable."
+        if ahead > NOTABLE_NATS
+        else ""
+    )
 
 
 def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) -> Reason:
@@ -314,8 +324,8 @@ def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) ->
     behind = best.log_odds - others[0].log_odds
     return Reason(
         "decisive",
-        f"{best.title} is {times_text(behind)} as probable as the next, {others[0].title}"
-        f"{_before_the_data(best, others[0])} ({times_text(needed)} are needed).",
+        f"{best.title} is {times_text(behind)} as probable as the next, {others[0].title} "
+        f"({times_text(needed)} are needed).{_before_the_data(best, others[0])}",
         {
             "hypothesis": best.name,
             "rival": others[0].name,
@@ -335,8 +345,8 @@ def library_says_it(best: Candidate, law: Candidate) -> Reason:
     """
     return Reason(
         "library_says_it",
-        f"A formula, {law.title}, explains the data; fitted from there, {best.title} of the "
-        "library explains them as well, and needs no new formula.",
+        f"The formula {law.title} explains the data, but so does {best.title} of the library: no "
+        "new formula is needed.",
         {
             "hypothesis": best.name,
             "rival": law.name,
@@ -357,9 +367,10 @@ def told_apart(best: Candidate, rival: Candidate, expected: float, needed: float
     is_told = expected >= needed
     return Reason(
         "told_apart" if is_told else "not_told_apart",
-        f"If {best.title} is there, it is {times_text(expected)} as probable as {rival.title} "
-        f"after a clip like this one{_before_the_data(best, rival)}: "
-        + ("enough to tell them apart." if is_told else f"{times_text(needed)} are needed."),
+        f"If {best.title} is the truth, it is on average {times_text(expected)} as probable as "
+        f"{rival.title} after a clip like this one: "
+        + ("enough to separate them." if is_told else f"{times_text(needed)} are needed.")
+        + _before_the_data(best, rival),
         {
             "hypothesis": best.name,
             "rival": rival.name,
@@ -382,8 +393,8 @@ def constant_by_data(named: Candidate, form: Form, low: float, high: float) -> R
     known = form.named_values[named.name]
     return Reason(
         "constant_by_data",
-        f"{named.title} takes {form.constant_words} for {known:g}; by these data alone it lies "
-        f"between {low:.2g} and {high:.2g} (95 %).",
+        f"{named.title} assumes that {form.constant_words} is {known:g}; from these data alone it "
+        f"is between {low:.2g} and {high:.2g} (95 %).",
         {
             "hypothesis": named.name,
             "form": form.name,
@@ -404,11 +415,11 @@ def slow_errors(title: str, lasts_s: float, size: float, rival: Candidate, ahead
       rival: the most probable without them.
       ahead: nats by which they are more probable than it; less than 0 where they are less.
     """
-    times = f"{times_text(ahead)} as" if ahead >= 0 else f"1/{exp(-ahead):.2g} as"
+    times = f"{times_text(ahead)} as"
     return Reason(
         "slow_errors",
-        f"Errors of the track that change within {lasts_s:.2g} s, {size:.2g} times as large as is "
-        f"stated of a point, beside {title} are {times} probable as {rival.title}.",
+        f"Slow errors of the track (changing within {lasts_s:.2g} s, {size:.2g} times as large as "
+        f"stated for a point), together with {title}, are {times} probable as {rival.title}.",
         {
             "hypothesis": rival.name,
             "beside": title,

@@ -73,7 +73,7 @@ def expect(
     log_odds = np.array([one.log_odds for one in beliefs.of])
     found = []
     for i, setting in enumerate(settings):
-        progress.report("rehearsing experiments", i / len(settings))
+        progress.report("simulating possible experiments", i / len(settings))
         proposal = propose(clip, trials, scale, setting, seconds)
         rehearsed = rehearse(proposal, trials, beliefs.of, seed)
         gain = about_hypotheses(rehearsed, log_odds, beliefs.margin, seed)
@@ -110,13 +110,11 @@ def sentence_of(best: Expected, about: str | None = None) -> str:
         return f"{where}: the interval of {about} becomes {narrower:.1f} times narrower"
     if math.isinf(best.lead_nats):
         return (
-            "only one hypothesis is open of those that can be rehearsed (a law is not): ask about "
-            "a parameter (--about)"
+            "only one hypothesis is left of those that can be simulated (a law cannot): ask "
+            "about a parameter (--about)"
         )
     if best.gain_nats < LITTLE:
-        return (
-            f"no setting is expected to tell more: at best {best.gain_nats:.2f} nats, with {where}"
-        )
+        return f"no setting is expected to help: at best {best.gain_nats:.2f} nats, with {where}"
     return (
         f"{where}: named with probability {best.named:.2f} "
         f"({best.gain_nats:.2f} nats expected about which hypothesis holds)"
@@ -164,9 +162,9 @@ def _check_about(trials: JointProblem, beliefs: Beliefs, about: str) -> None:
     if about not in (*shared, *ratio):
         known = ", ".join([*shared, *ratio])
         raise InputError(
-            f"--about: {about!r} is no parameter of a likely hypothesis; known: {known}"
+            f"--about: {about!r} is not a parameter of a likely hypothesis; known: {known}"
         )
     if re.fullmatch(r"m\d+", about) and not is_any_weighed(trials):
         raise InputError(
-            f"--about: {about}: motion tells the ratio of masses only; {RATIO} expected"
+            f"--about: {about}: a motion shows only the ratio of the masses; {RATIO} expected"
         )

@@ -136,7 +136,7 @@ class Program:
         try:
             return answer.decode("utf-8")
         except UnicodeDecodeError:
-            raise LabError("the answer is no text; a csv track expected") from None
+            raise LabError("the answer is not text; a csv track expected") from None
 
     def _wait(self, process: "subprocess.Popen[bytes]", out: IO[bytes]) -> None:
         ends_s = time.monotonic() + self.timeout_s

@@ -115,7 +115,9 @@ def _check(clip: Clip, given: Setting) -> None:
     if len(clip.objects) > 2 and "swap" in given:
         raise InputError("--can: swap: of two objects only")
     if "angle" in given and not MIN_RAMP_ANGLE_DEG <= float(given["angle"]) < 90.0:
-        raise InputError(f"--can: angle: {given['angle']:g} is no slope; 1 to 89 degrees expected")
+        raise InputError(
+            f"--can: angle: {given['angle']:g} is not a slope; 1 to 89 degrees expected"
+        )
 
 
 def _start(clip: Clip, first: Problem, given: Setting, angle_deg: float) -> np.ndarray:

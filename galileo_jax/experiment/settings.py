@@ -190,7 +190,7 @@ def _number(name: str, text: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"--can: {name}: {text!r} is no number; LOW:HIGH or A|B|C expected")
+        raise InputError(f"--can: {name}: {text!r} is not a number; LOW:HIGH or A|B|C expected")
     return value
 
 

@@ -47,7 +47,7 @@ def _reason(alike: Sequence[str], frictions: Sequence[str], others: Sequence[str
         )
     if alike:
         return (
-            f"gravity and {' and '.join(alike)} cannot be told apart: each of them multiplies all "
+            f"gravity and {' and '.join(alike)} cannot be separated: each of them multiplies all "
             "accelerations; leave gravity as declared, or measure the others"
         )
     if frictions:
@@ -61,4 +61,4 @@ def _reason(alike: Sequence[str], frictions: Sequence[str], others: Sequence[str
             "gravity and density_ratio cannot both be determined: declare mass, size and "
             "liquid_density"
         )
-    return "this motion does not depend on gravity enough to tell it"
+    return "this motion does not depend enough on gravity to determine it"

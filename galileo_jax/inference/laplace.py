@@ -58,8 +58,8 @@ def two_solutions(trials: JointProblem, fit: GradientFit) -> str | None:
         f"{value:.3g} ({share:.0%})" for value, share in zip(values, shares(fit), strict=True)
     )
     return (
-        f"{len(every)} solutions explain the clip about as well: {trials.names[i]} {told}; the "
-        "intervals hold them all"
+        f"{len(every)} solutions explain the clip about equally well: {trials.names[i]} {told}; "
+        "the intervals contain them all"
     )
 
 

@@ -29,6 +29,8 @@ def per_mass_unit(unit: str) -> str | None:
     """The unit of a force constant over a mass; None where `unit` is not that of one."""
     if unit in _UNITS:
         return _UNITS[unit]
+    if unit.startswith("kg "):
+        return unit.removeprefix("kg ")
     return f"{unit}/kg" if unit.partition("/")[0].split(" ")[0] in ("kg", "N", "J", "W") else None
 
 

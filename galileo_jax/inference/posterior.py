@@ -20,10 +20,12 @@ if TYPE_CHECKING:
 class Status(StrEnum):
     """How a sampling ended; the value is the sentence for the user."""
 
-    CONVERGED = "R-hat and effective sample size reached what was asked for"
-    STEP_LIMIT = "the step limit came before convergence; allow more steps or fix parameters"
+    CONVERGED = "R-hat and effective sample size reached their targets"
+    STEP_LIMIT = (
+        "the chains did not converge within the step limit; allow more steps or fix parameters"
+    )
     STUCK_CHAIN = "a chain never moved; check its start and the scale of the proposals"
-    FIXED_LENGTH = "ran its fixed number of steps; convergence was not asked for"
+    FIXED_LENGTH = "ran its fixed number of steps; convergence was not tested"
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class Posterior:
 
     @property
     def is_converged(self) -> bool:
-        """True where R-hat and effective sample size reached what was asked for."""
+        """True where R-hat and effective sample size reached their targets."""
         return self.status is Status.CONVERGED
 
     def __getitem__(self, name: str) -> np.ndarray:

@@ -35,7 +35,7 @@ SCALE_WARNING = (
 )
 
 FREE_SCALE_WARNING = (
-    "nothing in this motion tells the scale: give --pixels-per-metre to have lengths in metres"
+    "nothing in this motion shows the scale: give --pixels-per-metre to get lengths in metres"
 )
 
 UNSHOWN = ("latent", "given")  # roles that have no entry of their own in result.json

@@ -79,17 +79,17 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
         last = int(seen[-1])
         if (shared := _shared(clip, observation, i)) is not None:
             frame, other = shared
-            why = f"what is tracked there is where {other} is; what follows of both is left out"
+            why = f"it is then in the same place as {other}; both are left out from there on"
             found.append(Astray(name, float(observation.times_s[frame]), why, True))
             continue
         if (frame := _leapt(clip, observation, i, seen)) is not None:
-            why = "what is tracked there moves as nothing can that hits nothing: something else"
+            why = "its velocity jumps although it hits nothing: something else is tracked there"
             if SCENARIOS[clip.scenario].is_level:
-                why += ", or the puck after a blow by what is not in the scene"
+                why += ", or the puck was struck by something that is not in the scene"
             # Where it is lost soon after, what led there was no longer the puck, either.
             is_left_out = SCENARIOS[clip.scenario].is_level
         elif _is_lost(track, i, last, clip.objects[i].last_frame):
-            frame, why = last + 1, "nothing there looks like it; what follows is left out"
+            frame, why = last + 1, "nothing there looks like it; the rest is left out"
             is_left_out = False  # nothing follows
         else:
             continue

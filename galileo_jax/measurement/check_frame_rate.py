@@ -52,7 +52,7 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
     likely = _likely(wanted, clip.container_fps, found.is_least)
     name, more = observation.names[0], "at least " if found.is_least else ""
     doubt = (
-        f"{clip.path}: fps: {clip.fps:g}, but by {name}'s path gravity would be {more}"
+        f"{clip.path}: fps: {clip.fps:g}, but from {name}'s path gravity would be {more}"
         f"{found.value:.2g} m/s^2, not {clip.gravity:g}; likely {likely}"
     )
     if clip.pixels_per_metre is not None:

@@ -38,13 +38,13 @@ from galileo_jax.observation.observation import Observation
 STOPPED = "is stopped by something that is not in the scene"
 STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
 LANDED = "comes down on the table"
-RESTS = "is at rest, as is all that is still seen"
-PLACED = "is put into its place by a hand until then"
+RESTS = "is at rest, and so is everything else that is still seen"
+PLACED = "is put into its place by a hand before that"
 TAKEN = "is taken away by a hand from then on"
-TIPS_OVER = "tips over, and goes on on another face"
-FOLDS = "turns aside and slides past what it pushes: their centres come closer than when they hit"
-IS_HELD = "is held until then"
-HELD = "is moved by a hand until then: it accelerates otherwise than on its way"
+TIPS_OVER = "tips over onto another face"
+FOLDS = "turns aside and slides past what it pushes: their centres come closer than at the hit"
+IS_HELD = "is held before that"
+HELD = "is moved by a hand before that: it accelerates differently from later"
 
 SWINGS = ("pendulum", "spring", "liquid")
 
@@ -67,7 +67,7 @@ class Cut:
 
     def __str__(self) -> str:
         """One line, without the clip's name."""
-        return f"{self.name} {self.why}; what is {self.side} {self.time_s:.3f} s is left out"
+        return f"{self.name} {self.why}; everything {self.side} {self.time_s:.3f} s is left out"
 
 
 def is_board(clip: Clip) -> bool:

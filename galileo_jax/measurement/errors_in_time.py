@@ -77,8 +77,8 @@ def with_errors_in_time(observation: Observation) -> tuple[Observation, list[str
                 found.append(own)
             lasts = float(np.trapezoid(together[0] / together[0, 0], times))
             said.append(
-                f"{name}: errors of {axis} follow each other: {100 * share:.0f} % of their "
-                f"variance, for {lasts:.2g} s; taken into account"
+                f"{name}: errors in {axis} are correlated in time: {100 * share:.0f} % of "
+                f"their variance, over {lasts:.2g} s; taken into account"
             )
     if not found:
         return observation, []

@@ -58,7 +58,7 @@ def with_errors_of_clock(observation: Observation) -> tuple[Observation, list[st
         speed = float(np.median(np.abs(np.diff(way_m) / np.diff(times))))
         late_s = float(np.sqrt(together[0, 0] * np.median(variance))) / speed
         said.append(
-            f"{name}: its times are late and early by {1e3 * late_s:.1f} ms over several rows, as "
+            f"{name}: its times are off by {1e3 * late_s:.1f} ms over several rows, as "
             "the places along its path show; taken into account"
         )
     if not found:

@@ -79,7 +79,7 @@ def told_by_hit(clip: Clip, observation: Observation) -> Found:
         share = (apart - sum(known)) / (2 - len(known)) if len(known) < 2 else 0.0
         radii = [max(share, 1e-3) if size is None else size[0] for size in sizes]
         names = ", ".join(item.name for item in clip.objects if item.size_m is None)
-        line = f"{names}: size_m: null; a radius of {share:.4f} m is taken, from the hit"
+        line = f"{names}: size_m: null; a radius of {share:.4f} m is used, from the hit"
         found = {
             f"{item.name}.size_m": {"mean": share, "sd": sd}
             for item in clip.objects
@@ -93,13 +93,13 @@ def told_by_hit(clip: Clip, observation: Observation) -> Found:
     update: dict[str, Any] = {"pixels_per_metre": scale, "is_scale_assumed": not is_known}
     if not is_known:
         line = (
-            "pixels_per_metre, size_m: null; lengths are counted in radii of the pucks, taken for "
-            "equal: frictions are not known, decelerations in radii/s^2 are"
+            "pixels_per_metre, size_m: null; lengths are in radii of the pucks, assumed equal: "
+            "friction coefficients are not known, decelerations in radii/s^2 are"
         )
         return _scaled(_with_radii(clip, radii), observation, larger, update, {}, line)
     update["pixels_per_metre_sd"] = scale * sd / apart
     line = (
-        f"pixels_per_metre: null; {scale:.1f} +- {scale * sd / apart:.1f} is taken, from the "
+        f"pixels_per_metre: null; {scale:.1f} +- {scale * sd / apart:.1f} is used, from the "
         "distance of the centres at the hit"
     )
     found = {"pixels_per_metre": {"mean": scale, "sd": scale * sd / apart}}

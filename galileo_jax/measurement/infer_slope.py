@@ -67,7 +67,7 @@ def infer_slope(clip: Clip, observation: Observation) -> Slope:
         where = " left of origin_px, the ramp's foot" if has_foot else ""
         raise InputError(
             f"{clip.path}: ramp_angle_deg: null, and {name} is seen in {points.shape[1]} frames"
-            f"{where}; too few to tell the slope; {remedy}"
+            f"{where}; too few to determine the slope; {remedy}"
         )
     away = points - points.mean(axis=1, keepdims=True)
     values, axes = np.linalg.eigh(away @ away.T)
@@ -83,7 +83,7 @@ def infer_slope(clip: Clip, observation: Observation) -> Slope:
         unit = "m" if clip.is_scale_known else "of the picture's units"
         raise InputError(
             f"{clip.path}: ramp_angle_deg: null, and {name} moves by only {length_m:.3g} {unit} on "
-            f"the ramp, too little to tell the slope; {remedy}"
+            f"the ramp, too little to determine the slope; {remedy}"
         )
     if along[0] < 0:
         if clip.is_own_track:

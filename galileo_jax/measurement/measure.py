@@ -168,7 +168,7 @@ def _with_foot(clip: Clip, remarks: list[str]) -> Clip:
     origin = (round(float(x), 1), round(float(y), 1))
     clip = clip.model_copy(update={"origin_px": origin})
     remarks.append(
-        f"{clip.path}: origin_px: null; {list(origin)} +- {_foot_sd_px(clip):.1f} is taken, from "
+        f"{clip.path}: origin_px: null; {list(origin)} +- {_foot_sd_px(clip):.1f} is used, from "
         f"the bend of {clip.objects[0].name}'s path"
     )
     return clip
@@ -197,7 +197,7 @@ def _with_slope(clip: Clip, remarks: list[str]) -> Measurement:
     clip = _inclined(clip, slope)
     remarks.append(
         f"{clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "
-        f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is taken"
+        f"{slope.angle_deg:.2f} +- {slope.sd_deg:.2f} degrees, which is used"
     )
     found = {"mean": slope.angle_deg, "sd": slope.sd_deg}
     return Measurement(clip, observation, observation, pixels, {"ramp_angle_deg": found})
@@ -213,7 +213,7 @@ def _with_sizes(measured: Measurement, remarks: list[str]) -> Measurement:
     )
     entries = dict(measured.inferred)
     for name, size in found.items():
-        remarks.append(f"{clip.path}: {name}: size_m: null; {list(size)} is taken, from its path")
+        remarks.append(f"{clip.path}: {name}: size_m: null; {list(size)} is used, from its path")
         entries[f"{name}.size_m"] = {"mean": list(size), "sd": SIZE_SD_M}
     clip = clip.model_copy(update={"objects": objects})
     return replace(measured, clip=clip, inferred=entries)

@@ -33,7 +33,9 @@ def load_or_make(task: Trainable, config: TrainConfig, folder: Path) -> Arrays:
     identity["digest"] = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:16]
     index = folder / INDEX
     if index.is_file() and json.loads(index.read_text(encoding="utf-8")) != identity:
-        raise InputError(f"{folder}: samples of other settings are there; remove it or take --out")
+        raise InputError(
+            f"{folder}: contains samples of other settings; remove it or give another --out"
+        )
     write_json(index, identity)
     count = -(-config.samples // task.shard_size)
     shards = []

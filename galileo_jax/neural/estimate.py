@@ -61,14 +61,14 @@ def cnn_posterior(
     """
     problem, *others = trials.problems
     if others:
-        raise InputError("--method cnn: one clip expected; take --method grad for joint fits")
+        raise InputError("--method cnn: one clip expected; use --method grad for joint fits")
     scene = problem.model.scene.surroundings
     if not scene.is_scale_known:
-        raise InputError("--method cnn: pixels_per_metre is needed; take --method grad")
+        raise InputError("--method cnn: pixels_per_metre is needed; use --method grad")
     if problem.model.effects:
-        raise InputError("--method cnn: its network knows no effects; take --method grad")
+        raise InputError("--method cnn: its network knows no effects; use --method grad")
     if infers_gravity(problem.model.nuisances):
-        raise InputError("--method cnn: its network takes gravity as declared; take --method grad")
+        raise InputError("--method cnn: its network takes gravity as declared; use --method grad")
     network = network or trained_network()
     seen = see(problem.observation, scene)
     summary = one_at_a_time(_summarise)(seen)
@@ -87,7 +87,7 @@ def cnn_posterior(
     if complaint:
         notes["warnings"] = [
             f"this clip is unlike those that the network was trained on ({complaint}): do not "
-            "trust its intervals; take --method grad"
+            "trust its intervals; use --method grad"
         ]
     posterior = Posterior(
         names=trials.names,

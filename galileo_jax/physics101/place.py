@@ -160,7 +160,7 @@ def content_of(place: Place, labels: Labels) -> tuple[dict[str, Any], tuple[str,
     warnings = ()
     if "pixels_per_metre" in defaults.keys() - declared.keys():
         warnings = (
-            f"{place.video}: pixels_per_metre: {defaults['pixels_per_metre']:g} is taken, from "
+            f"{place.video}: pixels_per_metre: {defaults['pixels_per_metre']:g} is used, from "
             "107.5 pixels to 6.35 cm at the ramp's top; `galileo label --scale` declares another",
         )
     content = {"video": place.video.name, **defaults, **declared, "objects": objects}

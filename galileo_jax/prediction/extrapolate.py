@@ -69,7 +69,7 @@ def roll_out(model: Model, engine: Engine, theta: np.ndarray, times_s: np.ndarra
     position, velocity = engine.simulate(theta)
     has_succeeded = np.isfinite(position).all(axis=(1, 2, 3))
     if not has_succeeded.any():
-        raise InputError("no rollout of the posterior's draws succeeded; fit the clip again")
+        raise InputError("no simulation of a posterior draw succeeded; fit the clip again")
     theta, position, velocity = (a[has_succeeded] for a in (theta, position, velocity))
     recorded = np.arange(position.shape[-1]) * model.record_dt_s
     shape = (*position.shape[:-1], len(times_s))

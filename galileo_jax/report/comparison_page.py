@@ -25,8 +25,8 @@ NUM_CELLS = 12
 FAILURES = (
     "Position and speed along the path, 0 at the foot: measured (dots) and fitted (line). Below, "
     "the residuals in units of the stated noise: filled along the path, hollow across it; 95 % of "
-    "noise is inside the grey band. Grey: transitions between phases. Yellow: the interval in "
-    "which the model fails worst."
+    "noise is inside the grey band. Grey: transitions between phases. Yellow, where the model "
+    "fails: the worst interval."
 )
 
 
@@ -67,7 +67,7 @@ def write_comparison_page(path: Path, title: str, report: ComparisonReport) -> N
     lead = diagnosis_text.adequacy(comparison, report.effects)
     sections = [
         header("comparison", title, lead, more, comparison.is_adequate),
-        failures("Where the model fails", report.paths),
+        failures("Residuals" if comparison.is_adequate else "Where the model fails", report.paths),
         motion(report.clips, report.trials, {"fitted": report.theta}),
         cells(comparison, several=len(report.clips) > 1),
         provenance(

@@ -23,6 +23,7 @@ from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CANDIDATES = 8
 ONLY_WIDE = ("", "log evidence", "log prior", "chi2 per dof", "p")  # of the candidates
+WRAPPED = '<div class="wrapped">{}</div>'
 BAR = '<div class="bar"><div style="width:{:.1f}%"></div></div>'
 
 
@@ -66,7 +67,11 @@ def write_diagnosis_page(
             _fitted(trials, diagnosis),
             {_title(one): one.hypothesis.of(trials) for one in diagnosis.rounds},
         ),
-        failures(f"Where the model fails: {_title(diagnosis.rounds[0])}", shown[0]),
+        failures(
+            f"{'Residuals' if diagnosis.base.is_adequate else 'Where the model fails'}: "
+            f"{_title(diagnosis.rounds[0])}",
+            shown[0],
+        ),
         *(_added(name, charts) for name, charts in _before_after(diagnosis, shown)),
         _missing(report, trials.problems[0].observation.names),
         cells(diagnosis.base, several=len(trials.problems) > 1),
@@ -178,10 +183,12 @@ def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -
         strengths = entry["law"] or ", ".join(named)
         rows.append(
             [
-                escape(entry["effect"]).replace("_", "_<wbr>").replace("+", "+<wbr>"),
+                WRAPPED.format(
+                    escape(entry["effect"]).replace("_", "_<wbr>").replace("+", "+<wbr>")
+                ),
                 BAR.format(100 * entry["probability"]),
                 f"{entry['probability']:.3f}",
-                escape(strengths),
+                WRAPPED.format(escape(strengths)),
                 f"{entry['log_evidence']:+.1f}",
                 f"{entry['log_prior']:+.1f}",
                 f"{entry['chi2_per_dof']:.2f}",

@@ -46,7 +46,7 @@ def noise_text(comparison: Comparison) -> str:
     if all(low <= scale <= high for scale in comparison.noise_scale):
         return ""
     size = " and ".join(f"{scale:.1f}" for scale in comparison.noise_scale)
-    return f"The tracking errors are {size} times what was stated."
+    return f"The tracking errors are {size} times as large as stated."
 
 
 def why(found: Sequence[Reason]) -> list[str]:
@@ -119,22 +119,23 @@ def formula_text(record: Mapping[str, Any]) -> str:
         return ""
     best = missing["best_formula"]
     if best is None:
-        return "No formula explains the missing force: none promised to."
+        return "No short formula was found that could explain the missing force."
     leaves = (
         f"{p_equals(best['p_value'])}, chi2 per degree of freedom {best['chi2_per_dof']:.2f}, "
         f"probability {best['probability']:.2g}"
     )
     if not best["explains"]:
         return (
-            "No formula explains the missing force. The best leaves more than noise: "
-            f"{best['law']} ({leaves})."
+            f"No formula explains the missing force. The best one, {best['law']}, leaves more "
+            f"than noise ({leaves})."
         )
     doubt = "" if record["verdict"]["status"] == "law" else ", but it is not certain (see why)"
     return f"A formula explains the missing force{doubt}: {best['law']} ({leaves})."
 
 
 CLIPS_KINDS = {
-    "shared": "each clip alone agrees with the model: a parameter they share differs between them",
+    "shared": "each clip alone agrees with the model: a parameter that they share differs "
+    "between them",
     "some": "some clips alone agree with the model, others do not",
     "alike": "no clip alone agrees with the model; the missing acceleration along the path is the "
     "same in all, within its errors",
@@ -152,9 +153,10 @@ def each_clip(record: Mapping[str, Any]) -> list[str]:
             for extra, sd in zip(one["extra_acceleration_m_s2"], one["sd_m_s2"], strict=True)
         )
         found.append(
-            f"{one['clip']}: chi2 per value {one['chi2_together']:.2f} fitted with the others, "
-            f"{one['chi2_alone']:.2f} alone ({p_equals(one['p_alone'])}); acceleration beyond the "
-            f"joint model in each quarter of its path: {parts} m/s^2"
+            f"{one['clip']}: chi2 per value {one['chi2_together']:.2f} when fitted with the "
+            "others, "
+            f"{one['chi2_alone']:.2f} alone ({p_equals(one['p_alone'])}); missing acceleration "
+            f"in each quarter of its path: {parts} m/s^2"
         )
     return found
 

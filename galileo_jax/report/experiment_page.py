@@ -35,15 +35,15 @@ def write_next_page(path: Path, record: Mapping[str, Any]) -> None:
         header("next experiment", title, lead),
         f"<h2>What is open</h2>\n<p>Probabilities of the hypotheses so far.</p>{items(odds)}",
         chart_section(
-            "What each setting would tell",
+            "What each setting is expected to show",
             f"The expected gain in nats about {about}, against each of the settings; one point for "
-            "every combination that was looked at, the best in colour.",
+            "every combination that was tried, the best in colour.",
             [gains_chart(record)],
             "stack",
         ),
-        f"<h2>Settings</h2>\n{table(head, rows)}\n<p class='soft'>named: how probable it is that "
-        "the true hypothesis is then far enough ahead of all others; lead: how far it is ahead on "
-        "average; hit: how probable it is that object 1 hits another object. next.json has all "
+        f"<h2>Settings</h2>\n{table(head, rows)}\n<p class='soft'>named: probability that the "
+        "true hypothesis is then far enough ahead of all others; lead: how far it is ahead on "
+        "average; hit: probability that object 1 hits another object. next.json has all "
         f"{len(record['settings'])}.</p>",
     ]
     write_text(path, document(f"{title}: next experiment", sections))
@@ -110,7 +110,7 @@ def write_discovery_page(path: Path, record: Mapping[str, Any], sentence: str) -
         "<h2>Verdicts</h2>\n"
         + table(["clips", "verdict", "effects", "p without"], verdicts)
         + f"\n<h3>In words</h3>\n{items(words)}",
-        f"<h2>Left alone</h2>\n{items(held)}" if held else "",
+        f"<h2>Settings that stay the same</h2>\n{items(held)}" if held else "",
     ]
     write_text(path, document("discovery", [part for part in sections if part]))
 

@@ -74,7 +74,11 @@ def _render(run: Run, fitted: PosteriorPredictive, charts: Mapping[str, Sequence
         _undetermined(run, fitted),
         _motion(run, fitted),
         chart_section("Velocity", VELOCITY, charts["velocity"], legend=key),
-        chart_section("Where the model fails", _failure(fitted), charts["residuals"]),
+        chart_section(
+            "Residuals" if failing_interval_of(fitted) is None else "Where the model fails",
+            _failure(fitted),
+            charts["residuals"],
+        ),
         _table("Parameters", shown_parameters(run.result)),
         details("Nuisance parameters", _table("", run.result.get("nuisances", {}), NUISANCES)),
         chart_section("Posterior", _draws_caption(run), charts["draws"], "stack"),
@@ -103,7 +107,7 @@ VELOCITY = (
 
 def _header(title: str, run: Run) -> str:
     result = run.result
-    effects = ", ".join(result["effects"]) or "none beyond friction and impact"
+    effects = ", ".join(result["effects"]) or "none besides friction and impact"
     mark = "" if result["converged"] else ' class="warn"'
     caution = fit_text.caution(result)
     cautions = [*([caution] if caution else []), *result.get("warnings", [])]
@@ -173,12 +177,12 @@ def _undetermined(run: Run, fitted: PosteriorPredictive) -> str:
 
 def _failure(fitted: PosteriorPredictive) -> str:
     text = (
-        "Residuals: measured minus fitted, in units of the stated noise. If the model and that "
-        "are right they show no pattern, and 95 % of them are inside the grey band. "
+        "Residuals: measured minus fitted, in units of the stated noise. If model and noise are "
+        "right, they show no pattern, and 95 % of them are inside the grey band. "
     )
     found = failing_interval_of(fitted)
     if found is None:
-        return text + "No interval deviates more than noise does."
+        return text + "No interval deviates more than noise would."
     name, axis, worst = found
     return (
         f"{text}Yellow: the interval that deviates most, {name} along {axis} from "

@@ -20,34 +20,40 @@ MEANINGS = {
     "start_velocity_x": "velocity in the first frame, along the travel",
     "start_velocity_y": "velocity in the first frame, upward",
     "start_speed": "speed in the first frame",
-    "start_angle": "direction of the throw, over the horizontal",
+    "start_angle": "direction of the throw, above the horizontal",
     "floor_restitution": "share of the speed left after a bounce",
     "floor_height": "height of the centre at a bounce",
-    "floor_grip": "share of the speed along the floor that a bounce takes",
+    "floor_grip": "share of the speed along the floor that is lost in a bounce",
     "wall_restitution": "share of the speed against a wall left after a bounce",
     "wall_grip": "most of the impulse along a wall, over that against it",
     "period": "period of the swing without damping",
     "damping": "rate at which the swing dies away",
-    "rest": "place of rest, below the first",
+    "rest": "position of rest, below the first frame's",
     "stiffness": "of the spring",
     "stretch": "how far the weight alone stretches the spring",
     "density_ratio": "density of the liquid over the object's",
     "liquid_drag": "drag constant c of c v|v|",
     "terminal_speed": "speed at which drag and weight balance",
-    "declared_angle": "ramp's angle, over what was declared",
-    "declared_scale": "share by which lengths are measured too long",
+    "declared_angle": "ramp's angle, minus the declared one",
+    "declared_scale": "relative error of the scale: lengths are measured too long by this share",
     "foot_transition": "factor on the speed after the foot of the ramp",
     "impact_restitution": "share of the closing speed left after the impact",
-    "contact_gap": "by how much further apart objects touch when they meet again",
-    "release_instant": "release after the first frame",
-    "noise_scale": "tracking noise over what the tracker stated",
+    "contact_gap": "by how much further apart the objects are when they touch again",
+    "release_instant": "time of the release after the first frame",
+    "noise_scale": "tracking noise divided by the stated one",
 }
 OF_OBJECTS = (  # what parameters' names with numbers in them mean
     (re.compile(r"m(\d+)"), "mass of object {}"),
-    (re.compile(r"k(\d+)"), "friction of object {}"),
+    (re.compile(r"k(\d+)"), "friction coefficient of object {}"),
     (re.compile(r"mass_ratio_(\d+)_(\d+)"), "m{} / m{}"),
-    (re.compile(r"wall_offset_from(\d+)"), "first end of wall {}, to the left of where it is said"),
-    (re.compile(r"wall_offset_to(\d+)"), "second end of wall {}, to the left of where it is said"),
+    (
+        re.compile(r"wall_offset_from(\d+)"),
+        "first end of wall {}, to the left of where it is declared",
+    ),
+    (
+        re.compile(r"wall_offset_to(\d+)"),
+        "second end of wall {}, to the left of where it is declared",
+    ),
     (re.compile(r"start_offset_object(\d+)"), "start of object {}, from where it was marked"),
 )
 OUTSIDE = (  # what nuisances mean that are far from what is usual
@@ -55,17 +61,17 @@ OUTSIDE = (  # what nuisances mean that are far from what is usual
     (re.compile(r"foot_transition"), "the foot of the ramp multiplies the speed by {value:.3f}"),
     (
         re.compile(r"release_instant(?:_\d+)?"),
-        "object 1 is let go {thousandths:+.0f} ms from the first frame",
+        "object 1 is released {size:.0f} ms {side} the first frame",
     ),
     (
         re.compile(r"start_offset_object(\d+)(?:_\d+)?"),
-        "object {} starts {thousandths:.1f} mm from where it was marked",
+        "object {} starts {size:.1f} mm from where it was marked",
     ),
 )
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
 # Residuals of the noise's size may still follow a pattern that noise does not have.
-PATTERNS = "galileo compare looks for a pattern in them"
+PATTERNS = "galileo compare tests whether they have a pattern"
 
 
 def meaning(name: str) -> str | None:
@@ -94,14 +100,14 @@ def _reason(name: str, run: Run, fitted: PosteriorPredictive) -> str:
     if not fitted.moves.any():
         limit = math.tan(surroundings.angle_rad)
         if name == "k1":
-            return f"nothing moves: k1 is at least tan(angle) = {limit:.3f}, no more is known"
+            return f"nothing moves, so k1 is at least tan(angle) = {limit:.3f}; no more is known"
         return "nothing moves"
     confounded, reason = confounded_with_gravity(run.result["parameters"], surroundings.has_surface)
     if reason is not None and name in confounded:
         return reason
     if re.fullmatch(r"m\d+", name):
         if run.clip.objects[int(name[1:]) - 1].mass_kg is not None:
-            return "declared as weighed; the motion does not depend on it"
+            return "its declared mass; the motion does not depend on it"
         if count < 2:
             return "the motion of a single object does not depend on its mass"
         if any(ratio["identified"] for ratio in ratios):
@@ -152,11 +158,14 @@ def fit_quality(result: dict[str, Any]) -> str:
         text = f"The residuals have the size of the stated noise; {PATTERNS}"
     elif chi2 <= CHI2_BAD:
         text = (
-            f"The residuals are {size}: more noise than stated, or an effect that the model "
-            "lacks; galileo compare says which"
+            f"The residuals are {size}: there is more noise than stated, or the model lacks an "
+            "effect; galileo compare tests which"
         )
     else:
-        text = f"The model misses the data by {size}; do not trust its parameters"
+        text = (
+            f"The residuals are {size}: the model does not describe the data, so do not trust its "
+            "parameters"
+        )
     text = f"{text} (chi2 per degree of freedom {chi2:.2f})."
     if found := result.get("discrepancy"):
         text = f"{text} {discrepancy_text(found)}"
@@ -180,10 +189,11 @@ def pull_text(pull: Mapping[str, Any]) -> str:
     )
     for pattern, phrase in OUTSIDE:
         if found := pattern.fullmatch(name):
-            text = phrase.format(*found.groups(), value=value, thousandths=1e3 * value)
+            side = "before" if value < 0 else "after"
+            text = phrase.format(*found.groups(), value=value, size=1e3 * abs(value), side=side)
     return (
-        f"{text[0].upper()}{text[1:]}, {abs(pull['z']):.0f} standard deviations from what is "
-        "usual; galileo diagnose looks for the cause."
+        f"{text[0].upper()}{text[1:]}, {abs(pull['z']):.0f} standard deviations from the "
+        "expected value; galileo diagnose looks for the cause."
     )
 
 

@@ -110,7 +110,7 @@ def _template() -> dict[str, Any]:
         "hoverlabel": {"bgcolor": _rgba("card"), "font": {"color": _rgba("ink")}},
         "legend": {"orientation": "h", "x": 0, "y": 0, "yref": "container", "yanchor": "bottom"},
         "xaxis": {**axis, "ticks": "outside", "showgrid": False, "showline": True, "nticks": 7},
-        "yaxis": {**axis, "ticks": "", "nticks": 5},
+        "yaxis": {**axis, "ticks": "", "nticks": 5, "exponentformat": "none"},
     }}  # fmt: skip
 
 

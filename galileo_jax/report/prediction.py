@@ -16,7 +16,7 @@ from galileo_jax.results.run import Run
 from galileo_jax.runtime.atomic_write import write_text
 
 LEAST_M = 5e-4  # of motion after the clip; less is not mentioned
-OVER = "everything is at rest when the clip ends and stays so: these values describe the clip"
+OVER = "everything is at rest when the clip ends and stays at rest: these values describe the clip"
 ALONE = "prediction.html"  # where there is no report to go into
 
 

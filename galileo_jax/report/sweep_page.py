@@ -56,13 +56,13 @@ def write_sweep_page(
 
 
 _EFFECT = (
-    "How far each estimate is from the truth, by the effect that was hidden in the clip. Where "
-    "no truth is known, the velocity error over the tracking noise: 1 is noise alone."
+    "Error of each estimate, by the effect that was hidden in the clip. Where no truth is known: "
+    "the velocity error divided by the tracking noise; 1 is noise alone."
 )
 _METHOD = "The same by method and by those of its options that differ between cells."
 _NO_TRUTH = (
-    "The velocity error over the tracking noise, by method and by those of its options that "
-    "differ: 1 is noise alone."
+    "The velocity error divided by the tracking noise, by method and by those of its options "
+    "that differ; 1 is noise alone."
 )
 
 
@@ -159,9 +159,9 @@ def _confusion(rows: Sequence[Row]) -> list[str]:
     lines = [[escape(h), *(_shaded(count[h, v], most) for v in verdicts)] for h in hidden]
     right = sum(n for (h, v), n in count.items() if h == v)
     return [
-        f"<h2>Hidden and named</h2>\n<p>Rows: the effect hidden in the clip. Columns: the verdict "
-        f"of the diagnosis. {right} of {len(known)} are named right; none means that no effect is "
-        f"missing.</p>\n{table(['', *verdicts], lines)}"
+        f"<h2>Hidden and named</h2>\n<p>Rows: the effect hidden in the clip. Columns: the "
+        f"verdict of the diagnosis. {right} of {len(known)} are correct; none means that no "
+        f"effect is missing.</p>\n{table(['', *verdicts], lines)}"
     ]
 
 

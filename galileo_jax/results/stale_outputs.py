@@ -58,7 +58,7 @@ def stale_documents(folder: Path, observations: Sequence[Observation]) -> list[s
         if document.get(TRACKS, now) != now:
             clips = " ".join(map(str, document.get("clips", [])))
             sentences.append(
-                f"{(folder / name).parent}: made of an earlier track; "
+                f"{(folder / name).parent}: made from an earlier track; "
                 f"make it again: galileo {verb} {clips}"
             )
     return sentences

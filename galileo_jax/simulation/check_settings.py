@@ -192,7 +192,7 @@ def _number(name: str, value: Any, limit: Limit) -> float | int:
         within = f"at least {limit.low:g}" if high == math.inf else f"in [{limit.low:g}, {high:g}]"
         noun = "whole number" if limit.is_whole else "number"
         text = f"{value:g}" if isinstance(value, float) else str(value)
-        raise InputError(f"{name}: {text!r} is no {noun} {within}")
+        raise InputError(f"{name}: {text!r} is not a {noun} {within}")
     return int(value) if isinstance(value, Integral) and limit.is_whole else number
 
 
@@ -210,7 +210,7 @@ def _size(size: Any) -> tuple[int, int]:
     sides: list[Any] = [] if isinstance(size, str) or not isinstance(size, Sequence) else [*size]
     if len(sides) != 2 or not all(map(_is_side, sides)):
         text = "x".join(map(str, sides)) if sides else str(size)
-        raise InputError(f"--size: {text!r} is no size; even numbers such as 640x360 expected")
+        raise InputError(f"--size: {text!r} is not a size; even numbers such as 640x360 expected")
     return int(sides[0]), int(sides[1])
 
 

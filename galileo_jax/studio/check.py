@@ -37,7 +37,10 @@ def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple
         found.extend(_of_rectangle(marks))
     elif marks.has_table and marks.stick_m is None:
         found.append(
-            Remark("missing", "The scale is unknown. Lay the stick on a known length, and type it.")
+            Remark(
+                "missing",
+                "The scale is unknown. Drag the ruler onto a known length and type the length.",
+            )
         )
     if problem:
         found.append(Remark("missing", problem))
@@ -50,8 +53,8 @@ def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple
         found.append(
             Remark(
                 "odd",
-                f"{marks.fps:.4g} frames per second is what the file says; slow-motion files "
-                "often say a wrong rate.",
+                f"{marks.fps:.4g} frames per second is the rate in the file; slow-motion files "
+                "often state a wrong one.",
             )
         )
     if marks.has_ramp and marks.upper and marks.foot:
@@ -73,7 +76,7 @@ def _of_rectangle(marks: Marks) -> list[Remark]:
     assert marks.rectangle is not None
     found = []
     if not marks.has_scale:
-        text = "Type the rectangle's width and height, or turn back to the stick."
+        text = "Type the rectangle's width and height, or switch back to the ruler."
         found.append(Remark("missing", text))
     turns = []
     for i in range(4):

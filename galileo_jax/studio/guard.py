@@ -87,7 +87,7 @@ class Guard:
             return ""
         if self._is_entrance(scope):
             return ""
-        return "no token: open the address that galileo studio has printed"
+        return "no token: open the address that galileo studio printed"
 
     def _is_entrance(self, scope: Scope) -> bool:
         if scope["type"] != "http" or scope["method"] != "GET" or scope["path"] != "/":

@@ -257,10 +257,10 @@ def _stage_buttons(tab: Tab) -> None:
 
 
 _WORDS = {
-    "locked": "waits for the stage before it",
+    "locked": "waiting for the step before it",
     "open": "to do",
     "done": "done",
-    "stale": "made of earlier marks",
+    "stale": "made with earlier marks",
     "running": "running",
 }
 

@@ -167,4 +167,4 @@ def _listening(port: int | None) -> socket.socket:
             continue
         return listening
     taken = f"{tried[0]}" if port is not None else f"{FIRST_PORT} to {FIRST_PORT + NUM_PORTS - 1}"
-    raise InputError(f"--port: {taken} is taken or no port; give another")
+    raise InputError(f"--port: {taken} is in use or not a port; give another")

@@ -308,7 +308,7 @@ class Session:
             for action in follow:
                 action()
         elif message.kind == "cancelled":
-            self.note = "Cancelled; what was finished before is kept."
+            self.note = "Cancelled; what was finished before is saved."
         else:
             self.error = str(message.content)
         self._changed("job", "clips")

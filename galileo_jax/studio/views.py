@@ -93,10 +93,10 @@ def track_view(track: gx.Track) -> dict[str, Any]:
 def in_words(line: str) -> str:
     """A remark without the names of files and keys, which the page does not show."""
     text = line.split(": ", 1)[-1]
-    size = re.fullmatch(r"(.+): size_m: null; \[(.+)\] is taken, (.+)", text)
+    size = re.fullmatch(r"(.+): size_m: null; \[(.+)\] is used, (.+)", text)
     if size:
         name, sides, source = size.groups()
-        return f"{name}: no size given; {sides.replace(', ', ' x ')} m is taken, {source}."
+        return f"{name}: no size given; {sides.replace(', ', ' x ')} m is used, {source}."
     return text
 
 
@@ -116,7 +116,7 @@ def comparison_view(check: gx.Comparison) -> dict[str, Any]:
                 "start": one.failing_s[0],
                 "end": one.failing_s[1],
                 "sentence": (
-                    f"{one.title} misses the model most from {one.failing_s[0]:.2f} to "
+                    f"{one.title}: the model fails most from {one.failing_s[0]:.2f} to "
                     f"{one.failing_s[1]:.2f} s, in {one.worst.axis} {where}, by "
                     f"{one.worst.z:.0f} standard deviations."
                 ),

@@ -60,7 +60,7 @@ class Store:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError:
                 raise InputError(
-                    f"--out: {self.folder}: another sweep is at work there; take another folder"
+                    f"--out: {self.folder}: another sweep is running there; use another folder"
                 ) from None
             for pattern in ("cells/**/.*", "clips/.*.npz", ".summary.*", ".report.*"):
                 for left in self.folder.glob(pattern):

@@ -1,4 +1,4 @@
-"""`sweep`: many clips, many ways, from one config; stopped and taken up again at will."""
+"""`sweep`: evaluate many clips, with several methods; can be stopped and resumed."""
 
 import os
 import shlex
@@ -239,7 +239,7 @@ def _check(
         ("together", 1 if together is None else together, 1),
     ):
         if value < least:
-            raise InputError(f"--{name}: {value} is no whole number, {least} or more")
+            raise InputError(f"--{name}: {value} is not a whole number, {least} or more")
 
     if together is not None and together > 1 and (engine != "local" or workers or gpus):
         raise InputError(

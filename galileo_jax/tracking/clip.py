@@ -30,7 +30,7 @@ def track_clip(clip: Clip) -> Track:
     """
     video = clip.video
     if video is None:
-        raise InputError(f"{clip.path}: video: missing; a csv track is tracked already")
+        raise InputError(f"{clip.path}: video: missing; a csv track is already tracked")
     passes = 2 if all(item.point_px is not None for item in clip.objects) else 3
     total, done = passes * max(clip.frame_count, 1), itertools.count(1)
 

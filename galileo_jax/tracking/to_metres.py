@@ -28,7 +28,7 @@ def observe(clip: Clip, track: Track) -> Observation:
     if not np.isfinite(position[mask]).all():
         raise InputError(
             f"{clip.path}: rectangle: an object is seen where the plane of these "
-            "corners_px is not; mend them"
+            "corners_px is not; correct them"
         )
     slope = plane.slope(track.position_px)
     is_level = SCENARIOS[clip.scenario].is_level

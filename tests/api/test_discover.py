@@ -178,7 +178,7 @@ def test_a_lab_that_never_gives_a_track_ends_with_the_budget(verdicts):
     lab = Lab(*[LabError("out of order")] * 9)
     found = gx.discover(lab, budget=4)
     assert len(lab.asked) == 4 and found.status is None and found.found is None
-    assert found.sentence == "After 4 experiments: No experiment gave a track."
+    assert found.sentence == "After 4 experiments: No experiment delivered a track."
     assert len({one["height_m"] for one in lab.asked}) == 4, "always somewhere else"
 
 
@@ -233,7 +233,7 @@ def test_what_cannot_be_rehearsed_is_tried_all_the_same(verdicts, monkeypatch):
     monkeypatch.setattr(module, "rehearsed", refuse)
     lab = Lab()
     found = gx.discover(lab, budget=3)
-    assert "not rehearsed (--can: height has no place" in found.experiments["reason"][1]
+    assert "not simulated (--can: height has no place" in found.experiments["reason"][1]
     assert len({one["height_m"] for one in lab.asked}) == 3
 
 
@@ -282,8 +282,8 @@ def test_wrong_calls(verdicts, tmp_path):
     mute = Lab()
     mute.describe = lambda: (_ for _ in ()).throw(LabError("--describe: a JSON object expected"))
     for lab, options, line in (
-        (Lab(), {"budget": 0}, "--budget: 0 is no number of experiments"),
-        (Lab(), {"timeout": 0.0}, "--timeout: 0 is no time"),
+        (Lab(), {"budget": 0}, "--budget: 0 is not a number of experiments"),
+        (Lab(), {"timeout": 0.0}, "--timeout: 0 is not a time"),
         (Lab(), {"out": tmp_path / "file"}, "a file; a folder expected|is a file"),
         (mute, {}, "LAB: --describe: a JSON object expected"),
         (tmp_path / "none", {}, "no such program"),

@@ -57,7 +57,9 @@ def test_a_new_yaml_is_the_commands(tmp_path: Path, capsys) -> None:
     assert done.path == paths[0].with_suffix(".yaml")
     assert done.path.read_bytes() == paths[1].with_suffix(".yaml").read_bytes()
     assert done.clip.pixels_per_metre == 300
-    assert done.notes == ("fps: 30 taken from the container; slow-motion clips often lie about it",)
+    assert done.notes == (
+        "fps: 30 taken from the video file; slow-motion files often state a wrong rate",
+    )
     assert f"note: {done.notes[0]}\n" in capsys.readouterr().err
 
 
@@ -86,9 +88,9 @@ def test_a_correction_is_replaced_and_taken_back(tmp_path: Path) -> None:
     found = label(path, correct={"object1": [(12, 81, 113), (9,)]}).clip
     assert found.objects[0].corrections == ((12, 81, 113),)
     for wrong, words in (
-        ({"object1": [(3, 1)]}, "no frame, x and y"),
-        ({"object1": [(2.5, 1, 1)]}, "no frame, x and y"),
-        ({"object7": [(2, 1, 1)]}, "no 'object7' there"),
+        ({"object1": [(3, 1)]}, "not a frame, x and y"),
+        ({"object1": [(2.5, 1, 1)]}, "not a frame, x and y"),
+        ({"object7": [(2, 1, 1)]}, "there is no 'object7' to correct"),
     ):
         with pytest.raises(InputError, match=words):
             label(path, correct=wrong)

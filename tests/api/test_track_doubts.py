@@ -66,8 +66,8 @@ def test_half_a_pixel_changes_k1_as_a_steeper_ramp_and_longer_lengths_would(meas
     longer = k1 - friction(angle, acceleration * (1 + off))
     text = taken_as_exact(measured, k1)
     assert text is not None
-    assert f"(200 px) changes k1 by {steeper:.2g} and {longer:.2g}:" in text
-    assert "ramp_angle_deg and pixels_per_metre taken as exact" in text
+    assert f"(200 px) would change k1 by {steeper:.2g} and {longer:.2g}:" in text
+    assert "the fit takes ramp_angle_deg and pixels_per_metre as exact" in text
     assert "declare ramp_angle_sd_deg and pixels_per_metre_sd" in text
 
 
@@ -103,10 +103,10 @@ def test_chi2_in_the_thousands_sends_to_the_overlay(measured) -> None:
     hidden = replace(measured, observation=replace(measured.observation, mask=mask))
     found = with_track_doubts([hidden], result(5303.4))
     assert found["status"] == (
-        "the fit converged; but no motion of this model comes near the track (chi2 5303)"
+        "the fit converged; but no motion of this model comes close to the track (chi2 5303)"
     )
     (warning,) = found["warnings"]
-    assert "object1 from 0.60 s on above all: it was not seen for 0.40 s" in warning
+    assert "above all object1 from 0.60 s on: it had not been seen for 0.40 s" in warning
     assert warning.endswith("galileo track clip.mp4")
 
 
@@ -116,6 +116,6 @@ def test_the_run_says_what_is_taken_as_exact(tmp_path: Path, capsys) -> None:
     out = tmp_path / "run"
     assert command.run(fit_command.main, [str(tmp_path / "clip.mp4"), "--out", str(out)]) == 0
     (told,) = json.loads((out / "result.json").read_text())["taken_as_exact"]
-    assert "ramp_angle_deg and pixels_per_metre taken as exact" in told
+    assert "the fit takes ramp_angle_deg and pixels_per_metre as exact" in told
     assert f"note: {told}" in capsys.readouterr().err
-    assert "pixels_per_metre taken as exact" in (out / "report.html").read_text()
+    assert "pixels_per_metre as exact" in (out / "report.html").read_text()

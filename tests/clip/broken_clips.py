@@ -389,7 +389,7 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
         "    point_px",
         "    corrections: [12, 70.0, 110.0]\n    point_px",
         "objects[0].corrections",
-        "no list of [frame, x, y]",
+        "not a list of [frame, x, y]",
     ),
     "correction_of_a_frame_that_is_not_used": _edit(
         "    point_px",

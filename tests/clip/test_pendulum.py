@@ -159,7 +159,10 @@ def test_the_priors_start_near_the_answer(tmp_path):
 @pytest.mark.parametrize(
     ("extra", "message"),
     [
-        ("thread_m: 70.0\n", "thread_m: 70 m is no length of a thread; 0.01 to 30 m .* mean 0.7"),
+        (
+            "thread_m: 70.0\n",
+            "thread_m: 70 m is not a length of a thread; 0.01 to 30 m .* mean 0.7",
+        ),
         ("pivot_m: [0.0]\n", r"pivot_m\[1\]: missing; \[x, y\] expected"),
         ("floor: true\n", "floor: means nothing in scenario pendulum"),
     ],

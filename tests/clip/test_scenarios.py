@@ -196,7 +196,7 @@ def test_declared_densities_say_what_floats(tmp_path):
     ("scenario", "extra", "message"),
     [
         ("spring", "floor: true\n", "floor: means nothing in scenario spring, only in fall, fl"),
-        ("fall", "floor: low\n", "floor: 'low' is no height; metres above the origin, or true"),
+        ("fall", "floor: low\n", "floor: 'low' is not a height; metres above the origin, or true"),
         (
             "liquid",
             "liquid_density: 1.0\n",

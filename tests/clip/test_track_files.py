@@ -111,7 +111,7 @@ def test_declared_frame_rate_wins_over_the_trk(fps: float, tmp_path: Path) -> No
 def test_axes_laid_along_the_slope_are_made_level(tmp_path: Path) -> None:
     clip = clip_of(tmp_path, "slide.trk", make.trk(angle_deg=-20.0))
     check_motion(observation_of(clip))
-    assert "turned by -20.00 degrees; taken for laid along a slope" in clip.warnings[0]
+    assert "turned by -20.00 degrees; interpreted as laid along a slope" in clip.warnings[0]
 
 
 def test_leaning_camera_is_set_upright(tmp_path: Path) -> None:
@@ -187,7 +187,9 @@ OWN_CSV = "time_s,object1_x_m,object1_y_m\n" + "".join(
     "keys", ["track_units: cm", "track_y: down", "track_origin: [0.3, 0.2]", "direction: left"]
 )
 def test_own_csv_refuses_what_its_columns_say(keys: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"slide.yaml: {keys.split(':')[0]}: .*mend the columns"):
+    with pytest.raises(
+        InputError, match=f"slide.yaml: {keys.split(':')[0]}: .*correct the columns"
+    ):
         clip_of(tmp_path, "slide.csv", OWN_CSV, keys)
 
 
@@ -202,7 +204,9 @@ def test_misplaced_own_csv_is_not_advised_to_take_such_keys(tmp_path: Path) -> N
     text = YAML.format(name="slide.csv", keys="", objects="")
     item = "  - {name: object1, shape: box, size_m: [0.9, 0.9, 0.9]}\n"
     (tmp_path / "slide.yaml").write_text(text + item)
-    with pytest.raises(InputError, match=r"inside the ramp .*mend .*size_m or the csv") as caught:
+    with pytest.raises(
+        InputError, match=r"inside the ramp .*correct .*size_m or the csv"
+    ) as caught:
         load_clip(tmp_path / "slide.yaml")
     assert not any(key in str(caught.value) for key in ("track_", "direction", "_px"))
 
@@ -244,10 +248,10 @@ BROKEN = {
                            "track_units: cm", "line 3: t: 'x' is not a number"),
     "table_without_unit": ("a.csv", TABLE, "track_y: up", "a.yaml: track_units: missing"),
     "table_without_axis": ("a.csv", TABLE, "track_units: mm", "a.yaml: track_y: missing"),
-    "table_without_both": ("a.csv", TABLE, "", "track_units, track_y: missing; a.csv does not tell "
-                           "its unit of length and which way its y axis points; write track_units: "
-                           "m | cm | mm | km | in | ft | px, track_y: up | down"),
-    "table_in_wrong_unit": ("a.csv", TABLE, "track_units: m; track_y: down", "mend track_units"),
+    "table_without_both": ("a.csv", TABLE, "", "track_units, track_y: missing; a.csv does not "
+                           "state its unit of length and which way its y axis points; write "
+                           "track_units: m | cm | mm | km | in | ft | px, track_y: up | down"),
+    "table_in_wrong_unit": ("a.csv", TABLE, "track_units: m; track_y: down", "correct track_units"),
     "table_of_two_units": ("a.csv", broken(make.plain_table(True), "x (mm)", "x (m)"), "",
                            "in different units: m, mm"),
     "logger_pro_without_y": ("a.csv", broken(LOGGER, "Y (m)", "Q (m)"), "", "no column y"),

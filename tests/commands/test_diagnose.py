@@ -175,7 +175,7 @@ def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
         (["--add", "nonsense"], "known: auto, none, added_mass, air_drag"),
         (["--effects-from", "missing.py"], "missing.py: no such file"),
         (["--engine", "foo"], "--engine: invalid choice: 'foo'"),
-        (["--seed", "-1"], "'-1' is no whole number"),
+        (["--seed", "-1"], "'-1' is not a whole number"),
         (["--out", "clip.yaml"], "is a file; a folder expected"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

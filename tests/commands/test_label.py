@@ -68,7 +68,7 @@ def test_a_typed_angle_and_scale_are_exact(video: Path) -> None:
 def test_frame_rate_of_the_container_is_noted(video: Path, capsys) -> None:
     without_fps = [*NEW[: NEW.index("--fps")], *NEW[NEW.index("--fps") + 2 :]]
     assert run(video, *without_fps) == 0
-    assert "fps: 30 taken from the container" in capsys.readouterr().err
+    assert "fps: 30 taken from the video file" in capsys.readouterr().err
     assert load_clip(video).fps == 30
 
 
@@ -153,7 +153,7 @@ def test_lost_comments_are_noted(tmp_path: Path, capsys) -> None:
     objects = objects.replace("  - name: object2", "  - <<: *first\n    name: object2")
     path.write_text(f"{before}objects:{objects}")
     assert run(path, "--first-frame", "object1", 2) == 0
-    assert "clip.yaml was written afresh; its comments are lost" in capsys.readouterr().err
+    assert "clip.yaml was written anew; its comments are lost" in capsys.readouterr().err
     assert [item.first_frame for item in load_clip(path).objects] == [2, 0]
 
 

@@ -43,7 +43,7 @@ def test_next_prints_the_table_and_the_sentence(tmp_path, monkeypatch, capsys):
         (("next", "nowhere"), "nowhere: no result.json"),
         (("next", "nowhere", "--can", "hight=1:2"), "--can: unknown setting 'hight'"),
         (("discover", "nowhere"), "LAB: nowhere: no such program"),
-        (("discover", "nowhere", "--budget", "0"), "no whole number, 1 or more"),
+        (("discover", "nowhere", "--budget", "0"), "not a whole number, 1 or more"),
     ],
 )
 def test_wrong_calls_are_one_line(words, line, tmp_path, monkeypatch, capsys):
@@ -71,6 +71,6 @@ def test_discover_prints_every_experiment(tmp_path, monkeypatch, capsys):
     assert galileo("discover", lab, "--budget", 2, "--out", tmp_path / "run") == 0
     out = capsys.readouterr().out
     assert out.count("lost: exit code 1: out of order") == 2
-    assert "No experiment gave a track." in out
+    assert "No experiment delivered a track." in out
     assert (tmp_path / "run" / "report.html").is_file()
     assert len(json.loads((tmp_path / "run" / "discover.json").read_text())["experiments"]) == 2

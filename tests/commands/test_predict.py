@@ -190,7 +190,7 @@ def test_what_is_over_is_called_past(beyond_m, slides, is_told):
         (["{run}"], "--seconds"),
         (["{run}", "--seconds", "1", "--draws", "1"], "--draws"),
         (["{run}", "--seconds", "1", "--seed", "x"], "--seed"),
-        (["{run}", "--seconds", "1", "--draws", "20000"], "no whole number, 2 to 10000"),
+        (["{run}", "--seconds", "1", "--draws", "20000"], "not a whole number, 2 to 10000"),
         (["{run}", "--seconds", "1", "--out", "{file}"], "is a file"),
     ],
 )

@@ -159,7 +159,7 @@ def test_the_page_shows_errors_and_what_was_taken_for_what(tmp_path, clips, call
         seen = page.inner_text("main")
         for words in ("Error by effect", "Error by method", "an unlucky seed"):
             assert words in seen
-        assert "1 of 1 are named right" in seen
+        assert "1 of 1 are correct" in seen
         assert page.locator(".plot.js-plotly-plot").count() == 6
         assert page.locator(".share").all_inner_texts() == ["1"], "the confusion matrix"
         assert not complaints

@@ -112,5 +112,5 @@ def test_csv_track_is_refused(tmp_path):
         "track: walk.csv\nscenario: multi\nramp_angle_deg: 20.0\n"
         "objects:\n  - {name: object1, shape: box}\n"
     )
-    with pytest.raises(InputError, match="tracked already"):
+    with pytest.raises(InputError, match="already tracked"):
         main([str(tmp_path / "walk.yaml")])

@@ -36,7 +36,7 @@ def test_without_a_surface_no_ramp_is_asked_for(scene, says, effects):
 def test_each_scene_has_its_own_gravity():
     verdict = Verdict("ambiguous", ("frame_rate", "scale_error"))
     assert "another ramp angle" in advice(verdict, RAMP, 1)[0]
-    assert "another gravity" in advice(verdict, FALL, 1)[0]
+    assert "different gravity" in advice(verdict, FALL, 1)[0]
     assert "gravity" not in " ".join(advice(verdict, SPRING, 1))
 
 

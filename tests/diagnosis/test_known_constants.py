@@ -50,7 +50,7 @@ def test_where_a_clip_hardly_tells_the_power_its_interval_is_said(tmp_path):
     assert why.rule == "constant_by_data" and numbers["value"] == 1
     assert numbers["low"] < 1 < numbers["high"]
     assert numbers["high"] - numbers["low"] > 0.3
-    assert "the power of the speed for 1; by these data alone" in why.sentence
+    assert "the power of the speed is 1; from these data alone" in why.sentence
 
 
 def test_where_a_clip_tells_the_power_nothing_is_said(tmp_path):

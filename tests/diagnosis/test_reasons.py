@@ -57,21 +57,21 @@ def test_noise_of_another_size_is_told_of(comparison, scales, p_value, said):
 def test_odds_and_p_values_in_words():
     assert times_text(3.0) == "20 times"
     assert times_text(4.87) == "130 times"
-    assert times_text(-1.0) == "0.37 times"
+    assert times_text(-1.0) == "1/2.7"
     assert times_text(100.0) == "10^43 times"
     assert p_text(1e-30) == "< 1e-12" and p_equals(1e-30) == "p < 1e-12"
     assert p_equals(0.037) == "p = 0.037" and p_text(None) == ""
 
 
 @pytest.mark.parametrize(
-    ("prior", "said"), [(-5.0, ", and was 20 times before the data"), (-2.9, "")]
+    ("prior", "said"), [(-5.0, " Before the data it was already 20 times as probable."), (-2.9, "")]
 )
 def test_a_lead_that_is_mostly_prior_is_said_to_be(prior, said):
     best, rival = candidate("air_drag", 40.0), candidate("a_form", 36.6, log_prior=prior)
     lead, expected = decisive(best, [rival], 3.0), told_apart(best, rival, 3.4, 3.0)
-    assert f"30 times as probable as the next, a_form{said} (20 times are needed)" in lead.sentence
+    assert f"30 times as probable as the next, a_form (20 times are needed).{said}" in lead.sentence
     assert lead.numbers["log_prior_behind"] == pytest.approx(-2.0 - prior)
     assert (
-        f"30 times as probable as a_form after a clip like this one{said}: enough"
+        f"30 times as probable as a_form after a clip like this one: enough to separate them.{said}"
         in expected.sentence
     )

@@ -107,7 +107,7 @@ def test_a_library_of_one_effect_has_no_second():
 def test_the_reason_names_the_second_effect_and_its_price(two_effects):
     promise, best = two_effects
     why = reasons.pairs_promised(best, promise, 6)
-    assert f"{promise.beside} with {promise.effect}" in why.sentence
+    assert f"{promise.beside} together with {promise.effect}" in why.sentence
     assert "6 pairs" in why.sentence
     assert why.numbers["nats"] == promise.nats and why.numbers["price"] == promise.price
 

@@ -20,7 +20,7 @@ def test_the_readme_fits_on_two_screens():
 def test_the_readme_names_the_commands_of_the_makefile():
     makefile = (ROOT / "Makefile").read_text()
     targets = re.findall(r"^    make (\w+)", README, re.MULTILINE)
-    assert targets == ["demo", "test"]
+    assert sorted(set(targets)) == ["demo", "test"]
     assert all(re.search(rf"^{target}:", makefile, re.MULTILINE) for target in targets)
 
 

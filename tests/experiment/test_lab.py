@@ -39,7 +39,7 @@ def test_it_is_asked_and_answers_by_the_protocol(tmp_path):
         ("raise ValueError('no ramp')", "exit code 1: ValueError: no ramp"),
         ("os.kill(os.getpid(), 9)", "ended by signal 9"),
         ("print('too high', file=sys.stderr); sys.exit(2)", "refused: too high"),
-        ("sys.stdout.buffer.write(bytes([255, 254, 0]))", "the answer is no text"),
+        ("sys.stdout.buffer.write(bytes([255, 254, 0]))", "the answer is not text"),
         ("while True: print('x' * 100000)", "more than 20000000 bytes"),
     ],
 )

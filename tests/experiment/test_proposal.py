@@ -95,7 +95,7 @@ def test_swapped_objects_keep_their_masses_and_frictions(trials, clip):
     ("setting", "complaint"),
     [
         ({"height": 0.1, "release": 0.2}, "height and release say the same"),
-        ({"angle": 0.5}, "angle: 0.5 is no slope"),
+        ({"angle": 0.5}, "angle: 0.5 is not a slope"),
     ],
 )
 def test_what_has_no_place_is_refused(trials, clip, setting, complaint):
@@ -159,7 +159,10 @@ def test_about_a_parameter(found, trials, clip):
     beliefs = beliefs_of(found.found)
     ratio = expect(clip, trials, beliefs, [{"height": 0.2}], "mass_ratio")
     assert best_first(ratio)[0].gain_nats > 0
-    for about, line in (("k9", "no parameter of a likely"), ("m1", "ratio of masses only")):
+    for about, line in (
+        ("k9", "not a parameter of a likely"),
+        ("m1", "only the ratio of the masses"),
+    ):
         with pytest.raises(InputError, match=line):
             next_experiment(found, can="height=0.05:0.3", about=about)
 

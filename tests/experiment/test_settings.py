@@ -45,10 +45,10 @@ def test_units_at_the_end_of_a_name_are_its_own():
     [
         ("hieght=0.1:0.5", r"unknown setting 'hieght'; did you mean height\?; known|known: height"),
         ("height=0.5:0.1", "height: 0.5 to 0.1; the smaller one first"),
-        ("height=high", "height: 'high' is no number"),
+        ("height=high", "height: 'high' is not a number"),
         ("height=0.1:0.5,height=1", "height is given twice"),
         ("angle=10:95", "angle: 95.0 is outside 1 to 89 degrees"),
-        ("fps=nan", "'nan' is no number"),
+        ("fps=nan", "'nan' is not a number"),
         ("", "nothing given"),
         ({"fps": []}, "fps: no choices"),
         ({"fps": {"from": 1}}, "fps: {low, high} or {choices} expected"),
@@ -84,5 +84,5 @@ def test_a_setting_in_words():
 
 def test_with_one_hypothesis_there_is_nothing_to_tell():
     only = Expected({"height": 0.2}, 0.0, 1.0, math.inf, None)
-    assert "only one hypothesis is open" in sentence_of(only)
+    assert "only one hypothesis is left" in sentence_of(only)
     assert "k2 becomes 1.0 times narrower" in sentence_of(only, "k2")

@@ -81,7 +81,9 @@ def measured(clip: Path, name: str, change: Change) -> Measurement:
     return measure(load_clip(altered(clip, name, change)))
 
 
-@pytest.mark.parametrize("change, why", [(twin_stays, "moves as"), (looks_different, "looks like")])
+@pytest.mark.parametrize(
+    "change, why", [(twin_stays, "its velocity jumps"), (looks_different, "looks like")]
+)
 def test_a_lost_object_is_told_with_its_time(clip: Path, change: Change, why: str) -> None:
     found = measured(clip, change.__name__, change)
     (one,) = found.astray

@@ -62,7 +62,7 @@ def test_tracks_at_one_place_are_both_left_out_from_there() -> None:
     assert [(one.name, one.time_s, one.is_left_out) for one in found] == [
         (name, AT / FPS, True) for name in NAMES
     ]
-    assert "where other is" in found[0].why and "where one is" in found[1].why
+    assert "same place as other" in found[0].why and "same place as one" in found[1].why
     kept = without_astray(seen, found).mask
     assert kept[:, :AT].all() and not kept[:, AT:].any()
 

@@ -82,7 +82,8 @@ def test_what_follows_is_left_out_and_it_is_said(tmp_path):
     assert measured.observation.times_s[-1] == pytest.approx(59 / 60)
     (remark,) = measured.remarks
     assert (
-        "object1 is stopped by something that is not in the scene; what is after 0.983 s" in remark
+        "object1 is stopped by something that is not in the scene; everything after 0.983 s"
+        in remark
     )
     (entry,) = inferred([measured])["cuts"]["run"]
     assert entry == {"name": "object1", "time_s": 59 / 60, "side": "after", "why": STOPPED}

@@ -55,4 +55,4 @@ def test_errors_that_follow_each_other_are_found_in_their_size():
 def test_what_was_found_is_said():
     seen, said = with_errors_in_time(_track(-4.905 * TIMES**2, _errors(1, 0.8)))
     assert seen.modes_m is not None and seen.num_errors == len(seen.modes_m)
-    assert len(said) == 1 and said[0].startswith("ball: errors of y follow each other: ")
+    assert len(said) == 1 and said[0].startswith("ball: errors in y are correlated in time: ")

@@ -47,7 +47,7 @@ def test_times_that_are_late_and_catch_up_are_found() -> None:
     assert all(said for _, said in found)
     for seen, (line,) in found:
         assert seen.modes_m is not None and seen.num_errors == len(seen.modes_m)
-        assert line.startswith("ball: its times are late and early by ")
+        assert line.startswith("ball: its times are off by ")
         late_ms = float(line.split(" by ")[1].split()[0])
         assert 0.3 < late_ms < 3.0
         # All of it is along the path.

@@ -84,7 +84,7 @@ def test_scatter_enters_the_error(tmp_path: Path) -> None:
     ({"angle_deg": 0.0}, "degrees: no ramp"),
     ({"angle_deg": -15.0}, "path falls by -15"),
     ({"angle_deg": 160.0}, "object1's x decreases; x along the travel"),
-    ({"acceleration": 0.0, "scenario": "ramp"}, "too little to tell the slope"),
+    ({"acceleration": 0.0, "scenario": "ramp"}, "too little to determine the slope"),
 ])  # fmt: skip
 def test_what_cannot_be_told_is_one_line(change: dict, words: str, tmp_path: Path) -> None:
     clip = load_clip(write_track(tmp_path, **change))

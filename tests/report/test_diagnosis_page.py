@@ -31,8 +31,8 @@ SAYS = {
     "unknown": "see the missing force",
 }
 LAW_SAYS = (
-    "No formula explains the missing force. The best leaves more than noise: "
-    f"{LAW.text} (p = 0.0003, chi2 per degree of freedom 1.00, probability 0.01)."
+    f"No formula explains the missing force. The best one, {LAW.text}, leaves more than noise "
+    "(p = 0.0003, chi2 per degree of freedom 1.00, probability 0.01)."
 )
 GO_ON = "galileo fit a.yaml --effects air_drag"
 AGAIN = "galileo diagnose a.yaml --seed 0"
@@ -119,7 +119,7 @@ def test_a_comparison_opens_in_a_browser(trials, clip, tmp_path, browser):
         document = page.content()
     assert complaints == []
     assert "The model is not adequate" in document
-    assert "Object 1 is let go -50 ms from the first frame, 5 standard deviations" in document
+    assert "Object 1 is released 50 ms before the first frame, 5 standard deviations" in document
     assert "foot_transition" not in document, "inside its prior"
 
 
@@ -230,7 +230,7 @@ def test_what_the_best_formula_says():
     )
     assert "but it is not certain (see why)" in said("unknown", {"best_formula": best})
     none = said("unknown", {"best_formula": None})
-    assert none == "No formula explains the missing force: none promised to."
+    assert none == "No short formula was found that could explain the missing force."
     assert said("named", None) == ""
     old = {"objects": {"object1": {"formula": "a1 = 0.8 t"}}}
     assert said("unknown", old) == "", "no longer believed"

@@ -209,7 +209,7 @@ def test_says_why_a_parameter_is_not_told(tmp_path):
 @pytest.mark.parametrize(
     ("chi2", "said"),
     [(0.3, "smaller than the stated noise"), (1.1, "size of the stated noise"),
-     (2, "galileo compare says which"), (50, "do not trust"), (None, "cannot be computed")],
+     (2, "galileo compare tests which"), (50, "do not trust"), (None, "cannot be computed")],
 )  # fmt: skip
 def test_chi2_is_put_in_words(chi2, said):
     assert said in fit_quality({"error": {"chi2_per_dof": chi2}})

@@ -96,6 +96,6 @@ def test_a_diagnosis_of_another_track_is_told_of(tmp_path):
     (tmp_path / "diagnosis" / "diagnosis.json").write_text(json.dumps(document))
     assert stale_documents(tmp_path, [seen]) == []
     (told,) = stale_documents(tmp_path, [moved])
-    assert "diagnosis: made of an earlier track" in told and "galileo diagnose a.csv" in told
+    assert "diagnosis: made from an earlier track" in told and "galileo diagnose a.csv" in told
     unseen = replace(seen, position_m=np.where(seen.mask[:, None], seen.position_m, np.nan))
     assert digest(unseen) == digest(seen)

@@ -69,7 +69,7 @@ def test_release_alone(tmp_path):
         ({"m1": 0.3}, "--m1: is that of --like"),
         ({"effects": ["rolling"]}, "--effect: is that of --like"),
         ({"scenario": "incline"}, "scenario ramp; incline expected"),
-        ({"release": 99.0}, "--release: '99' is no number in"),
+        ({"release": 99.0}, "--release: '99' is not a number in"),
     ],
 )
 def test_what_is_refused(sealed, tmp_path, options, complaint):

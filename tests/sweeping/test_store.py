@@ -89,7 +89,7 @@ def test_a_failure_is_kept_until_there_is_a_result(tmp_path):
 def test_two_sweeps_do_not_share_a_folder(tmp_path):
     with (
         Store(tmp_path).locked(),
-        pytest.raises(InputError, match="another sweep is at work there"),
+        pytest.raises(InputError, match="another sweep is running there"),
         Store(tmp_path).locked(),
     ):
         pass

@@ -132,8 +132,8 @@ def test_a_fit_that_is_cancelled_is_no_failure(clips, tmp_path, monkeypatch):
     [
         ({"engine": "slurm"}, "--engine: unknown 'slurm'; known: local, ray"),
         ({"address": "a:1"}, "--address: for --engine ray only"),
-        ({"workers": -1}, "--workers: -1 is no whole number, 0 or more"),
-        ({"cpus_per_worker": 0}, "--cpus-per-worker: 0 is no whole number, 1 or more"),
+        ({"workers": -1}, "--workers: -1 is not a whole number, 0 or more"),
+        ({"cpus_per_worker": 0}, "--cpus-per-worker: 0 is not a whole number, 1 or more"),
         ({"config": {}}, "config: clips: missing"),
         ({"config": {"clips": ["x.csv"], "reports": "no"}}, "config: reports: "),
     ],

@@ -119,8 +119,8 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
         keys, what, choices = zip(*asked, strict=True)
         wanted = ", ".join(f"{key}: {words}" for key, words in zip(keys, choices, strict=True))
         raise InputError(
-            f"{yaml_path}: {', '.join(keys)}: missing; {path.name} does not tell "
-            f"{' and '.join(what)}; write {wanted}"
+            f"{yaml_path}: {', '.join(keys)}: missing; {path.name} does not state "
+            f"{' and '.join(what)}; write {wanted} (or give it to galileo label)"
         )
     if unit == "px":
         scale, origin = _scale(yaml_path, path, file, table.calibration), _origin(file, table)
@@ -199,7 +199,7 @@ def _check_own_keys(yaml_path: Path, path: Path, file: ClipFile) -> None:
             raise InputError(
                 f"{yaml_path}: {key}: {short(found)} means nothing for {path.name}, whose columns "
                 "are in metres, x along the travel, y up, from the foot of the ramp; leave it out, "
-                "and mend the columns if they are not"
+                "and correct the columns if they are not"
             )
 
 
@@ -218,7 +218,7 @@ def _in_declared_order(
     """The table with the declared objects alone, in their order, and doubts about who is who.
 
     An object is found by its `track_name`, else by its own name ('mass A' is mass_A); names
-    that say nothing are taken in order, where there are as many of them as objects.
+    that say nothing are assigned in this order, where there are as many of them as objects.
     """
     by_name = {_plain(name): index for index, name in enumerate(table.names)}
     wanted = [item.track_name or item.name for item in file.objects]
@@ -240,7 +240,9 @@ def _in_declared_order(
         order = list(range(len(wanted)))
         pairs = zip(wanted, table.names, strict=True)
         taken = [f"{theirs!r} as {ours}" for ours, theirs in pairs if theirs != ours]
-        warnings = (f"{path}: {', '.join(taken)}: taken in order",) if len(taken) > 1 else ()
+        warnings = (
+            (f"{path}: {', '.join(taken)}: assigned in this order",) if len(taken) > 1 else ()
+        )
     chosen = [index for index in order if index is not None]
     names = tuple(table.names[index] for index in chosen)
     return replace(table, names=names, position=table.position[chosen]), warnings
@@ -301,7 +303,7 @@ def _scale(
     if not MIN_SCALE_PX_PER_M <= scale <= MAX_SCALE_PX_PER_M:
         raise InputError(
             f"{path}: calibrated to {scale:.4g} pixels per metre; {MIN_SCALE_PX_PER_M:g} to "
-            f"{MAX_SCALE_PX_PER_M:g} expected; mend its calibration or give pixels_per_metre"
+            f"{MAX_SCALE_PX_PER_M:g} expected; correct its calibration or give pixels_per_metre"
         )
     return scale
 
@@ -354,7 +356,7 @@ def _observation(
         largest = float(np.nanmax(np.abs(position[index])))
         if largest > MAX_POSITION_M and not is_nominal:
             raise InputError(
-                f"{path}: {name}: a position of {largest:g} m; mend track_units, "
+                f"{path}: {name}: a position of {largest:g} m; correct track_units, "
                 "pixels_per_metre or the origin"
             )
         covariance[index] = roughness_covariance_m2(path, name, times, position[index])

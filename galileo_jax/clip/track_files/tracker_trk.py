@@ -155,7 +155,9 @@ def _calibration(
             if is_level
             else "laid along a slope: the picture's own vertical is used"
         )
-        warnings = (f"{path}: its axes are turned by {angle_deg:.2f} degrees; taken for {taken}",)
+        warnings = (
+            f"{path}: its axes are turned by {angle_deg:.2f} degrees; interpreted as {taken}",
+        )
     is_calibrated = scales != [1.0, 1.0]
     if not is_calibrated:
         scales, unit = [math.nan, math.nan], None

@@ -20,9 +20,11 @@ class Code(StrEnum):
     """How a fit ended; the value is the sentence for the user."""
 
     CONVERGED = "the fit converged"
-    MISFIT = "the fit converged, but not to within the noise, nor did a second search; try diagnose"
-    STEP_LIMIT = "the fit has not settled; try another --seed or --method mh"
-    FAILED = "no rollout succeeded; check the clip's geometry"
+    MISFIT = (
+        "the fit converged, but noise does not explain the residuals, even after a second search"
+    )
+    STEP_LIMIT = "the fit has not converged; try another --seed or --method mh"
+    FAILED = "no simulation succeeded; check the clip's geometry"
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ def register(effect: EffectClass) -> EffectClass:
       InputError: it is no `Effect`, has no name, or one that is taken.
     """
     if not (isinstance(effect, type) and issubclass(effect, Effect)):
-        raise InputError(f"@register: {effect!r} is no subclass of Effect")
+        raise InputError(f"@register: {effect!r} is not a subclass of Effect")
     if not isinstance(getattr(effect, "name", None), str):
         raise InputError(f"@register: {effect.__name__} has no name")
     return effect_registry.register(effect)

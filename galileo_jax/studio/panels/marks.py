@@ -45,14 +45,14 @@ def build(tab: "Tab") -> None:
         scene.on_value_change(lambda event: _mark(tab, scenario=event.value))
         lengths = _lengths(tab, marks)
         is_laid = marks.rectangle is not None
-        text = "Stick instead" if is_laid else "Rectangle instead"
+        text = "Ruler instead" if is_laid else "Rectangle instead"
         plain_button(text, lambda: _turn(tab, not is_laid), "rectangle")
     for one in marks.objects:
         fields[one.name] = _object(tab, one)
     with ui.element("div").classes("rowline"):
         text = "Click on the object" if tab.placing else "Add object"
         plain_button(text, lambda: _place(tab), "add-object")
-        plain_button("Propose", session.propose, "propose", session.job is None)
+        plain_button("Find objects", session.propose, "propose", session.job is None)
     title("Check")
     place = ui.element("div").style("display: contents")
 
@@ -88,7 +88,7 @@ def _lengths(tab: "Tab", marks: Marks) -> list[Any]:
 
     if marks.rectangle is None:
         write = lambda value: _mark(tab, stick_m=value or None)  # noqa: E731
-        return [field("stick, m", marks.stick_m, "data-stick", write)]
+        return [field("ruler, m", marks.stick_m, "data-stick", write)]
     return [
         field(label, value, f"data-side={i}", partial(_side, tab, i))
         for i, (label, value) in enumerate(
@@ -133,7 +133,7 @@ def _check(tab: "Tab") -> None:
     for one in sheet.remarks:
         remark(one.kind, one.sentence)
     if sheet.is_complete:
-        remark("fine", "Nothing is missing: the clip can be tracked.")
+        remark("fine", "Everything is there: the clip can be tracked.")
         main_button("Track", lambda: _track(tab), tab, "track")
 
 
@@ -162,7 +162,7 @@ def _size(tab: "Tab", name: str, text: str) -> None:
     try:
         size = tuple(float(part) for part in text.replace(",", " ").split())
     except ValueError:
-        tab.session.error = f"{name}: {text[:30]!r} is no size; metres expected"
+        tab.session.error = f"{name}: {text[:30]!r} is not a size; metres expected"
         tab.redraw()
         return
     _change(tab, name, size_m=size or None)

@@ -68,9 +68,7 @@ def _put_right(tab: "Tab", marks: Marks) -> None:
         ui.label(f"Click on the middle of {tab.placing} in the video.").classes("say")
         plain_button("Never mind", lambda: _place(tab, ""), "place-none")
         return
-    ui.label("If a path leaves its object, go to the first frame that is wrong:").classes(
-        "soft small"
-    )
+    ui.label("If a path leaves its object, go to the first wrong frame:").classes("soft small")
     with ui.element("div").classes("rowline"):
         for one in marks.objects:
             plain_button(
@@ -80,7 +78,7 @@ def _put_right(tab: "Tab", marks: Marks) -> None:
     for one in marks.objects:
         for frame, _, _ in one.corrections:
             with ui.element("div").classes("rowline"):
-                ui.label(f"{one.name} was put right in frame {frame}").classes("soft")
+                ui.label(f"{one.name} was corrected in frame {frame}").classes("soft")
                 drop = ui.button(icon="close", color=None).props("flat round").classes("icon")
                 drop.props(f'aria-label="Take back frame {frame} of {one.name}"')
                 drop.on("click", partial(_take_back, tab, one.name, frame))

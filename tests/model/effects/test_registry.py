@@ -153,7 +153,7 @@ def test_register_takes_named_effects_only():
     for wrong, complaint in (
         (Taken, "two effects are named 'rolling'"),
         (Nameless, "Nameless has no name"),
-        (dict, "is no subclass of Effect"),
+        (dict, "is not a subclass of Effect"),
     ):
         with pytest.raises(InputError, match=complaint):
             register(wrong)  # pyright: ignore[reportArgumentType]

@@ -21,7 +21,7 @@ class ForceWavesInTime(Form):
     """An acceleration of all objects that waves in time."""
 
     name: ClassVar[str] = "force_waves_in_time"
-    meaning: ClassVar[str] = "a force that comes and goes with time"
+    meaning: ClassVar[str] = "a force that oscillates in time"
     family: ClassVar[str] = "wave_t"
     nature: ClassVar[str] = "push"
 

@@ -21,7 +21,7 @@ class FrictionWavesInPlace(Form):
     """Coefficients of all objects that wave along the path."""
 
     name: ClassVar[str] = "friction_waves_in_place"
-    meaning: ClassVar[str] = "friction that waves along the path"
+    meaning: ClassVar[str] = "friction that goes up and down along the path"
     family: ClassVar[str] = "wave_q"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:

@@ -40,7 +40,7 @@ LIFT = 2.0  # what is displaced over what a sphere carries along
 
 @register
 class AddedMass(Effect):
-    """The fluid that a body carries along and displaces."""
+    """Fluid that the object carries along and displaces."""
 
     name: ClassVar[str] = "added_mass"
 

@@ -24,7 +24,7 @@ FALL_PRIOR = LogNormal(median=0.003, sd=1.5)
 
 @register
 class AirDrag(Effect):
-    """Quadratic drag of all objects."""
+    """Air drag on all objects, quadratic in the speed."""
 
     name: ClassVar[str] = "air_drag"
 

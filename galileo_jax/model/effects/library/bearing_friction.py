@@ -28,7 +28,7 @@ PRIOR = LogNormal(median=0.005, sd=1.0)
 
 @register
 class BearingFriction(Effect):
-    """Dry friction where a pendulum is held."""
+    """Dry friction in a pendulum's bearing."""
 
     name: ClassVar[str] = "bearing_friction"
 

@@ -21,7 +21,7 @@ PRIOR = Normal(0.0, 0.5)
 
 @register
 class ConstantForce(Effect):
-    """A steady pull on object 1."""
+    """A steady force on object 1."""
 
     name: ClassVar[str] = "constant_force"
 

@@ -22,7 +22,7 @@ PRIOR = Normal(0.0, 0.07)
 
 @register
 class FrameRate(Effect):
-    """A relative error of the declared frame rate."""
+    """The declared frame rate is wrong."""
 
     name: ClassVar[str] = "frame_rate"
 

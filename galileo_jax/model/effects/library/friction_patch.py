@@ -22,7 +22,7 @@ PRIOR = Normal(0.0, 0.2)
 
 @register
 class FrictionPatch(Effect):
-    """Another coefficient of object 1 on a strip."""
+    """A strip on which object 1 has another friction coefficient."""
 
     name: ClassVar[str] = "friction_patch"
 

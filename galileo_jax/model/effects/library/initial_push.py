@@ -20,7 +20,7 @@ PRIOR = LogNormal(median=0.3, sd=1.0)
 
 @register
 class InitialPush(Effect):
-    """A speed at the release."""
+    """Object 1 is pushed at the release."""
 
     name: ClassVar[str] = "initial_push"
 

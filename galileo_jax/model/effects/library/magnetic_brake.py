@@ -23,7 +23,7 @@ PRIOR = LogNormal(median=1.0, sd=1.2)
 
 @register
 class MagneticBrake(Effect):
-    """Linear drag of object 1 in a zone."""
+    """A zone in which object 1 is braked in proportion to its speed."""
 
     name: ClassVar[str] = "magnetic_brake"
 

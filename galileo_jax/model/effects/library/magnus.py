@@ -31,7 +31,7 @@ SLOW_M_S, LEAST_RAD_S = 1e-3, 1e-3  # at rest S has no value, and without spin n
 
 @register
 class Magnus(Effect):
-    """The force of the air on a spinning ball in flight."""
+    """Lift on a spinning ball in flight."""
 
     name: ClassVar[str] = "magnus"
 

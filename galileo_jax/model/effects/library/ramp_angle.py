@@ -21,7 +21,7 @@ PRIOR = Normal(0.0, math.radians(2.0))
 
 @register
 class RampAngle(Effect):
-    """An error of the declared angle."""
+    """The declared angle of the ramp is wrong."""
 
     name: ClassVar[str] = "ramp_angle"
 

@@ -21,7 +21,7 @@ PRIOR = LogNormal(median=0.15, sd=1.0)
 
 @register
 class ReleaseDelay(Effect):
-    """A clock that starts late."""
+    """Object 1 is released later than in the first frame."""
 
     name: ClassVar[str] = "release_delay"
 

@@ -18,7 +18,7 @@ from galileo_jax.model.parameters import Parameter, Uniform
 
 @register
 class Restitution(Effect):
-    """An impact that is not plastic."""
+    """Objects bounce when they collide."""
 
     name: ClassVar[str] = "restitution"
 

@@ -28,7 +28,7 @@ PRIOR = LogNormal(median=0.3, sd=0.7)
 
 @register
 class RodMass(Effect):
-    """The mass of the rod that holds a pendulum's bob."""
+    """The rod of a pendulum has a mass."""
 
     name: ClassVar[str] = "rod_mass"
 

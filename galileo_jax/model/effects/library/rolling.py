@@ -24,7 +24,7 @@ PRIOR = LogNormal(median=0.45, sd=0.4)
 
 @register
 class Rolling(Effect):
-    """Inertia of object 1 beyond its mass."""
+    """Object 1 rolls instead of sliding."""
 
     name: ClassVar[str] = "rolling"
 

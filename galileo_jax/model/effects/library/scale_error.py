@@ -23,7 +23,7 @@ PRIOR = Normal(0.0, 0.07)
 
 @register
 class ScaleError(Effect):
-    """A relative error of the declared scale."""
+    """The declared scale is wrong."""
 
     name: ClassVar[str] = "scale_error"
 

@@ -19,7 +19,7 @@ PRIOR = LogNormal(median=1.0, sd=1.2)
 
 @register
 class SpringTether(Effect):
-    """A spring from object 1 to its start."""
+    """A spring pulls object 1 back to its start."""
 
     name: ClassVar[str] = "spring_tether"
 

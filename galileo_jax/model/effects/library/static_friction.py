@@ -33,7 +33,7 @@ LEAST_SHARE = 1e-3
 
 @register
 class StaticFriction(Effect):
-    """An extra coefficient at rest."""
+    """Friction is larger at rest than in motion."""
 
     name: ClassVar[str] = "static_friction"
 

@@ -22,7 +22,7 @@ SPEED_PRIOR = LogNormal(median=0.4, sd=0.7)
 
 @register
 class Stribeck(Effect):
-    """Friction of object 1 that falls with speed."""
+    """Friction of object 1 falls with the speed."""
 
     name: ClassVar[str] = "stribeck"
 

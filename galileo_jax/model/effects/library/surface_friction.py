@@ -17,7 +17,7 @@ PRIOR = Normal(0.0, 0.1)
 
 @register
 class SurfaceFriction(Effect):
-    """Another coefficient of object 1 on the table."""
+    """Object 1 has another friction coefficient on the table."""
 
     name: ClassVar[str] = "surface_friction"
 

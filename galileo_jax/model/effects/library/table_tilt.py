@@ -23,7 +23,7 @@ PRIOR = Normal(0.0, math.radians(1.5))
 
 @register
 class TableTilt(Effect):
-    """A table that slopes."""
+    """The table is not level."""
 
     name: ClassVar[str] = "table_tilt"
 

@@ -20,7 +20,7 @@ PRIOR = LogNormal(median=0.01, sd=0.7)
 
 @register
 class ThreadStretch(Effect):
-    """The stretch of a pendulum's thread."""
+    """The thread of a pendulum stretches."""
 
     name: ClassVar[str] = "thread_stretch"
 

@@ -23,7 +23,7 @@ FALL_PRIOR = LogNormal(median=0.03, sd=1.5)
 
 @register
 class ViscousDrag(Effect):
-    """Linear drag of all objects."""
+    """Drag on all objects, linear in the speed."""
 
     name: ClassVar[str] = "viscous_drag"
 
