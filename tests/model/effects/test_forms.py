@@ -46,7 +46,7 @@ def test_they_have_no_place_among_the_names():
 
 def test_a_form_is_as_probable_as_an_effect_but_a_drag_with_a_name_is_more():
     odds = {form.name: form.odds(theta(), PAIR) for form in FORMS}
-    assert odds.pop("drag_of_a_power") == 0.25
+    assert odds.pop("drag_of_a_power") == 0.05
     assert set(odds.values()) == {1.0}
 
 

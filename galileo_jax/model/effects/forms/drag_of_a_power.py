@@ -26,7 +26,7 @@ class DragOfAPower(Form):
     meaning: ClassVar[str] = "a drag that grows with another power of the speed"
     family: ClassVar[str] = "power_v"
     nature: ClassVar[str] = "drag"
-    how_likely: ClassVar[float] = 0.25  # drags are well known: most have a power with a name
+    how_likely: ClassVar[float] = 0.05  # drags are well known: nearly all have a power with a name
     constant: ClassVar[str] = "power"
     constant_words: ClassVar[str] = "the power of the speed"
     named_values: ClassVar[Mapping[str, float]] = MappingProxyType(
