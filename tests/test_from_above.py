@@ -118,11 +118,12 @@ def test_a_puck_that_turns_is_braked_less_along_its_way(tmp_path: Path) -> None:
     assert "start_turning1" in result["nuisances"]
 
 
-def test_what_grips_or_slips_is_told_as_two_solutions(tmp_path: Path) -> None:
+def test_what_grips_or_slips_does_not_lead_astray(tmp_path: Path) -> None:
+    """Small grip with more restitution looks alike; the interval holds the truth."""
     result, true = filmed(tmp_path, 7905)
     told = result["parameters"]["restitution"]
     assert told["q025"] < true["restitution"] < told["q975"]
-    assert any("2 solutions" in line and "restitution" in line for line in result["warnings"])
+    assert not result["parameters"]["grip"]["identified"]
 
 
 def walled(folder: Path, walls: Any, **keys) -> Path:

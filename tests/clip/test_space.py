@@ -111,7 +111,9 @@ def test_the_drag_of_the_air_is_expected(tmp_path):
 
 def test_what_is_wrong_is_one_line(tmp_path):
     path = write(tmp_path, ", spin_rad_s: [1.0, 2.0]")
-    with pytest.raises(InputError, match=r"spin_rad_s\[2\]: missing"):
+    with pytest.raises(
+        InputError, match=r"spin_rad_s: \[1.0, 2.0\] has 2 values; \[x, y, z\] in rad/s"
+    ):
         load_clip(path)
     path = write(tmp_path)
     table = tmp_path / "flight.csv"

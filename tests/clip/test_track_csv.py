@@ -262,3 +262,12 @@ def test_a_saved_track_is_known_for_ours(tmp_path: Path) -> None:
         assert load_clip(path).fps == pytest.approx(30.0, rel=1e-3)
         found = measure(load_clip(path)).observation
         np.testing.assert_array_equal(found.position_m, expected.position_m)
+
+
+def test_places_in_millimetres_within_a_hundred_are_refused(tmp_path: Path) -> None:
+    """Pucks that go nine centimetres: a fall may be of 90 m, but not of 135 m/s."""
+    rows = [f"{k / 60},{90 * k / 40},{0.5 * k / 40}" for k in range(40)]
+    path = tmp_path / "mm.csv"
+    path.write_text("\n".join(["time_s,object1_x_m,object1_y_m", *rows]) + "\n")
+    with pytest.raises(InputError, match=r"object1: moves at 135 m/s; .* millimetres"):
+        read_observation_csv(path)
