@@ -138,7 +138,7 @@ def walled(folder: Path, walls: Any, **keys) -> Path:
 @pytest.mark.parametrize(
     ("walls", "said"),
     [
-        ("right", "walls: 'right' is no list of walls, such as"),
+        ("right", "walls: 'right' is not a list of walls, such as"),
         ([{"from_m": [0.0, 1.0]}], "walls[0]: to_m is missing; both ends"),
         ([{"from_m": [0.0, 1.0], "to_px": [9.0, 9.0]}], "either as from_m and to_m or as from_px"),
         ([{"from_m": [0, 900], "to_m": [1200, 900]}], "are these millimetres or pixels?"),

@@ -313,8 +313,8 @@ class _Loop:
             )
         odds = ", ".join(f"{name} {p:.2f}" for name, p in list(ahead.hypotheses.items())[:3])
         return dict(best.setting), (
-            f"it is expected to tell most: {best.gain_nats:.2f} nats, and the true one of the "
-            f"hypotheses is then named with probability {best.named:.2f}; until now: {odds}"
+            f"largest expected gain: {best.gain_nats:.2f} nats; the true hypothesis is then named "
+            f"with probability {best.named:.2f}; so far: {odds}"
         )
 
 

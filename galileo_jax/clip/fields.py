@@ -204,7 +204,11 @@ def _spin(value: Any) -> Any:
         return None
     is_list = isinstance(value, list | tuple)
     if not is_list or len(value) != 3 or not all(map(_is_real, value)):
-        has = f"has {len(value)} values" if is_list and len(value) != 3 else "is no list of numbers"
+        has = (
+            f"has {len(value)} values"
+            if is_list and len(value) != 3
+            else "is not a list of numbers"
+        )
         raise wrong(f"{short(value)} {has}; [x, y, z] in rad/s expected")
     if max(map(abs, value)) > MAX_SPIN_RAD_S:
         raise wrong(

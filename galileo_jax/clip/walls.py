@@ -56,7 +56,7 @@ class Wall(BaseModel):
             )
         if math.dist(one, other) < (SHORTEST_M if in_metres else SHORTEST_PX):
             raise wrong(
-                f"{list(one)} to {list(other)} is no line; two ends that lie apart expected"
+                f"{list(one)} to {list(other)} is not a line; two ends that lie apart expected"
             )
         return self
 
@@ -78,7 +78,7 @@ def _walls(value: Any) -> Any:
         return ()
     if not isinstance(value, list | tuple):
         raise wrong(
-            f"{short(value)} is no list of walls, such as [{{from_m: [0, 0], to_m: [1, 0]}}]"
+            f"{short(value)} is not a list of walls, such as [{{from_m: [0, 0], to_m: [1, 0]}}]"
         )
     if len(value) > MOST_WALLS:
         raise wrong(f"{len(value)} walls; {MOST_WALLS} at most")

@@ -15,10 +15,9 @@ if TYPE_CHECKING:
 NUM_SETTINGS = 8
 LARGE = 1000.0
 LEGEND = (
-    "gain: what the experiment is expected to tell, in nats (0.69 tell between two hypotheses that "
-    "are as probable)",
-    "named: how probably the true hypothesis is then named; lead: by how much, in log odds",
-    "hit: how probably object 1 reaches object 2",
+    "gain: expected gain in nats (0.69 nats decide between two equally probable hypotheses)",
+    "named: probability that the true hypothesis is then named; lead: its mean lead in log odds",
+    "hit: probability that object 1 reaches object 2",
 )
 NUMBERS = {"gain_nats": "gain nats", "named": "named", "lead_nats": "lead nats", "hit": "hit"}
 

@@ -55,25 +55,32 @@ SEPARATES = (
     ),
 )
 
+# Rules by which several explanations are left.
+OPEN = ("contested", "contested_together", "not_told_apart")
+
 
 def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, ...]:
     """Sentences for the user: what would tell more. Empty where nothing is open."""
     if verdict.status == "unknown":
         form = verdict.form
         known = () if form is None else (f"it looks like {FORM_MEANINGS[form]} ({form})",)
+        if any(why.rule in OPEN for why in verdict.reasons):
+            known = (
+                *known,
+                f"{_another_run(scene)}, and diagnose both clips together: within one clip time, "
+                "place and speed change together, in two they do not",
+            )
         return (
             *known,
             "look at the missing acceleration against time, speed and place; if you recognise "
             "it, write it as an effect of your own (ten lines of Python: "
             "docs/how-to/write_an_effect.md) and run diagnose again with --effects-from",
         )
-    motion = "slide" if scene.has_surface else free_phase(scene)
-    motion = "level" if scene.is_level else motion
-    again = ANOTHER_RUN[motion]
+    motion, again = _motion(scene), _another_run(scene)
     if verdict.status == "named":
         seconds = [why for why in verdict.reasons if why.rule == "second_possible"]
         others = (why.numbers["second"] for why in seconds)
-        return tuple(f"to see whether {other} is there, too: {again}" for other in others)
+        return tuple(f"to see whether {other} acts, too: {again}" for other in others)
     if verdict.status != "ambiguous":
         return ()
     groups = [(group, how.format(again=again)) for group, how in SEPARATES]
@@ -102,3 +109,15 @@ def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, 
             "diagnose several clips of the same objects together: they share masses and friction"
         )
     return tuple(said)
+
+
+def _another_run(scene: Surroundings) -> str:
+    """What to film again."""
+    return ANOTHER_RUN[_motion(scene)]
+
+
+def _motion(scene: Surroundings) -> str:
+    """Under which name `ANOTHER_RUN` has it."""
+    if scene.is_level:
+        return "level"
+    return "slide" if scene.has_surface else free_phase(scene)

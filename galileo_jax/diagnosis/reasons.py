@@ -127,7 +127,7 @@ def pairs_promised(single: Candidate, second: Promise, count: int) -> Reason:
 
 
 def second_possible(named: Candidate, shares: Mapping[str, float]) -> Reason:
-    """Another effect may be there beside the one that is named, too weak to be told.
+    """Another effect may act beside the one that is named, too weak to show.
 
     Args:
       named: a single effect.
@@ -136,8 +136,8 @@ def second_possible(named: Candidate, shares: Mapping[str, float]) -> Reason:
     total, likeliest = sum(shares.values()), max(shares, key=lambda name: shares[name])
     return Reason(
         "second_possible",
-        f"That another effect is there beside {named.title}, too weak to be told here, has a "
-        f"probability of {100 * total:.0f} %, {likeliest} first ({100 * shares[likeliest]:.0f} %).",
+        f"Besides {named.title} another effect may act that is too weak to show here: probability "
+        f"{100 * total:.0f} %, most likely {likeliest} ({100 * shares[likeliest]:.0f} %).",
         {
             "hypothesis": named.name,
             "second": likeliest,
@@ -223,8 +223,8 @@ def out_of_the_race(better: Candidate, best: Candidate, needed: float) -> Reason
     ahead = better.log_odds - best.log_odds
     return Reason(
         "out_of_the_race",
-        f"{better.title} would be {times_text(ahead)} as probable as {best.title}, yet leaves "
-        f"{p_equals(better.p_value or 0.0)}, and {needed:g} is needed.",
+        f"{better.title} would be {times_text(ahead)} as probable as {best.title}, but leaves more "
+        f"than noise ({p_equals(better.p_value or 0.0)}; at least {needed:g} is needed).",
         {
             "hypothesis": best.name,
             "rival": better.name,
@@ -289,8 +289,9 @@ def contested_together(
     """
     return Reason(
         "contested_together",
-        f"{best.title} is {times_text(ahead)} as probable as all others together that explain the "
-        f"data, {', '.join(c.title for c in others)} first; {times_text(needed)} would decide.",
+        f"{best.title} is {times_text(ahead)} as probable as all other explanations together "
+        f"({', '.join(c.title for c in others)} first); {times_text(needed)} would be needed to "
+        "decide.",
         {
             "hypothesis": best.name,
             "rival": others[0].name,
@@ -320,7 +321,7 @@ def decisive(best: Candidate, candidates: Sequence[Candidate], needed: float) ->
     """
     others = [c for c in candidates if c.effects != best.effects]
     if not others:
-        return Reason("no_rival", f"Nothing but {best.title} leaves only noise.", {})
+        return Reason("no_rival", f"Only {best.title} explains the data.", {})
     behind = best.log_odds - others[0].log_odds
     return Reason(
         "decisive",

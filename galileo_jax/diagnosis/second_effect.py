@@ -33,7 +33,7 @@ def promises_of_seconds(
       library: names of the effects.
     """
     if len(library) < 2:
-        return None
+        return []
     best = best_named(candidates)
     one, two = (log_prior([1.0] * count, len(library)) for count in (1, 2))
     promises = []

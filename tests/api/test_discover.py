@@ -100,8 +100,8 @@ def test_it_ends_when_the_verdict_has_stood(verdicts, tmp_path):
     assert [one["outcome"] for one in document["experiments"]] == ["track"] * 3
     assert "nothing is known yet" in document["experiments"][0]["reason"]
     assert document["experiments"][1]["reason"] == (
-        "it is expected to tell most: 0.50 nats, and the true one of the hypotheses is then named "
-        "with probability 0.90; until now: air_drag 0.60, rolling 0.40"
+        "largest expected gain: 0.50 nats; the true hypothesis is then named with probability "
+        "0.90; so far: air_drag 0.60, rolling 0.40"
     )
     assert document["ended"] == "the verdict (named) is the same in successive rounds"
     assert "it is named" in (tmp_path / "run" / "report.html").read_text()

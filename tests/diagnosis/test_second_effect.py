@@ -101,7 +101,7 @@ def test_beside_the_only_effect_nothing_promises_more(tmp_path):
 
 def test_a_library_of_one_effect_has_no_second():
     race: Any = None
-    assert promised_by_a_second(race, [], ["air_drag"]) is None
+    assert promises_of_seconds(race, [], ["air_drag"]) == []
 
 
 def test_the_reason_names_the_second_effect_and_its_price(two_effects):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 DEGREES_OF_FREEDOM = 5.0
 POWERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)  # of the weights, until enough draws count
@@ -44,7 +44,8 @@ class Cloud:
         """The t round weighted draws."""
         own = z[:, free]
         for power in POWERS:
-            weights = np.exp(power * log_weights - logsumexp(power * log_weights))
+            weights = np.exp(power * (log_weights - log_weights.max()))
+            weights /= weights.sum()
             if 1 / np.sum(weights**2) > DRAWS_PER_PARAMETER * own.shape[1]:
                 break
         mean = weights @ own
