@@ -55,6 +55,7 @@ STAGES = {
     "fitted": "replicates",
     "looking at what": "leads",
     "inferring": "force",
+    "looking for": "force",
 }
 COLUMNS = ("start-up", "imports", "reading", "tracking", *dict.fromkeys(STAGES.values()), "report")
 

@@ -155,8 +155,8 @@ def diagnose(
         # wrong effect it may be so, too.
         near = reduced(trials, candidates[0].hypothesis, ())
         views = views_of(trials, near, base)
-        on_stage("looking for a law")
-        laws = law_candidates(trials, base, near, views, len(library), candidates)
+        on_stage("looking for a law: comparing formulas with the missing force")
+        laws = law_candidates(trials, base, near, views, len(library), candidates, on_stage)
         for candidate in ranked(laws):
             on_candidate(candidate)
         both = _compared(trials, (*candidates, *laws), decisive, seed, compared)

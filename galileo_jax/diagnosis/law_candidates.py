@@ -1,6 +1,6 @@
 """Formulas as candidates, and the verdict that one of them is the law."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +30,7 @@ def law_candidates(
     views: Sequence[View],
     num_effects: int,
     fitted: Sequence[Candidate],
+    on_stage: Callable[[str], None] = lambda _: None,
 ) -> list[Candidate]:
     """Formulas that the missing force suggests, fitted in the model.
 
@@ -40,10 +41,11 @@ def law_candidates(
       views: of each clip.
       num_effects: in the library.
       fitted: ranked; the formula of the best form is tried, too, with its constants free.
+      on_stage: told what is being done.
     """
     made = []
     wanted = [FORM_SHAPES[c.effects[0]] for c in fitted[:1] if c.family is not None]
-    for law in fitted_laws(trials, near, views, wanted):
+    for law in fitted_laws(trials, near, views, wanted, on_stage):
         fit, own = law.hypothesis.fit, law.hypothesis.of(trials)
         values = {name: f"{value:.4g}" for name, value in law.constants().items()}
         made.append(

@@ -1,6 +1,6 @@
 """Suggested formulas as effects, fitted to the track in the model with all else free."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
@@ -66,6 +66,7 @@ def fitted_laws(
     near: Hypothesis,
     views: Sequence[View],
     wanted: Collection[Shape] = (),
+    on_stage: Callable[[str], None] = lambda _: None,
 ) -> list[FittedLaw]:
     """The best few formulas, fitted; the most evident first.
 
@@ -78,12 +79,16 @@ def fitted_laws(
       near: no effects, all else from where fits start.
       views: of each clip, from `missing_force.views_of`.
       wanted: what is tried whatever the screening says of them.
+      on_stage: told what is being done.
     """
-    made = _fitted(trials, near, suggestions(views, wanted), views)
+    found = suggestions(views, wanted)
+    on_stage(f"looking for a law: fitting the {len(found)} most promising formulas")
+    made = _fitted(trials, near, found, views)
     known = {name_of(law.structure) for law in made}
     if made:
         others = [*_simpler(made[0]), *of_family(views, made[0].structure.family)]
         new = [one for one in others if name_of(one.structure) not in known]
+        on_stage(f"looking for a law: fitting the best formula in {len(new[:NUM_LAWS])} other ways")
         made += _fitted(trials, near, new[:NUM_LAWS], views)
     return without_twins(sorted(made, key=lambda law: -law.hypothesis.fit.log_evidence))
 
