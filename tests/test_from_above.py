@@ -142,7 +142,7 @@ def walled(folder: Path, walls: Any, **keys) -> Path:
         ([{"from_m": [0.0, 1.0]}], "walls[0]: to_m is missing; both ends"),
         ([{"from_m": [0.0, 1.0], "to_px": [9.0, 9.0]}], "either as from_m and to_m or as from_px"),
         ([{"from_m": [0, 900], "to_m": [1200, 900]}], "are these millimetres or pixels?"),
-        ([{"from_m": [0.0, 1.0], "to_m": [0.0, 1.0]}], "no line; two ends that lie apart"),
+        ([{"from_m": [0.0, 1.0], "to_m": [0.0, 1.0]}], "is not a line; two ends that lie apart"),
         ([{"from_m": [0.0, "x"], "to_m": [0.0, 1.0]}], "walls[0].from_m[1]: 'x' is not a number"),
         ([{"from": [0.0, 1.0], "to_m": [0.0, 1.0]}], "walls[0].from: unknown key"),
         ([[0.0, 1.0]], "walls[0]: [0.0, 1.0] is not a mapping; from_m, to_m expected"),

@@ -26,7 +26,7 @@ STARTS_PER_PARAMETER, MOST_STARTS = 32, 96
 NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
 NUM_MATCHED = 3  # shapes kept as starts
 MOST_Z, MOST_FAR_Z = 2.5, 5.0  # of a matched strength's prior; of one with long tails
-NUM_STRENGTHS = (15, 5, 5, 5)  # a grid over all strengths, then between neighbours of the best
+NUM_STRENGTHS, NUM_ZOOMS = 15, 4  # a grid over all strengths, then between neighbours of the best
 SPREAD_Z = 0.7  # of starts round the fit without the candidate
 
 
@@ -138,12 +138,12 @@ def best_strengths(
     """`z` `[candidate, z]` with the strength of least cost, all else as it is: ever finer grids."""
     priors = [fitter.trials.model_parameters[columns[0]].prior for columns in where]
     middle, reach = np.zeros(len(z)), np.array([_most_z(prior) for prior in priors])
-    for num in NUM_STRENGTHS:
-        tried = np.repeat(z[:, None], num, axis=1)
-        steps = np.linspace(-reach, reach, num, axis=-1)
+    for _ in range(NUM_ZOOMS):
+        tried = np.repeat(z[:, None], NUM_STRENGTHS, axis=1)
+        steps = np.linspace(-reach, reach, NUM_STRENGTHS, axis=-1)
         for own, columns, centre, step in zip(tried, where, middle, steps, strict=True):
             own[:, columns] = (centre + step)[:, None]
-        of = np.repeat(np.arange(len(z)), num)
+        of = np.repeat(np.arange(len(z)), NUM_STRENGTHS)
         costs = fitter.search_costs(tried.reshape(len(of), -1), free[of]).reshape(len(z), -1)
         best = np.argmin(costs, axis=1)
         middle = middle + np.take_along_axis(steps, best[:, None], axis=1)[:, 0]

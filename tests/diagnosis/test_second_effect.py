@@ -139,7 +139,7 @@ def test_a_second_effect_is_said_beside_a_name_if_it_is_probable_enough():
     (why,) = with_second(named, [NAMED], PROMISES).reasons
     assert why.rule == "second_possible" and why.numbers["second"] == "frame_rate"
     assert why.numbers["probability"] == pytest.approx(0.195, abs=0.001)
-    assert "probability of 19 %, frame_rate first (18 %)" in why.sentence
+    assert "probability 19 %, most likely frame_rate (18 %)" in why.sentence
     assert with_second(named, [NAMED], PROMISES[1:]) == named
     for other in (Verdict("ambiguous", ("air_drag", "rolling")), Verdict("none", ())):
         assert with_second(other, [NAMED], PROMISES) == other

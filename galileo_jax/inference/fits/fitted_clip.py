@@ -81,7 +81,7 @@ def _padded(problem: Problem) -> Padded:
     frames = rounded_up(len(times), FRAMES) - len(times)
     # A camera's wobble has as many modes as frames; all else has fewer than those to spare.
     most = len(data.observed_m) * (len(times) + frames) + SPARE_MODES
-    is_few = len(data.gain) <= SPARE_MODES
+    is_few = problem.noise != "camera" and len(data.gain) <= SPARE_MODES
     modes = SPARE_MODES if is_few else max(rounded_up(len(data.gain), FRAMES), most)
     modes -= len(data.gain)
     whitening = Whitening(
