@@ -28,7 +28,8 @@ def fitted_pairs(
     """Pairs of the best single effects with others, and what could be confused with the best pair.
 
     The first are fitted from the single effects' fits. One that is as good as the best pair may not
-    be reached from there: it is, from the best pair without one of its effects.
+    be reached from there: it is, from the best pair without one of its effects. Not where the best
+    pair has less evidence than one of its effects alone: what is like it has no more.
     """
     trials, seed = race.fitter.trials, race.seed
     singles = [c for c in candidates if not c.is_form][:NUM_JOINED]
@@ -46,13 +47,24 @@ def fitted_pairs(
         return ()
     made = race(starts, sets)
     searched = {frozenset(c.effects) for c in made}
-    made += _of_others(race, ranked(made)[0], candidates, library, searched)
+    alone = {c.name: c.log_evidence for c in candidates}
+
+    def adds(pair: Candidate) -> bool:
+        return pair.log_evidence > max(alone[name] for name in pair.effects)
+
+    best = ranked(made)[0]
+    stronger = max(best.effects, key=lambda name: alone[name])
+    taken = best.effects if adds(best) else (stronger,)
+    made += _of_others(race, best, taken, candidates, library, searched)
     for _ in range(NUM_ROUNDS):
         best = ranked(made)[0]
+        if not adds(best):
+            break
         made += _alike(race, best, library, searched)
         if ranked(made)[0].effects == best.effects:
             break
-    return ranked([*made, *_crossed(race, ranked(made))])
+    known = {frozenset(c.effects) for c in made}
+    return ranked([*made, *_crossed(race, ranked(filter(adds, made)), known)])
 
 
 def _alike(
@@ -75,11 +87,12 @@ def _alike(
 def _of_others(
     race: Race,
     best: Candidate,
+    taken: Sequence[str],
     candidates: Sequence[Candidate],
     library: Sequence[str],
     searched: set[frozenset[str]],
 ) -> list[Candidate]:
-    """Pairs of neither effect of the best pair, fitted where a short search comes near that.
+    """Pairs of effects that are not `taken`, fitted where a short search comes near the best pair.
 
     Two effects may together do what the best single effect does alone, and neither of them need be
     among the best. Each pair starts from the better of its single effects. Those fitted are added
@@ -90,20 +103,25 @@ def _of_others(
     left = [
         (one, pair)
         for one, pair in pairs
-        if frozenset(pair) not in searched and not set(pair) & set(best.effects)
+        if frozenset(pair) not in searched and not set(pair) & set(taken)
     ]
     made = _nearest(race, best, [one.hypothesis for one, _ in left], [pair for _, pair in left])
     searched.update(frozenset(c.effects) for c in made)
     return made
 
 
-def _crossed(race: Race, made: Sequence[Candidate]) -> list[Candidate]:
+def _crossed(race: Race, made: Sequence[Candidate], known: set[frozenset[str]]) -> list[Candidate]:
     """What the effects of the pairs that are about equal make with each other, fitted.
 
     Where A and B do as well as A and C and as D and C, so may B and C, with all else so different
     that from any of them only side valleys are reached: each is searched for from scratch.
+
+    Args:
+      race: of the candidates.
+      made: pairs that have more evidence than either effect alone, ranked.
+      known: all pairs that were fitted.
     """
-    sets = crossed_pairs(made)
+    sets = [pair for pair in crossed_pairs(made) if frozenset(pair) not in known]
     if not sets:
         return []
     count = len(race.fitter.trials.model_parameters)
