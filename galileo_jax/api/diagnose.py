@@ -353,7 +353,7 @@ def diagnose(
 
 def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
     def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
-        fitter_of(with_library(some, seen, engine)).compile()
+        fitter_of(with_library(some, seen, engine)).compile(with_races=True)
 
     return precompile(clips, compile_for).join
 

@@ -121,12 +121,14 @@ def fit_candidates(
     count = len(trials.model_parameters)
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
     from_fits = [base.fit for base in bases]
+    shown: dict[int, GradientFit] = {}
     if starts is None:
         matching, gains = matched(fitter, from_fits, candidates, seed)
         if len(candidates) > NUM_AT_ONCE:
             best = int(np.argmax(gains))
             [fit] = fitter.fit_from(matching[best][:1], free[[best]], np.zeros(1, int))
             on_fit(Hypothesis(tuple(candidates[best]), fit))
+            shown[best] = fit
             matching[best][0] = fit.z[:count]  # others that are far behind that leave the race
         both = zip(scattered(fitter, from_fits, free, seed), matching, strict=True)
         starts = [np.concatenate(pair) for pair in both]
@@ -163,6 +165,8 @@ def fit_candidates(
         polished = fitter.polish(np.concatenate(again), free[whose], owner)
         for row, fit in polished.items():
             take(int(whose[row]), fit)
+    for i, fit in shown.items():
+        take(i, fit)
     hypotheses = [Hypothesis(tuple(e), fits[i]) for i, e in enumerate(candidates)]
     for i in np.flatnonzero(needs_mending(hypotheses)).tolist():
         fit, found = mended(fitter, ends_at[i], seed, bases[i].fit)

@@ -50,10 +50,10 @@ def fitted_pairs(
     alone = {c.name: c.log_evidence for c in candidates}
 
     def adds(pair: Candidate) -> bool:
-        return pair.log_evidence > max(alone[name] for name in pair.effects)
+        return pair.log_evidence > max(alone.get(name, -np.inf) for name in pair.effects)
 
     best = ranked(made)[0]
-    stronger = max(best.effects, key=lambda name: alone[name])
+    stronger = max(best.effects, key=lambda name: alone.get(name, -np.inf))
     taken = best.effects if adds(best) else (stronger,)
     made += _of_others(race, best, taken, candidates, library, searched)
     for _ in range(NUM_ROUNDS):

@@ -130,3 +130,29 @@ def test_a_pair_without_either_effect_of_the_best_one_is_found(monkeypatch):
     assert [one.name for one in found] == ["c+d", "a+b"]
     base, pair = fitted[-1]
     assert tuple(pair) == ("d", "c") and base is singles[1].hypothesis
+
+
+def test_pairs_that_add_nothing_to_an_effect_lead_nowhere(monkeypatch):
+    """a alone has more evidence than with anything: only pairs without a are looked for."""
+    searched, fits = [], []
+
+    def search(fitter, bases, pairs, seed, lowest):
+        searched.extend(frozenset(pair) for pair in pairs)
+        return np.zeros((len(pairs), 1)), np.full(len(pairs), 99.0)
+
+    def race(bases, sets, starts=None):
+        return [candidate("+".join(sorted(pair)), 39.0) for pair in sets]
+
+    fitter = SimpleNamespace(
+        trials=SimpleNamespace(model_parameters=()),
+        search_costs=lambda z, free: np.zeros(1),
+        fit=lambda *_, **__: fits.append(1),
+    )
+    stub: Any = MagicMock(side_effect=race, seed=0, fitter=fitter)
+    monkeypatch.setattr(pairs_module, "best_gains", lambda *_: np.array([0, 9, 0, 0, 0.0]))
+    monkeypatch.setattr(pairs_module, "short_search", search)
+    monkeypatch.setattr(pairs_module, "pairs_to_try", lambda *_: [[("a", "b"), ("a", "c")], [], []])
+    singles = [candidate(name, 60.0 - 20 * i) for i, name in enumerate("abc")]
+    found = pairs_module.fitted_pairs(stub, singles, list("abcd"))
+    assert {one.name for one in found} == {"a+b", "a+c"}
+    assert set(searched) <= {frozenset("bc"), frozenset("bd"), frozenset("cd")} and not fits

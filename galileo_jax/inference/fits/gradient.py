@@ -108,10 +108,17 @@ class GradientFitter:
         """Of the trials."""
         return self._residuals
 
-    def compile(self) -> None:
-        """Compiles (or reads from the cache) all parts, so that `fit` only computes."""
+    def compile(self, with_races: bool = False) -> None:
+        """Compiles (or reads from the cache) all parts, so that `fit` only computes.
+
+        Args:
+          with_races: what many hypotheses at once need, too.
+        """
         one, many = (np.zeros((n, self._count)) for n in (1, self.settings.num_starts))
         parts: list[Callable[[], Any]] = []
+        if with_races:
+            free = self.trials.free(self.trials.all_effects)[: self._count]
+            parts.append(functools.partial(self._descent, self._batch(many, free), np.inf, 1))
         for effects in dict.fromkeys([(), self.trials.all_effects]):
             free = self.trials.free(effects)[: self._count]
             parts.append(functools.partial(self._descent, self._batch(one, free), np.inf, 1))
