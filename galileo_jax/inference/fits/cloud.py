@@ -55,16 +55,25 @@ class Cloud:
 
     def draw(self, generator: np.random.Generator, num: int) -> np.ndarray:
         """Points, `[draw, parameter]`, z."""
-        u = generator.standard_normal((num, len(self.mean)))
-        chi = generator.chisquare(DEGREES_OF_FREEDOM, num) / DEGREES_OF_FREEDOM
         z = np.zeros((num, len(self.free)))
-        z[:, self.free] = self.mean + (u / np.sqrt(chi)[:, None]) @ self.root.T
+        z[:, self.free] = self.mean + student_t(generator, num, len(self.mean)) @ self.root.T
         return z
 
     def log_density(self, z: Float[np.ndarray, "draw parameter"]) -> np.ndarray:
         """Of the free parameters, `[draw]`."""
         u = np.linalg.solve(self.root, (z[:, self.free] - self.mean).T)
-        nu, dim = DEGREES_OF_FREEDOM, len(self.mean)
-        constant = gammaln((nu + dim) / 2) - gammaln(nu / 2) - dim / 2 * np.log(np.pi * nu)
-        constant -= np.linalg.slogdet(self.root)[1]
-        return constant - (nu + dim) / 2 * np.log1p(np.sum(u**2, axis=0) / nu)
+        return log_student_t(np.sum(u**2, axis=0), len(u)) - np.linalg.slogdet(self.root)[1]
+
+
+def log_student_t(far: Float[np.ndarray, " draw"], dim: int) -> Float[np.ndarray, " draw"]:
+    """The log density of a standard t in so many dimensions, at squared distances from its mean."""
+    nu = DEGREES_OF_FREEDOM
+    constant = gammaln((nu + dim) / 2) - gammaln(nu / 2) - dim / 2 * np.log(np.pi * nu)
+    return constant - (nu + dim) / 2 * np.log1p(far / nu)
+
+
+def student_t(generator: np.random.Generator, num: int, dim: int) -> Float[np.ndarray, "draw dim"]:
+    """Draws of it. SciPy's `multivariate_t` is the same; its import takes longer than the draws."""
+    u = generator.standard_normal((num, dim))
+    chi = generator.chisquare(DEGREES_OF_FREEDOM, num) / DEGREES_OF_FREEDOM
+    return u / np.sqrt(chi)[:, None]

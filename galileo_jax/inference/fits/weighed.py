@@ -26,9 +26,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import gammaln, logsumexp
+from scipy.special import logsumexp
 
-from galileo_jax.inference.fits.cloud import DEGREES_OF_FREEDOM, Cloud
+from galileo_jax.inference.fits.cloud import Cloud, log_student_t, student_t
 from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD
@@ -79,9 +79,7 @@ class _Part:
 
     def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
         """Points, and their log density in this part."""
-        u = generator.standard_normal((num, self.valley.root.shape[1]))
-        chi = generator.chisquare(DEGREES_OF_FREEDOM, num) / DEGREES_OF_FREEDOM
-        u = u / np.sqrt(chi)[:, None]
+        u = student_t(generator, num, self.valley.root.shape[1])
         z = np.array(self.valley(self.width * u))
         z[:, self.others] = generator.standard_normal((num, len(self.others)))
         return z, self._log_density_at(u, z)
@@ -94,12 +92,10 @@ class _Part:
     def _log_density_at(self, u: np.ndarray, z: np.ndarray) -> np.ndarray:
         with np.errstate(over="ignore", invalid="ignore"):
             far = np.nan_to_num(np.sum(u**2, axis=1), nan=np.inf)
-        nu, dim = DEGREES_OF_FREEDOM, u.shape[1]
-        constant = gammaln((nu + dim) / 2) - gammaln(nu / 2) - dim / 2 * np.log(np.pi * nu)
-        constant -= self.valley.log_volume + dim * np.log(self.width)
-        own = z[:, self.others]
-        constant -= len(self.others) / 2 * np.log(2 * np.pi)
-        return constant - (nu + dim) / 2 * np.log1p(far / nu) - 0.5 * np.sum(own**2, axis=1)
+        dim, own = u.shape[1], z[:, self.others]
+        volume = self.valley.log_volume + dim * np.log(self.width)
+        from_priors = -len(self.others) / 2 * np.log(2 * np.pi) - 0.5 * np.sum(own**2, axis=1)
+        return log_student_t(far, dim) - volume + from_priors
 
 
 def weighed(
