@@ -36,9 +36,9 @@ ADEQUATE_P = 0.01
 # a camera that sees still objects better than it states still blurs moving ones.
 JUDGED_SCALE_RANGE = (1.0, NOISE_SCALE_RANGE[1])
 ANY_SCALE = (0.0, np.inf)
-# Where modes take up so much of a cell's values, as of how a falling body drifts aside, what they
-# leave is no noise, and tells nothing.
-ABSORBED = 0.99
+# Where modes take up so much of a cell's values, as of how a box wobbles across its way, what they
+# leave is as large as these imperfections happen to be in this clip, and tells nothing of the model.
+ABSORBED = 0.9
 # Of the chance of a false alarm, how much is spent on the nuisances. They are far inside their
 # priors in most clips, so that an equal share would cost the residuals half of theirs.
 PULL_SHARE = 0.05

@@ -3,7 +3,8 @@
 Sampling and coding shift what moves from frame to frame; what stands still they shift once. The
 tracker states both alike, so that a fit of one noise scale would take the quiet frames for a reason
 to trust the moving ones too much. The one shift of what has come to rest is stated as a pattern
-that all frames of the rest share: however many there are, they do not average it out.
+that all frames of the rest share: however many there are, they do not average it out. Errors that
+follow each other within a rest (`errors_at_rest`) are stated as patterns of that rest.
 """
 
 from dataclasses import replace
@@ -12,12 +13,17 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import chdtri
 
+from galileo_jax.measurement.errors_at_rest import errors_at_rest
 from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.random_patterns import random_patterns
 
 WINDOW = 9  # frames
 STILL_SDS = 5.0  # of the stated noise: whoever goes no further in a window is at rest in it
 MIN_WINDOWS = 20  # fewer do not tell a variance
 LEAST_SCALE = 0.3  # a coder repeats what stands still: less scatter than that is no less noise
+# Of a rest's frames beside a motion so many may hold its slow end: errors are not learnt from them.
+BESIDE = WINDOW // 2
+FAINT = 0.1  # of the independent errors: a weaker pattern of errors is left out
 
 
 def with_noise_at_rest(observation: Observation) -> Observation:
@@ -45,7 +51,36 @@ def with_noise_at_rest(observation: Observation) -> Observation:
     scale2 = np.where(is_still, np.clip(share, LEAST_SCALE**2, 1.0), 1.0)
     covariance = observation.covariance_m2 * scale2[:, None, None]
     lowered = replace(observation, covariance_m2=covariance)
-    return replace(lowered, modes_m=_with_shifts(lowered, is_still))
+    return _with_errors(replace(lowered, modes_m=_with_shifts(lowered, is_still)), is_still)
+
+
+def _with_errors(
+    observation: Observation, is_still: Bool[np.ndarray, "object frame"]
+) -> Observation:
+    """The observation with the covariance of the errors of each rest."""
+    covariance, found = observation.covariance_m2.copy(), []
+    for i, still in enumerate(is_still):
+        for rest in _stretches(still):
+            first = BESIDE if rest.start else 0
+            after = rest.stop - rest.start - (BESIDE if rest.stop < len(still) else 0)
+            if after - first < WINDOW:
+                continue
+            for axis in range(observation.position_m.shape[1]):
+                sd = np.sqrt(observation.covariance_m2[i, axis, axis, rest])
+                place = observation.position_m[i, axis, rest]
+                alone, together = errors_at_rest(place, sd, first, after)
+                root = np.where(np.arange(len(covariance[i])) == axis, np.sqrt(alone), 1.0)
+                covariance[i, ..., rest] *= (root[:, None] * root)[..., None]
+                least = FAINT * alone / np.linalg.eigvalsh(together)[-1]
+                for pattern in random_patterns(together, least):
+                    mode = np.zeros_like(observation.position_m)
+                    mode[i, axis, rest] = pattern * sd
+                    found.append(mode)
+    if not found:
+        return observation
+    before = [] if observation.modes_m is None else list(observation.modes_m)
+    modes = np.stack([*before, *found])
+    return replace(observation, covariance_m2=covariance, modes_m=modes, num_errors=len(found))
 
 
 def _with_shifts(

@@ -22,21 +22,21 @@ def filmed(noise_at_rest, seed=81):
 
 
 def scales(observation):
-    before, after = observation.covariance_m2, with_noise_at_rest(observation).covariance_m2
-    assert (after[:, 0, 1] == 0).all()
-    return np.sqrt(after[0, 0, 0] / before[0, 0, 0])
+    found = with_noise_at_rest(observation)
+    assert (found.covariance_m2[:, 0, 1] == 0).all()
+    variance = np.diag(covariance_of(found, 0)) * SD_M**2
+    return np.sqrt(variance / observation.covariance_m2[0, 0, 0])
 
 
 @pytest.mark.parametrize("noise", [0.5, 0.8])
 def test_noise_at_rest_is_found(noise):
     found = scales(filmed(noise))
     assert (found[70:] == 1.0).all(), "in motion nothing changes"
-    assert found[:55] == pytest.approx(noise, rel=0.15)
+    assert found[:55] == pytest.approx(noise, rel=0.2)
 
 
-def test_it_is_never_raised_and_not_lowered_without_end():
-    assert (scales(filmed(1.5)) == 1.0).all()
-    assert scales(filmed(0.01))[:55] == pytest.approx(LEAST_SCALE)
+def test_it_is_not_lowered_without_end():
+    assert scales(filmed(0.01))[:55] == pytest.approx(LEAST_SCALE, rel=0.1)
 
 
 def test_a_short_track_is_left_as_it_is():
@@ -62,14 +62,73 @@ def test_the_shift_of_what_came_to_rest_is_one_error():
         seen.mask,
     )
     found = with_noise_at_rest(back)
-    assert found.modes_m is not None and found.modes_m.shape == (2, 1, 2, FRAMES)
+    assert found.modes_m is not None
     assert not found.modes_m[..., :55].any(), "nothing is shared by what moves"
-    for axis, mode in enumerate(found.modes_m):
+    shifts = found.modes_m[: len(found.modes_m) - found.num_errors]
+    assert shifts.shape == (2, 1, 2, FRAMES)
+    for axis, mode in enumerate(shifts):
         assert not mode[0, 1 - axis].any()
         at_rest = mode[0, axis, 75:]
         assert (at_rest == at_rest[0]).all()
         moving, resting = (
-            found.covariance_m2[0, axis, axis, part] for part in (slice(55), slice(75, None))
+            np.median(np.diag(covariance_of(found, axis))[part]) * SD_M**2
+            for part in (slice(55), slice(75, None))
         )
-        assert at_rest[0] ** 2 + np.median(resting) == pytest.approx(np.median(moving), rel=0.1)
-    assert with_noise_at_rest(seen).modes_m is None, "the first picture is coded by itself"
+        assert at_rest[0] ** 2 + resting == pytest.approx(moving, rel=0.25)
+    first = with_noise_at_rest(seen)
+    shifts = 0 if first.modes_m is None else len(first.modes_m) - first.num_errors
+    assert shifts == 0, "the first picture is coded by itself"
+
+
+def at_rest_all_the_time(memory, seed, frames=60):
+    """A body that nothing moves, whose errors `[1, 2, frame]` are as `memory` of those before."""
+    rng, errors = np.random.default_rng(seed), np.zeros((1, 2, frames))
+    fresh = rng.standard_normal(errors.shape)
+    for j in range(frames):
+        before = errors[..., j - 1] if j else fresh[..., 0]
+        errors[..., j] = memory * before + np.sqrt(1 - memory**2) * fresh[..., j]
+    covariance = SD_M**2 * np.tile(np.eye(2)[None, ..., None], (1, 1, 1, frames))
+    times, mask = np.arange(frames) / 30, np.ones((1, frames), bool)
+    return Observation(("object1",), times, 0.2 + SD_M * errors, covariance, mask)
+
+
+def covariance_of(observation, axis):
+    """`[frame, frame]`, in units of what was stated."""
+    found = np.diag(observation.covariance_m2[0, axis, axis])
+    if observation.num_errors:
+        own = observation.modes_m[-observation.num_errors :, 0, axis]
+        found = found + own.T @ own
+    return found / SD_M**2
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.5, 0.65])
+def test_errors_that_follow_each_other_are_told_from_independent_ones(memory):
+    """The mean of a rest is as uncertain as it is, and whitened errors are independent."""
+    of_mean, lags, squares = [], [], []
+    for seed in range(30):
+        seen = with_noise_at_rest(at_rest_all_the_time(memory, seed))
+        for axis in range(2):
+            cover = covariance_of(seen, axis)
+            of_mean.append(cover.mean())
+            errors = (seen.position_m[0, axis] - 0.2) / SD_M
+            white = np.linalg.solve(np.linalg.cholesky(cover), errors)
+            lags.append(np.mean(white[1:] * white[:-1]))
+            squares.append(np.mean(white**2))
+    apart = np.abs(np.subtract.outer(np.arange(60), np.arange(60)))
+    true = np.mean(float(memory) ** apart) if memory else 1 / 60
+    # A rest that scatters less than the others by chance is taken to scatter as they do.
+    assert 0.7 < np.median(of_mean) / true < 1.8
+    assert np.mean(lags) == pytest.approx(0.0, abs=0.1)
+    assert 0.75 < np.mean(squares) < 1.1
+
+
+def test_a_slow_start_is_no_error_of_the_rest():
+    """Frames beside a motion are not learnt from."""
+    seen = at_rest_all_the_time(0.0, 5)
+    moved = seen.position_m.copy()
+    moved[0, 0, -4:] += SD_M * np.array([2.0, 8.0, 20.0, 40.0])
+    starts = Observation(seen.names, seen.times_s, moved, seen.covariance_m2, seen.mask)
+    without, found = (covariance_of(with_noise_at_rest(one), 0) for one in (seen, starts))
+    assert np.median(np.diag(found)[:50]) == pytest.approx(
+        np.median(np.diag(without)[:50]), rel=0.2
+    )
