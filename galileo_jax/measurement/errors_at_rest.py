@@ -20,7 +20,6 @@ from scipy.special import logsumexp
 
 PIECE = 48  # frames whose likelihood is computed together
 MOST_VARIANCE = 4.0  # of what rests of the clip have: more is a motion
-AVERAGE_WORTH = 10  # values: how much the average of the rests says of one of them
 SHARES = (0.3, 0.5, 0.7, 0.85, 0.95)
 TAUS = (1.0, 1.5, 2.5, 4.0, 7.0)  # frames
 Errors = Float[np.ndarray, " errors"]
@@ -50,8 +49,7 @@ def errors_at_rest(
     prior[0] = 0.0
     evidence = prior - (determinant + degrees * np.log(np.maximum(square, 1e-300))) / 2
     probability = np.exp(evidence - logsumexp(evidence))
-    variance = (square + AVERAGE_WORTH) / (degrees - 2 + AVERAGE_WORTH)
-    variance = np.minimum(variance, MOST_VARIANCE)
+    variance = np.clip(square / (degrees - 2), 1.0, MOST_VARIANCE)
     weight = probability * variance
     shares = np.array([0.0, *(share for share in SHARES for _ in TAUS)])
     alone = float(weight @ (1 - shares))

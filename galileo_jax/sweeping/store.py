@@ -33,6 +33,7 @@ from galileo_jax.sweeping.work import PAGE, CellResult, MeasuredClip
 
 RESULT, FAILURE = "result.json", "failure.json"
 ARRAYS = ("times_s", "position_m", "covariance_m2", "mask")
+FLAGS = ("is_squared", "is_turning", "is_filmed")
 
 
 class Store:
@@ -128,8 +129,7 @@ class Store:
             Observation(names=names, **arrays),
             modes_m=modes,
             turned_rad=turned,
-            is_squared=bool(notes.get("is_squared", False)),
-            is_turning=bool(notes.get("is_turning", False)),
+            **{name: bool(notes.get(name, False)) for name in FLAGS},
             num_errors=int(notes.get("num_errors", 0)),
             wander_m=notes.get("wander_m"),
         )
@@ -146,7 +146,7 @@ class Store:
         notes = {name: getattr(one, name) for name in ("inferred", "doubts", "remarks")}
         notes["cuts"] = [vars(entry) for entry in one.cuts]
         notes["astray"] = [vars(entry) for entry in one.astray]
-        notes |= {"is_squared": seen.is_squared, "is_turning": seen.is_turning}
+        notes |= {name: getattr(seen, name) for name in FLAGS}
         notes |= {"num_errors": seen.num_errors, "wander_m": seen.wander_m}
         arrays = {name: getattr(seen, name) for name in ARRAYS}
         if seen.modes_m is not None:
