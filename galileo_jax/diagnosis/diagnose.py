@@ -24,6 +24,7 @@ from dataclasses import replace
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
+from galileo_jax.diagnosis.base_again import better_base
 from galileo_jax.diagnosis.candidates import Hypothesis, reduced
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
@@ -104,6 +105,15 @@ def diagnose(
     race = Race(fitter, base, is_adequate, seed, on_candidate)
     singles = [(name,) for name in trials.all_effects]
     candidates = ranked(race([base] * len(singles), singles))
+    again = better_base(fitter, base, candidates)
+    if again is not None:
+        on_stage("comparing a better fit without effects with the data")
+        base, first = again, Round(again, compare(trials, again.fit, seed))
+        on_round(first)
+        rounds, is_adequate = [first], first.comparison.is_adequate
+        on_stage(f"fitting {len(library)} candidates once more")
+        race = Race(fitter, base, is_adequate, seed, on_candidate)
+        candidates = ranked(race([base] * len(singles), singles))
     for candidate in candidates:
         on_candidate(candidate)
     if add not in ("auto", "none"):

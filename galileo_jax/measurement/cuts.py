@@ -8,7 +8,8 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
     toss                     to the first impact
     pendulum, spring, liquid from where it is let go, to a blow or a stop
-    ramp                     to where a box tips over, or two that touch turn aside
+    ramp                     to where a box tips over, two that touch turn aside, or object 1 comes
+                             back to the foot
     from_above               to a blow where neither another puck nor a declared wall is, or to a
                              quarter of a second after everything has come to rest
 """
@@ -29,6 +30,7 @@ from galileo_jax.measurement.find_hand import hand_frame
 from galileo_jax.measurement.find_held import let_go_frame, standstill_frame
 from galileo_jax.measurement.find_placed import placed_frames
 from galileo_jax.measurement.find_rest import rest_frame
+from galileo_jax.measurement.find_return import return_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
 from galileo_jax.measurement.find_stranger import stranger_frame
 from galileo_jax.measurement.find_tip import tip
@@ -43,6 +45,7 @@ PLACED = "is put into its place by a hand before that"
 TAKEN = "is taken away by a hand from then on"
 TIPS_OVER = "tips over onto another face"
 FOLDS = "turns aside and slides past what it pushes: their centres come closer than at the hit"
+RETURNS = "comes back to the foot of the ramp, where its edge meets the slope"
 IS_HELD = "is held before that"
 HELD = "is moved by a hand before that: it accelerates differently from later"
 
@@ -198,6 +201,9 @@ def _of_a_ramp(clip: Clip, observation: Observation) -> tuple[Observation, tuple
         last = fold_frame(clip, observation, front)
         if last is not None:
             ends.append((last, front - 1, FOLDS))
+    last = return_frame(clip, observation, 0)
+    if last is not None:
+        ends.append((last, 0, RETURNS))
     if not ends:
         return observation, ()
     last, which, why = min(ends)

@@ -162,8 +162,6 @@ class Parameter:
       step: a coarse step in `z` for the first finite differences, before the scale of the
         posterior is known; None: no rollout depends on it (clock, camera).
       per_clip: whether each clip of a series has its own (nuisances always do).
-      multiplies: name of the coefficient of friction that it multiplies: motion is linear in
-        their product.
     """
 
     name: str
@@ -173,7 +171,6 @@ class Parameter:
     role: Role = "main"
     step: float | None = 0.02
     per_clip: bool = False
-    multiplies: str | None = None
 
     @property
     def is_positive(self) -> bool:

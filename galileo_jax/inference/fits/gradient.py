@@ -44,6 +44,7 @@ ELSEWHERE_Z = (-2.0, -1.0, 1.0, 2.0)  # of what a fit leaves open: elsewhere it 
 FAR_SDS = 8.0  # from a fit that tells a parameter: there it should be far worse (32 nats)
 UNTOLD_SD_Z = 0.9  # of the prior's 1: a parameter left so open does not show
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
+ALONG_Z = np.linspace(-2.0, 2.5, 19)  # of a positive nuisance: where another valley may begin
 LEADS_ON = 1.0  # nats: less is no other valley
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
 LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
@@ -262,6 +263,23 @@ class GradientFitter:
         """A fit and it with other values of the positive nuisances, `[variant, z]`."""
         count = self._count
         return np.stack(self._variants(fit.z[:count], fit.free[:count]))
+
+    def along_nuisances(self, fit: GradientFit) -> np.ndarray:
+        """Where chi2 is least as one positive nuisance moves, all else as in a fit, `[start, z]`.
+
+        Every minimum of every line, the fit's own noise; the lines' ends, too.
+        """
+        z, count = fit.z[: self._count], self._count
+        own = np.flatnonzero(self._is_positive_nuisance & fit.free[:count])
+        points = np.tile(z, (len(own), len(ALONG_Z), 1))
+        points[np.arange(len(own)), :, own] = ALONG_Z
+        flat = points.reshape(-1, count)
+        noise = np.tile(np.exp(NOISE_SD * fit.z[count:]), (len(flat), 1))
+        free = np.tile(fit.free[:count], (len(flat), 1))
+        costs = self._residuals.costs(Batch(flat, free, noise)).reshape(len(own), len(ALONG_Z))
+        beside = np.pad(costs, ((0, 0), (1, 1)), constant_values=np.inf)
+        is_least = (costs <= beside[:, :-2]) & (costs <= beside[:, 2:])
+        return np.concatenate([z[None], points[is_least]])
 
     def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         """chi2 / 2 and the prior's part at the search's noise, `[point]`: to choose starts."""

@@ -8,7 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.model.effects.motion import ALONE, LONG_RAMP, LONG_TABLE, film, move, slide_m_s2
+from galileo_jax.model.effects import make_effects
+from galileo_jax.model.effects.effect import State
+from tests.model.effects.motion import (
+    ALONE,
+    LONG_RAMP,
+    LONG_TABLE,
+    PAIR,
+    film,
+    move,
+    slide_m_s2,
+)
 from tests.ramp_model import HIT, SMOOTH, make_surroundings
 
 EXACT = 1e-9  # the midpoint rule is exact for constant forces
@@ -250,3 +260,39 @@ def test_spring_tether_is_harmonic(stiffness):
     amplitude = G * math.sin(ANGLE) / omega**2
     expected = amplitude * (1 - np.cos(omega * motion.times_s))
     assert motion.gone_m[0] == pytest.approx(expected, abs=5e-4 * amplitude)
+
+
+@pytest.mark.parametrize("straightness", [0.0, 0.4, 1.0])
+def test_a_straight_band_pulls_to_its_start_and_lifts(straightness):
+    """On the table, by the geometry of the plane; on the ramp along it."""
+    scene, (band,) = PAIR, make_effects(["spring_tether"])
+    stiffness, mass, k = 3.0, 0.4, 0.2
+    theta = {"spring_tether": stiffness, "spring_straightness": straightness, "m1": mass, "m2": 0.3}
+    theta = {name: np.asarray(value) for name, value in theta.items()}
+    start, slope = scene.start_path_m[0], scene.angle_rad
+    force, law = band.force(theta, scene), band.friction(theta, scene)
+    assert force is not None and law is not None
+    on_table, on_ramp = (
+        State(np.array([q, 0.5]), np.array([0.7, 0.0]), np.asarray(0.3), np.array([q < 0, False]))
+        for q in (0.2, 0.4 * start)
+    )
+    coefficients = np.array([k, k])
+    gone = np.array([0.2 - start * np.cos(slope), start * np.sin(slope)])  # of r - r_start
+    straight, along = -stiffness * gone[0], -stiffness * (0.2 - start)
+    expected = straightness * straight + (1 - straightness) * along
+    assert force(on_table) == pytest.approx(np.array([expected, 0.0]))
+    lifted = straightness * -stiffness * gone[1] / (mass * scene.gravity)
+    assert lifted >= 0.0
+    assert law(on_table, coefficients) == pytest.approx(np.array([k * (1 - lifted), k]))
+    assert force(on_ramp) == pytest.approx(np.array([stiffness * 0.6 * start, 0.0]))
+    assert law(on_ramp, coefficients) == pytest.approx(coefficients)
+
+
+def test_stribeck_friction_is_that_of_all_objects():
+    (law,) = make_effects(["stribeck"])
+    theta = {"stribeck": np.asarray(1.5), "stribeck_speed": np.asarray(0.4)}
+    friction = law.friction(theta, PAIR)
+    assert friction is not None
+    speed, k = np.array([0.8, -0.2]), np.array([0.1, 0.3])
+    state = State(np.array([0.1, 0.3]), speed, np.asarray(0.0), np.array([False, False]))
+    assert friction(state, k) == pytest.approx(k * (1 + 1.5 * np.exp(-np.abs(speed) / 0.4)))

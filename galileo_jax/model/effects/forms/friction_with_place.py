@@ -23,7 +23,7 @@ class FrictionWithPlace(Form):
         """By which share per metre; none in a fall."""
         if not scene.has_surface:
             return ()
-        return (Parameter(self.name, "1/m", PRIOR, 0.0, "effect", 0.1, multiplies="k1"),)
+        return (Parameter(self.name, "1/m", PRIOR, 0.0, "effect", 0.1),)
 
     def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
         """The coefficients at the places."""

@@ -23,7 +23,7 @@ class FrictionWithTime(Form):
         """By which share per second; none in a fall."""
         if not scene.has_surface:
             return ()
-        return (Parameter(self.name, "1/s", PRIOR, 0.0, "effect", 0.1, multiplies="k1"),)
+        return (Parameter(self.name, "1/s", PRIOR, 0.0, "effect", 0.1),)
 
     def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
         """The coefficients at the time."""

@@ -1,8 +1,11 @@
 """Spring tether: a spring (a rubber band) ties object 1 to where it is let go.
 
-    F = -K (q - q_start)
+    F = -K (q - q_start)          along the path,
+    F = -K (r - r_start)          straight to that point,
 
-along the path, slack at the declared start.
+slack at the declared start. On the ramp both are the same. On the table a band led round the foot
+pulls along the path; a free one pulls straight, so that it also lifts the object and lightens what
+rubs. `spring_straightness` is 0 for the one and 1 for the other.
 
 Source: Hooke, De potentia restitutiva (1678).
 Confused with: constant_force and k1 on a short path; air_drag in part (both grow on the way).
@@ -10,11 +13,20 @@ Confused with: constant_force and k1 on a short path; air_drag in part (both gro
 
 from typing import ClassVar
 
-from galileo_jax.model.effects.effect import Effect, Force, State, Surroundings, Theta
+from galileo_jax.model.effects.effect import (
+    Array,
+    Effect,
+    Force,
+    Friction,
+    State,
+    Surroundings,
+    Theta,
+)
 from galileo_jax.model.effects.registry import register
-from galileo_jax.model.parameters import LogNormal, Parameter
+from galileo_jax.model.parameters import LogNormal, Normal, Parameter
 
 PRIOR = LogNormal(median=1.0, sd=1.2)
+STRAIGHTNESS_PRIOR = Normal(0.5, 0.5)  # led round the foot or free: both one sd from the middle
 
 
 @register
@@ -24,15 +36,51 @@ class SpringTether(Effect):
     name: ClassVar[str] = "spring_tether"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The stiffness K."""
-        return (Parameter("spring_tether", "N/m", PRIOR, 0.0, "effect", 0.1),)
+        """The stiffness K, and past a foot how straight it pulls."""
+        stiffness = Parameter("spring_tether", "N/m", PRIOR, 0.0, "effect", 0.1)
+        if not _bends(scene):
+            return (stiffness,)
+        usual = STRAIGHTNESS_PRIOR.mean  # means nothing while the strength is absent
+        straightness = Parameter(
+            "spring_straightness", "1", STRAIGHTNESS_PRIOR, usual, "effect", 0.1
+        )
+        return (stiffness, straightness)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The pull back."""
         stiffness = scene.only(theta["spring_tether"], 0)
         start = scene.start_path_m[0]
+        if not _bends(scene):
+            return lambda state: -stiffness * (state.path_m - start)
+        # On the table a straight band is shorter: its start is not so far back as along the ramp.
+        straight = theta["spring_straightness"][..., None]
+        cos = stiffness.__array_namespace__().cos(scene.angle_rad)
+        nearer = straight * start * (cos - 1.0)
 
-        def pull(state: State):
-            return -stiffness * (state.path_m - start)
+        def pull(state: State) -> Array:
+            on_table = (state.path_m > 0.0).astype(state.path_m.dtype)
+            return -stiffness * (state.path_m - start - on_table * nearer)
 
         return pull
+
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+        """The coefficients, less by what of the weight a straight band carries on the table."""
+        if not _bends(scene) or not scene.has_surface:
+            return None
+        stiffness = scene.only(theta["spring_tether"], 0)
+        xp = stiffness.__array_namespace__()
+        height_m = -scene.start_path_m[0] * xp.sin(scene.angle_rad)
+        gravity = xp.asarray(scene.gravity)[..., None]
+        weight = xp.stack([xp.asarray(m) for m in scene.mass(theta)], axis=-1) * gravity
+        carried = stiffness * height_m * theta["spring_straightness"][..., None] / weight
+
+        def law(state: State, k: Array) -> Array:
+            on_table = (state.path_m > 0.0).astype(state.path_m.dtype)
+            return k * (1.0 - on_table * carried)
+
+        return law
+
+
+def _bends(scene: Surroundings) -> bool:
+    """Whether the path goes round a foot."""
+    return scene.has_table and scene.comes_down[0]

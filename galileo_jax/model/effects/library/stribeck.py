@@ -1,8 +1,9 @@
-"""Stribeck friction: object 1 rubs more at low speed than at high.
+"""Stribeck friction: bodies rub more at low speed than at high.
 
     k(v) = k (1 + a exp(-|v| / v_s)),    a = stribeck, v_s = stribeck_speed
 
-A film of grease or air carries the faster body; k is the friction at high speed.
+of every object, each with its own k. A film of grease or air carries the faster body; k is the
+friction at high speed.
 
 Source: Stribeck (1902), the fall of friction with speed; Tustin (1947), J. IEE 94 IIA, 143,
 the exponential; Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30, 1083.
@@ -22,7 +23,7 @@ SPEED_PRIOR = LogNormal(median=0.4, sd=0.7)
 
 @register
 class Stribeck(Effect):
-    """Friction of object 1 falls with the speed."""
+    """Friction falls with the speed."""
 
     name: ClassVar[str] = "stribeck"
 
@@ -32,7 +33,7 @@ class Stribeck(Effect):
             return ()
         usual = SPEED_PRIOR.median  # means nothing while the strength is absent
         return (
-            Parameter("stribeck", "1", PRIOR, 0.0, "effect", 0.1, multiplies="k1"),
+            Parameter("stribeck", "1", PRIOR, 0.0, "effect", 0.1),
             Parameter("stribeck_speed", "m/s", SPEED_PRIOR, usual, "effect", 0.1),
         )
 
@@ -40,7 +41,7 @@ class Stribeck(Effect):
         """The coefficients at the speeds."""
         if not scene.has_surface:
             return None
-        excess = scene.only(theta["stribeck"], 0)
+        excess = theta["stribeck"][..., None]
         speed = theta["stribeck_speed"][..., None]
 
         def law(state: State, k: Array) -> Array:
