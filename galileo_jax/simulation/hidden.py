@@ -55,7 +55,7 @@ STRENGTHS = {
 OTHERS = {
     "friction_patch_length": Range(0.08, 0.20),
     "magnetic_brake_length": Range(0.08, 0.20),
-    "spring_straightness": Range(1.0, 1.0),  # a free band
+    "spring_tether_straightness": Range(1.0, 1.0),  # a free band
     "stribeck_speed": Range(0.2, 0.6),
 }
 START = "_start"

@@ -37,7 +37,7 @@ def candidate(fit: GradientFit, log_evidence: float) -> Candidate:
         p_value=None,
         confounded_with=(),
         num_constants=1,
-        num_expected=1.0,
+        num_expected=1,
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.model.effects.registry import effect_names, make_effects
+from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import absent
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.declared import Declared
@@ -16,6 +16,7 @@ from galileo_jax.simulation.hidden import Hidden, hide
 from galileo_jax.simulation.motion import roll_out
 from galileo_jax.simulation.series import draw_series
 from galileo_jax.simulation.truth import draw_truth
+from tests.model.effects.motion import LIBRARY
 
 # The two integrators differ by where within 0.1 ms a hit or a stop is put.
 SOLVERS_AGREE_M = 1e-4
@@ -43,7 +44,7 @@ def trials(*effects: Hidden, count: int = 1, seed: int = 2, angle_deg: float = 2
 
 @pytest.mark.slow
 @pytest.mark.parametrize("strength", [0.0, 1.0])
-@pytest.mark.parametrize("name", effect_names())
+@pytest.mark.parametrize("name", LIBRARY)
 def test_solvers_agree_about_the_library(name, strength):
     ((truth, fine),) = trials(hidden(name, strength), seed=1)
     exact = roll_out(truth, "rigid")

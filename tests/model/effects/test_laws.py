@@ -267,8 +267,8 @@ def test_a_straight_band_pulls_to_its_start_and_lifts(straightness):
     """On the table, by the geometry of the plane; on the ramp along it."""
     scene, (band,) = PAIR, make_effects(["spring_tether"])
     stiffness, mass, k = 3.0, 0.4, 0.2
-    theta = {"spring_tether": stiffness, "spring_straightness": straightness, "m1": mass, "m2": 0.3}
-    theta = {name: np.asarray(value) for name, value in theta.items()}
+    given = {"spring_tether": stiffness, "spring_tether_straightness": straightness}
+    theta = {name: np.asarray(value) for name, value in {**given, "m1": mass, "m2": 0.3}.items()}
     start, slope = scene.start_path_m[0], scene.angle_rad
     force, law = band.force(theta, scene), band.friction(theta, scene)
     assert force is not None and law is not None

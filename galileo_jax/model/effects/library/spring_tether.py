@@ -5,7 +5,7 @@
 
 slack at the declared start. On the ramp both are the same. On the table a band led round the foot
 pulls along the path; a free one pulls straight, so that it also lifts the object and lightens what
-rubs. `spring_straightness` is 0 for the one and 1 for the other.
+rubs. `spring_tether_straightness` is 0 for the one and 1 for the other.
 
 Source: Hooke, De potentia restitutiva (1678).
 Confused with: constant_force and k1 on a short path; air_drag in part (both grow on the way).
@@ -42,7 +42,7 @@ class SpringTether(Effect):
             return (stiffness,)
         usual = STRAIGHTNESS_PRIOR.mean  # means nothing while the strength is absent
         straightness = Parameter(
-            "spring_straightness", "1", STRAIGHTNESS_PRIOR, usual, "effect", 0.1
+            "spring_tether_straightness", "1", STRAIGHTNESS_PRIOR, usual, "effect", 0.1
         )
         return (stiffness, straightness)
 
@@ -53,7 +53,7 @@ class SpringTether(Effect):
         if not _bends(scene):
             return lambda state: -stiffness * (state.path_m - start)
         # On the table a straight band is shorter: its start is not so far back as along the ramp.
-        straight = theta["spring_straightness"][..., None]
+        straight = theta["spring_tether_straightness"][..., None]
         cos = stiffness.__array_namespace__().cos(scene.angle_rad)
         nearer = straight * start * (cos - 1.0)
 
@@ -72,7 +72,7 @@ class SpringTether(Effect):
         height_m = -scene.start_path_m[0] * xp.sin(scene.angle_rad)
         gravity = xp.asarray(scene.gravity)[..., None]
         weight = xp.stack([xp.asarray(m) for m in scene.mass(theta)], axis=-1) * gravity
-        carried = stiffness * height_m * theta["spring_straightness"][..., None] / weight
+        carried = stiffness * height_m * theta["spring_tether_straightness"][..., None] / weight
 
         def law(state: State, k: Array) -> Array:
             on_table = (state.path_m > 0.0).astype(state.path_m.dtype)
