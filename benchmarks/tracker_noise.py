@@ -2,8 +2,9 @@
 
 Renders random clips (`rendered_clips.py`), every second one with faults, tracks them, and takes the
 errors apart by what the object does: in units of what the fit is told, less their mean in each
-stretch; two frames about the foot and the hit are left out. Mean square, and correlation from one
-frame to the next five. The last line is JSON.
+stretch, at rest without what the fit is told that they have in common; two frames about the foot
+and the hit are left out. Mean square, and correlation from one frame to the next five. The last
+line is JSON.
 """
 
 import argparse
@@ -22,6 +23,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.track_cache import track_once
+from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 
 LAGS = range(1, 6)
@@ -62,10 +64,6 @@ def errors_of(path: Path) -> Iterator[tuple[str, np.ndarray]]:
         frames = np.arange(len(true))
         stated = np.sqrt(np.einsum("fii->fi", pixels.covariance_px2[i, : len(true)]))
         z = (pixels.position_px[i, : len(true)] - true) / stated
-        at_rest = (
-            z
-            * np.sqrt(seen.covariance_m2[i, 0, 0] / quiet.covariance_m2[i, 0, 0])[: len(true), None]
-        )
         visible = pixels.is_visible[i, : len(true)]
         moves = np.hypot(*np.gradient(true, axis=0).T) > MOVES_PX
         near = np.any([abs(frames - event) < NEAR_FRAMES for event in events], axis=0)
@@ -77,9 +75,26 @@ def errors_of(path: Path) -> Iterator[tuple[str, np.ndarray]]:
                 where = "ramp" if number == 0 else "table"
                 yield f"moving {name}, object {i + 1}, {where}", z[own, axis]
             still = ~moves & visible
-            yield f"rest before, object {i + 1}", at_rest[still & (frames < first), axis]
-            after = still & (frames > last + SETTLES_FRAMES)
-            yield f"rest after, object {i + 1}", at_rest[after, axis]
+            error_m = z[:, axis] * np.sqrt(seen.covariance_m2[i, axis, axis, : len(true)])
+            for name, own in (
+                ("rest before", still & (frames < first)),
+                ("rest after", still & (frames > last + SETTLES_FRAMES)),
+            ):
+                yield f"{name}, object {i + 1}", _independent(error_m, quiet, i, axis, own)
+
+
+def _independent(
+    error_m: np.ndarray, seen: Observation, index: int, axis: int, own: np.ndarray
+) -> np.ndarray:
+    """Errors of a rest, `[frame]`, as independent ones of unit size, if they are as stated."""
+    where = np.flatnonzero(own)
+    if len(where) < FEWEST:
+        return np.empty(0)
+    cover = np.diag(seen.covariance_m2[index, axis, axis, where])
+    if seen.num_errors and seen.modes_m is not None:
+        modes = seen.modes_m[-seen.num_errors :, index, axis][:, where]
+        cover = cover + modes.T @ modes
+    return np.linalg.solve(np.linalg.cholesky(cover), error_m[where] - error_m[where].mean())
 
 
 def scatter(parts: Sequence[np.ndarray]) -> dict[str, float]:
