@@ -67,7 +67,9 @@ def main(argv: Sequence[str]) -> int | None:
             for name, kind in cases.items()
         }
         for name, kind in cases.items():
-            made[name].result()  # raises what `simulate` raised
+            if not made[name].result():
+                tables.row(name, (kind, "", "not made: none of the effects drawn has a place"))
+                continue
             if name not in done:
                 done[name] = _examine(call.out, name, kind)
             entries.append(done[name])
@@ -106,18 +108,21 @@ def draw(folder: Path, name: str, kind: str, library: Sequence[str], attempt: in
     }
 
 
-def make_clip(folder: Path, name: str, kind: str, library: Sequence[str]) -> None:
+def make_clip(folder: Path, name: str, kind: str, library: Sequence[str]) -> bool:
     """Simulates a case unless it is there; an effect without a place in the scene is drawn again.
+
+    Returns whether that came to a case; all else that `simulate` raises is raised.
 
     Runs in a process of its own, so that effects from outside stay unknown to the diagnosis.
     """
     for attempt in range(TRIES):
         if (folder / f"{name}.truth.json").is_file():
-            return
+            return True
         try:
             hidden_cases.make_clips(draw(folder, name, kind, library, attempt))
         except InputError:
             continue
+    return (folder / f"{name}.truth.json").is_file()
 
 
 def seen_truth(traces: Mapping[str, float], least: float = 0.0) -> str:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.diagnosis.base_again import better_base
+from galileo_jax.diagnosis.base_again import better_base, without_effects
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
@@ -14,7 +14,7 @@ from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
-FOUND, BEHIND = 0.5, 30.0  # nats
+FOUND, BEHIND = 3.0, 30.0  # nats
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +64,21 @@ def test_an_effect_that_does_not_lead_is_no_place_to_start(fitted):
     fitter, base, other = fitted
     missed = Hypothesis((), replace(base, log_evidence=-np.inf))
     assert better_base(fitter, missed, [candidate(other, 2.0)]) is None
+
+
+def test_the_others_make_up_for_the_effect(fitted):
+    """Where a nuisance acts as the effect does, it takes over what the effect did."""
+    fitter, _, other = fitted
+    trials, names = fitter.trials, [p.name for p in fitter.trials.model_parameters]
+    e, impact = names.index("restitution"), names.index("impact_restitution")
+    count, slope = len(names), np.random.default_rng(0).standard_normal((400, 1))
+    z, jacobian = np.zeros_like(other.z), np.zeros((400, count))
+    z[e], z[impact] = -1.0, 0.3
+    jacobian[:, [e, impact]] = 100.0 * slope * np.array([1.0, 2.0])
+    fit = replace(other, z=z, jacobian=jacobian)
+    moved = without_effects(trials, Hypothesis(("restitution",), fit))
+    prior = trials.model_parameters[e].prior
+    value, ahead = (float(prior.forward(np.asarray(at))) for at in (-1.0, -1.0 + 1e-5))
+    expected = 0.3 + value / ((ahead - value) / 1e-5) / 2.0
+    assert moved.z[impact] == pytest.approx(expected, rel=1e-3)
+    assert moved.z[e] == 0.0 and not moved.free[e]
