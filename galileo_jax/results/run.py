@@ -2,6 +2,7 @@
 
 DIR/result.json       numbers; its keys: docs/reference/result_files.md
 DIR/observation.csv   the track in metres with its covariance
+DIR/errors.npz        errors that its frames share, where there are any
 DIR/clip.yaml         the clip as fitted, overrides included
 DIR/posterior.nc      draws of all parameters (ArviZ InferenceData)
 """
@@ -24,6 +25,7 @@ from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.registry import load_file, make_effects
 from galileo_jax.observation.observation import Observation
+from galileo_jax.results.shared_errors import save_shared_errors, with_shared_errors
 from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 
@@ -78,6 +80,7 @@ def save_run(
             keys[key] = str(Path(file).resolve())
     write_text(folder / CLIP, yaml.safe_dump(keys, sort_keys=False))
     write_observation_csv(folder / OBSERVATION, observation)
+    save_shared_errors(folder, observation)
     posterior.to_netcdf(folder / POSTERIOR)
     write_json(folder / RESULT, result)
 
@@ -105,7 +108,7 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     folder = Path(folder)
     result = read_result(folder)
     clip = load_clip(folder / CLIP)
-    observation = read_observation_csv(folder / OBSERVATION)
+    observation = with_shared_errors(folder, read_observation_csv(folder / OBSERVATION))
     posterior = Posterior.from_netcdf(folder / POSTERIOR)
     for path in result.get("effects_from", []):
         load_file(path)

@@ -20,7 +20,7 @@ PICTURES = ("prediction.svg", "prediction.html", "first_and_last.png")  # those 
 PREDICTION_KEYS = {"run", "seconds_beyond_clip_s", "version"}  # what makes the file one of ours
 DOCUMENTS = {"compare": "compare/compare.json", "diagnose": "diagnosis/diagnosis.json"}
 TRACKS = "tracks"  # key of those documents: the digests of what they were made of
-RUN_FILES = ("clip.yaml", "observation.csv", "report.html")
+RUN_FILES = ("clip.yaml", "observation.csv", "errors.npz", "report.html")
 
 
 def digest(observation: Observation) -> str:

@@ -19,7 +19,7 @@ from galileo_jax.model.effects.registry import make_effects
 from tests.diagnosis.test_verdict import candidate
 from tests.precision import in_64_bit
 
-EFFECTS = ("initial_push", "spring_tether")
+EFFECTS = ("initial_push", "viscous_drag")
 
 
 def count_rollouts(monkeypatch) -> list[int]:
@@ -69,11 +69,11 @@ def test_a_nuisance_far_out_promises_its_own_to_the_effect_that_it_stands_for(
         fitter = GradientFitter(trials)
         base, whole = (fitter.fit(0, effects=names) for names in ((), EFFECTS[:1]))
         rolled = count_rollouts(monkeypatch)
-        push, spring = best_gains(trials, base, [(name,) for name in EFFECTS], 0)
+        push, drag = best_gains(trials, base, [(name,) for name in EFFECTS], 0)
     # The base fit and each effect; then the base fit and less of each.
     assert rolled == [1 + len(EFFECTS), 1 + len(EFFECTS)]
     released = base.z[list(trials.names).index("release_instant")]
     assert abs(released) > 5  # sds: an early release does what the push does
     assert push > 0.5 * np.square(released) / 2
-    assert push > 2 * spring
+    assert push > 2 * drag
     assert whole.log_evidence > base.log_evidence

@@ -1,0 +1,51 @@
+"""DIR/errors.npz of a run: what observation.csv cannot say of a track's errors.
+
+The csv has a covariance for each frame. Errors that many frames share (`Observation.modes_m`) and
+what is known of where the track is from stand beside it, so that a comparison of a saved run has
+the likelihood of the fit. Where there is nothing to say there is no file.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax.observation.observation import Observation
+from galileo_jax.runtime.atomic_write import replacing
+
+ERRORS = "errors.npz"
+FLAGS = ("is_squared", "is_filmed", "num_errors")
+NOTHING = np.zeros((0, 0, 0, 0))
+
+
+def save_shared_errors(folder: Path, observation: Observation) -> None:
+    """Writes them, or removes those of an older run."""
+    is_plain = not any(getattr(observation, name) for name in FLAGS)
+    modes = NOTHING if observation.modes_m is None else observation.modes_m
+    if is_plain and not modes.size:
+        (folder / ERRORS).unlink(missing_ok=True)
+        return
+    with replacing(folder / ERRORS) as path:
+        np.savez_compressed(
+            path,
+            modes_m=modes,
+            is_squared=observation.is_squared,
+            is_filmed=observation.is_filmed,
+            num_errors=observation.num_errors,
+        )
+
+
+def with_shared_errors(folder: Path, observation: Observation) -> Observation:
+    """The observation with those of its run; as it is where there is no file."""
+    if not (folder / ERRORS).is_file():
+        return observation
+    with np.load(folder / ERRORS) as file:
+        modes = file["modes_m"]
+        squared, filmed, num_errors = (int(file[name]) for name in FLAGS)
+    return replace(
+        observation,
+        modes_m=modes if modes.size else None,
+        is_squared=bool(squared),
+        is_filmed=bool(filmed),
+        num_errors=num_errors,
+    )
