@@ -19,6 +19,8 @@ from galileo_jax.diagnosis.score_tests import best_gains
 from galileo_jax.diagnosis.short_search import short_search
 from galileo_jax.diagnosis.verdict import NUM_JOINED, ranked
 
+PLACE = ("_start", "_length")  # of what acts in one place only
+STRENGTHS_Z = (-1.0, 0.0, 1.0, 2.0)
 NUM_ROUNDS = 2  # the second where what could be confused with the best pair is better than that
 
 
@@ -63,6 +65,11 @@ def fitted_pairs(
         made += _alike(race, best, library, searched)
         if ranked(made)[0].effects == best.effects:
             break
+    for _ in range(NUM_ROUNDS):
+        best = ranked(made)[0]
+        made = _best_of_each([*made, *_in_its_place(race, best, library)])
+        if ranked(made)[0].effects == best.effects:
+            break
     known = {frozenset(c.effects) for c in made}
     return ranked([*made, *_crossed(race, ranked(filter(adds, made)), known)])
 
@@ -82,6 +89,39 @@ def _alike(
         starts += [reduced(race.fitter.trials, best.hypothesis, [kept])] * len(others)
     searched.update(frozenset(pair) for pair in sets)
     return _nearest(race, best, starts, sets)
+
+
+def _in_its_place(race: Race, best: Candidate, library: Sequence[str]) -> list[Candidate]:
+    """The best pair with another effect of a place where it has one: a brake for a patch, fitted.
+
+    A place is met by few starts. Here it is known, and only the strength is to be found.
+    """
+    names = [p.name for p in race.fitter.trials.model_parameters]
+    sets: list[tuple[str, ...]] = []
+    bases, starts = [], []
+    for one in best.effects:
+        (kept,) = (name for name in best.effects if name != one)
+        for other in library:
+            same = [(names.index(one + s), other + s) for s in PLACE if one + s in names]
+            if other in best.effects or not same or any(name not in names for _, name in same):
+                continue
+            z = best.hypothesis.fit.z[: len(names)].copy()
+            for i, name in same:
+                z[names.index(name)] = z[i]
+            tried = np.tile(z, (len(STRENGTHS_Z), 1))
+            tried[:, names.index(other)] = STRENGTHS_Z
+            sets.append((kept, other))
+            starts.append(tried)
+            bases.append(reduced(race.fitter.trials, best.hypothesis, [kept]))
+    return race(bases, sets, starts) if sets else []
+
+
+def _best_of_each(made: Sequence[Candidate]) -> list[Candidate]:
+    """Of fits of the same effects the one with the most evidence."""
+    found: dict[frozenset[str], Candidate] = {}
+    for one in sorted(made, key=lambda c: c.log_evidence):
+        found[frozenset(one.effects)] = one
+    return list(found.values())
 
 
 def _of_others(
