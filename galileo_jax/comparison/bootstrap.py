@@ -21,9 +21,10 @@ from galileo_jax.inference.problem import Problem
 from galileo_jax.similarity.noise_scale import mode_covariance
 
 NUM_STEPS = 4
-# Of the objects and axes of 60 rendered films a coder's errors in motion followed each other in so
-# many (`benchmarks/tracker_noise.py`): so much of their variance, over so many frames. Which they
-# are, a clip hardly tells; a fit takes them to be independent, as in most they are.
+# In so many tracks of an object along an axis a coder's errors in motion follow each other: so much
+# of their variance, over so many frames. Rounded from a mixture fitted once to the errors of 60
+# rendered films (docs/history/verdicts.md, Alarms of films). Which tracks they are, a clip hardly
+# tells; a fit takes all to be independent, as most are.
 FOLLOW_OFTEN, FOLLOW_SHARE, FOLLOW_FRAMES = 0.2, 0.9, 2.0
 
 
@@ -129,9 +130,9 @@ def _errors(
         cover = mode_covariance(0.0, mode_size, data, errors)
         values, vectors = np.linalg.eigh(cover)
         along = along @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
-    along = found @ basis.T + along / noise_scale
+    own = found @ basis.T
     left = noise_scale / np.sqrt(noise_scale**2 + gain2)
-    return found + (along * left - found @ basis.T) @ basis
+    return found + ((own + along / noise_scale) * left - own) @ basis
 
 
 def _follow_each_other(
