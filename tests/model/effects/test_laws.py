@@ -190,11 +190,25 @@ def test_table_tilt(tilt):
     assert np.arctan2(-vy, vx)[vx > 0] == pytest.approx(tilt)
 
 
-def test_constant_force():
-    motion = move(LONG_RAMP, {"constant_force": 0.4})
-    expected = (slide_m_s2(LONG_RAMP) + 0.4 / M1) * motion.times_s
-    assert motion.speed_m_s[0] == pytest.approx(expected, abs=EXACT)
+@pytest.mark.parametrize("levelness", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("force", [0.4, -0.1])
+def test_constant_force(force, levelness):
+    """Along the ramp, or level: then F cos a pulls along it and F sin a lifts off."""
+    given = {"constant_force": force, "constant_force_levelness": levelness}
+    motion = move(LONG_RAMP, given)
+    along = force * (1 - levelness + levelness * math.cos(ANGLE))
+    lifted = levelness * force * math.sin(ANGLE)
+    pulled = slide_m_s2(LONG_RAMP) + (along + LONG_RAMP.friction[0] * lifted) / M1
+    assert motion.speed_m_s[0] == pytest.approx(pulled * motion.times_s, abs=EXACT)
     assert (motion.speed_m_s[1] == 0).all()
+
+
+@pytest.mark.parametrize("levelness", [0.0, 1.0])
+def test_on_the_table_a_constant_force_is_level(levelness):
+    given = {"constant_force": -0.2, "constant_force_levelness": levelness}
+    _, speed = on_table(move(LONG_TABLE, given))
+    moving = speed[speed > 0][:-1]
+    assert np.diff(moving) == pytest.approx(-0.2 / M1 / 240, abs=1e-6)
 
 
 PATCH = {"friction_patch_start": 0.2, "friction_patch_length": 0.1}
@@ -223,6 +237,16 @@ def test_smooth_patch_is_at_best_without_friction(rougher):
     inside = (x > CORNER_M + 0.15) & (x < CORNER_M + 0.25)
     loss = np.diff(speed[inside] ** 2) / np.diff(x[inside]) / 2
     assert loss == pytest.approx(-max(0.0, 0.1 + rougher) * G, abs=1e-6)
+
+
+def test_friction_patch_brakes_whatever_slides_over_it():
+    """Object 2, which is hit before the strip, loses dk g L in it as object 1 would."""
+    experiment = replace(HIT, friction=(0.2, 0.0), release_m=1.2)
+    strip = {"friction_patch": 0.3, "friction_patch_start": 0.4, "friction_patch_length": 0.1}
+    motion, plain = move(experiment, strip), move(experiment)
+    assert motion.position_m[1, 0, -1] > CORNER_M + 0.55 > motion.position_m[0, 0, -1] + 0.1
+    lost = 0.5 * (plain.speed_m_s[1, -1] ** 2 - motion.speed_m_s[1, -1] ** 2)
+    assert lost == pytest.approx(0.3 * G * 0.1, rel=ZONE_RTOL, abs=ZONE_ATOL)
 
 
 @pytest.mark.parametrize(("rougher", "k"), [(0.1, 0.2), (-0.05, 0.05), (-0.5, 0.0)])

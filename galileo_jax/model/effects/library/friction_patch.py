@@ -1,8 +1,9 @@
-"""Friction patch: a strip of the path is rougher (or smoother) for object 1.
+"""Friction patch: a strip of the path is rougher (or smoother).
 
     k(q) = max(0, k + friction_patch)  for  start < q < start + length
 
-with smooth edges, tanh(q / 5 mm), q along the path, 0 at the foot.
+of every object that slides over it (seen from above, where each object has a way of its own, of
+object 1), with smooth edges, tanh(q / 5 mm), q along the path, 0 at the foot.
 
 Source: Coulomb, Théorie des machines simples (1785), with a coefficient that depends on the
 place; the smooth edges are ours.
@@ -22,7 +23,7 @@ PRIOR = Normal(0.0, 0.2)
 
 @register
 class FrictionPatch(Effect):
-    """A strip on which object 1 has another friction coefficient."""
+    """A strip of the way with another friction coefficient."""
 
     name: ClassVar[str] = "friction_patch"
 
@@ -37,7 +38,8 @@ class FrictionPatch(Effect):
         """The coefficients at the places."""
         if not scene.has_surface:
             return None
-        rougher = scene.only(theta["friction_patch"], 0)
+        rougher = theta["friction_patch"]
+        rougher = scene.only(rougher, 0) if scene.is_level else rougher[..., None]
 
         def law(state: State, k: Array) -> Array:
             xp = k.__array_namespace__()
