@@ -99,7 +99,7 @@ def constant_force(truth: Truth, rng: np.random.Generator) -> World:
 
 def magnetic_brake(truth: Truth, rng: np.random.Generator) -> World:
     """Magnets below the last of the ramp brake an object of copper."""
-    b, begins = truth.mass_kg[0] * rng.uniform(2.0, 5.0), -rng.uniform(0.25, 0.15)
+    b, begins = truth.mass_kg[0] * rng.uniform(2.0, 5.0), rng.uniform(-0.25, -0.15)
 
     def force(place: np.ndarray, v: np.ndarray) -> np.ndarray:
         q = path_m(truth, place)[:, None]
