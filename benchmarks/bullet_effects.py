@@ -15,9 +15,10 @@ import argparse
 import json
 import math
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import bullet_scene
@@ -57,7 +58,7 @@ class World(NamedTuple):
     late_s: float = 0.0
     longer: float = 0.0
     slower: float = 0.0
-    values: dict[str, float] = {}
+    values: Mapping[str, float] = MappingProxyType({})
 
 
 Make = Callable[[Truth, np.random.Generator], World]

@@ -6,11 +6,14 @@ for constant friction on a level table, and second order for every other law; a 
 met at its time, by Newton's method on the step itself, so that the motion is a continuous function
 of the parameters with the right derivatives, as in `engine_rigid`.
 
+Rims that are not round (`oval_rims`) meet where they face each other, and are pushed there.
+
 Discs that touch and press, or are pressed against a wall, are held apart by small plastic impacts.
 Walls have no thickness: a disc is on that side on which its centre is.
 """
 
 import math
+from collections.abc import Callable, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
@@ -24,11 +27,14 @@ from galileo_jax.rollout.engine_free import start_velocity
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.event_loop import recorded, step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
+from galileo_jax.rollout.oval_rims import Rim, facing
 
 MAX_EVENTS = 16  # within one recorded step
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 TOUCH_M_S = 1e-9
 NEWTON_STEPS = 3
+OVAL_STEPS = 5
+CLOSED_M = 1e-7  # rims so near touch
 ROOT2 = math.sqrt(2.0)
 
 
@@ -64,6 +70,7 @@ class Table(NamedTuple):
       walls: true; None where there are none.
       pressure: `[object, 2]`, where discs press on the table, see `Effect.pressure`; None: in the
         middle.
+      oval: `[object, 2]`, how far from round rims are, see `Effect.oval`; None: all are round.
     """
 
     law: Dynamics
@@ -71,6 +78,13 @@ class Table(NamedTuple):
     radius_m: jax.Array
     walls: Walls | None
     pressure: Any | None
+    oval: Any | None
+
+    def rim(self, discs: Discs) -> Rim | None:
+        """The rims as they are turned; None where all are round."""
+        if self.oval is None:
+            return None
+        return Rim(self.radius_m, self.oval, ROOT2 * discs.place_m[:, 2] / self.radius_m)
 
 
 def roll_out(
@@ -98,9 +112,9 @@ def roll_out(
     walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
     if walls is not None:
         walls = walls._replace(ends_m=seen[0, :2] + (walls.ends_m - seen[0, :2]) / shown)
-    pressures = [p for e in effects if (p := e.pressure(named, scene)) is not None]
-    beside = sum(pressures[1:], pressures[0]) if pressures else None
-    table = Table(law, rims, jnp.asarray(scene.half_length_m), walls, beside)
+    beside = _sum([e.pressure(named, scene) for e in effects])
+    oval = _sum([e.oval(named, scene) for e in effects])
+    table = Table(law, rims, jnp.asarray(scene.half_length_m), walls, beside, oval)
     # Starts and turning as the camera's scale will show them.
     start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
     discs = Discs(
@@ -124,6 +138,11 @@ def roll_out(
         jnp.concatenate([place[:, :2], turned], axis=1),
         jnp.concatenate([speed[:, :2], per_turn * speed[:, 2:]], axis=1),
     )
+
+
+def _sum(found: Sequence[Any | None]) -> Any | None:
+    given = [each for each in found if each is not None]
+    return sum(given[1:], given[0]) if given else None
 
 
 def _magnified(effects: tuple[Effect, ...], named: dict[str, Any], scene: Surroundings) -> Any:
@@ -168,12 +187,12 @@ def _to_next_event(
     moved = discs.after(a, t)
     speed = jnp.where((stops <= t)[:, None], 0.0, moved.speed_m_s)
     for k, pair in enumerate(pairs):
-        struck = _struck(moved.place_m, speed, pair, table)
+        struck = _struck(moved, speed, pair, table)
         speed = jnp.where(hits[k] <= t, struck, speed)
     place = moved.place_m
     for wall in range(bounces.shape[0]):
         is_hit = bounces[wall] <= t
-        back, bounced = _bounced(place, speed, wall, table)
+        back, bounced = _bounced(moved._replace(place_m=place), speed, wall, table)
         place = jnp.where(is_hit[:, None], back, place)
         speed = jnp.where(is_hit[:, None], bounced, speed)
     return moved._replace(place_m=place, speed_m_s=speed), t
@@ -227,6 +246,9 @@ def _hits(
     discs: Discs, a: jax.Array, pairs: np.ndarray, left_s: jax.Array, table: Table
 ) -> jax.Array:
     """When the rims of each pair meet, s `[pair]`; inf where they do not within `left_s`."""
+    if table.oval is not None:
+        found = [_oval_hit(discs, a, pair, left_s, table) for pair in pairs]
+        return jnp.stack(found) if found else jnp.zeros(0)
     one, other = pairs.T
     apart = (discs.place_m[other] - discs.place_m[one])[:, :2]
     u, du = (discs.speed_m_s[other] - discs.speed_m_s[one])[:, :2], (a[other] - a[one])[:, :2]
@@ -249,26 +271,117 @@ def _hits(
     return jnp.where(meets & (at <= left_s), jnp.maximum(at, 0.0), jnp.inf)
 
 
-def _struck(place_m: jax.Array, speed_m_s: jax.Array, pair: np.ndarray, table: Table) -> jax.Array:
-    """Speeds `[object, 3]` after a hit of two discs, one from object `pair[0]` to `pair[1]`."""
+def _oval_hit(
+    discs: Discs, a: jax.Array, pair: np.ndarray, left_s: jax.Array, table: Table
+) -> jax.Array:
+    """As `_hits`, of one pair of rims that are not round."""
     one, other = (int(i) for i in pair)
-    apart = (place_m[other] - place_m[one])[:2]
-    normal = apart / _length(apart)
+
+    def gap(t: jax.Array) -> tuple[jax.Array, jax.Array]:
+        then = discs.after(a, t)
+        rim = table.rim(then)
+        assert rim is not None
+        apart = (then.place_m[other] - then.place_m[one])[:2]
+        direction, gap_m = facing(apart, rim.of(one), rim.of(other))
+        u = (then.speed_m_s[other] - then.speed_m_s[one])[:2]
+        normal = jnp.stack([jnp.cos(direction), jnp.sin(direction)])
+        sides = jnp.stack([rim.of(i).reach_m(direction)[1] for i in (one, other)])
+        spin = ROOT2 * then.speed_m_s[jnp.array([one, other]), 2]
+        turns = jnp.sum(sides / rim.radius_m[jnp.array([one, other])] * spin)
+        return gap_m, jnp.sum(u * normal) + turns
+
+    return _meeting_s(gap, left_s)
+
+
+def _meeting_s(
+    gap: Callable[[jax.Array], tuple[jax.Array, jax.Array]], left_s: jax.Array
+) -> jax.Array:
+    """When gaps close, s `[...]`; inf where they do not within `left_s`.
+
+    Args:
+      gap: a time to gaps, m, and how fast they grow.
+      left_s: what is left of the step.
+    """
+    now, rate = gap(jnp.zeros(()))
+    meets = rate < -TOUCH_M_S
+    at = jnp.where(meets, -now / jnp.where(meets, rate, -1.0), 0.0)
+    left = now
+    for _ in range(OVAL_STEPS):
+        # The last of the steps carries the derivative of the instant.
+        at = jax.lax.stop_gradient(jnp.clip(at, 0.0, left_s))
+        left, rate = gap(at)
+        rate = jax.lax.stop_gradient(rate)
+        at = at - left / jnp.where(rate < 0, rate, -jnp.inf)
+    is_there = (left < CLOSED_M) & (at <= left_s)
+    return jnp.where(meets & is_there, jnp.maximum(at, 0.0), jnp.inf)
+
+
+def _struck(discs: Discs, speed_m_s: jax.Array, pair: np.ndarray, table: Table) -> jax.Array:
+    """Speeds `[object, 3]` after a hit of two discs, one from object `pair[0]` to `pair[1]`."""
+    both = one, other = tuple(int(i) for i in pair)
+    apart = (discs.place_m[other] - discs.place_m[one])[:2]
+    rim = table.rim(discs)
+    if rim is None:
+        normal = apart / _length(apart)
+        reach, side = jnp.ones(2), jnp.zeros(2)
+    else:
+        direction, _ = facing(apart, rim.of(one), rim.of(other))
+        normal = jnp.stack([jnp.cos(direction), jnp.sin(direction)])
+        reach, side = _shares(rim, direction, both)
     across = jnp.stack([-normal[1], normal[0]])
-    u = (speed_m_s[other] - speed_m_s[one])[:2]
-    mass = table.law.mass[jnp.array([one, other])]
-    reduced = 1.0 / jnp.sum(1.0 / mass)
-    approach = -jnp.sum(u * normal)
-    e = jnp.where(approach > PLASTIC_M_S, table.rims.restitution, 0.0)
-    push = jnp.maximum((1.0 + e) * approach, 0.0) * reduced
-    slip = jnp.sum(u * across) - ROOT2 * (speed_m_s[one, 2] + speed_m_s[other, 2])
+    u, turning = (speed_m_s[other] - speed_m_s[one])[:2], speed_m_s[jnp.array(both), 2]
+    inverse = 1.0 / table.law.mass[jnp.array(both)]
+    approach = -jnp.sum(u * normal) - ROOT2 * jnp.sum(side * turning)
+    slip = jnp.sum(u * across) - ROOT2 * jnp.sum(reach * turning)
     # J = m r^2 / 2: turning adds twice the inverse mass.
-    most = table.rims.grip * push
-    rub = jnp.clip(-slip * reduced / 3.0, -most, most)
-    impulse = push * normal + rub * across
-    change = jnp.concatenate([impulse, -ROOT2 * rub[None]])
-    back = jnp.concatenate([-impulse, -ROOT2 * rub[None]])
-    return speed_m_s.at[other].add(change / mass[1]).at[one].add(back / mass[0])
+    gives = (
+        jnp.sum(inverse * (1.0 + 2.0 * side**2)),
+        jnp.sum(inverse * (1.0 + 2.0 * reach**2)),
+        -2.0 * jnp.sum(inverse * reach * side),
+    )
+    push, rub = _impulse(approach, slip, gives, table.rims.restitution, table.rims.grip)
+    impulse, turns = push * normal + rub * across, ROOT2 * (side * push - reach * rub)
+    change = jnp.concatenate([impulse, turns[1:]])
+    back = jnp.concatenate([-impulse, turns[:1]])
+    return speed_m_s.at[other].add(change * inverse[1]).at[one].add(back * inverse[0])
+
+
+def _shares(
+    rim: Rim, direction: jax.Array, which: Sequence[int] | None = None
+) -> tuple[jax.Array, jax.Array]:
+    """Where rims touch in a direction, along and across it, as shares of their radii."""
+    chosen = rim if which is None else jax.tree.map(lambda each: each[jnp.array(which)], rim)
+    reach, side, _ = chosen.reach_m(direction)
+    return reach / chosen.radius_m, side / chosen.radius_m
+
+
+def _impulse(
+    approach: jax.Array,
+    slip: jax.Array,
+    gives: tuple[jax.Array, jax.Array, jax.Array],
+    restitution: jax.Array,
+    grip: jax.Array,
+) -> tuple[jax.Array, jax.Array]:
+    """What a hit gives along and across: Newton's, and Coulomb's or as much as stops the slip.
+
+    Args:
+      approach: speed of the touching points towards each other, m/s.
+      slip: across, m/s.
+      gives: by how much impulses of 1 change the speed along, across, and one the other.
+      restitution: as in `Rims`.
+      grip: as in `Rims`.
+    """
+    along, across, mixed = gives
+    e = jnp.where(approach > PLASTIC_M_S, restitution, 0.0)
+    wanted = jnp.maximum((1.0 + e) * approach, 0.0)
+    rub = -(along * slip + mixed * wanted) / (along * across - mixed**2)
+    push = (wanted - mixed * rub) / along
+    way = jnp.sign(rub)
+    slides = jnp.abs(rub) > grip * push
+    most = wanted / (along + way * grip * mixed)
+    hits = wanted > 0
+    push, rub = jnp.where(slides, most, push), jnp.where(slides, way * grip * most, rub)
+    return jnp.where(hits, push, 0.0), jnp.where(hits, rub, 0.0)
 
 
 def _before_wall(place_m: jax.Array, ends_m: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
@@ -285,6 +398,10 @@ def _bounces(discs: Discs, a: jax.Array, left_s: jax.Array, table: Table) -> jax
     """When each disc meets each wall, s `[wall, object]`; inf where not within `left_s`."""
     if table.walls is None:
         return jnp.zeros((0, len(table.radius_m)))
+    if table.oval is not None:
+        return jnp.stack(
+            [_oval_bounce(discs, a, each, left_s, table) for each in table.walls.ends_m]
+        )
     found = []
     for ends in table.walls.ends_m:
         away, normal, along = _before_wall(discs.place_m, ends)
@@ -303,25 +420,50 @@ def _bounces(discs: Discs, a: jax.Array, left_s: jax.Array, table: Table) -> jax
     return jnp.stack(found)
 
 
+def _oval_bounce(
+    discs: Discs, a: jax.Array, ends_m: jax.Array, left_s: jax.Array, table: Table
+) -> jax.Array:
+    """As `_bounces`, of rims that are not round and one wall."""
+
+    def gap(t: jax.Array) -> tuple[jax.Array, jax.Array]:
+        then = discs.after(a, t[..., None])
+        rim = table.rim(then)
+        assert rim is not None
+        away, normal, _ = _before_wall(then.place_m, ends_m)
+        reach, side = _shares(rim, jnp.arctan2(normal[:, 1], normal[:, 0]))
+        speed = jnp.sum(then.speed_m_s[:, :2] * normal, axis=1)
+        return away - reach * rim.radius_m, speed + ROOT2 * side * then.speed_m_s[:, 2]
+
+    at = _meeting_s(gap, left_s)
+    _, _, along = _before_wall(discs.place_m, ends_m)
+    there = discs.after(a, jnp.where(at < jnp.inf, at, 0.0)[:, None]).place_m[:, :2] - ends_m[0]
+    passes = (there @ along >= 0) & (there @ along <= _length(ends_m[1] - ends_m[0]))
+    return jnp.where(passes, at, jnp.inf)
+
+
 def _bounced(
-    place_m: jax.Array, speed_m_s: jax.Array, wall: int, table: Table
+    discs: Discs, speed_m_s: jax.Array, wall: int, table: Table
 ) -> tuple[jax.Array, jax.Array]:
     """Places and speeds `[object, 3]` of all discs, were they to strike a wall here."""
     assert table.walls is not None
-    away, normal, along = _before_wall(place_m, table.walls.ends_m[wall])
+    away, normal, _ = _before_wall(discs.place_m, table.walls.ends_m[wall])
+    rim = table.rim(discs)
+    if rim is None:
+        reach, side = jnp.ones(len(away)), jnp.zeros(len(away))
+    else:
+        reach, side = _shares(rim, jnp.arctan2(normal[:, 1], normal[:, 0]))
     # What was pressed into the wall within the step, by a thousandth of a millimetre, comes back.
-    into = jnp.maximum(table.radius_m - away, 0.0)
-    approach = -jnp.sum(speed_m_s[:, :2] * normal, axis=1)
-    e = jnp.where(approach > PLASTIC_M_S, table.walls.restitution, 0.0)
-    push = jnp.maximum((1.0 + e) * approach, 0.0)
-    # The rim is one radius behind the centre, seen from the wall's normal: it turns against `side`.
-    side = jnp.sign(along[0] * normal[:, 1] - along[1] * normal[:, 0])
-    slip = speed_m_s[:, :2] @ along + side * ROOT2 * speed_m_s[:, 2]
-    most = table.walls.grip * push
-    rub = jnp.clip(-slip / 3.0, -most, most)  # J = m r^2 / 2, as in `_struck`
-    change = push[:, None] * normal + rub[:, None] * along
-    change = jnp.concatenate([change, (side * ROOT2 * rub)[:, None]], axis=1)
-    return place_m.at[:, :2].add(into[:, None] * normal), speed_m_s + change
+    into = jnp.maximum(reach * table.radius_m - away, 0.0)
+    across = jnp.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    turning = ROOT2 * speed_m_s[:, 2]
+    approach = -jnp.sum(speed_m_s[:, :2] * normal, axis=1) - side * turning
+    slip = jnp.sum(speed_m_s[:, :2] * across, axis=1) - reach * turning
+    gives = 1.0 + 2.0 * side**2, 1.0 + 2.0 * reach**2, -2.0 * reach * side  # as in `_struck`
+    push, rub = _impulse(approach, slip, gives, table.walls.restitution, table.walls.grip)
+    change = push[:, None] * normal + rub[:, None] * across
+    turns = ROOT2 * (side * push - reach * rub)
+    change = jnp.concatenate([change, turns[:, None]], axis=1)
+    return discs.place_m.at[:, :2].add(into[:, None] * normal), speed_m_s + change
 
 
 def _length(vectors: jax.Array) -> jax.Array:

@@ -6,11 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.rollout.engine_level import roll_out
+from galileo_jax.rollout.oval_rims import Rim, facing
 from galileo_jax.simulation.level import LevelTruth, draw_level, solve_level
 
 DT_S = 1 / 240
@@ -217,6 +219,98 @@ def test_uneven_pressure_agrees_with_the_fine_solver(seed: int) -> None:
     assert np.abs(np.asarray(position[:, 2]) - fine.pitch_rad).max() < 5e-3
 
 
+def oval(one: LevelTruth, *shares: float) -> LevelTruth:
+    """With rims that are not round, c and s of each."""
+    names = [f"oval_rim_{part}{i}" for i in (1, 2) for part in "cs"]
+    values = {**one.values, **dict(zip(names, shares, strict=True))}
+    effects = make_effects(["oval_rim"])
+    return LevelTruth(one.things, values, one.start_m, effects, walls_m=one.walls_m)
+
+
+def outline(radius: float, c: float, s: float) -> np.ndarray:
+    """Points of a rim about its middle, `[point, 2]`."""
+    angles = np.linspace(0, 2 * np.pi, 20001)
+    h = radius * (1 + c * np.cos(2 * angles) + s * np.sin(2 * angles))
+    slope = 2 * radius * (s * np.cos(2 * angles) - c * np.sin(2 * angles))
+    along = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return h[:, None] * along + slope[:, None] * along[:, ::-1] * [-1.0, 1.0]
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize(
+    "shares", [(0.05, 0.0, 0.0, 0.0), (0.03, -0.06, 0.0, 0.1), (-0.1, 0.05, 0.08, 0.02)]
+)
+def test_oval_rims_face_each_other_where_their_outlines_are_nearest(
+    shares: tuple[float, float, float, float],
+) -> None:
+    radii, apart = np.array([0.02, 0.03]), np.array([0.045, 0.03])
+    rims = [
+        Rim(jnp.asarray(radius), jnp.asarray(pair), jnp.asarray(0.0))
+        for radius, pair in zip(radii, (shares[:2], shares[2:]), strict=True)
+    ]
+    direction, gap = facing(jnp.asarray(apart), rims[0], rims[1])
+    one, other = outline(radii[0], *shares[:2]), apart + outline(radii[1], *shares[2:])
+    distances, indices = cKDTree(other).query(one)
+    nearest = int(np.argmin(distances))
+    assert gap == pytest.approx(distances[nearest], abs=1e-6)
+    way = other[indices[nearest]] - one[nearest]
+    assert float(direction) == pytest.approx(math.atan2(way[1], way[0]), abs=2e-3)
+
+
+@pytest.mark.usefixtures("x64")
+def test_an_oval_rim_turns_what_it_hits_without_grip() -> None:
+    """Head-on: momentum is conserved, and each turns by r^2 m w / 2 = h' P about its middle."""
+    drawn = truth(
+        k1=1e-5,
+        k2=1e-5,
+        grip=0.0,
+        restitution=0.8,
+        start_velocity_x1=1.0,
+        start_velocity_y1=0.0,
+        start_turning1=0.0,
+    )
+    one = LevelTruth(drawn.things, drawn.values, ((0.0, 0.0), (0.3, 0.0)))
+    position, velocity = (np.asarray(each) for each in rolled(oval(one, 0.0, 0.04, 0.0, 0.0), 1.0))
+    masses = np.array([one.values["m1"], one.values["m2"]])
+    radii = np.array([(item.size_m or (0.0,))[0] for item in one.things])
+    given = masses[1] * velocity[1, :2, -1]
+    assert np.hypot(*given) > 0.0
+    assert masses @ velocity[:, 0, -1] == pytest.approx(masses[0], rel=1e-3)
+    # About object 1's middle: the impulse is at h along the normal and h' across it.
+    push, angle = np.hypot(*given), math.atan2(given[1], given[0])
+    slope = 2 * radii[0] * 0.04 * math.cos(2 * angle)
+    spin = masses[0] * radii[0] ** 2 / 2 * velocity[0, 2, -1]
+    assert spin == pytest.approx(slope * push, rel=1e-3)
+    assert abs(angle) > 0.02
+    assert velocity[1, 2, -1] == pytest.approx(0.0, abs=1e-9)
+    hit = np.flatnonzero(velocity[1, 0] > 0)[0]
+    assert position[1, 0, hit - 1] == pytest.approx(0.3)
+
+
+@pytest.mark.usefixtures("x64")
+@pytest.mark.parametrize(("seed", "has_walls"), [(0, False), (3, False), (2, True)])
+def test_oval_rims_agree_with_the_fine_solver(seed: int, has_walls: bool) -> None:
+    drawn = draw_level(np.random.default_rng(seed), {}, has_walls=has_walls)
+    one = oval(drawn, 0.04, -0.03, -0.05, 0.02)
+    motion, _ = solve_level(one)
+    position, _ = (np.asarray(each) for each in rolled(one, 1.2))
+    fine = motion.at(DT_S * np.arange(position.shape[-1]))
+    apart = np.abs(position[:, :2] - fine.position_m)
+    assert apart.max() < 2 * FINE_M
+    assert np.median(apart) < 1e-5
+    assert np.abs(position[:, 2] - fine.pitch_rad).max() < 0.05
+    free, _ = rolled(drawn, 1.2)
+    assert np.abs(position - np.asarray(free)).max() > 10 * FINE_M
+
+
+@pytest.mark.usefixtures("x64")
+def test_rims_that_are_hardly_oval_move_as_round_ones() -> None:
+    drawn = draw_level(np.random.default_rng(2), {}, has_walls=True)
+    position, _ = rolled(oval(drawn, 0.0, 0.0, 0.0, 0.0), 1.2)
+    expected, _ = rolled(drawn, 1.2)
+    assert np.asarray(position) == pytest.approx(np.asarray(expected), abs=1e-8)
+
+
 @pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize("seed", [0, 2, 4])
 def test_walls_agree_with_the_fine_solver(seed: int) -> None:
@@ -256,9 +350,13 @@ def test_effects_agree_with_the_fine_solver(name: str) -> None:
 
 
 @pytest.mark.usefixtures("x64")
-@pytest.mark.parametrize(("seed", "has_walls"), [(0, False), (5, False), (2, True)])
-def test_slopes_agree_with_differences(seed: int, has_walls: bool) -> None:
+@pytest.mark.parametrize(
+    ("seed", "has_walls", "is_oval"),
+    [(0, False, False), (5, False, False), (2, True, False), (2, True, True)],
+)
+def test_slopes_agree_with_differences(seed: int, has_walls: bool, is_oval: bool) -> None:
     one = draw_level(np.random.default_rng(seed), {}, has_walls)
+    one = oval(one, 0.04, -0.03, -0.05, 0.02) if is_oval else one
     names = tuple(one.values)
     theta = np.array([one.values[name] for name in names])
 

@@ -339,6 +339,14 @@ class Effect:
         """
         return None
 
+    def oval(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Returns how far from round the rims of discs are that are seen from above, or None.
+
+        c and s of the second harmonic of how far they reach, as shares of their radii
+        (`rollout/oval_rims.py`), when the discs are first seen: `[..., object, 2]`.
+        """
+        return None
+
     def walls(self, theta: Theta, scene: Surroundings) -> Walls | None:
         """Returns the walls off which discs bounce that are seen from above, or None."""
         return None

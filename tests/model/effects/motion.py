@@ -44,7 +44,7 @@ LIBRARY = (
 # Listed there, too, and without a place on a ramp: of falls, flights and pendulums.
 OFF_THE_RAMP = (
     *("added_mass", "magnus", "bearing_friction", "rod_mass", "thread_stretch"),
-    "uneven_pressure",
+    *("oval_rim", "uneven_pressure"),
 )
 ALONE = replace(HIT, object2_x_m=None)
 # Object 2 stands where nothing comes, so that one compiled program serves all experiments.

@@ -43,7 +43,9 @@ class ConstantForce(Effect):
         if not _bends(scene):
             return (pull,)
         usual = LEVELNESS_PRIOR.mean  # means nothing while the force is absent
-        levelness = Parameter("constant_force_levelness", "1", LEVELNESS_PRIOR, usual, "effect", 0.1)
+        levelness = Parameter(
+            "constant_force_levelness", "1", LEVELNESS_PRIOR, usual, "effect", 0.1
+        )
         return (pull, levelness)
 
     def force(self, theta: Theta, scene: Surroundings) -> Force:

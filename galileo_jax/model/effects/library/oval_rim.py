@@ -1,0 +1,51 @@
+"""Oval rim: a puck that is seen from above is not round.
+
+    h(a) = r (1 + c cos 2 (a - turned) + s sin 2 (a - turned))
+
+is how far its rim reaches in the direction a from its middle, c and s when it is first seen. A hit
+then pushes beside the middle, by h' = dh/da: it turns pucks without any grip, and sends them off
+beside the line of their middles.
+
+Closed form: two pucks without grip that meet head-on where h' is not 0 part with r J w / 2 = h' P.
+
+Source: do Carmo, Differential Geometry of Curves and Surfaces, section 1.7 (support functions);
+Chatterjee and Ruina (1998), A new algebraic rigid-body collision law, J. Appl. Mech. 65, 939.
+Confused with: grip, and where exactly the pucks meet (nuisance `hit_offset`), in a single hit.
+"""
+
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import Normal, Parameter
+
+PRIOR = Normal(0.0, 0.03)  # of a radius: a seam, a dent, a puck cut by hand
+
+
+@register
+class OvalRim(Effect):
+    """How far from round pucks are that are seen from above."""
+
+    name: ClassVar[str] = "oval_rim"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """Two of every puck; none of what is not seen from above, or has nothing to meet."""
+        if not scene.is_level or (len(scene.names) < 2 and not len(scene.walls_m)):
+            return ()
+        return tuple(
+            Parameter(name, "1", PRIOR, 0.0, "effect", 0.05, per_clip=True)
+            for i in range(len(scene.names))
+            for name in _names(i)
+        )
+
+    def oval(self, theta: Theta, scene: Surroundings) -> Array | None:
+        """Shares of the radii."""
+        if not self.parameters(scene):
+            return None
+        rows = [[theta[name] for name in _names(i)] for i in range(len(scene.names))]
+        xp = rows[0][0].__array_namespace__()
+        return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _names(i: int) -> tuple[str, ...]:
+    return tuple(f"oval_rim_{part}{i + 1}" for part in "cs")
