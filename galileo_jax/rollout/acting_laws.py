@@ -2,7 +2,8 @@
 
 Most hypotheses have one effect of twenty; the others are pinned where they do nothing. Rollouts in
 which no force and no friction law acts have a program without any, in which the motion between
-events is known in closed form. All others share one, which is told which laws act in its batch.
+events is known in closed form. All others share one, which is told which laws act in its batch. In
+the same way rims that are not round, which take ten times as long to meet, have programs apart.
 Where a law is none of the package's its programs cannot be kept (`trace_cache`), and are made anew
 in every process: then there is one for all.
 """
@@ -16,21 +17,24 @@ from jaxtyping import Bool
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.model import Model
 
-STEADY, WITH_LAWS = 0, 1  # kinds of rollouts
+STEADY, WITH_LAWS, WITH_OVALS = 0, 1, 2  # kinds of rollouts: bits of one number
+LAW_HOOKS, OVAL_HOOKS = ("force", "push", "friction"), ("oval",)
 PACKAGE = f"{__name__.split('.')[0]}."
 
 
 @dataclass(frozen=True)
 class Law:
-    """An effect with a force or a friction law of its own.
+    """An effect with a force or a friction law of its own, or rims that are not round.
 
     Attributes:
       effect: it.
+      kind: what its rollouts have.
       columns: of its parameters in the model.
       absent: their values where it does nothing.
     """
 
     effect: Effect
+    kind: int
     columns: np.ndarray
     absent: np.ndarray
 
@@ -76,8 +80,11 @@ class ActingLaws:
     def __init__(self, model: Model):
         self._model = model
         self._share = functools.cache(self._share_of)
-        found = [e for e in model.effects if _has_law(e) and self._columns(e).size]
-        self._laws = tuple(Law(e, self._columns(e), self._absent(e)) for e in found)
+        self._laws = tuple(
+            Law(effect, kind, self._columns(effect), self._absent(effect))
+            for effect in model.effects
+            if (kind := _kind(effect)) and self._columns(effect).size
+        )
         self._is_ours = all(type(e).__module__.startswith(PACKAGE) for e in model.effects)
 
     def shares(self, theta: np.ndarray) -> list[tuple[Share, np.ndarray]]:
@@ -95,11 +102,14 @@ class ActingLaws:
     def _kinds(self, acts: Bool[np.ndarray, "law batch"]) -> np.ndarray:
         """Which program each rollout has, `[batch]`."""
         if not self._is_ours:
-            return np.full(acts.shape[1], WITH_LAWS)
-        return np.where(acts.any(axis=0), WITH_LAWS, STEADY)
+            return np.full(acts.shape[1], WITH_LAWS | WITH_OVALS)
+        kinds = np.zeros(acts.shape[1], int)
+        for law, is_there in zip(self._laws, acts, strict=True):
+            kinds |= np.where(is_there, law.kind, 0)
+        return kinds
 
     def _share_of(self, kind: int) -> Share:
-        laws = self._laws if kind == WITH_LAWS else ()
+        laws = tuple(law for law in self._laws if law.kind & ~kind == 0)
         return self._without([law.effect for law in self._laws if law not in laws], laws)
 
     def _without(self, left_out: list[Effect], laws: tuple[Law, ...] = ()) -> Share:
@@ -118,8 +128,12 @@ class ActingLaws:
         return np.array([self._model.parameters[i].absent for i in self._columns(effect)])
 
 
-def _has_law(effect: Effect) -> bool:
+def _kind(effect: Effect) -> int:
+    """What rollouts in which it acts have; 0: what all have."""
     own = type(effect)
-    return any(
-        getattr(own, hook) is not getattr(Effect, hook) for hook in ("force", "push", "friction")
+    bits = ((WITH_LAWS, LAW_HOOKS), (WITH_OVALS, OVAL_HOOKS))
+    return sum(
+        bit
+        for bit, hooks in bits
+        if any(getattr(own, hook) is not getattr(Effect, hook) for hook in hooks)
     )

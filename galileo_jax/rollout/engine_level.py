@@ -33,7 +33,7 @@ MAX_EVENTS = 16  # within one recorded step
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
 TOUCH_M_S = 1e-9
 NEWTON_STEPS = 3
-OVAL_STEPS = 5
+OVAL_STEPS = 3  # of Newton's method, from an even closing on
 CLOSED_M = 1e-7  # rims so near touch
 ROOT2 = math.sqrt(2.0)
 

@@ -19,7 +19,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
-STEPS = 4  # of Newton's method, from the middles' direction on
+# Newton's method, from the middles' direction on: rims of 0.1 are off by 3e-8 rad, and their gap by
+# the square of that.
+STEPS = 3
 
 
 class Rim(NamedTuple):
