@@ -45,6 +45,7 @@ from galileo_jax.diagnosis.second_effect import (
 from galileo_jax.diagnosis.slow_errors import unless_slow_errors
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
+    PAIR_P,
     best_named,
     decisive_margin,
     explains,
@@ -52,6 +53,7 @@ from galileo_jax.diagnosis.verdict import (
     is_nothing_missing,
     looked_at_again,
     needs_pairs,
+    pair_ahead_of_all,
     ranked,
     rivals,
     to_add,
@@ -183,6 +185,7 @@ def diagnose(
             candidates, verdict = both, law_or(trials, verdict, both, decisive)
         else:
             why = (*why, reasons.library_says_it(best_named(candidates), law))
+        verdict = _or_pair(trials, verdict, candidates, decisive, on_stage)
         verdict = unless_slow_errors(trials, base, verdict, candidates, decisive)
     verdict = with_known_constants(trials, verdict, candidates, seed)
     verdict = with_second(verdict, candidates, promises)
@@ -230,6 +233,33 @@ def _judged(
     verdict = verdict_of(candidates, decisive)
     if verdict.status != "named":
         return verdict
+    return _looked_at(trials, verdict, candidates, decisive, on_stage)
+
+
+def _or_pair(
+    trials: JointProblem,
+    verdict: Verdict,
+    candidates: Sequence[Candidate],
+    decisive: float,
+    on_stage: Callable[[str], None],
+) -> Verdict:
+    """A pair in place of unknown, where it is ahead of all that was tried, formulas among it."""
+    pair = pair_ahead_of_all(candidates, decisive) if verdict.status == "unknown" else None
+    if pair is None:
+        return verdict
+    why = reasons.explains(pair), reasons.pair_ahead(pair, PAIR_P)
+    named = Verdict("named", pair.effects, reasons=why)
+    return _looked_at(trials, named, candidates, decisive, on_stage)
+
+
+def _looked_at(
+    trials: JointProblem,
+    verdict: Verdict,
+    candidates: Sequence[Candidate],
+    decisive: float,
+    on_stage: Callable[[str], None],
+) -> Verdict:
+    """A named verdict, if a clip like this one tells it from what could be confused with it."""
     on_stage("looking at what could be confused with it")
     named = next(c for c in candidates if c.effects == verdict.effects)
     alike = within_luck(named, candidates, decisive)

@@ -157,6 +157,22 @@ def explains(best: Candidate) -> Reason:
     )
 
 
+def pair_ahead(pair: Candidate, needed: float) -> Reason:
+    """A pair that leaves a little more than noise is far ahead of all else, formulas too.
+
+    Args:
+      pair: the most probable hypothesis.
+      needed: the p-value that a pair needs as long as formulas were not tried.
+    """
+    return Reason(
+        "pair_ahead",
+        f"Two effects at once must leave p = {needed:g} at least, because one formula might say "
+        f"it better; with {pair.title} it is {p_equals(pair.p_value or 0.0)}, but formulas were "
+        "tried, and all of them, and all other effects, are far less probable.",
+        {"hypothesis": pair.name, "p_value": pair.p_value, "least_p_value": needed},
+    )
+
+
 def nothing_explains(best: Candidate) -> Reason:
     """No hypothesis leaves only noise."""
     p_value = best.p_value or 0.0

@@ -29,8 +29,11 @@ FAINT_FACTOR = 2.0
 # Log odds, in nats, at which an effect is believed although the base model passes its comparison:
 # a test that looks everywhere notices less than one that knows where to look (e^7 = 1100).
 CONVINCING = 7.0
-# A pair must pass this p-value, not ADEQUATE_P: two effects come close to almost any motion. An
-# effect that is so many times as likely as others, as the air's drag on a ball, does not count.
+# A pair must pass this p-value, not ADEQUATE_P: two effects come close to almost any motion, and
+# one formula may be what they come close to. Where formulas were tried and all are far behind, a
+# pair needs no more than a single effect (`pair_ahead_of_all`): else one true pair of 25 would be
+# unknown. An effect that is so many times as likely as others, as the air's drag on a ball, does
+# not count.
 PAIR_P = 0.05
 EXPECTED_ODDS = 3.0
 # Two effects at once are so much rarer than one: who measures knows of most of what disturbs.
@@ -179,6 +182,24 @@ def _explaining(candidates: Sequence[Candidate]) -> list[Candidate]:
         if c.p_value is not None and c.p_value >= ADEQUATE_P and len(c.effects) == len(top.effects)
     ]
     return [c for c in candidates if c in leads or explains(c)]
+
+
+def pair_ahead_of_all(candidates: Sequence[Candidate], decisive: float) -> Candidate | None:
+    """A pair that only its stricter p-value keeps from being named, where formulas were tried.
+
+    All other hypotheses together, formulas and forms among them, are behind it by what a name
+    needs, whether the data contradict them or not.
+
+    Args:
+      candidates: ranked.
+      decisive: nats by which it must be ahead.
+    """
+    best = candidates[0]
+    is_pair = len(best.effects) > 1 and not best.is_form
+    if not is_pair or best.p_value is None or not ADEQUATE_P <= best.p_value < _least_p(best):
+        return None
+    others = _without(best, candidates)
+    return best if not others or best.log_odds - _sum_of(others) >= decisive else None
 
 
 def form_that_leads(singles: Sequence[Candidate]) -> Candidate | None:

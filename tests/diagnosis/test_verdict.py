@@ -23,6 +23,7 @@ from galileo_jax.diagnosis.verdict import (
     may_decide,
     needs_pairs,
     num_expected,
+    pair_ahead_of_all,
     ranked,
     rivals,
     to_add,
@@ -606,3 +607,30 @@ def test_a_pair_with_what_is_expected_counts_as_one_effect():
     assert explains(replace(pair, num_expected=1))
     assert not explains(replace(candidate(PAIR, 50.0, p_value=0.009), num_expected=1))
     assert [num_expected(odds) for odds in ([1.0, 30.0], [1.0, 2.0], [30.0, 5.0])] == [1, 0, 2]
+
+
+def test_a_pair_ahead_of_all_that_was_tried_needs_no_more_than_one_effect():
+    others = candidate("air_drag", 9.0), candidate("law_push_power_t", 36.9, 1e-6)
+    table = ranked([candidate("air_drag+stribeck", 40.0, 0.03), *others])
+    ahead = pair_ahead_of_all(table, DECISIVE)
+    assert ahead is not None and ahead.name == "air_drag+stribeck"
+    assert verdict_of(table, DECISIVE).status == "unknown"  # before formulas were tried
+
+
+@pytest.mark.parametrize(
+    ("p_value", "rival"),
+    [
+        (0.009, candidate("rolling", 9.0)),  # contradicted
+        (0.2, candidate("rolling", 9.0)),  # the usual rules name it
+        (0.03, candidate("rolling", 38.0, 1e-6)),  # nearly as probable, contradicted or not
+        (0.03, candidate("force_at_a_time", 38.0)),
+    ],
+)
+def test_a_pair_not_ahead_of_all_or_contradicted_is_not_named(p_value, rival):
+    table = ranked([candidate("air_drag+stribeck", 40.0, p_value), rival])
+    assert pair_ahead_of_all(table, DECISIVE) is None
+
+
+def test_a_single_effect_is_no_pair():
+    table = ranked([candidate("air_drag", 40.0, 0.03), candidate("rolling", 9.0)])
+    assert pair_ahead_of_all(table, DECISIVE) is None
