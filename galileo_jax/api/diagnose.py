@@ -21,6 +21,7 @@ from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
+from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.laws.source import proposed_file
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
 from galileo_jax.experiment.advise import with_next
@@ -248,7 +249,8 @@ class Diagnosis:
         """Writes diagnosis.json, report.html and, below model/, the run of the last model.
 
         And hypotheses.npz, of which `next_experiment` is made; where a formula explains the data
-        (law, or ambiguous with one), its effect, too: proposed_effect.py, for `--effects-from`.
+        (law, ambiguous with one, or unknown because it is not certain), its effect, too:
+        proposed_effect.py, for `--effects-from`.
 
         Args:
           folder: made where it is not there.
@@ -257,9 +259,10 @@ class Diagnosis:
         folder, best = Path(folder), self.best
         proposed = folder / PROPOSED
         proposed.unlink(missing_ok=True)
-        if self.verdict.law is not None:
+        formula = proposed_formula(self.verdict, self.found.candidates)
+        if formula is not None and formula.law is not None:
             clips = [Path(clip).name for clip in self.document["clips"]]
-            write_text(proposed, proposed_file(self.verdict.law, clips))
+            write_text(proposed, proposed_file(formula.law, clips))
             if self.verdict.status == "law":  # the last model has it
                 files = [*best.result.get("effects_from", []), str(proposed.resolve())]
                 best = replace(best, result={**best.result, "effects_from": files})

@@ -70,6 +70,21 @@ def best_formula(candidates: Sequence[Candidate]) -> Candidate | None:
     return next((c for c in laws if explains(c)), laws[0] if laws else None)
 
 
+def proposed_formula(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | None:
+    """The formula that is worth trying as an effect: the law, one beside others, or the best.
+
+    Where the verdict is unknown, the most probable of those that explain the data, if one does.
+
+    Args:
+      verdict: on them.
+      candidates: ranked.
+    """
+    if verdict.law is not None:
+        return next(c for c in candidates if c.law == verdict.law)
+    best = best_formula(candidates) if verdict.status == "unknown" else None
+    return best if best is not None and explains(best) else None
+
+
 def law_to_doubt(candidates: Sequence[Candidate]) -> Candidate | None:
     """The best formula that explains the data where no single effect of the library does better.
 

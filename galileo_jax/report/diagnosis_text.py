@@ -7,6 +7,7 @@ from typing import Any
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Reason
+from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
@@ -15,7 +16,7 @@ from galileo_jax.report.fit_text import number
 
 NO_EFFECTS = "no effects"
 MOST_APART = 2  # that are said one by one
-PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis whose verdict is a law
+PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis: a formula that explains the data
 
 
 def effects_text(effects: Sequence[str]) -> str:
@@ -129,8 +130,12 @@ def formula_text(record: Mapping[str, Any]) -> str:
             f"No formula explains the missing force. The best one, {best['law']}, leaves more "
             f"than noise ({leaves})."
         )
-    doubt = "" if record["verdict"]["status"] == "law" else ", but it is not certain (see why)"
-    return f"A formula explains the missing force{doubt}: {best['law']} ({leaves})."
+    if record["verdict"]["status"] == "law":
+        return f"A formula explains the missing force: {best['law']} ({leaves})."
+    return (
+        f"A formula explains the missing force, but it is not certain (see why): {best['law']} "
+        f"({leaves}). It is in {PROPOSED}, to be tried as an effect."
+    )
 
 
 CLIPS_KINDS = {
@@ -173,12 +178,16 @@ def next_command(
     found = diagnosis.verdict
     if found.status == "none":
         return f"galileo fit {files}"
-    if found.status == "unknown":
+    formula = proposed_formula(found, diagnosis.candidates)
+    if found.status == "unknown" and formula is None:
         return f"galileo diagnose {files}{more} --effects-from my_effect.py"
-    if found.status == "law":
+    if found.status == "named":
+        effects = found.effects
+    elif found.status == "ambiguous":
+        effects = found.effects[0].split("+")
+    else:
+        effects = formula.effects if formula is not None else found.effects
         more += f" --effects-from {shlex.quote(str(folder / PROPOSED))}"
-    chosen = found.status in ("named", "law")
-    effects = found.effects if chosen else found.effects[0].split("+")
     return f"galileo fit {files}{more} --effects {','.join(effects)}"
 
 
