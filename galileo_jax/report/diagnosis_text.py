@@ -95,16 +95,42 @@ def ambiguity(rivals: Sequence[str]) -> str:
     hypotheses = [rival.split("+") for rival in rivals]
     common = [name for name in hypotheses[0] if all(name in own for own in hypotheses)]
     if not common:
-        names = " and ".join([", ".join(rivals[:-1]), rivals[-1]])
-        return f"This clip cannot distinguish between {names}; each of them explains the data."
+        alone, beside = _without_company(hypotheses)
+        names = " and ".join([", ".join(alone[:-1]), alone[-1]])
+        together = f", alone or together with {_any_of(beside)}" if beside else ""
+        return (
+            f"This clip cannot distinguish between {names}; each of them explains the data"
+            f"{together}."
+        )
     rest = ["+".join(n for n in own if n not in common) for own in hypotheses]
     others = [name for name in rest if name]
-    one_of = " or ".join([", ".join(others[:-1]), others[-1]] if others[1:] else others)
     alone = "" if len(others) == len(rest) else "alone or "
     return (
-        f"{' and '.join(common)} explains the data {alone}together with {one_of}; "
+        f"{' and '.join(common)} explains the data {alone}together with {_any_of(others)}; "
         f"this clip cannot tell which."
     )
+
+
+def _without_company(hypotheses: Sequence[Sequence[str]]) -> tuple[list[str], list[str]]:
+    """The hypotheses that no other one is part of, and what else stands beside one of them.
+
+    Where fewer than two are left, all stay.
+    """
+    least = [own for own in hypotheses if not any(set(one) < set(own) for one in hypotheses)]
+    beside = [
+        name
+        for own in hypotheses
+        if own not in least
+        for name in own
+        if not any(name in one and set(one) < set(own) for one in least)
+    ]
+    if len(least) < 2:
+        return ["+".join(own) for own in hypotheses], []
+    return ["+".join(own) for own in least], list(dict.fromkeys(beside))
+
+
+def _any_of(names: Sequence[str]) -> str:
+    return " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
 
 
 def formula_text(record: Mapping[str, Any]) -> str:

@@ -205,6 +205,21 @@ def test_what_could_not_be_confused_is_one_line():
             "tell which.",
         ),
         (
+            (
+                "friction_patch",
+                "magnetic_brake",
+                "friction_patch+rolling",
+                "magnetic_brake+stribeck",
+            ),
+            "This clip cannot distinguish between friction_patch and magnetic_brake; each of them "
+            "explains the data, alone or together with rolling or stribeck.",
+        ),
+        (
+            ("air_drag", "stribeck+rolling", "air_drag+rolling"),
+            "This clip cannot distinguish between air_drag and stribeck+rolling; each of them "
+            "explains the data, alone or together with rolling.",
+        ),
+        (
             ("rolling", "rolling+stribeck"),
             "rolling explains the data alone or together with stribeck; this clip cannot tell "
             "which.",
