@@ -55,3 +55,17 @@ def test_twins_count_once(clip_of_two, tau, num, all_ahead):
         found = without_twins(laws if all_ahead else laws[::-1])
     assert len(found) == num
     assert not all(one.structure.is_on_all for one in found)  # the shorter claim is left
+
+
+@pytest.mark.parametrize(("ahead", "is_on_all"), [(0.1, False), (0.5, True), (-0.5, False)])
+def test_the_more_evident_twin_is_left(clip_of_two, ahead, is_on_all):
+    trials, truth = clip_of_two
+    both, one = (Structure("friction", is_all, (DECAY,)) for is_all in (True, False))
+    with in_64_bit():
+        laws = [
+            law(trials, truth, both, OVER_BEFORE_THE_HIT_S, ahead),
+            law(trials, truth, one, OVER_BEFORE_THE_HIT_S, 0.0),
+        ]
+        laws = sorted(laws, key=lambda each: -each.hypothesis.fit.log_evidence)
+        (found,) = without_twins(laws)
+    assert found.structure.is_on_all == is_on_all
