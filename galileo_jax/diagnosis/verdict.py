@@ -108,6 +108,8 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
 
     Always the best, the best with a name and the best formula; beyond these what could be confused
     with the best, alone or together: all others together come to less than a twentieth of it.
+    Where the best is a form that says the same as the best formula, beyond it what could be
+    confused with the formula.
 
     Args:
       candidates: ranked.
@@ -115,8 +117,15 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
     """
     best = candidates[0]
     law = next((c for c in candidates if c.law is not None), None)
-    always = [id(c) for c in (best, best_named(candidates), law, *_in_sum(best, candidates))]
-    return tuple(c for c in candidates if id(c) in always or best.log_odds - c.log_odds < margin)
+    is_said_by_a_form = law is not None and best.is_form and best.family == law.family
+    leaders = [best, law] if law is not None and is_said_by_a_form else [best]
+    always = [id(c) for c in (best, best_named(candidates), law) if c is not None]
+    always += [id(c) for leader in leaders for c in _in_sum(leader, candidates)]
+    return tuple(
+        c
+        for c in candidates
+        if id(c) in always or any(one.log_odds - c.log_odds < margin for one in leaders)
+    )
 
 
 def _in_sum(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:

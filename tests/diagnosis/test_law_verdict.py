@@ -222,3 +222,17 @@ def test_a_law_is_not_needed_where_an_effect_says_it_as_well():
 @pytest.mark.parametrize(("constants", "is_needed"), [(2, False), (3, True)])
 def test_many_constants_need_the_law_s_word(constants, is_needed):
     assert needs(replace(candidate("friction_patch", 60.0), num_constants=constants)) == is_needed
+
+
+def test_what_is_near_a_formula_is_compared_where_its_form_is_ahead():
+    """The form is no rival of its own formula; what is near the formula is."""
+    rival = law(49.0, None, family="power_t", name="law_2")
+    table = ranked([candidate(FORM_OF_POWER_V, 55.0, None), law(50.0, None), rival])
+    assert [c.name for c in to_compare((*table, candidate("air_drag", 1.0)), DECISIVE)] == [
+        FORM_OF_POWER_V,
+        "law_1",
+        "law_2",
+        "air_drag",
+    ]
+    other_form = ranked([candidate(FORM_OF_PULSE_T, 55.0, None), law(50.0, None), rival])
+    assert "law_2" not in [c.name for c in to_compare((*other_form, candidate("air_drag", 1.0)), 3)]
