@@ -34,6 +34,9 @@ from galileo_jax.inference.joint_problem import JointProblem
 
 NUM_REFITTED, OUT_OF_THE_RACE = 6, 100.0  # candidates, unless so many nats behind the best
 NUM_AT_ONCE = 6  # refined in one batch: the sooner the first can be shown
+# Between Laplace's and mended evidence, nats: those of hypotheses that describe the data differ by
+# up to 2.5, and alike.
+ALIKE_NATS = 3.0
 MAY_STILL_GAIN = 5.0  # nats that a valley with more cost in the search may yet have the better of
 
 
@@ -58,13 +61,18 @@ class Hypothesis:
         return self.trials or trials
 
     def evidence_over(self, base: "Hypothesis") -> float:
-        """Log evidence less that of another, nats: like with like, where only Laplace's is known.
+        """Log evidence less that of another, nats.
 
-        Errors of Laplace's are alike where hypotheses are.
+        Like with like, where only Laplace's is known: its errors are alike where hypotheses are.
+        Where that of the other is off by more than such errors are (a fit far from the data has a
+        bent valley), its mended evidence counts for all, so that all are measured from one place.
         """
-        if self.weighed is None or base.weighed is None:
+        if base.weighed is None:
             return self.fit.log_evidence - base.fit.log_evidence
-        return self.weighed.log_evidence - base.weighed.log_evidence
+        known, mended = base.fit.log_evidence, base.weighed.log_evidence
+        if self.weighed is None:
+            return self.fit.log_evidence - (known if abs(known - mended) < ALIKE_NATS else mended)
+        return self.weighed.log_evidence - mended
 
     def is_same(self, other: "Hypothesis") -> bool:
         """Whether it has the same fit and evidence."""

@@ -32,6 +32,11 @@ def test_mended_with_mended_and_laplace_with_laplace():
     assert known.evidence_over(base) == pytest.approx(11.5)
     assert unknown.evidence_over(base) == pytest.approx(5.0)
     assert known.evidence_over(Hypothesis((), FIT)) == pytest.approx(10.0)
+    off = Hypothesis(
+        (), FIT, weighed=mended(-83.0)
+    )  # a base so far from the data: one place for all
+    assert known.evidence_over(off) == pytest.approx(-5.0)
+    assert unknown.evidence_over(off) == pytest.approx(unknown.fit.log_evidence + 83.0)
 
 
 def test_valleys_apart_the_best_first_and_none_twice():
