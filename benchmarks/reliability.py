@@ -165,8 +165,8 @@ def traces(yaml: Path, kind: str) -> tuple[dict[str, float], float]:
 
     Without one: with all others, or with none, whichever is better.
 
-    The fit with all is looked for from the truth, too, so that no narrow valley hides one. What is
-    outside the library always leaves one: infinite.
+    All fits are looked for from the truth, too, so that no narrow valley hides one, or seems to
+    show one. What is outside the library always leaves one: infinite.
 
     Returns:
       By effect, and of all over none: what the truth must have in a table in which it was found.
@@ -182,11 +182,15 @@ def traces(yaml: Path, kind: str) -> tuple[dict[str, float], float]:
     values = record | record["effect_parameters"] | record["nuisances"]
     parameters = trials.model_parameters
     truth = inverse(parameters, np.array([values.get(p.name, p.absent) for p in parameters]))
-    free = trials.free(hidden)[: len(parameters)]
-    (beside,) = fitter.fit_from(np.where(free, truth, 0.0)[None], free[None], np.zeros(1, int))
-    whole = max(fitter.fit(0, effects=hidden).log_evidence, beside.log_evidence)
+
+    def evidence_of(effects: tuple[str, ...]) -> float:
+        free = trials.free(effects)[: len(parameters)]
+        (beside,) = fitter.fit_from(np.where(free, truth, 0.0)[None], free[None], np.zeros(1, int))
+        return max(fitter.fit(0, effects=effects).log_evidence, beside.log_evidence)
+
+    whole = evidence_of(hidden)
     without = {name: tuple(other for other in hidden if other != name) for name in hidden}
-    evidence = {rest: fitter.fit(0, effects=rest).log_evidence for rest in {(), *without.values()}}
+    evidence = {rest: evidence_of(rest) for rest in {(), *without.values()}}
     less = {name: max(evidence[rest], evidence[()]) for name, rest in without.items()}
     return {name: whole - less[name] for name in hidden}, whole - evidence[()]
 
