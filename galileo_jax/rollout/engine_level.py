@@ -22,7 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from galileo_jax.model.effects.effect import Effect, Rims, Surroundings, Walls
+from galileo_jax.model.effects.effect import Array, Effect, Rims, Surroundings, Walls
 from galileo_jax.rollout.engine_free import start_velocity
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.event_loop import recorded, step_by_events
@@ -359,8 +359,8 @@ def _impulse(
     approach: jax.Array,
     slip: jax.Array,
     gives: tuple[jax.Array, jax.Array, jax.Array],
-    restitution: jax.Array,
-    grip: jax.Array,
+    restitution: Array,
+    grip: Array,
 ) -> tuple[jax.Array, jax.Array]:
     """What a hit gives along and across: Newton's, and Coulomb's or as much as stops the slip.
 
