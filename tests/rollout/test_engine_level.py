@@ -250,7 +250,7 @@ def test_oval_rims_face_each_other_where_their_outlines_are_nearest(
     ]
     direction, gap = facing(jnp.asarray(apart), rims[0], rims[1])
     one, other = outline(radii[0], *shares[:2]), apart + outline(radii[1], *shares[2:])
-    distances, indices = KDTree(other).query(one)
+    distances, indices = (np.asarray(each) for each in KDTree(other).query(one))
     nearest = int(np.argmin(distances))
     assert gap == pytest.approx(distances[nearest], abs=1e-6)
     way = other[indices[nearest]] - one[nearest]
