@@ -12,7 +12,6 @@ again. The last line is JSON.
 """
 
 import argparse
-import json
 import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -23,6 +22,7 @@ from typing import Any, NamedTuple
 
 import bullet_scene
 import calibration
+import journal
 import numpy as np
 import pybullet  # pyright: ignore
 import tables
@@ -219,27 +219,33 @@ def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     call.out.mkdir(parents=True, exist_ok=True)
     log = call.out / "results.jsonl"
-    lines = log.read_text().splitlines() if log.is_file() else []
-    done = {row["case"]: row for row in map(json.loads, lines)}
+    done = journal.finished(log)
     library = effect_names()
-    scores = []
-    tables.row("case", ("chi2", "after", "says"))
+    scores, worst = [], 0.0
+    tables.row("case", ("chi2", "after", "k1: z", "says"))
     for seed in range(call.first, call.first + call.seeds):
         for name in call.only or WORLDS:
             case = f"{name}_{seed}"
             if case not in done:
                 done[case] = {"case": case, **examine(name, seed)}
-                with log.open("a") as file:
-                    file.write(json.dumps(done[case]) + "\n")
+                journal.add(log, done[case])
             score = verdicts.judge(name, library, done[case]["diagnosis"])
             says = "" if score.is_named_right else "NO: " if not score.is_covered else "among "
-            tables.row(case, (score.before**2, score.after**2, says + score.label))
+            z = k1_z(done[case]) if score.is_named_right and name != "none" else None
+            worst = max(worst, abs(z or 0.0))
+            tables.row(case, (score.before**2, score.after**2, z, f" {says}{score.label}"))
             scores.append(score)
-    figures = verdicts.summary(scores)
+    figures = verdicts.summary(scores) | {"k1_worst_z_where_named": worst}
     for key, value in figures.items():
         tables.row(key, [value])
     tables.finish("bullet_effects", figures | {"seeds": [call.first, call.seeds]})
     return None
+
+
+def k1_z(row: Mapping[str, Any]) -> float:
+    """By how many standard deviations k1 of the best hypothesis is off."""
+    mean, sd = row["found"]["k1"]
+    return (mean - row["truth"]["k1"]) / sd
 
 
 def examine(name: str, seed: int) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import hidden_cases
+import journal
 import numpy as np
 import tables
 import verdicts
@@ -40,7 +41,7 @@ def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     library = hidden_cases.ramp_effects()
     cases = _cases(call, library)
-    kept = _results(call.out / "results.jsonl")
+    kept = journal.finished(call.out / "results.jsonl")
     least = call.least_chi2 if call.least_chi2 is not None else (0.0 if call.folder else 3.0)
     tables.row("case", COLUMNS)
     scores: list[tuple[Case, verdicts.Score]] = []
@@ -135,16 +136,8 @@ def _examine(case: Case, call: argparse.Namespace) -> dict[str, Any]:
         entry["error"] = f"{type(error).__name__}: {error}"
     entry["seconds"] = round(time.perf_counter() - began, 2)
     call.out.mkdir(parents=True, exist_ok=True)
-    with (call.out / "results.jsonl").open("a") as file:
-        file.write(json.dumps(entry) + "\n")
+    journal.add(call.out / "results.jsonl", entry)
     return entry
-
-
-def _results(path: Path) -> dict[str, Any]:
-    """Finished cases by name; refused ones are tried again."""
-    lines = path.read_text().splitlines() if path.is_file() else []
-    entries = [json.loads(line) for line in lines if line.endswith("}")]
-    return {entry["case"]: entry for entry in entries if not entry["error"]}
 
 
 def _show(case: Case, score: verdicts.Score, seconds: float) -> None:

@@ -9,12 +9,12 @@ finished stays in DIR/results.jsonl. The last line is JSON.
 """
 
 import argparse
-import json
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import journal
 import numpy as np
 import tables
 from hidden_cases import ANGLES_DEG
@@ -41,16 +41,14 @@ def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     call.out.mkdir(parents=True, exist_ok=True)
     log = call.out / "results.jsonl"
-    lines = log.read_text().splitlines() if log.is_file() else []
-    done = {row["case"]: row for row in map(json.loads, lines)}
+    done = journal.finished(log)
     names = call.only or [*LAWS, *LIBRARY, NO_LAW]
     rows = []
     for i, name in enumerate(names):
         case = f"{name}_{call.clips}_{call.seed + i}"
         if case not in done:
             done[case] = {"case": case, **_one(call, name, call.seed + i)}
-            with log.open("a") as file:
-                file.write(json.dumps(done[case]) + "\n")
+            journal.add(log, done[case])
         rows.append(done[case])
         _show(rows[-1])
     hidden = [row for row in rows if row["name"] in LAWS]

@@ -26,6 +26,7 @@ from typing import Any
 
 import hidden_cases
 import hidden_effects
+import journal
 import numpy as np
 import tables
 import verdicts
@@ -57,7 +58,7 @@ def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
     library = effect_names()
     call.out.mkdir(parents=True, exist_ok=True)
-    done = _results(call.out / "results.jsonl")
+    done = journal.finished(call.out / "results.jsonl")
     tables.row("case", ("kind", "truth", "says"))
     entries = []
     cases = {f"case{i}": KINDS[i % len(KINDS)] for i in range(call.first, call.first + call.num)}
@@ -212,8 +213,7 @@ def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
         ]
     except Exception as error:  # one case must not end hours of others; it is reported
         entry["error"] = f"{type(error).__name__}: {error}"
-    with (out / "results.jsonl").open("a") as file:
-        file.write(json.dumps(entry) + "\n")
+    journal.add(out / "results.jsonl", entry)
     return entry
 
 
@@ -367,12 +367,6 @@ def _counts(statuses: Sequence[str]) -> dict[str, int]:
 
 def _mean(values: Sequence[bool]) -> float:
     return float(np.mean(values)) if values else float("nan")
-
-
-def _results(path: Path) -> dict[str, Any]:
-    lines = path.read_text().splitlines() if path.is_file() else []
-    entries = [json.loads(line) for line in lines if line.endswith("}")]
-    return {entry["case"]: entry for entry in entries if not entry["error"]}
 
 
 def _print(figures: Mapping[str, Any]) -> None:

@@ -117,10 +117,11 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
     """
     best = candidates[0]
     law = next((c for c in candidates if c.law is not None), None)
-    is_said_by_a_form = law is not None and best.is_form and best.family == law.family
-    leaders = [best, law] if law is not None and is_said_by_a_form else [best]
-    always = [id(c) for c in (best, best_named(candidates), law) if c is not None]
-    always += [id(c) for leader in leaders for c in _in_sum(leader, candidates)]
+    leaders = [best]
+    if law is not None and best.is_form and best.family == law.family:
+        leaders.append(law)
+    in_sum = [c for leader in leaders for c in _in_sum(leader, candidates)]
+    always = [id(c) for c in (best, best_named(candidates), law, *in_sum)]
     return tuple(
         c
         for c in candidates

@@ -49,7 +49,7 @@ def see(observation: Observation, scene: Surroundings, is_ideal: bool = False) -
     Raises:
       InputError: no ramp with a table.
     """
-    if not scene.has_table or not scene.comes_down[0] or len(scene.names) > 2:
+    if not scene.crosses_foot or len(scene.names) > 2:
         raise InputError(
             "--method cnn: its network knows one or two objects on a ramp that ends on a table; "
             "take --method grad"

@@ -160,7 +160,7 @@ def formula_text(record: Mapping[str, Any]) -> str:
         return f"A formula explains the missing force: {best['law']} ({leaves})."
     return (
         f"A formula explains the missing force, but it is not certain (see why): {best['law']} "
-        f"({leaves}). It is in {PROPOSED}, to be tried as an effect."
+        f"({leaves}). galileo diagnose writes it to {PROPOSED}, to be tried as an effect."
     )
 
 
@@ -204,15 +204,15 @@ def next_command(
     found = diagnosis.verdict
     if found.status == "none":
         return f"galileo fit {files}"
-    formula = proposed_formula(found, diagnosis.candidates)
-    if found.status == "unknown" and formula is None:
-        return f"galileo diagnose {files}{more} --effects-from my_effect.py"
-    if found.status == "named":
-        effects = found.effects
-    elif found.status == "ambiguous":
+    effects: Sequence[str] = found.effects
+    if found.status == "ambiguous":
         effects = found.effects[0].split("+")
-    else:
-        effects = formula.effects if formula is not None else found.effects
+    if found.status == "unknown":
+        formula = proposed_formula(found, diagnosis.candidates)
+        if formula is None:
+            return f"galileo diagnose {files}{more} --effects-from my_effect.py"
+        effects = formula.effects
+    if found.status in ("law", "unknown"):
         more += f" --effects-from {shlex.quote(str(folder / PROPOSED))}"
     return f"galileo fit {files}{more} --effects {','.join(effects)}"
 

@@ -3,7 +3,7 @@
 Most hypotheses have one effect of twenty; the others are pinned where they do nothing. Rollouts in
 which no force and no friction law acts have a program without any, in which the motion between
 events is known in closed form. All others share one, which is told which laws act in its batch. In
-the same way rims that are not round, which take ten times as long to meet, have programs apart.
+the same way rims that are not round, which take seven times as long, have programs apart.
 Where a law is none of the package's its programs cannot be kept (`trace_cache`), and are made anew
 in every process: then there is one for all.
 """

@@ -22,7 +22,7 @@ from galileo_jax.rollout.engines import make_engine
 NUM_REFITTED = 3
 MOST_Z = 2.5
 SAME_MOTION_NATS = 0.5  # by which no clip tells two motions apart
-SAME_EVIDENCE_NATS = 0.25
+SAME_EVIDENCE_NATS = 0.25  # by which neither of two laws is the more evident
 LEAST_FRICTION = 0.05  # a friction's strength is a share of its coefficient
 
 
@@ -96,7 +96,7 @@ def fitted_laws(
 
 
 def without_twins(laws: Sequence[FittedLaw]) -> list[FittedLaw]:
-    """Laws, of those that say the same of object 1 and of all objects the first only.
+    """Laws, of those that say the same of object 1 and of all objects one only.
 
     Where the clip shows nothing of the formula on the others, the two are one hypothesis, and would
     count twice in a table of probabilities. The more evident is left, or else the shorter claim:

@@ -183,6 +183,11 @@ class Surroundings:
         return self.has_surface and self.moves_in_plane
 
     @property
+    def crosses_foot(self) -> bool:
+        """Whether object 1 comes down a ramp onto a table."""
+        return self.has_table and self.comes_down[0]
+
+    @property
     def starts_moving(self) -> bool:
         """Whether nothing is let go: the object moves when it is first seen."""
         return "start_velocity" in self.laws or self.is_level
@@ -217,6 +222,12 @@ class Surroundings:
     def mass(self, theta: Theta) -> list[Array]:
         """The objects' masses, kg, each `[...]`."""
         return [theta[f"m{i + 1}"] for i in range(len(self.names))]
+
+    def weight(self, theta: Theta) -> PerObject:
+        """The objects' weights, N, `[..., object]`."""
+        mass = self.mass(theta)
+        xp = mass[0].__array_namespace__()
+        return xp.stack(mass, axis=-1) * xp.asarray(self.gravity)[..., None]
 
     def only(self, value: Array, *objects: int) -> Array:
         """`value` `[...]` for the given objects (counted from 0), 0 for others: `[..., object]`."""

@@ -40,7 +40,7 @@ class ConstantForce(Effect):
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The force, and before a foot how level it is on the ramp."""
         pull = Parameter("constant_force", "N", PRIOR, 0.0, "effect", 0.05)
-        if not _bends(scene):
+        if not scene.crosses_foot:
             return (pull,)
         usual = LEVELNESS_PRIOR.mean  # means nothing while the force is absent
         levelness = Parameter(
@@ -51,7 +51,7 @@ class ConstantForce(Effect):
     def force(self, theta: Theta, scene: Surroundings) -> Force:
         """The force along the path."""
         pull = scene.only(theta["constant_force"], 0)
-        if not _bends(scene):
+        if not scene.crosses_foot:
             return lambda state: pull
         xp = pull.__array_namespace__()
         less = theta["constant_force_levelness"][..., None] * (xp.cos(scene.angle_rad) - 1.0)
@@ -63,24 +63,17 @@ class ConstantForce(Effect):
 
     def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
         """The coefficients, less by what of the weight a level force carries on the ramp."""
-        if not _bends(scene) or not scene.has_surface:
+        if not scene.crosses_foot or not scene.has_surface:
             return None
         pull = scene.only(theta["constant_force"], 0)
         xp = pull.__array_namespace__()
-        gravity = xp.asarray(scene.gravity)[..., None]
-        weight = xp.stack([xp.asarray(m) for m in scene.mass(theta)], axis=-1) * gravity
         level = theta["constant_force_levelness"][..., None]
-        carried = level * pull * xp.tan(scene.angle_rad) / weight
+        carried = level * pull * xp.tan(scene.angle_rad) / scene.weight(theta)
 
         def law(state: State, k: Array) -> Array:
             return xp.maximum(k * (1.0 - _on_ramp(state) * carried), xp.zeros_like(k))
 
         return law
-
-
-def _bends(scene: Surroundings) -> bool:
-    """Whether the path goes round a foot."""
-    return scene.has_table and scene.comes_down[0]
 
 
 def _on_ramp(state: State) -> Array:

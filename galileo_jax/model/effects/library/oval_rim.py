@@ -6,9 +6,9 @@ is how far its rim reaches in the direction a from its middle, c and s when it i
 then pushes beside the middle, by h' = dh/da: it turns pucks without any grip, and sends them off
 beside the line of their middles.
 
-Closed form: two pucks without grip that meet head-on where h' is not 0 part with r J w / 2 = h' P.
+Closed form: an impulse P without grip turns a disc of mass m by m r^2 w / 2 = h' P.
 
-Source: do Carmo, Differential Geometry of Curves and Surfaces, section 1.7 (support functions);
+Source: Santaló, Integral Geometry and Geometric Probability (1976), chapter 1 (support functions);
 Chatterjee and Ruina (1998), A new algebraic rigid-body collision law, J. Appl. Mech. 65, 939.
 Confused with: grip, and where exactly the pucks meet (nuisance `hit_offset`), in a single hit.
 """

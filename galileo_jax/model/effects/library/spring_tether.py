@@ -38,7 +38,7 @@ class SpringTether(Effect):
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The stiffness K, and past a foot how straight it pulls."""
         stiffness = Parameter("spring_tether", "N/m", PRIOR, 0.0, "effect", 0.1)
-        if not _bends(scene):
+        if not scene.crosses_foot:
             return (stiffness,)
         usual = STRAIGHTNESS_PRIOR.mean  # means nothing while the strength is absent
         straightness = Parameter(
@@ -50,7 +50,7 @@ class SpringTether(Effect):
         """The pull back."""
         stiffness = scene.only(theta["spring_tether"], 0)
         start = scene.start_path_m[0]
-        if not _bends(scene):
+        if not scene.crosses_foot:
             return lambda state: -stiffness * (state.path_m - start)
         # On the table a straight band is shorter: its start is not so far back as along the ramp.
         straight = theta["spring_tether_straightness"][..., None]
@@ -65,22 +65,16 @@ class SpringTether(Effect):
 
     def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
         """The coefficients, less by what of the weight a straight band carries on the table."""
-        if not _bends(scene) or not scene.has_surface:
+        if not scene.crosses_foot or not scene.has_surface:
             return None
         stiffness = scene.only(theta["spring_tether"], 0)
         xp = stiffness.__array_namespace__()
         height_m = -scene.start_path_m[0] * xp.sin(scene.angle_rad)
-        gravity = xp.asarray(scene.gravity)[..., None]
-        weight = xp.stack([xp.asarray(m) for m in scene.mass(theta)], axis=-1) * gravity
-        carried = stiffness * height_m * theta["spring_tether_straightness"][..., None] / weight
+        lifts = stiffness * height_m * theta["spring_tether_straightness"][..., None]
+        carried = lifts / scene.weight(theta)
 
         def law(state: State, k: Array) -> Array:
             on_table = (state.path_m > 0.0).astype(state.path_m.dtype)
             return k * (1.0 - on_table * carried)
 
         return law
-
-
-def _bends(scene: Surroundings) -> bool:
-    """Whether the path goes round a foot."""
-    return scene.has_table and scene.comes_down[0]
