@@ -21,7 +21,7 @@ PROBE_Z = 0.1
 SMALL_QUANTILE_Z = -2.0
 NUM_SHAPES = 96  # tried per candidate whose effect has a shape
 # Nodes of the average over a strength's prior: of equal steps in its logarithm, but near zero.
-NUM_NODES, MOST_NODE_Z, NODE_FOLDS = 2001, 4.0, 8.0
+NUM_NODES, MOST_NODE_Z, NODE_FOLDS = 2001, 5.0, 8.0
 SHOWS = 1e-9  # a slope below does not
 # Standard deviations by which a probe may change the track and still be a slope: a nuisance that
 # is bent far to take an effect's place follows its slope, but not a large effect.
