@@ -101,7 +101,12 @@ def rotation(quaternion: jax.Array) -> Float[jax.Array, "3 3"]:
 
 def mobility(solid: Solid, turned: jax.Array) -> Float[jax.Array, "3 3"]:
     """From angular momentum over the mass to spin, of a body turned by a matrix."""
-    return (turned / solid.inertia_m2) @ turned.T
+    return mobility_of(solid.inertia_m2, turned)
+
+
+def mobility_of(inertia_m2: Float[jax.Array, " 3"], turned: jax.Array) -> Float[jax.Array, "3 3"]:
+    """As `mobility`, from principal moments over the mass."""
+    return (turned / inertia_m2) @ turned.T
 
 
 def spin_rad_s(solid: Solid, pose: Pose) -> Float[jax.Array, " 3"]:
@@ -134,12 +139,15 @@ def energy_j_kg(solid: Solid, pose: Pose) -> jax.Array:
 
 
 def turned_on(
-    solid: Solid, quaternion: jax.Array, momentum: jax.Array, spent_s: jax.Array
+    inertia_m2: Float[jax.Array, " 3"],
+    quaternion: jax.Array,
+    momentum: jax.Array,
+    spent_s: jax.Array,
 ) -> Float[jax.Array, " 4"]:
-    """The quaternion of a body that turns freely for a time."""
+    """The quaternion of a body that turns freely for a time; principal moments over the mass."""
 
     def rate(at: jax.Array) -> jax.Array:
-        spin = mobility(solid, rotation(at / jnp.linalg.norm(at))) @ momentum
+        spin = mobility_of(inertia_m2, rotation(at / jnp.linalg.norm(at))) @ momentum
         w, v = at[0], at[1:]
         return 0.5 * jnp.concatenate([-(spin @ v)[None], w * spin + jnp.cross(spin, v)])
 

@@ -119,7 +119,7 @@ def _moved(
 ) -> Pose:
     """One step of Moreau's midpoint rule, with contacts that last at the `lowest` corners."""
     half = 0.5 * spent_s
-    middle = turned_on(solid, pose.quaternion, pose.momentum_m2_s, half)
+    middle = turned_on(solid.inertia_m2, pose.quaternion, pose.momentum_m2_s, half)
     levers, turns = levers_m(solid, middle)[lowest], mobility(solid, rotation(middle))
     falls = jnp.stack([jnp.zeros(()), jnp.zeros(()), -solid.gravity])
     velocity = pose.velocity_m_s + spent_s * falls
@@ -137,7 +137,7 @@ def _moved(
     momentum = pose.momentum_m2_s + twist
     return Pose(
         pose.position_m + half * (pose.velocity_m_s + velocity + push),
-        turned_on(solid, middle, momentum, half),
+        turned_on(solid.inertia_m2, middle, momentum, half),
         velocity + push,
         momentum,
     )

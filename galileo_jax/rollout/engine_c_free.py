@@ -22,13 +22,12 @@ from galileo_jax.model.model import Model
 from galileo_jax.model.scene.free_scene import free_model
 from galileo_jax.rollout.engine_c import LOOK_EVERY, is_at_rest
 from galileo_jax.rollout.engine_rigid import EngineRigid
+from galileo_jax.rollout.free_start import check_free, past_the_foot_m
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
-from galileo_jax.rollout.mujoco_fields import FOOT_ZONE_M, Loads, make_loads, write_contacts
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.rollout.mujoco_fields import Loads, make_loads, write_contacts
 
 # Box contacts and the faces' damping are stable at it; halving it changes hardly anything.
 STEP_S = 1 / 3840
-CLEAR_M = 0.01  # starts are known within a few mm
 SETTLE_S = 0.5
 ALONG, ACROSS, UP = 0, 1, 2  # MuJoCo's axes; ACROSS points away from the camera
 # Coefficient of restitution against the faces' stiffness (1/s^2) and damping (1/s), measured on
@@ -66,7 +65,7 @@ class EngineCFree:
         Raises:
           InputError: no two objects can meet on the table, or they meet at the foot.
         """
-        _check(model)
+        check_free(model)
         self.model = model
         self._planar = EngineRigid(model)
         self.substeps = max(1, round(model.record_dt_s / STEP_S))
@@ -129,7 +128,7 @@ class EngineCFree:
         """Whether all of object 1 is on the table when MuJoCo takes over, `[batch]`."""
         last = np.minimum(begin, poses.position_m.shape[-1] - 1)
         x = poses.position_m[np.arange(len(begin)), 0, 0, last]
-        return (begin > last) | (x >= _past_the_foot_m(self.model))
+        return (begin > last) | (x >= past_the_foot_m(self.model.scene.surroundings))
 
     def _go_on(self, poses: Poses, begin: np.ndarray, law: Dynamics, loads: Loads) -> np.ndarray:
         """Writes the motion from the hits on into `poses`; returns which rollouts were kept.
@@ -263,27 +262,6 @@ def face_solref(restitution: np.ndarray) -> np.ndarray:
     """The faces' (-stiffness, -damping) `[..., 2]` for a coefficient of restitution."""
     stiffness = np.exp(np.interp(restitution, RESTITUTION, np.log(STIFFNESS)))
     return np.stack([-stiffness, -np.interp(restitution, RESTITUTION, DAMPING)], axis=-1)
-
-
-def _past_the_foot_m(model: Model) -> float:
-    """Where object 1's centre (x) is when all of it is on the table, beyond the foot's zone."""
-    scene = model.scene.surroundings
-    return max(scene.half_length_m[0], scene.corner_m[0] + FOOT_ZONE_M)
-
-
-def _check(model: Model) -> None:
-    scene = model.scene.surroundings
-    if not scene.has_table or len(scene.names) < 2:
-        raise InputError("motion: free: two objects that meet on a table expected, or planar")
-    if any(scene.rolls):
-        raise InputError("motion: free: nothing may roll; objects that slide expected, or planar")
-    face = scene.start_m[1][0] - scene.half_length_m[1]
-    needed = _past_the_foot_m(model) + scene.half_length_m[0] + CLEAR_M
-    if face < needed:
-        raise InputError(
-            f"motion: free: {scene.names[1]}'s face is {face:.3f} m past the foot, where it is hit "
-            f"by what still crosses the foot; {needed:.3f} m or more expected, or planar"
-        )
 
 
 def _sunk_m(compiled: mujoco.MjModel) -> np.ndarray:

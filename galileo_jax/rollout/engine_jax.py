@@ -36,10 +36,16 @@ class EngineJax:
     name = "rigid"
     roll_out: ClassVar[Callable[..., Motion]]
 
-    def __init__(self, model: Model, laws: ActingLaws | None = None):
+    def __init__(
+        self,
+        model: Model,
+        laws: ActingLaws | None = None,
+        surroundings: Surroundings | None = None,
+    ):
         self.model = model
         self._laws = ActingLaws(model) if laws is None else laws
-        self._surroundings = OnDevice(model.scene.surroundings)
+        self._scene = model.scene.surroundings if surroundings is None else surroundings
+        self._surroundings = OnDevice(self._scene)
 
     def simulate(
         self, theta: Float[np.ndarray, "batch parameter"]
@@ -140,7 +146,7 @@ class EngineJax:
             rounded_up(model.num_records + 1, RECORDS),
             model.record_dt_s,
             theta,
-            model.scene.surroundings,
+            self._scene,
         )
 
 

@@ -109,6 +109,8 @@ _ARRAYS = (
     "release_s",
     "expected",
     "walls_m",
+    "half_depth_m",
+    "beside_m",
 )
 _STATIC = (
     "names",
@@ -154,6 +156,8 @@ class Surroundings:
         clip suggests, wide against what the fit will tell; of the angle, scale and origin how
         well they are declared, where not taken at their word.
       walls_m: `[wall, end, 2]`, on a table that is seen from above: the declared walls' ends.
+      half_depth_m, beside_m: `[object]`, of boxes that move freely: half the extent across the
+        travel, and how far the centre is from the plane, towards the camera; empty: of others.
     """
 
     names: tuple[str, ...]
@@ -176,6 +180,8 @@ class Surroundings:
     laws: tuple[str, ...] = ()
     expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     walls_m: tuple[tuple[tuple[float, float], tuple[float, float]], ...] = ()
+    half_depth_m: tuple[float, ...] = ()
+    beside_m: tuple[float, ...] = ()
 
     @property
     def is_level(self) -> bool:
