@@ -74,7 +74,8 @@ def fit(
       free: declared quantities to infer instead, such as "gravity".
       discrepancy: "none", or "gp": allow for an acceleration of unknown form, whose size and
         smoothness are inferred (method "grad").
-      motion: "planar", or "free": from the first hit on objects turn and tip (MuJoCo's C engine).
+      motion: "planar", or "free": from the first hit on objects turn and tip (boxes by the
+        rigid engine, cylinders by MuJoCo's C engine).
       engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
       noise: the errors that a track is assumed to have: "camera", "bodies" or "tracker"; None: as
         the clip was measured.
@@ -168,10 +169,9 @@ def _check(options: FitOptions) -> None:
             "more"
         )
     if options.motion == "free":
-        if options.engine not in ("auto", "c"):
+        if options.engine == "mjx":
             raise InputError(
-                f"--engine {options.engine}: it moves objects in a plane only; --motion free "
-                "needs c"
+                "--engine mjx: it moves objects in a plane only; --motion free needs rigid or c"
             )
         for name in ("method", "init"):
             if getattr(options, name) == "cnn":

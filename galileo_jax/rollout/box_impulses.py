@@ -9,6 +9,7 @@ Found by going round all points, each time with the others' impulses given (proj
 Gauss-Seidel). The sources are `body_contact`'s.
 """
 
+import functools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -17,7 +18,7 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
 SWEEPS = 60  # at most
-CONVERGED_M_S = 1e-10
+CONVERGED_M_S = 1e-9
 TINY = 1e-30  # keeps the derivative of a length finite at 0
 
 
@@ -36,14 +37,14 @@ class Corners(NamedTuple):
       least_m_s: `[box, corner]`, least speed at which each may rise afterwards.
       touches: `[box, corner]`, of which anything is asked.
       friction: `[box]`.
-      carries_m_s: how much of each box' weight is at each corner at first: the sweeps' start.
+      guess_m_s: `[box, corner, 3]`, impulses over the mass with which the sweeps start.
     """
 
     levers_m: Float[jax.Array, "box corner 3"]
     least_m_s: Float[jax.Array, "box corner"]
     touches: Bool[jax.Array, "box corner"]
     friction: Float[jax.Array, " box"]
-    carries_m_s: Float[jax.Array, " box"]
+    guess_m_s: Float[jax.Array, "box corner 3"]
 
 
 class Points(NamedTuple):
@@ -54,12 +55,14 @@ class Points(NamedTuple):
       normal: `[3]`, from the first to the second.
       least_m_s: `[point]`, least speed at which each opens afterwards.
       touches: `[point]`.
+      guess_ns: `[point]`, impulses with which the sweeps start.
     """
 
     levers_m: Float[jax.Array, "2 point 3"]
     normal: Float[jax.Array, " 3"]
     least_m_s: Float[jax.Array, " point"]
     touches: Bool[jax.Array, " point"]
+    guess_ns: Float[jax.Array, " point"]
 
 
 def after_impulses(
@@ -69,8 +72,8 @@ def after_impulses(
     boxes: Sequence[tuple[int, int]],
     mobility: Float[jax.Array, "box 3 3"],
     inverse_kg: Float[jax.Array, " box"],
-) -> Speeds:
-    """Speeds after the impulses at all corners and points.
+) -> tuple[Speeds, jax.Array, tuple[jax.Array, ...]]:
+    """Speeds after the impulses at all corners and points, and these impulses.
 
     Args:
       speeds: before them.
@@ -80,55 +83,62 @@ def after_impulses(
       mobility: from angular momentum over the mass to spin.
       inverse_kg: one over the masses.
     """
-    count, num = corners.touches.shape
-    tables = [
-        [_Corner.of(corners, mobility, i, k) for k in range(num)] for i in range(count)
-    ]
+    stands = jax.vmap(jax.vmap(_Corner.of, (0, 0, 0, None, None)), (0, 0, 0, 0, 0))(
+        corners.levers_m, corners.least_m_s, corners.touches, corners.friction, mobility
+    )
     pairs = [
-        [_Point.of(of, both, mobility, inverse_kg, k) for k in range(of.touches.shape[0])]
+        jax.vmap(functools.partial(_Point.of, of.normal, both, mobility, inverse_kg), (1, 0, 0))(
+            of.levers_m, of.least_m_s, of.touches
+        )
         for of, both in zip(points, boxes, strict=True)
     ]
-    weight = jnp.where(corners.touches, corners.carries_m_s[:, None], 0.0)
-    standing = jnp.zeros((count, num, 3)).at[:, :, 2].set(weight)
-    between = tuple(jnp.zeros(of.touches.shape) for of in points)
+    standing = jnp.where(corners.touches[..., None], corners.guess_m_s, 0.0)
+    between = tuple(jnp.where(of.touches, of.guess_ns, 0.0) for of in points)
 
     def sweep(carry):
-        done, _, velocity, spin, standing, between = carry
-        v, w = list(velocity), list(spin)
-        stands = [[standing[i, k] for k in range(num)] for i in range(count)]
-        pushes = [list(each) for each in between]
+        done, _, speeds, standing, between = carry
         changed = jnp.zeros(())
-        for own, both, impulses in zip(pairs, boxes, pushes, strict=True):
-            for k, point in enumerate(own):
-                impulses[k], by = point.swept(impulses[k], v, w, both)
-                changed = jnp.maximum(changed, jnp.abs(by) * inverse_kg[both[0]])
-        for i, own in enumerate(tables):
-            for k, corner in enumerate(own):
-                change, v[i], w[i] = corner.swept(stands[i][k], v[i], w[i])
-                stands[i][k] = stands[i][k] + change
-                changed = jnp.maximum(changed, jnp.max(jnp.abs(change)))
-        return (
-            done + 1,
-            changed,
-            jnp.stack(v),
-            jnp.stack(w),
-            jnp.stack([jnp.stack(each) for each in stands]),
-            tuple(jnp.stack(each) for each in pushes),
-        )
+        pushes = []
+        for of, own, both, impulses in zip(points, pairs, boxes, between, strict=True):
+            at = jnp.asarray(both)
+            num = jnp.where(jnp.any(of.touches), len(impulses), 0)
+
+            def point(k: jax.Array, carry, own=own, at=at):
+                impulses, speeds, changed = carry
+                each = jax.tree.map(lambda leaf: leaf[k], own)
+                change, speeds = each.swept(impulses[k], speeds, at)
+                most = jnp.maximum(changed, jnp.abs(change) * each.moves[0])
+                return impulses.at[k].add(change), speeds, most
+
+            carry = impulses, speeds, changed
+            impulses, speeds, changed = jax.lax.fori_loop(0, num, point, carry)
+            pushes.append(impulses)
+
+        def corner(k: jax.Array, carry):
+            standing, speeds, changed = carry
+            each = jax.tree.map(lambda leaf: leaf[:, k], stands)
+            change, speeds = jax.vmap(_Corner.swept)(each, standing[:, k], speeds)
+            most = jnp.maximum(changed, jnp.max(jnp.abs(change)))
+            return standing.at[:, k].add(change), speeds, most
+
+        carry = standing, speeds, changed
+        standing, speeds, changed = jax.lax.fori_loop(0, standing.shape[1], corner, carry)
+        return done + 1, changed, speeds, standing, tuple(pushes)
 
     def goes_on(carry) -> jax.Array:
         return (carry[0] < SWEEPS) & (carry[1] > CONVERGED_M_S)
 
-    velocity = speeds.velocity + jnp.sum(standing, axis=1)
     turned = jnp.sum(jnp.cross(corners.levers_m, standing), axis=1)
+    velocity = speeds.velocity + jnp.sum(standing, axis=1)
     spin = speeds.spin + jnp.einsum("bij,bj->bi", mobility, turned)
     any_touches = jnp.any(corners.touches)
-    for of in points:
+    for of, own, both, impulses in zip(points, pairs, boxes, between, strict=True):
         any_touches = any_touches | jnp.any(of.touches)
-    asked = jnp.where(any_touches, 1.0, 0.0)
-    start = (0, asked, velocity, spin, standing, between)
-    _, _, velocity, spin, _, _ = jax.lax.while_loop(goes_on, sweep, start)
-    return Speeds(velocity, spin)
+        velocity = velocity.at[jnp.asarray(both)].add(jnp.einsum("p,pij->ij", impulses, own.pushes))
+        spin = spin.at[jnp.asarray(both)].add(jnp.einsum("p,pij->ij", impulses, own.turns))
+    asked = jnp.where(any_touches, 1.0, 0.0)  # in flight there is nothing to sweep
+    begin = (0, asked, Speeds(velocity, spin), standing, between)
+    return jax.lax.while_loop(goes_on, sweep, begin)[2:]
 
 
 class _Corner(NamedTuple):
@@ -143,82 +153,76 @@ class _Corner(NamedTuple):
     friction: jax.Array
 
     @classmethod
-    def of(cls, corners: Corners, mobility: jax.Array, i: int, k: int) -> "_Corner":
-        lever = corners.levers_m[i, k]
+    def of(
+        cls,
+        lever: jax.Array,
+        least: jax.Array,
+        touches: jax.Array,
+        friction: jax.Array,
+        mobility: jax.Array,
+    ) -> "_Corner":
         skew = _skew(lever)
-        matrix = jnp.eye(3) - skew @ mobility[i] @ skew
+        matrix = jnp.eye(3) - skew @ mobility @ skew
         a, b, c = matrix[0, 0], matrix[1, 1], matrix[0, 1]
         slides = 0.5 * (a + b) + jnp.sqrt(0.25 * (a - b) ** 2 + c**2 + TINY)
-        return cls(
-            lever,
-            mobility[i] @ skew,
-            matrix[2, 2],
-            slides,
-            corners.least_m_s[i, k],
-            corners.touches[i, k],
-            corners.friction[i],
-        )
+        return cls(lever, mobility @ skew, matrix[2, 2], slides, least, touches, friction)
 
-    def swept(
-        self, impulse: jax.Array, velocity: jax.Array, spin: jax.Array
-    ) -> tuple[jax.Array, jax.Array, jax.Array]:
+    def swept(self, impulse: jax.Array, speeds: Speeds) -> tuple[jax.Array, Speeds]:
         """The change of its impulse, and the box' speeds after it."""
+        velocity, spin = speeds
         u = velocity + jnp.cross(spin, self.lever)
         push = jnp.maximum(impulse[2] - (u[2] - self.least) / self.rises, 0.0)
         wanted = impulse[:2] - u[:2] / self.slides
         size = jnp.sqrt(jnp.sum(wanted**2) + TINY)
         rub = wanted * jnp.minimum(1.0, self.friction * push / size)
         change = jnp.where(self.touches, jnp.append(rub, push), 0.0) - impulse
-        return change, velocity + change, spin + self.turns @ change
+        return change, Speeds(velocity + change, spin + self.turns @ change)
 
 
 class _Point(NamedTuple):
-    """One point between two boxes."""
+    """One point between two boxes: what a unit impulse does there to both, `[2, ...]`."""
 
+    arms: jax.Array  # levers x normal
+    pushes: jax.Array  # velocities that it brings
+    turns: jax.Array  # and spins
+    moves: jax.Array  # one over the masses
+    opens: jax.Array  # how fast it opens the point
     normal: jax.Array
-    arms: tuple[jax.Array, jax.Array]  # levers x normal
-    turns: tuple[jax.Array, jax.Array]  # spins that a unit impulse brings
-    moves: tuple[jax.Array, jax.Array]  # one over the masses
-    opens: jax.Array  # how fast a unit impulse opens it
     least: jax.Array
     touches: jax.Array
 
     @classmethod
     def of(
         cls,
-        points: Points,
+        normal: jax.Array,
         boxes: tuple[int, int],
         mobility: jax.Array,
         inverse_kg: jax.Array,
-        k: int,
+        levers: jax.Array,
+        least: jax.Array,
+        touches: jax.Array,
     ) -> "_Point":
-        arms = [jnp.cross(points.levers_m[side, k], points.normal) for side in range(2)]
-        moves = [inverse_kg[i] for i in boxes]
-        turns = [move * (mobility[i] @ arm) for i, arm, move in zip(boxes, arms, moves, strict=True)]
-        opens = sum(move + arm @ turn for move, arm, turn in zip(moves, arms, turns, strict=True))
+        at, sides = jnp.asarray(boxes), jnp.array([-1.0, 1.0])
+        arms, moves = jnp.cross(levers, normal), inverse_kg[at]
+        per_push = (sides * moves)[:, None]
+        turns = per_push * jnp.einsum("bij,bj->bi", mobility[at], arms)
+        opens = jnp.sum(moves) + jnp.sum(sides[:, None] * arms * turns)
         return cls(
-            points.normal,
-            (arms[0], arms[1]),
-            (turns[0], turns[1]),
-            (moves[0], moves[1]),
-            jnp.asarray(opens),
-            points.least_m_s[k],
-            points.touches[k],
+            sides[:, None] * arms, per_push * normal, turns, moves, opens, normal, least, touches
         )
 
     def swept(
-        self, impulse: jax.Array, v: list[jax.Array], w: list[jax.Array], boxes: tuple[int, int]
-    ) -> tuple[jax.Array, jax.Array]:
-        """Its impulse and the change of it; writes the boxes' speeds into `v` and `w`."""
-        one, other = boxes
-        u = (v[other] - v[one]) @ self.normal + w[other] @ self.arms[1] - w[one] @ self.arms[0]
+        self, impulse: jax.Array, speeds: Speeds, boxes: jax.Array
+    ) -> tuple[jax.Array, Speeds]:
+        """The change of its impulse, and the boxes' speeds after it."""
+        velocity, spin = speeds.velocity[boxes], speeds.spin[boxes]
+        u = (velocity[1] - velocity[0]) @ self.normal + jnp.sum(self.arms * spin)
         new = jnp.maximum(impulse - (u - self.least) / self.opens, 0.0)
         change = jnp.where(self.touches, new, 0.0) - impulse
-        v[one] = v[one] - change * self.moves[0] * self.normal
-        v[other] = v[other] + change * self.moves[1] * self.normal
-        w[one] = w[one] - change * self.turns[0]
-        w[other] = w[other] + change * self.turns[1]
-        return impulse + change, change
+        return change, Speeds(
+            speeds.velocity.at[boxes].add(change * self.pushes),
+            speeds.spin.at[boxes].add(change * self.turns),
+        )
 
 
 def _skew(lever: jax.Array) -> jax.Array:

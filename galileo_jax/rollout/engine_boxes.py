@@ -25,7 +25,7 @@ from galileo_jax.model.effects.effect import Effect, State, Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.body import rotation, turned_on
-from galileo_jax.rollout.box_faces import Box, Touch, touch
+from galileo_jax.rollout.box_faces import NUM_POINTS, Box, Touch, touch
 from galileo_jax.rollout.box_impulses import Corners, Points, Speeds, after_impulses
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engine_rigid import roll_out as roll_out_in_plane
@@ -35,7 +35,7 @@ from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 from galileo_jax.runtime.errors import InputError
 
 MAX_EVENTS = 8  # within one step
-SUBSTEPS = 2  # of a record: 1/480 s
+SUBSTEPS = 3  # of a record: 1/720 s
 MOST_CORNERS = 4  # the lowest: of a box no more can stand
 NEAR_M = 1e-4  # faces so near may come to touch within a step without a hit
 TOUCH_M = 1e-8
@@ -45,6 +45,7 @@ REACH_M = 0.01  # points farther apart are of no account in a step
 STILL_M_S = 1e-6
 TINY = 1e-30  # keeps the derivative of a length finite at 0
 SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+MEETING_STEPS = 3  # of Newton's method
 HIT_AHEAD = 1.5  # records: so far ahead of a hit the boxes are free
 
 
@@ -56,12 +57,16 @@ class Boxes(NamedTuple):
       quaternion: `[box, 4]`, how each is turned from flat and level.
       velocity_m_s: `[box, 3]`.
       momentum_m2_s: `[box, 3]`, angular momentum over the mass, along the world's axes.
+      stands_m_s2: `[box, corner, 3]`, what the table did over the last step, per mass and second.
+      pushes_n: `[pair, point]`, and what the boxes did to each other.
     """
 
     place_m: Float[jax.Array, "box 3"]
     quaternion: Float[jax.Array, "box 4"]
     velocity_m_s: Float[jax.Array, "box 3"]
     momentum_m2_s: Float[jax.Array, "box 3"]
+    stands_m_s2: Float[jax.Array, "box corner 3"]
+    pushes_n: Float[jax.Array, "pair point"]
 
 
 class Shapes(NamedTuple):
@@ -122,11 +127,12 @@ def roll_out_poses(
     shapes = _shapes(dynamics(effects, scene, named, jnp, acts), scene)
     num = jnp.asarray(num_records) if count is None else count
     begin = jnp.minimum(_begin(*planar, scene, dt_s), num - 1)
-    first = _flat(planar[0][..., begin], planar[1][..., begin], shapes)
+    before = _flat(planar[0][..., begin], planar[1][..., begin], shapes)
+    first, late_s = _to_first_hit(before, begin * dt_s, shapes)
 
     def record(i: jax.Array, carry: tuple[Boxes, Any]) -> tuple[Boxes, Any]:
         boxes, made = carry
-        boxes = _record(boxes, (i - 1) * dt_s, dt_s, shapes)
+        boxes = _record(boxes, (i - 1) * dt_s + late_s, dt_s, shapes)
         kept = jax.tree.map(lambda all_, one: all_.at[i].set(one), made, _seen(boxes, shapes))
         return boxes, kept
 
@@ -135,20 +141,76 @@ def roll_out_poses(
         lambda one: jnp.broadcast_to(one, (length, *one.shape)), _seen(first, shapes)
     )
     made = jax.lax.fori_loop(begin + 1, num, record, (first, made))[1]
-    index = jnp.arange(length)
-    made = jax.tree.map(lambda own: jnp.moveaxis(own[jnp.minimum(index, num - 1)], 0, -1), made)
-    beside = jnp.broadcast_to(jnp.asarray(scene.beside_m)[:, None, None], planar[0][:, :1].shape)
-    before = (
-        jnp.concatenate([planar[0], beside], axis=1),
-        jnp.concatenate([planar[1], jnp.zeros_like(beside)], axis=1),
-        jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0])[:, None], (*beside.shape[:1], 4, length)),
-    )
+    at = jnp.minimum(jnp.arange(length), num - 1) - late_s / dt_s
     is_flat = (begin >= num - 1) | (planar[0][0, 0, begin] >= past_the_foot_m(scene))
     place, speed, turned = (
-        jnp.where(is_flat, jnp.where(index > begin, after, own), jnp.nan)
-        for after, own in zip(made, before, strict=True)
+        jnp.where(is_flat, jnp.where(at >= begin, after, own), jnp.nan)
+        for after, own in zip(_between(made, at, dt_s), _level(*planar, scene), strict=True)
     )
     return place, speed, turned
+
+
+def _to_first_hit(boxes: Boxes, time_s: jax.Array, shapes: Shapes) -> tuple[Boxes, jax.Array]:
+    """The boxes as the first hit leaves them, and how long after `time_s` that is.
+
+    Records begin anew with the hit, so that it always is at the same place in a step: the motion
+    is as smooth in the parameters as bodies are, not as steps are.
+    """
+    pairs = list(combinations(range(len(shapes.half_m)), 2))
+    late_s = jnp.zeros(())
+    for _ in range(MEETING_STEPS):
+        a, spin = _acceleration(boxes, time_s + late_s, shapes), jnp.zeros_like(boxes.place_m)
+        times = [jnp.inf]
+        for pair in pairs:
+            found = _touch(boxes, pair, shapes)
+            rate = _opens(boxes, spin, found, pair)[0]
+            faster = (a[pair[1]] - a[pair[0]]) @ found.normal
+            times.append(_meets_s(jnp.min(found.gaps_m), rate, faster))
+        soonest = jnp.min(jnp.stack(times))
+        spent_s = jnp.where(jnp.isfinite(soonest), soonest, 0.0)
+        lasts = [jnp.zeros((), bool) for _ in pairs]
+        boxes = _moved(boxes, lasts, pairs, time_s + late_s, spent_s, shapes)
+        late_s = late_s + spent_s
+    touches = [_touch(boxes, pair, shapes) for pair in pairs]
+    return _struck(boxes, touches, pairs, time_s + late_s, shapes), late_s
+
+
+def _between(made: Any, at: jax.Array, dt_s: float) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """What was `made` `[record, ...]` at other times, by Hermite's cubics: `[..., record]`.
+
+    Args:
+      made: places, velocities and quaternions.
+      at: `[record]`, when, in records.
+      dt_s: from one to the next.
+    """
+    place, speed, turned = made
+    last = place.shape[0] - 2
+    i = jnp.clip(jnp.floor(at).astype(int), 0, last)
+    s = (at - i)[:, None, None]
+    x0, x1 = place[i], place[i + 1]
+    v0, v1 = speed[i] * dt_s, speed[i + 1] * dt_s
+    a, b = 2 * (x0 - x1) + v0 + v1, 3 * (x1 - x0) - 2 * v0 - v1
+    mixed = turned[i] * (1 - s) + turned[i + 1] * s
+    found = (
+        ((a * s + b) * s + v0) * s + x0,
+        (v0 + (v1 - v0) * s) / dt_s,
+        mixed / jnp.linalg.norm(mixed, axis=-1, keepdims=True),
+    )
+    place, speed, turned = (jnp.moveaxis(own, 0, -1) for own in found)
+    return place, speed, turned
+
+
+def _level(
+    position: jax.Array, velocity: jax.Array, scene: Surroundings
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Motion in the plane as motion in space."""
+    beside = jnp.broadcast_to(jnp.asarray(scene.beside_m)[:, None, None], position[:, :1].shape)
+    turned = jnp.array([1.0, 0.0, 0.0, 0.0])[:, None]
+    return (
+        jnp.concatenate([position, beside], axis=1),
+        jnp.concatenate([velocity, jnp.zeros_like(beside)], axis=1),
+        jnp.broadcast_to(turned, (len(position), 4, position.shape[-1])),
+    )
 
 
 def _shapes(law: Dynamics, scene: Surroundings) -> Shapes:
@@ -178,8 +240,14 @@ def _flat(position: jax.Array, velocity: jax.Array, shapes: Shapes) -> Boxes:
     none = jnp.zeros_like(path)
     quaternion = jnp.zeros((len(path), 4)).at[:, 0].set(1.0)
     place = jnp.stack([shapes.corner_m + path, -jnp.asarray(scene.beside_m), shapes.half_m[:, 2]], axis=1)
+    stands = jnp.zeros((len(path), MOST_CORNERS, 3))
     return Boxes(
-        place, quaternion, jnp.stack([speed, none, none], axis=1), jnp.zeros((len(path), 3))
+        place,
+        quaternion,
+        jnp.stack([speed, none, none], axis=1),
+        jnp.zeros((len(path), 3)),
+        stands.at[..., 2].set(shapes.law.gravity / MOST_CORNERS),
+        jnp.zeros((len(path) * (len(path) - 1) // 2, NUM_POINTS)),
     )
 
 
@@ -230,9 +298,9 @@ def _to_next_hit(
         meets = _meets_s(gap, rate, faster)
         last = (gap < NEAR_M) & (rate > -SLOW_M_S)
         soonest = jnp.where(last, soonest, jnp.minimum(soonest, meets))
-        lasts.append((found.gaps_m < REACH_M) & (last | is_last))
+        lasts.append(last | is_last)
     spent_s = jnp.where(is_last, left_s, soonest)
-    return _moved(boxes, touches, lasts, pairs, time_s, spent_s, shapes), spent_s
+    return _moved(boxes, lasts, pairs, time_s, spent_s, shapes), spent_s
 
 
 def _meets_s(gap: jax.Array, rate: jax.Array, faster: jax.Array) -> jax.Array:
@@ -246,7 +314,6 @@ def _meets_s(gap: jax.Array, rate: jax.Array, faster: jax.Array) -> jax.Array:
 
 def _moved(
     boxes: Boxes,
-    touches: list[Touch],
     lasts: list[jax.Array],
     pairs: list[tuple[int, int]],
     time_s: jax.Array,
@@ -275,25 +342,28 @@ def _moved(
         _least(own, over),
         jnp.broadcast_to(spent_s > 0, own.shape),
         law.coefficient(state),
-        spent_s * down / MOST_CORNERS,
+        spent_s * boxes.stands_m_s2,
     )
-    points = [
-        Points(
-            _levers(boxes, found, pair),
-            found.normal,
-            _least(found.gaps_m, over),
-            last & (spent_s > 0),
-        )
-        for found, last, pair in zip(touches, lasts, pairs, strict=True)
-    ]
+    middle = boxes._replace(place_m=place, quaternion=turned)
+    points = []
+    for last, pair, push in zip(lasts, pairs, boxes.pushes_n, strict=True):
+        found = _touch(middle, pair, shapes)
+        meets = (found.gaps_m < REACH_M) & last & (spent_s > 0)
+        least = _least(found.gaps_m, over)
+        levers = _levers(middle, found, pair)
+        points.append(Points(levers, found.normal, least, meets, spent_s * push))
     before = Speeds(boxes.velocity_m_s + spent_s * fall, _spin(mobility, boxes))
-    after = after_impulses(before, corners, points, pairs, mobility, 1.0 / law.inertia)
+    after, stands, pushes = after_impulses(
+        before, corners, points, pairs, mobility, 1.0 / law.inertia
+    )
     momentum = boxes.momentum_m2_s + _momentum(turned, after.spin - before.spin, shapes)
     return Boxes(
         boxes.place_m + half_s * (boxes.velocity_m_s + after.velocity),
         _turned_on(turned, momentum, half_s, shapes),
         after.velocity,
         momentum,
+        stands / over,
+        jnp.stack(pushes) / over,
     )
 
 
@@ -313,17 +383,19 @@ def _struck(
         opens, is_near = _opens(boxes, spin, found, pair), found.gaps_m < TOUCH_M
         is_hit = jnp.any(is_near & (opens < -SLOW_M_S))
         least = jnp.where(opens < -SLOW_M_S, -law.restitution * opens, 0.0)
-        points.append(Points(_levers(boxes, found, pair), found.normal, least, is_near & is_hit))
+        levers = _levers(boxes, found, pair)
+        none = jnp.zeros_like(least)
+        points.append(Points(levers, found.normal, least, is_near & is_hit, none))
         any_hit = any_hit | is_hit
     levers, gaps = _corners(boxes.place_m, boxes.quaternion, shapes)
     lowest = _lowest(gaps)
     levers = jnp.take_along_axis(levers, lowest[..., None], axis=1)
     stands = (jnp.take_along_axis(gaps, lowest, axis=1) < NEAR_M) & any_hit
     state = _state(boxes.place_m, boxes.velocity_m_s, time_s, shapes)
-    none = jnp.zeros_like(law.inertia)
+    none = jnp.zeros((*stands.shape, 3))
     corners = Corners(levers, jnp.zeros(stands.shape), stands, law.coefficient(state), none)
     before = Speeds(boxes.velocity_m_s, spin)
-    after = after_impulses(before, corners, points, pairs, mobility, 1.0 / law.inertia)
+    after, _, _ = after_impulses(before, corners, points, pairs, mobility, 1.0 / law.inertia)
     momentum = boxes.momentum_m2_s + _momentum(boxes.quaternion, after.spin - spin, shapes)
     return boxes._replace(velocity_m_s=after.velocity, momentum_m2_s=momentum)
 

@@ -14,8 +14,7 @@ def make_engine(name: str, model: Model) -> Engine:
     faster on every device (benchmarks/rollouts.py). MuJoCo's engines check it.
 
     Raises:
-      InputError: unknown name (lists the known), or a scene that MuJoCo's engines do not have.
-        Free motion is the C engine's alone.
+      InputError: unknown name (lists the known), or a scene that the engine does not have.
     """
     if name not in ENGINES:
         raise InputError(f"engine: unknown value {name!r}; known: {', '.join(ENGINES)}")
@@ -54,12 +53,21 @@ def make_engine(name: str, model: Model) -> Engine:
 
 
 def _free(name: str, model: Model) -> Engine:
-    if name not in ("auto", "c"):
+    """Boxes are JAX's, whatever else slides is the C engine's."""
+    if name == "auto":
+        name = "rigid" if all(shape == "box" for shape in model.scene.shapes) else "c"
+    if name == "rigid":
+        from galileo_jax.rollout.engine_boxes import EngineBoxes
+
+        return EngineBoxes(model)
+    if name != "c":
         raise InputError(
-            f"engine: {name!r} moves objects in a plane; --motion free is of c or auto"
+            f"engine: {name!r} moves objects in a plane; --motion free is of rigid, c or auto"
         )
     if infers_gravity(model.effects + model.nuisances):
-        raise InputError("free: gravity: --motion free takes it as declared; leave one of them out")
+        raise InputError(
+            "free: gravity: engine c takes it as declared; leave one of them out, or rigid for boxes"
+        )
     from galileo_jax.rollout.engine_c_free import EngineCFree
 
     return EngineCFree(model)
