@@ -117,10 +117,10 @@ def roll_out_poses(
     count: jax.Array | None = None,
     acts: jax.Array | None = None,
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """As `roll_out`: places and velocities `[object, 3, record]` and quaternions `[object, 4, record]`.
+    """As `roll_out`, in space: places, velocities `[object, 3, record]`, quaternions too.
 
-    x along the travel, y up, z towards the camera; quaternions in the axes (x, -z, y), as
-    `engine_c_free.Poses`.
+    x along the travel, y up, z towards the camera; quaternions `[object, 4, record]` in the axes
+    (x, -z, y), as `engine_c_free.Poses`.
     """
     planar = roll_out_in_plane(effects, names, num_records, dt_s, theta, scene, count, acts)
     named = {name: theta[i] for i, name in enumerate(names)}
@@ -215,7 +215,10 @@ def _level(
 
 def _shapes(law: Dynamics, scene: Surroundings) -> Shapes:
     half = jnp.stack(
-        [jnp.asarray(own) for own in (scene.half_length_m, scene.half_depth_m, scene.half_height_m)],
+        [
+            jnp.asarray(own)
+            for own in (scene.half_length_m, scene.half_depth_m, scene.half_height_m)
+        ],
         axis=1,
     )
     square = half**2
@@ -239,7 +242,9 @@ def _flat(position: jax.Array, velocity: jax.Array, shapes: Shapes) -> Boxes:
     path, speed = (position[:, 0] - shapes.corner_m) / cos, velocity[:, 0] / cos
     none = jnp.zeros_like(path)
     quaternion = jnp.zeros((len(path), 4)).at[:, 0].set(1.0)
-    place = jnp.stack([shapes.corner_m + path, -jnp.asarray(scene.beside_m), shapes.half_m[:, 2]], axis=1)
+    place = jnp.stack(
+        [shapes.corner_m + path, -jnp.asarray(scene.beside_m), shapes.half_m[:, 2]], axis=1
+    )
     stands = jnp.zeros((len(path), MOST_CORNERS, 3))
     return Boxes(
         place,

@@ -66,7 +66,7 @@ def _free(name: str, model: Model) -> Engine:
         )
     if infers_gravity(model.effects + model.nuisances):
         raise InputError(
-            "free: gravity: engine c takes it as declared; leave one of them out, or rigid for boxes"
+            "free: gravity: engine c takes it as declared; leave it out, or rigid for boxes"
         )
     from galileo_jax.rollout.engine_c_free import EngineCFree
 

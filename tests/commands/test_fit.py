@@ -333,7 +333,7 @@ def test_a_broken_clip_is_one_line(broken, tmp_path, capfd):
         (["--init", "cnn"], "--init: of --method mh, not of grad"),
         (["--method", "mh", "--preset", "thesis", "--init", "cnn"], "--init: not of --preset th"),
         (["--method", "mh", "--selection", "best"], "--selection: of --preset thesis only"),
-        (["--motion", "free", "--engine", "rigid"], "--engine rigid: it moves objects in a plane"),
+        (["--motion", "free", "--engine", "mjx"], "--engine mjx: it moves objects in a plane"),
         (["--motion", "free", "--method", "cnn"], "--method cnn: the network knows motion in a"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

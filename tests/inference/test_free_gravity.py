@@ -206,7 +206,7 @@ def test_what_is_refused(tmp_path):
         cnn_posterior(trials_of(path), 0)
     one = measure(load_clip(path))
     model = replace(trials_of(path).problems[0].model, motion="free")
-    with pytest.raises(InputError, match="gravity: --motion free takes it as declared"):
+    with pytest.raises(InputError, match="gravity: engine c takes it as declared"):
         make_engine("c", model)
     other = one.clip.model_copy(update={"gravity": 1.62, "path": Path("moon.yaml")})
     with pytest.raises(InputError, match=r"moon.yaml: gravity: 1.62, but .*clip.yaml: 9.81; one"):

@@ -9,16 +9,22 @@ import pytest
 
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.model.effects.registry import make_effects
-from galileo_jax.model.model import Model
-from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.rollout.engine_c_free import EngineCFree
 from galileo_jax.rollout.engine_rigid import EngineRigid
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.runtime.errors import InputError
-from tests.rollout.objects import BALL, scene_of, theta_of
+from tests.rollout.free_boxes import (
+    FRICTION,
+    MASS_KG,
+    SIDE_M,
+    SMOOTH,
+    cubes,
+    hit_record,
+    model_of,
+    yaw_rad,
+)
+from tests.rollout.objects import BALL, theta_of
 
-SIDE_M = 0.06
-MASS_KG, FRICTION, SMOOTH = (0.5, 0.3), (0.1, 0.2), (0.0, 0.0)
 # Against motion in a plane, away from the hit: it makes a box rock on its edges by 0.1 mm.
 PLANAR_ATOL_M, PLANAR_ATOL_M_S, AFTER_HIT_S = 0.001, 0.005, 0.12
 YAW_RTOL, SPEED_ATOL_M_S = 0.01, 0.006  # bodies turn by some degrees until the faces have met
@@ -29,35 +35,11 @@ ROUGH_M = 1e-5
 ALONE_ATOL_M = 1e-9
 
 
-def cubes(z_m=0.0, side_m=(SIDE_M, SIDE_M, SIDE_M)):
-    """Two boxes, the second off the plane."""
-    return [
-        ClipObject(name="object1", shape="box", size_m=(SIDE_M,) * 3),
-        ClipObject(name="object2", shape="box", size_m=side_m, z_m=z_m),
-    ]
-
-
-def model_of(objects, duration_s=1.6, effects=(), **scene):
-    scene.setdefault("beyond_m", [0.25, 0.36][: len(objects) - 1])
-    shapes = [each.shape for each in objects]
-    compiled = compile_scene(scene_of(objects, **scene), shapes, tuple(objects))
-    return Model(compiled, duration_s, effects, motion="free")
-
-
 def poses_of(objects, friction=FRICTION, mass_kg=MASS_KG, **given):
     """The model, its poses for one parameter vector, and the first record after the hit."""
     model = model_of(objects)
     poses = EngineCFree(model).poses(theta_of(model, mass_kg, friction, **given)[None])
-    return model, poses, hit_record(poses)
-
-
-def hit_record(poses):
-    return int(np.argmax(poses.velocity_m_s[0, 1, 0] > 0.01))
-
-
-def yaw_rad(poses):
-    """Of each object, about the vertical, counter-clockwise from above, `[object, record]`."""
-    return np.unwrap(2 * np.arctan2(poses.quaternion[0, :, 3], poses.quaternion[0, :, 0]))
+    return model, poses, hit_record(poses.velocity_m_s[0])
 
 
 @pytest.mark.parametrize(("mass_kg", "friction"), [(MASS_KG, FRICTION), ((0.2, 0.6), (0.2, 0.1))])
@@ -98,7 +80,7 @@ def test_a_hit_off_centre_turns_both(z_m):
     inertia1, inertia2 = (m * SIDE_M**2 / 6 for m in MASS_KG)
     at = z_m * inertia1 / (inertia1 + inertia2)
     impulse = v / (1 / m1 + 1 / m2 + at**2 / inertia1 + (z_m - at) ** 2 / inertia2)
-    rate = np.gradient(yaw_rad(poses), 1 / 240, axis=-1)
+    rate = np.gradient(yaw_rad(poses.quaternion[0]), 1 / 240, axis=-1)
     # At once: later the faces slide on each other and turn the bodies faster.
     assert rate[:, hit + 1] == pytest.approx(-impulse * at / inertia1, rel=5 * YAW_RTOL)
     assert rate[0, hit + 1] == pytest.approx(rate[1, hit + 1], rel=YAW_RTOL)
@@ -114,7 +96,7 @@ def test_momentum_and_spin_are_kept():
     assert along[later] == pytest.approx(along[hit - 2], rel=MOMENTUM_RTOL)
     assert across[later] == pytest.approx(0.0, abs=MOMENTUM_RTOL * along[hit - 2])
     # About the vertical through the origin; z points to the camera, yaw is seen from above.
-    rate = np.gradient(yaw_rad(poses), 1 / 240, axis=-1)
+    rate = np.gradient(yaw_rad(poses.quaternion[0]), 1 / 240, axis=-1)
     orbit = (
         poses.position_m[0, :, 2] * poses.velocity_m_s[0, :, 0]
         - poses.position_m[0, :, 0] * poses.velocity_m_s[0, :, 2]
@@ -148,7 +130,7 @@ def test_restitution(restitution, release_m):
     model = model_of(cubes(), effects=make_effects(["restitution"]), release_m=release_m)
     theta = theta_of(model, MASS_KG, SMOOTH, restitution=restitution)
     poses = EngineCFree(model).poses(theta[None])
-    hit, v = hit_record(poses), poses.velocity_m_s[0, :, 0]
+    hit, v = hit_record(poses.velocity_m_s[0]), poses.velocity_m_s[0, :, 0]
     measured = (v[1, hit + 18] - v[0, hit + 18]) / v[0, hit - 2]
     assert measured == pytest.approx(restitution, abs=RESTITUTION_ATOL)
 
@@ -194,7 +176,9 @@ def test_what_it_cannot_do_is_said():
         make_engine("auto", model_of([cubes()[0], BALL]))
     with pytest.raises(InputError, match=r"face is 0\.050 m past the foot.*0\.075 m or more"):
         make_engine("auto", model_of(cubes(), beyond_m=[0.08]))
-    with pytest.raises(InputError, match="'mjx' moves objects in a plane; --motion free is of c"):
+    with pytest.raises(
+        InputError, match="'mjx' moves objects in a plane; --motion free is of rigid"
+    ):
         make_engine("mjx", model_of(cubes()))
 
 
@@ -209,7 +193,7 @@ from galileo_jax.inference.samplers import Settings, sample, sampler_class
 from galileo_jax.rollout.engine_c_free import EngineCFree
 from galileo_jax.rollout.rollout import in_jax
 from tests.rollout.objects import theta_of
-from tests.rollout.test_engine_c_free import FRICTION, MASS_KG, cubes, model_of
+from tests.rollout.free_boxes import FRICTION, MASS_KG, cubes, model_of
 model = model_of(cubes())
 theta = jnp.asarray(theta_of(model, MASS_KG, FRICTION))
 
