@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
 SWEEPS = 60  # at most
-CONVERGED_M_S = 1e-11  # of one sweep: they converge slowly, and steps add up
+CONVERGED_M_S = 1e-10  # of one sweep: they converge slowly, and steps add up
 TINY = 1e-30  # keeps the derivative of a length finite at 0
 
 
@@ -86,6 +86,8 @@ def after_impulses(
     stands = jax.vmap(jax.vmap(_Corner.of, (0, 0, 0, None, None)), (0, 0, 0, 0, 0))(
         corners.levers_m, corners.least_m_s, corners.touches, corners.friction, mobility
     )
+    orders = [jnp.argsort(~of.touches, stable=True) for of in points]
+    points = [_ordered(of, order) for of, order in zip(points, orders, strict=True)]
     pairs = [
         jax.vmap(functools.partial(_Point.of, of.normal, both, mobility, inverse_kg), (1, 0, 0))(
             of.levers_m, of.least_m_s, of.touches
@@ -101,7 +103,7 @@ def after_impulses(
         pushes = []
         for of, own, both, impulses in zip(points, pairs, boxes, between, strict=True):
             at = jnp.asarray(both)
-            num = jnp.where(jnp.any(of.touches), len(impulses), 0)
+            num = jnp.sum(of.touches)
 
             def point(k: jax.Array, carry, own=own, at=at):
                 impulses, speeds, changed = carry
@@ -138,7 +140,20 @@ def after_impulses(
         spin = spin.at[jnp.asarray(both)].add(jnp.einsum("p,pij->ij", impulses, own.turns))
     asked = jnp.where(any_touches, 1.0, 0.0)  # in flight there is nothing to sweep
     begin = (0, asked, Speeds(velocity, spin), standing, between)
-    return jax.lax.while_loop(goes_on, sweep, begin)[2:]
+    _, _, speeds, standing, between = jax.lax.while_loop(goes_on, sweep, begin)
+    given = zip(between, orders, strict=True)
+    return speeds, standing, tuple(jnp.zeros_like(own).at[order].set(own) for own, order in given)
+
+
+def _ordered(points: Points, order: jax.Array) -> Points:
+    """The same points; those that touch come first, and no others need be looked at."""
+    return Points(
+        points.levers_m[:, order],
+        points.normal,
+        points.least_m_s[order],
+        points.touches[order],
+        points.guess_ns[order],
+    )
 
 
 class _Corner(NamedTuple):

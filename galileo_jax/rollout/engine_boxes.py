@@ -1,4 +1,4 @@
-"""Boxes that move freely, in JAX: from the first hit on they turn, tip and leave the line of travel.
+"""Boxes that move freely, in JAX: from the first hit on they turn, tip and leave the plane.
 
 Until two objects meet nothing makes them leave the plane: so far the rigid engine moves them, with
 all its effects. From the last record before the first hit on each box has six coordinates. It
@@ -160,7 +160,7 @@ def _to_first_hit(boxes: Boxes, time_s: jax.Array, shapes: Shapes) -> tuple[Boxe
     late_s = jnp.zeros(())
     for _ in range(MEETING_STEPS):
         a, spin = _acceleration(boxes, time_s + late_s, shapes), jnp.zeros_like(boxes.place_m)
-        times = [jnp.inf]
+        times = [jnp.asarray(jnp.inf)]
         for pair in pairs:
             found = _touch(boxes, pair, shapes)
             rate = _opens(boxes, spin, found, pair)[0]

@@ -4,6 +4,7 @@
 # pyright: reportAttributeAccessIssue=false
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
@@ -36,8 +37,8 @@ def boxes(apart_m: float, aside_m: float, yaws_rad=(0.0, 0.0)) -> tuple[Box, Box
     (a, b) = HALF_M
     centres = np.array([[0.0, 0.0, a[2]], [a[0] + b[0] + apart_m, aside_m, b[2]]])
     return (
-        Box(centres[0], turned(yaws_rad[0]), a),
-        Box(centres[1], turned(yaws_rad[1]), b),
+        Box(*map(jnp.asarray, (centres[0], turned(yaws_rad[0]), a))),
+        Box(*map(jnp.asarray, (centres[1], turned(yaws_rad[1]), b))),
     )
 
 
