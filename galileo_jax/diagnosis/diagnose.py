@@ -29,7 +29,11 @@ from galileo_jax.diagnosis.candidates import Hypothesis, reduced
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
-from galileo_jax.diagnosis.fitted_pairs import fitted_pairs, pairs_from_base
+from galileo_jax.diagnosis.fitted_pairs import (
+    fitted_pairs,
+    pairs_from_base,
+    pairs_like_the_best,
+)
 from galileo_jax.diagnosis.known_constants import with_known_constants
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
 from galileo_jax.diagnosis.law_verdict import best_formula, is_law_needed, law_to_doubt, needs_laws
@@ -158,6 +162,9 @@ def diagnose(
             if any(explains(c) for c in wider):
                 candidates, compared = wider, tried
         better = singles_of_pairs(race, candidates)
+        candidates = _improved(trials, candidates, better, decisive, seed, compared)
+        on_stage("looking at pairs that could be confused with the best")
+        better = pairs_like_the_best(race, candidates, library)
         candidates = _improved(trials, candidates, better, decisive, seed, compared)
     verdict = _judged(trials, candidates, decisive, on_stage)
     views: list[View] = []

@@ -17,7 +17,7 @@ from galileo_jax.diagnosis.pairs import (
 from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.score_tests import best_gains
 from galileo_jax.diagnosis.short_search import short_search
-from galileo_jax.diagnosis.verdict import NUM_JOINED, ranked
+from galileo_jax.diagnosis.verdict import NUM_JOINED, best_named, ranked
 
 PLACE = ("_start", "_length")  # of what acts in one place only
 STRENGTHS_Z = (-1.0, 0.0, 1.0, 2.0)
@@ -72,6 +72,31 @@ def fitted_pairs(
             break
     known = {frozenset(c.effects) for c in made}
     return ranked([*made, *_crossed(race, ranked(filter(adds, made)), known)])
+
+
+def pairs_like_the_best(
+    race: Race, candidates: Sequence[Candidate], library: Sequence[str]
+) -> list[Candidate]:
+    """What could be confused with the pair that leads in the end, fitted; none where none leads.
+
+    It may have been found after `fitted_pairs` looked at what is like its own best, and two
+    effects may pass for another two.
+
+    Args:
+      race: of the candidates.
+      candidates: the table.
+      library: names of the effects.
+    """
+    made: list[Candidate] = []
+    searched = {frozenset(c.effects) for c in candidates}
+    for _ in range(NUM_ROUNDS):
+        best = best_named(ranked([*candidates, *made]))
+        if len(best.effects) != 2:
+            break
+        made += _alike(race, best, library, searched)
+        if best_named(ranked([*candidates, *made])).effects == best.effects:
+            break
+    return made
 
 
 def _alike(

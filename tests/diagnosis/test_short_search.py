@@ -156,3 +156,27 @@ def test_pairs_that_add_nothing_to_an_effect_lead_nowhere(monkeypatch):
     found = pairs_module.fitted_pairs(stub, singles, list("abcd"))
     assert {one.name for one in found} == {"a+b", "a+c"}
     assert set(searched) <= {frozenset("bc"), frozenset("bd"), frozenset("cd")} and not fits
+
+
+@pytest.mark.parametrize(("leads", "expected"), [("a+b", ["b+c", "c+d"]), ("a", [])])
+def test_what_is_like_the_pair_that_leads_in_the_end_is_looked_for(monkeypatch, leads, expected):
+    """However it was found: two effects may pass for another two."""
+    odds = {"b+c": 60.0, "c+d": 70.0, "d+e": 80.0}
+
+    def search(fitter, bases, pairs, seed, lowest):
+        known = ["+".join(sorted(pair)) in odds for pair in pairs]
+        return np.zeros((len(pairs), 1)), np.where(known, 0.0, 99.0)
+
+    def race(bases, sets, starts=None):
+        names = ["+".join(sorted(pair)) for pair in sets]
+        return [candidate(name, odds.get(name, 1.0)) for name in names]
+
+    fitter = SimpleNamespace(
+        trials=SimpleNamespace(model_parameters=()), search_costs=lambda z, free: np.zeros(1)
+    )
+    stub: Any = MagicMock(side_effect=race, seed=0, fitter=fitter)
+    monkeypatch.setattr(pairs_module, "reduced", lambda trials, best, kept: best)
+    monkeypatch.setattr(pairs_module, "short_search", search)
+    table = [candidate(leads, 50.0), candidate("d", 40.0)]
+    found = pairs_module.pairs_like_the_best(stub, table, list("abcde"))
+    assert [one.name for one in found] == expected
