@@ -1,0 +1,154 @@
+"""Bodies wobble across their path, as far as their track shows.
+
+They rock, sink into contacts and are lifted at a hit, by some tenths of a millimetre; how fast they
+go along the path shows none of that. It is a rough wobble (an Ornstein-Uhlenbeck process). Its size
+differs from clip to clip, and where there is none the likelihood must not allow for any: what is
+allowed for and is not there counts as evidence that the noise is smaller than it is, by a twentieth
+in ideal tracks, and with the noise go all intervals.
+
+The size is that which explains best what is measured across the path while a body moves. There it
+goes straight whatever the physics: in each piece between foot, hit and rest
+
+    across = parabola (a camera that is not square) + wobble + error,    w^2 K + s^2 sd^2
+
+and the likelihood of w is that of what the parabola leaves, s averaged over. The mean over all
+sizes is taken. Too small a one is made up for by a larger noise, and intervals are then too wide.
+
+Source: Patterson, Thompson (1971), Biometrika 58, 545 (the likelihood of what a regression leaves).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.special import logsumexp
+
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.random_patterns import random_patterns
+
+WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
+"""The largest, and how long it lasts; where a track is too short to tell, it is taken so."""
+SIZES = np.concatenate([[0.0], np.geomspace(1 / 16, 1.0, 9)])
+"""Tried, of the largest."""
+SCALES, SCALE_SD = np.geomspace(0.5, 2.0, 9), 0.3
+"""Of the stated errors, and the standard deviation of their logarithm."""
+LEAST_FRAMES = 8  # of a piece
+MOVED_M = 2e-3  # from where it begins and ends: nearer, a body may be at rest
+BESIDE_HIT = 1
+LEAST_SD_M = 1e-9  # of an error: one of none has no likelihood
+
+
+def wobble(
+    position: Float[np.ndarray, "object 2 frame"],
+    observation: Observation,
+    scene: Surroundings,
+    past_foot: Float[np.ndarray, "object frame"],
+) -> list[np.ndarray]:
+    """The patterns of all objects times their standard deviations, each `[object, 2, frame]`, m.
+
+    Args:
+      position: measured, 0 where it was not.
+      observation: the same, with errors.
+      scene: with a surface.
+      past_foot: share of each object's length that is past the foot; 0 on a slope without one.
+    """
+    apart = np.abs(observation.times_s[:, None] - observation.times_s)
+    patterns = random_patterns(np.exp(-apart / WOBBLE_S))
+    across = _across(position, scene)
+    size_m = wobble_size_m(position, observation, across, past_foot)
+    found = []
+    for i, own in enumerate(across if size_m else ()):
+        for pattern in patterns:
+            one = np.zeros_like(position)
+            one[i] = size_m * pattern * own
+            found.append(one)
+    return found
+
+
+def wobble_size_m(
+    position: Float[np.ndarray, "object 2 frame"],
+    observation: Observation,
+    across: Float[np.ndarray, "object 2 frame"],
+    past_foot: Float[np.ndarray, "object frame"],
+) -> float:
+    """Its standard deviation, m, in all objects of a clip.
+
+    Args:
+      position: as of `wobble`, like `observation` and `past_foot`.
+      observation: the same, with errors.
+      across: unit vectors across the path.
+      past_foot: share of each object's length that is past the foot.
+    """
+    evidence = np.zeros(len(SIZES))
+    for i, own in enumerate(across):
+        place = np.sum(position[i] * own, axis=0)
+        variance = np.einsum("at,abt,bt->t", own, observation.covariance_m2[i], own)
+        for piece in _pieces(position, observation.mask, past_foot[i], i):
+            evidence += _evidence(observation.times_s[piece], place[piece], variance[piece])
+    if not evidence.any():
+        return WOBBLE_SD_M
+    weight = np.exp(evidence - np.asarray(logsumexp(evidence)))
+    return float(WOBBLE_SD_M * (weight @ SIZES))
+
+
+def _across(
+    position: Float[np.ndarray, "object 2 frame"], scene: Surroundings
+) -> Float[np.ndarray, "object 2 frame"]:
+    found = []
+    for i, corner in enumerate(scene.corner_m):
+        is_on_ramp = scene.comes_down[i] & (position[i, 0] < corner) | (not scene.has_table)
+        slope = np.where(is_on_ramp, scene.angle_rad, 0.0)
+        found.append([np.sin(slope), np.cos(slope)])
+    return np.array(found)
+
+
+def _pieces(
+    position: Float[np.ndarray, "object 2 frame"],
+    mask: Bool[np.ndarray, "object frame"],
+    past_foot: Float[np.ndarray, " frame"],
+    i: int,
+) -> Sequence[np.ndarray]:
+    """Frames in which object i moves and lies on one plane: before and after foot and hits."""
+    seen = np.flatnonzero(mask[i])
+    if not seen.size:
+        return []
+    way = np.linalg.norm(position[i] - position[i][:, seen[:1]], axis=0)
+    back = np.linalg.norm(position[i] - position[i][:, seen[-1:]], axis=0)
+    moves = mask[i] & (way > MOVED_M) & (back > MOVED_M)
+    ends = []
+    for j in range(len(position)):
+        both = mask[i] & mask[j]
+        if j != i and both.any():
+            apart = np.linalg.norm(position[j] - position[i], axis=0)
+            ends.append(int(np.argmin(np.where(both, apart, np.inf))))
+    found = []
+    for is_on in (past_foot == 0, past_foot == 1):
+        frames = np.flatnonzero(moves & is_on)
+        edges = np.searchsorted(frames, sorted(ends))
+        for own in np.split(frames, edges):
+            piece = own[[all(abs(frame - end) > BESIDE_HIT for end in ends) for frame in own]]
+            if len(piece) >= LEAST_FRAMES:
+                found.append(piece)
+    return found
+
+
+def _evidence(
+    times_s: Float[np.ndarray, " frame"],
+    place_m: Float[np.ndarray, " frame"],
+    variance_m2: Float[np.ndarray, " frame"],
+) -> Float[np.ndarray, " size"]:
+    """The log likelihood of each size, of what no parabola takes up of a piece."""
+    sd = np.maximum(np.sqrt(variance_m2), LEAST_SD_M)
+    since = (times_s - times_s[0]) / (times_s[-1] - times_s[0])
+    basis, _ = np.linalg.qr(np.vander(since, 3) / sd[:, None], mode="complete")
+    left = basis[:, 3:]
+    rough = np.exp(-np.abs(times_s[:, None] - times_s) / WOBBLE_S) / np.outer(sd, sd)
+    values, vectors = np.linalg.eigh(left.T @ rough @ left)
+    amplitude = vectors.T @ (left.T @ (place_m / sd))
+    wobbles = (WOBBLE_SD_M * SIZES) ** 2 * values[:, None]
+    variance = SCALES[:, None, None] ** 2 + wobbles.T
+    square = amplitude**2 / variance
+    log_density = -0.5 * np.sum(square + np.log(variance), axis=-1)  # [scale, size]
+    prior = -0.5 * (np.log(SCALES) / SCALE_SD) ** 2
+    return np.asarray(logsumexp(log_density + prior[:, None], axis=0))
