@@ -28,9 +28,9 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.observation.random_patterns import random_patterns
 
 WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
-"""The largest, and how long it lasts; where a track is too short to tell, it is taken so."""
-SIZES = np.concatenate([[0.0], np.geomspace(1 / 16, 1.0, 9)])
-"""Tried, of the largest."""
+"""A large one, and how long it lasts; where a track is too short to tell, it is taken so."""
+SIZES = np.concatenate([[0.0], np.geomspace(1 / 16, 1.5, 10)])
+"""Tried, of a large one."""
 SCALES, SCALE_SD = np.geomspace(0.5, 2.0, 9), 0.3
 """Of the stated errors, and the standard deviation of their logarithm."""
 LEAST_FRAMES = 8  # of a piece
