@@ -1,18 +1,21 @@
-"""Bodies wobble across their path, as far as their track shows.
+"""Bodies wobble across their path: in full where that costs nothing, else as their track shows.
 
 They rock, sink into contacts and are lifted at a hit, by some tenths of a millimetre; how fast they
-go along the path shows none of that. It is a rough wobble (an Ornstein-Uhlenbeck process). Its size
-differs from clip to clip, and where there is none the likelihood must not allow for any: what is
-allowed for and is not there counts as evidence that the noise is smaller than it is, by a twentieth
-in ideal tracks, and with the noise go all intervals.
+go along the path shows none of that. It is a rough wobble (an Ornstein-Uhlenbeck process). Where
+errors are far smaller, nothing is left of what is measured across the path, and nothing is lost.
+Where they are as large as the wobble it matters whether there is any: what is allowed for and is
+not there counts as evidence that the noise is smaller than it is, by up to a twelfth, and with the
+noise go all intervals. Then
 
-The size is that which explains best what is measured across the path while a body moves. There it
-goes straight whatever the physics: in each piece between foot, hit and rest
+- between foot, hits and rest every piece of a track lies as high and as askew as it will: there
+  bodies are lifted;
+- within the pieces in which a body moves, the wobble has the size that explains best what is
+  measured across the path, which is straight whatever the physics:
 
-    across = parabola (a camera that is not square) + wobble + error,    w^2 K + s^2 sd^2
+      across = parabola (a camera that is not square) + wobble + error,    w^2 K + s^2 sd^2
 
-and the likelihood of w is that of what the parabola leaves, s averaged over. The mean over all
-sizes is taken. Too small a one is made up for by a larger noise, and intervals are then too wide.
+  by the likelihood of what the parabola leaves, s averaged over. The mean over all sizes is taken.
+  Too small a one is made up for by a larger noise, and intervals are then too wide.
 
 Source: Patterson, Thompson (1971), Biometrika 58, 545 (the likelihood of what a regression leaves).
 """
@@ -33,6 +36,7 @@ SIZES = np.concatenate([[0.0], np.geomspace(1 / 16, 1.5, 10)])
 """Tried, of a large one."""
 SCALES, SCALE_SD = np.geomspace(0.5, 2.0, 9), 0.3
 """Of the stated errors, and the standard deviation of their logarithm."""
+FALSIFIES = 0.03  # of the noise's variance: half of it of an interval
 LEAST_FRAMES = 8  # of a piece
 MOVED_M = 2e-3  # from where it begins and ends: nearer, a body may be at rest
 BESIDE_HIT = 1
@@ -54,16 +58,41 @@ def wobble(
       past_foot: share of each object's length that is past the foot; 0 on a slope without one.
     """
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    patterns = random_patterns(np.exp(-apart / WOBBLE_S))
+    rough = random_patterns(np.exp(-apart / WOBBLE_S))
     across = _across(position, scene)
-    size_m = wobble_size_m(position, observation, across, past_foot)
+    own = [rough * WOBBLE_SD_M] * len(across)
+    if falsifies_noise(rough, across, observation):
+        size_m = wobble_size_m(position, observation, across, past_foot)
+        own = [
+            np.concatenate([rough * size_m, _lifts(position, observation.mask, past_foot[i], i)])
+            for i in range(len(across))
+        ]
     found = []
-    for i, own in enumerate(across if size_m else ()):
+    for i, patterns in enumerate(own):
         for pattern in patterns:
             one = np.zeros_like(position)
-            one[i] = size_m * pattern * own
+            one[i] = pattern * across[i]
             found.append(one)
     return found
+
+
+def falsifies_noise(
+    rough: Float[np.ndarray, "pattern frame"],
+    across: Float[np.ndarray, "object 2 frame"],
+    observation: Observation,
+) -> bool:
+    """Whether a large wobble that is not there would make the noise much smaller than it is.
+
+    Its patterns, of variance g^2 in units of the noise, leave a share f = 1 / (1 + g^2) of what is
+    seen to the noise. Where they are absent the noise's variance comes out too small by about
+    sum f (1 - f) over the sum of all that tells of it, see `noise_scale`.
+    """
+    variance = np.einsum("oat,oabt,obt->ot", across, observation.covariance_m2, across)
+    noise2 = float(np.median(variance[observation.mask]))
+    gain2 = WOBBLE_SD_M**2 * np.sum(rough**2, axis=1) / max(noise2, LEAST_SD_M**2)
+    left = 1 / (1 + gain2)
+    told = 2 * rough.shape[1] - len(rough) + np.sum(left**2)
+    return bool(np.sum(left * (1 - left)) > FALSIFIES * told)
 
 
 def wobble_size_m(
@@ -103,6 +132,55 @@ def _across(
     return np.array(found)
 
 
+def _lifts(
+    position: Float[np.ndarray, "object 2 frame"],
+    mask: Bool[np.ndarray, "object frame"],
+    past_foot: Float[np.ndarray, " frame"],
+    i: int,
+) -> Float[np.ndarray, "pattern frame"]:
+    """How high and how askew each piece may lie, at rest or not; frames in none by themselves."""
+    moves, ends = _moves(position, mask[i], i), _hits(position, mask, i)
+    frames = np.arange(mask.shape[1])
+    is_near = np.any([np.abs(frames - end) <= BESIDE_HIT for end in ends] or [frames < 0], axis=0)
+    # A number for each kind of frame: a change of it begins another piece.
+    kind = np.where(past_foot == 0, 0, np.where(past_foot == 1, 1, 2)) + 3 * moves
+    kind = kind + 6 * np.searchsorted(sorted(ends), frames)
+    starts = np.flatnonzero(np.diff(kind) != 0) + 1
+    found = []
+    for piece in np.split(frames, starts):
+        if len(piece) < LEAST_FRAMES or past_foot[piece[0]] not in (0, 1):
+            found.extend(np.eye(len(frames))[piece])
+            continue
+        for shape in (np.ones(len(piece)), np.linspace(-1.0, 1.0, len(piece))):
+            own = np.zeros(len(frames))
+            own[piece] = shape
+            found.append(own)
+        found.extend(np.eye(len(frames))[piece[is_near[piece]]])
+    return WOBBLE_SD_M * np.array(found)
+
+
+def _moves(
+    position: Float[np.ndarray, "object 2 frame"], seen: Bool[np.ndarray, " frame"], i: int
+) -> Bool[np.ndarray, " frame"]:
+    """Frames in which object i is neither where it was first seen nor where it was last."""
+    ends = np.flatnonzero(seen)[[0, -1]] if seen.any() else []
+    away = [np.linalg.norm(position[i] - position[i][:, [end]], axis=0) > MOVED_M for end in ends]
+    return np.all([seen, *away], axis=0)
+
+
+def _hits(
+    position: Float[np.ndarray, "object 2 frame"], mask: Bool[np.ndarray, "object frame"], i: int
+) -> list[int]:
+    """Frames in which object i is nearest to another."""
+    found = []
+    for j in range(len(position)):
+        both = mask[i] & mask[j]
+        if j != i and both.any():
+            apart = np.linalg.norm(position[j] - position[i], axis=0)
+            found.append(int(np.argmin(np.where(both, apart, np.inf))))
+    return found
+
+
 def _pieces(
     position: Float[np.ndarray, "object 2 frame"],
     mask: Bool[np.ndarray, "object frame"],
@@ -110,18 +188,7 @@ def _pieces(
     i: int,
 ) -> Sequence[np.ndarray]:
     """Frames in which object i moves and lies on one plane: before and after foot and hits."""
-    seen = np.flatnonzero(mask[i])
-    if not seen.size:
-        return []
-    way = np.linalg.norm(position[i] - position[i][:, seen[:1]], axis=0)
-    back = np.linalg.norm(position[i] - position[i][:, seen[-1:]], axis=0)
-    moves = mask[i] & (way > MOVED_M) & (back > MOVED_M)
-    ends = []
-    for j in range(len(position)):
-        both = mask[i] & mask[j]
-        if j != i and both.any():
-            apart = np.linalg.norm(position[j] - position[i], axis=0)
-            ends.append(int(np.argmin(np.where(both, apart, np.inf))))
+    moves, ends = _moves(position, mask[i], i), _hits(position, mask, i)
     found = []
     for is_on in (past_foot == 0, past_foot == 1):
         frames = np.flatnonzero(moves & is_on)

@@ -9,9 +9,7 @@ import pytest
 
 from galileo_jax.neural.film import Bodies, filmed, noisy
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity import wobble_discrepancy
 from galileo_jax.similarity.discrepancy import modes
-from galileo_jax.similarity.wobble_discrepancy import WOBBLE_SD_M
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
 
@@ -36,8 +34,7 @@ def motion(experiment) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, x64, monkeypatch):
-    monkeypatch.setattr(wobble_discrepancy, "wobble_size_m", lambda *_: WOBBLE_SD_M)
+def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, x64):
     experiment = CASES[case]
     times, exact = motion(experiment)
     scene = make_surroundings(experiment)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from galileo_jax.observation.random_patterns import random_patterns
 from galileo_jax.similarity import wobble_discrepancy
-from galileo_jax.similarity.discrepancy import modes
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from galileo_jax.similarity.noise_scale import fitted_noise_scale
 from galileo_jax.similarity.wobble_discrepancy import WOBBLE_S, WOBBLE_SD_M, wobble_size_m
@@ -17,12 +17,6 @@ SCENE = make_surroundings(HIT)
 NOISE_M = 5e-5
 CORNER = SCENE.corner_m[0]
 NEAR_FOOT_M = 0.05  # further than the box is long
-
-
-def covariance(observation):
-    """Of all modes, `[object, 2, frame, object, 2, frame]`, m^2."""
-    patterns = modes(observation, SCENE)
-    return np.einsum("moit,mpju->oitpju", patterns, patterns)
 
 
 def across_of(observation):
@@ -45,20 +39,25 @@ def wobbling(size_m, seed, noise_m=NOISE_M, frames=None):
     return seen
 
 
-def size_of(observation):
+def past_foot(observation):
+    """The share of each object that is past the foot, `[object, frame]`."""
     x = observation.position_m[:, 0]
     past = np.ones_like(x)
     past[0] = np.clip(0.5 + (x[0] - CORNER) / (2 * NEAR_FOOT_M), 0, 1)
-    return wobble_size_m(observation.position_m, observation, across_of(observation), past)
+    return past
 
 
-def test_it_is_across_the_path_and_of_its_size(monkeypatch):
-    """The modes with it less those without: all of it across, none along."""
-    hit = observe(HIT, 0, noise_m=0.0)
-    monkeypatch.setattr(wobble_discrepancy, "wobble_size_m", lambda *_: WOBBLE_SD_M)
-    whole = covariance(hit)
-    monkeypatch.setattr(wobble_discrepancy, "wobble_size_m", lambda *_: 0.0)
-    wobble = (whole - covariance(hit))[0, :, :, 0]
+def size_of(observation):
+    across, past = across_of(observation), past_foot(observation)
+    return wobble_size_m(observation.position_m, observation, across, past)
+
+
+def test_it_is_across_the_path_and_of_its_size():
+    """Where errors are small: all of it across, none along."""
+    hit = observe(HIT, 0, noise_m=1e-6)
+    past = past_foot(hit)
+    patterns = np.array(wobble_discrepancy.wobble(hit.position_m, hit, SCENE, past))[:, 0]
+    wobble = np.einsum("mit,mju->itju", patterns, patterns)
     across = across_of(hit)[0]
     along = np.stack([across[1], -across[0]])
     frames = range(len(hit.times_s))
@@ -73,6 +72,24 @@ def test_it_is_across_the_path_and_of_its_size(monkeypatch):
     far = across[:, first] @ wobble[:, first, :, last] @ across[:, last]
     assert near > 0.8 * WOBBLE_SD_M**2
     assert abs(far) < 0.05 * WOBBLE_SD_M**2
+
+
+@pytest.mark.parametrize(("noise_m", "falsifies"), [(2e-6, False), (1e-5, False), (2e-4, True)])
+def test_its_size_matters_where_errors_are_as_large(noise_m, falsifies):
+    seen = observe(HIT, 0, noise_m)
+    apart = np.abs(seen.times_s[:, None] - seen.times_s)
+    rough = random_patterns(np.exp(-apart / WOBBLE_S))
+    assert wobble_discrepancy.falsifies_noise(rough, across_of(seen), seen) == falsifies
+
+
+def test_a_body_that_is_lifted_at_a_hit_is_no_misfit():
+    seen = wobbling(0.0, 5)
+    data = GaussianLikelihood.prepare(seen, SCENE)
+    hit = int(np.argmin(np.abs(np.diff(seen.position_m[:, 0], axis=0))))
+    lifted = np.zeros_like(seen.position_m)
+    lifted[1, 1, hit + 1 :] = 10 * NOISE_M
+    left = GaussianLikelihood.tracking_errors(lifted, 1.0, data)
+    assert np.sum(left**2) < 2, "of 100 squared errors for each frame after it"
 
 
 @pytest.mark.parametrize("size_m", [1e-4, 2e-4])
@@ -91,7 +108,7 @@ def test_a_track_too_short_to_tell_may_wobble_as_most_do():
 
 
 def test_ideal_tracks_have_the_noise_that_they_are_drawn_with():
-    """All but a twentieth; with modes as large as any wobble a tenth was missing."""
+    """All but a twentieth; with modes as large as any wobble a tenth is missing."""
     found = []
     for seed in range(12):
         seen, clean = observe(HIT, seed, 2e-4), observe(HIT, seed, 0.0)
