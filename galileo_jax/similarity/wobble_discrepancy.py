@@ -7,8 +7,9 @@ Where they are as large as the wobble it matters whether there is any: what is a
 not there counts as evidence that the noise is smaller than it is, by up to a twelfth, and with the
 noise go all intervals. Then
 
-- between foot, hits and rest every piece of a track lies as high and as askew as it will: there
-  bodies are lifted;
+- within a tenth of a second after the foot and after a hit a body may be as high as it will: it is
+  lifted there, by up to a millimetre, and comes down again;
+- each piece of a track between these, or at rest, lies as high and as askew as it will;
 - within the pieces in which a body moves, the wobble has the size that explains best what is
   measured across the path, which is straight whatever the physics:
 
@@ -19,8 +20,6 @@ noise go all intervals. Then
 
 Source: Patterson, Thompson (1971), Biometrika 58, 545 (the likelihood of what a regression leaves).
 """
-
-from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -39,7 +38,7 @@ SCALES, SCALE_SD = np.geomspace(0.5, 2.0, 9), 0.3
 FALSIFIES = 0.03  # of the noise's variance: half of it of an interval
 LEAST_FRAMES = 8  # of a piece
 MOVED_M = 2e-3  # from where it begins and ends: nearer, a body may be at rest
-BESIDE_HIT = 1
+BEFORE, AFTER_S = 1, 0.1  # frames before a blow, and how long after it a body is lifted
 LEAST_SD_M = 1e-9  # of an error: one of none has no likelihood
 
 
@@ -64,7 +63,7 @@ def wobble(
     if falsifies_noise(rough, across, observation):
         size_m = wobble_size_m(position, observation, across, past_foot)
         own = [
-            np.concatenate([rough * size_m, _lifts(position, observation.mask, past_foot[i], i)])
+            np.concatenate([rough * size_m, _lifts(position, observation, past_foot[i], i)])
             for i in range(len(across))
         ]
     found = []
@@ -113,7 +112,9 @@ def wobble_size_m(
     for i, own in enumerate(across):
         place = np.sum(position[i] * own, axis=0)
         variance = np.einsum("at,abt,bt->t", own, observation.covariance_m2[i], own)
-        for piece in _pieces(position, observation.mask, past_foot[i], i):
+        for piece in _pieces(position, observation, past_foot[i], i):
+            if not _moves(position, observation.mask[i], i)[piece[0]]:
+                continue
             evidence += _evidence(observation.times_s[piece], place[piece], variance[piece])
     if not evidence.any():
         return WOBBLE_SD_M
@@ -134,29 +135,21 @@ def _across(
 
 def _lifts(
     position: Float[np.ndarray, "object 2 frame"],
-    mask: Bool[np.ndarray, "object frame"],
+    observation: Observation,
     past_foot: Float[np.ndarray, " frame"],
     i: int,
 ) -> Float[np.ndarray, "pattern frame"]:
-    """How high and how askew each piece may lie, at rest or not; frames in none by themselves."""
-    moves, ends = _moves(position, mask[i], i), _hits(position, mask, i)
-    frames = np.arange(mask.shape[1])
-    is_near = np.any([np.abs(frames - end) <= BESIDE_HIT for end in ends] or [frames < 0], axis=0)
-    # A number for each kind of frame: a change of it begins another piece.
-    kind = np.where(past_foot == 0, 0, np.where(past_foot == 1, 1, 2)) + 3 * moves
-    kind = kind + 6 * np.searchsorted(sorted(ends), frames)
-    starts = np.flatnonzero(np.diff(kind) != 0) + 1
+    """How high and how askew each piece may lie; frames in none by themselves."""
+    pieces = _pieces(position, observation, past_foot, i)
+    in_none = np.ones(position.shape[-1], bool)
     found = []
-    for piece in np.split(frames, starts):
-        if len(piece) < LEAST_FRAMES or past_foot[piece[0]] not in (0, 1):
-            found.extend(np.eye(len(frames))[piece])
-            continue
+    for piece in pieces:
+        in_none[piece] = False
         for shape in (np.ones(len(piece)), np.linspace(-1.0, 1.0, len(piece))):
-            own = np.zeros(len(frames))
+            own = np.zeros(len(in_none))
             own[piece] = shape
             found.append(own)
-        found.extend(np.eye(len(frames))[piece[is_near[piece]]])
-    return WOBBLE_SD_M * np.array(found)
+    return WOBBLE_SD_M * np.array([*found, *np.eye(len(in_none))[in_none]])
 
 
 def _moves(
@@ -168,36 +161,51 @@ def _moves(
     return np.all([seen, *away], axis=0)
 
 
-def _hits(
-    position: Float[np.ndarray, "object 2 frame"], mask: Bool[np.ndarray, "object frame"], i: int
+def _blows(
+    position: Float[np.ndarray, "object 2 frame"],
+    mask: Bool[np.ndarray, "object frame"],
+    past_foot: Float[np.ndarray, " frame"],
+    i: int,
 ) -> list[int]:
-    """Frames in which object i is nearest to another."""
+    """Frames from which on object i is lifted: past the foot, hit, and nearest to another."""
     found = []
+    beyond = np.flatnonzero(mask[i] & (past_foot == 1))
+    if beyond.size and (past_foot < 1).any():
+        found.append(int(beyond[0]))
     for j in range(len(position)):
         both = mask[i] & mask[j]
-        if j != i and both.any():
-            apart = np.linalg.norm(position[j] - position[i], axis=0)
-            found.append(int(np.argmin(np.where(both, apart, np.inf))))
+        if j == i or not both.any():
+            continue
+        apart = np.where(both, np.linalg.norm(position[j] - position[i], axis=0), np.inf)
+        found.append(int(np.argmin(apart)))
+        ahead = max(i, j)
+        moved = np.flatnonzero(_moves(position, mask[ahead], ahead))
+        found.extend(moved[:1].tolist())
     return found
 
 
 def _pieces(
     position: Float[np.ndarray, "object 2 frame"],
-    mask: Bool[np.ndarray, "object frame"],
+    observation: Observation,
     past_foot: Float[np.ndarray, " frame"],
     i: int,
-) -> Sequence[np.ndarray]:
-    """Frames in which object i moves and lies on one plane: before and after foot and hits."""
-    moves, ends = _moves(position, mask[i], i), _hits(position, mask, i)
-    found = []
-    for is_on in (past_foot == 0, past_foot == 1):
-        frames = np.flatnonzero(moves & is_on)
-        edges = np.searchsorted(frames, sorted(ends))
-        for own in np.split(frames, edges):
-            piece = own[[all(abs(frame - end) > BESIDE_HIT for end in ends) for frame in own]]
-            if len(piece) >= LEAST_FRAMES:
-                found.append(piece)
-    return found
+) -> list[np.ndarray]:
+    """Frames in which object i rests, or moves on one plane and no blow has lifted it."""
+    mask, times_s = observation.mask, observation.times_s
+    blows = _blows(position, mask, past_foot, i)
+    frames = np.arange(len(times_s))
+    is_lifted = np.zeros(len(times_s), bool)
+    for blow in blows:
+        is_lifted |= (frames >= blow - BEFORE) & (times_s <= times_s[blow] + AFTER_S)
+    is_in = mask[i] & ~is_lifted & ((past_foot == 0) | (past_foot == 1))
+    # A number for each kind of frame: a change of it begins another piece.
+    kind = 2 * past_foot + _moves(position, mask[i], i)
+    starts = np.flatnonzero((np.diff(kind) != 0) | np.diff(is_in)) + 1
+    return [
+        piece
+        for piece in np.split(frames, starts)
+        if is_in[piece[0]] and len(piece) >= LEAST_FRAMES
+    ]
 
 
 def _evidence(
