@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from galileo_jax.measurement.noise_at_rest import LEAST_SCALE
-from galileo_jax.similarity import discrepancy, hit_discrepancy, wobble_discrepancy
+from galileo_jax.similarity import discrepancy, hit_discrepancy
 
 NUM_WAVES = 8
 RESTS_M_S = 1e-4  # what is slower rests, in a motion without noise
@@ -78,11 +78,11 @@ def _wobble(x: jax.Array, times: jax.Array, bodies: Bodies, normal: Normal) -> j
     """How bodies rock and sink across their path, `[object, 2, frame]`."""
     # Frequencies of Cauchy's distribution, a ratio of normal numbers: an exponential correlation.
     frequency = normal((2, NUM_WAVES, 1)) / normal((2, NUM_WAVES, 1))
-    wave = _wave(times / wobble_discrepancy.WOBBLE_S, (2,), normal, frequency)
+    wave = _wave(times / discrepancy.WOBBLE_S, (2,), normal, frequency)
     is_on_ramp = jnp.stack([x[0] < bodies.foot_m, jnp.zeros(x.shape[1], bool)])
     slope = jnp.where(is_on_ramp, bodies.angle_rad, 0.0)
     across = jnp.stack([jnp.sin(slope), jnp.cos(slope)], axis=1)
-    return wobble_discrepancy.WOBBLE_SD_M * wave[:, None] * across
+    return discrepancy.WOBBLE_SD_M * wave[:, None] * across
 
 
 def _apart_after_hit(

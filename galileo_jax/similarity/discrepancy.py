@@ -16,7 +16,6 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.observation.random_patterns import SMALLEST, random_patterns
 from galileo_jax.similarity.hit_discrepancy import after_hits
 from galileo_jax.similarity.rocking_discrepancy import rocking, rocking_frames, rocking_steps
-from galileo_jax.similarity.wobble_discrepancy import wobble
 
 POINT_SD_M = 0.003  # how far a marked point is from the centre
 OFFSET_SD_M = 0.01  # of the whole track of one object: origin, point, level of the table
@@ -29,6 +28,9 @@ THROW_SD_RAD = 0.05  # nobody throws square to the camera: what comes nearer gro
 LENS_SD, LENS_CENTRE_SD = 0.005, 0.3
 READ_OFF = 10.0  # times an angle's sd: so wide that the direction tells nothing more
 SCALE_SD = 0.001
+# Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
+# millimetre; how fast they go along it shows none of that.
+WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
 # Several cameras place a body in space by where each sees it: how they stand to each other, their
 # lenses and clocks shift it by a few millimetres, ever another way as it goes.
 WANDER_SD_M, WANDER_S = 2e-3, 0.15
@@ -103,13 +105,7 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
                 step[i, axis] = sd * share
                 found.append(step)
     if scene.has_surface:
-        past_foot = [
-            _share_past_foot(position[i, 0], scene, i)
-            if comes_down
-            else np.full(frames, float(scene.has_table))
-            for i, comes_down in enumerate(scene.comes_down)
-        ]
-        found.extend(wobble(position, observation, scene, np.array(past_foot)))
+        found.extend(_wobble(position, observation, scene))
     elif not scene.moves_in_plane:
         found.extend(_aside(position))
     found.extend(after_hits(position, observation, is_filmed))
@@ -163,6 +159,24 @@ def _lens(aside: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
         shift = 2.0 * place * place[:, axis : axis + 1]
         shift[:, axis] += square[:, 0]
         found.append(LENS_SD * LENS_CENTRE_SD * edge_m * shift)
+    return found
+
+
+def _wobble(
+    position: np.ndarray, observation: Observation, scene: Surroundings
+) -> list[np.ndarray]:
+    """For each object a rough wobble across its path (an Ornstein-Uhlenbeck process)."""
+    apart = np.abs(observation.times_s[:, None] - observation.times_s)
+    patterns = random_patterns(WOBBLE_SD_M**2 * np.exp(-apart / WOBBLE_S))
+    found = []
+    for i, corner in enumerate(scene.corner_m):
+        is_on_ramp = scene.comes_down[i] & (position[i, 0] < corner) | (not scene.has_table)
+        slope = np.where(is_on_ramp, scene.angle_rad, 0.0)
+        across = np.stack([np.sin(slope), np.cos(slope)])
+        for pattern in patterns:
+            wobble = np.zeros_like(position)
+            wobble[i] = pattern * across
+            found.append(wobble)
     return found
 
 

@@ -13,9 +13,14 @@ import numpy as np
 from galileo_jax.clip.walls import bounces
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import camera, offsets, wander
+from galileo_jax.similarity.discrepancy import (
+    WOBBLE_S,
+    WOBBLE_SD_M,
+    camera,
+    offsets,
+    wander,
+)
 from galileo_jax.similarity.hit_discrepancy import HIT_STEP_SD_M
-from galileo_jax.similarity.wobble_discrepancy import WOBBLE_S, WOBBLE_SD_M
 
 NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other in some frame
 CENTRE_SHARE = 0.1  # of a radius: how far a followed point may be from the centre

@@ -12,7 +12,7 @@ import numpy as np
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 
-RISES_M = 1.2e-3  # three times what bodies wobble across their path (`WOBBLE_SD_M`)
+RISES_M = 1.2e-3  # three times what bodies wobble across their path (`discrepancy.WOBBLE_SD_M`)
 CLEAR = 5.0  # standard deviations of a frame
 TILTED_M, TILTED_SD = 6e-4, 2.0  # what is lifted by more, beside the highest frame, rocks with it
 LONGEST_S = 0.4  # a box that does not come down again does not rock

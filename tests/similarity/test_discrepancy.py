@@ -1,4 +1,4 @@
-"""What the modes may explain and what not: nothing along the path before a hit."""
+"""What the modes may explain and what not: wobble across the path, nothing before a hit."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import LENS_SD, modes
+from galileo_jax.similarity.discrepancy import LENS_SD, WOBBLE_S, WOBBLE_SD_M, modes
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from galileo_jax.similarity.hit_discrepancy import (
     CLOSE_M,
@@ -16,7 +16,6 @@ from galileo_jax.similarity.hit_discrepancy import (
     _speeds_at,
 )
 from galileo_jax.similarity.level_discrepancy import level_modes
-from galileo_jax.similarity.wobble_discrepancy import WOBBLE_S, WOBBLE_SD_M
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
@@ -34,6 +33,34 @@ def covariance(observation):
 @pytest.fixture(scope="module")
 def hit():
     return observe(HIT, 0, noise_m=0.0)
+
+
+def along_and_across(observation):
+    """Unit vectors `[2, 2, frame]` of object 1's path."""
+    x, corner = observation.position_m[0, 0], SCENE.corner_m[0]
+    slope = np.where(x < corner, HIT.angle_rad, 0.0)
+    along = np.stack([np.cos(slope), -np.sin(slope)])
+    return along, np.stack([np.sin(slope), np.cos(slope)])
+
+
+def test_wobble_is_across_the_path_and_of_its_size(hit, monkeypatch):
+    """The modes with it less those without: all of it across, none along."""
+    whole = covariance(hit)
+    monkeypatch.setattr("galileo_jax.similarity.discrepancy.WOBBLE_SD_M", 0.0)
+    wobble = (whole - covariance(hit))[0, :, :, 0]
+    along, across = along_and_across(hit)
+    frames = range(len(hit.times_s))
+    for t in frames:
+        assert across[:, t] @ wobble[:, t, :, t] @ across[:, t] == pytest.approx(
+            WOBBLE_SD_M**2, rel=0.05
+        )
+        assert abs(along[:, t] @ wobble[:, t, :, t] @ along[:, t]) < 1e-3 * WOBBLE_SD_M**2
+    # Neighbours in time wobble together, and the ends of the clip do not.
+    first, last = frames[0], frames[-1]
+    near = across[:, first] @ wobble[:, first, :, first + 1] @ across[:, first + 1]
+    far = across[:, first] @ wobble[:, first, :, last] @ across[:, last]
+    assert near > 0.8 * WOBBLE_SD_M**2
+    assert abs(far) < 0.05 * WOBBLE_SD_M**2
 
 
 def test_a_hit_loosens_only_what_follows(hit):
