@@ -14,6 +14,7 @@ of mass and its inertia, as anybody would simulate a cube.
 Errors are means over the frames from the first impact on, of the place over the edge and of the
 turning, and medians over the tosses. The last line is JSON.
 """
+# pyright: reportAttributeAccessIssue=false
 
 import argparse
 import tempfile
@@ -98,8 +99,13 @@ def main(argv: Sequence[str]) -> int | None:
     learned = {path.stem for path in paths[:: call.every]}
     common = joint_fit(paths[:: call.every])
     value = dict(zip(COMMON, np.asarray(forward(jnp.asarray(common))).tolist(), strict=True))
-    shared = (value[name] for name in ("edge", "gravity", "floor", "inertia"))
-    cube = Cube(*shared, np.array([value[name] for name in CENTRE]))
+    cube = Cube(
+        edge=value["edge"],
+        gravity=value["gravity"],
+        floor=value["floor"],
+        inertia=value["inertia"],
+        centre=np.array([value[name] for name in CENTRE]),
+    )
     old = [one for one in thrown if one.name in learned]
     new = [one for one in thrown if one.name not in learned]
     middle = cube._replace(inertia=SOLID, centre=np.zeros(3))
@@ -145,7 +151,8 @@ def at_the_impact(path: Path) -> Thrown | None:
     )
     velocity = flight.velocity_m_s + flight.acceleration_m_s2 * flown_s
     place = flight.position_m + (flight.velocity_m_s + velocity) / 2 * flown_s
-    start = Start(place, turned.as_quat(scalar_first=True), velocity, flight.spin_rad_s)
+    begin = (place, turned.as_quat(scalar_first=True), velocity, flight.spin_rad_s)
+    start = Start(*(jnp.asarray(each) for each in begin))
     rest = slice(flight.last, None)
     return Thrown(
         path.stem,
