@@ -17,7 +17,6 @@ turning, and medians over the tosses. The last line is JSON.
 # pyright: reportAttributeAccessIssue=false
 
 import argparse
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,7 +30,6 @@ import tables
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-import galileo_jax as gx
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.commands import command
 from galileo_jax.inference.toss.residuals import CENTRE, COMMON, Start, forward, motion
@@ -97,7 +95,7 @@ def main(argv: Sequence[str]) -> int | None:
     paths = sorted(call.folder.glob("*.csv"))
     thrown = [one for path in paths if (one := at_the_impact(path)) is not None]
     learned = {path.stem for path in paths[:: call.every]}
-    common = joint_fit(paths[:: call.every])
+    common = cube_tosses.joint_fit(paths[:: call.every]).solution.solution.common
     value = dict(zip(COMMON, np.asarray(forward(jnp.asarray(common))).tolist(), strict=True))
     cube = Cube(
         edge=value["edge"],
@@ -161,17 +159,6 @@ def at_the_impact(path: Path) -> Thrown | None:
         poses.position_m[rest],
         poses.quaternion[rest],
     )
-
-
-def joint_fit(paths: Sequence[Path]) -> np.ndarray:
-    """What the tosses together tell of cube and board, in the order of `COMMON`."""
-    with tempfile.TemporaryDirectory() as folder:
-        clips = []
-        for path in paths:
-            clip = Path(folder) / f"{path.stem}.yaml"
-            clip.write_text(cube_tosses.YAML.format(track=path.resolve()))
-            clips.append(clip)
-        return gx.fit_tosses(clips).solution.solution.common
 
 
 def best_for(

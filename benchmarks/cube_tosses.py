@@ -10,7 +10,9 @@ the second half of each from its first.
 
 import argparse
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linprog
@@ -97,13 +99,7 @@ def geometry(tosses: list[Poses]) -> None:
 
 def fit(tables: list[Path], window: float) -> None:
     """The joint fit, and the second halves."""
-    with tempfile.TemporaryDirectory() as folder:
-        clips = []
-        for table in tables:
-            clip = Path(folder) / f"{table.stem}.yaml"
-            clip.write_text(YAML.format(track=table.resolve()))
-            clips.append(clip)
-        found = gx.fit_tosses(clips, window=window, ahead=True)
+    found = joint_fit(tables, window=window, ahead=True)
     print(f"joint fit of {len(found.solution.names)} tosses, {window:g} s after the impact")
     for name, told in found.parameters.items():
         print(f"  {name:<12} {told['mean']:.5f} [{told['q025']:.5f}, {told['q975']:.5f}]")
@@ -112,6 +108,17 @@ def fit(tables: list[Path], window: float) -> None:
     second = found.document["second_half"]
     place, turn = 100 * second["median_place_over_edge"], second["median_turn_deg"]
     print(f"  second half from the first: {place:.1f} % of the edge, {turn:.1f} degrees (medians)")
+
+
+def joint_fit(tables: Sequence[Path], **options: Any) -> gx.TossFit:
+    """`gx.fit_tosses` of tables of poses, with its options."""
+    with tempfile.TemporaryDirectory() as folder:
+        clips = []
+        for table in tables:
+            clip = Path(folder) / f"{table.stem}.yaml"
+            clip.write_text(YAML.format(track=table.resolve()))
+            clips.append(clip)
+        return gx.fit_tosses(clips, **options)
 
 
 def _height(poses: Poses) -> np.ndarray:

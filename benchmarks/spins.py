@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import tables
 from scipy.integrate import solve_ivp
+from verdicts import LARGEST_SET
 
 import galileo_jax as gx
 from galileo_jax.commands import command
@@ -31,7 +32,6 @@ SPEED_M_S, LASTS_S, EVERY_S = (5.0, 9.0), (0.25, 0.5), (0.005, 0.01)
 PLACE_SD_M, TIME_SD_S = 1e-3, 5e-4
 DRAG, LIFT, SPIN_RAD_S, WRONG = (0.4, 0.6), (0.8, 1.3), (100.0, 400.0), (0.01, 0.04)
 KINDS = ("none", "spin", "error", "spin")
-MOST_AMONG = 3
 YAML = f"""track: flight.csv
 track_up: z
 scenario: flight
@@ -99,17 +99,14 @@ def outcome(status: str, effects: Sequence[str]) -> str:
     if status == "named":
         return "spin named" if has_spin else "named without"
     if status == "ambiguous" and has_spin:
-        return "spin among three" if len(effects) <= MOST_AMONG else "spin among more"
+        return "spin among three" if len(effects) <= LARGEST_SET else "spin among more"
     return "ambiguous without" if status == "ambiguous" else status
 
 
 def draw(folder: Path, kind: str, rng: np.random.Generator) -> Flight:
     """A flight, its track and its yaml."""
-    speed, elevation, azimuth = (
-        rng.uniform(*SPEED_M_S),
-        rng.uniform(-0.1, 0.5),
-        rng.uniform(0, 2 * math.pi),
-    )
+    speed, elevation = rng.uniform(*SPEED_M_S), rng.uniform(-0.1, 0.5)
+    azimuth = rng.uniform(0, 2 * math.pi)
     level = speed * math.cos(elevation)
     velocity = [level * math.cos(azimuth), speed * math.sin(elevation), level * math.sin(azimuth)]
     times = np.cumsum(rng.uniform(*EVERY_S, 200))
