@@ -116,7 +116,7 @@ def _errors(
     generator: np.random.Generator,
 ) -> np.ndarray:
     """Whitened errors of a clip, `[replicate, value]`: the tracker's, and modes of a size."""
-    data, errors = problem.data, problem.errors_in_time
+    data, errors = problem.data, problem.errors_in_full
     gain2, basis = data.gain**2, data.basis.reshape(len(data.gain), -1)
     shape = (count, *problem.observation.position_m.shape)
     found = generator.standard_normal(shape)

@@ -117,7 +117,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     scales = np.clip(fitted, *JUDGED_SCALE_RANGE)
     measured = whitened(trials, theta[None], scales)
     sizes = [
-        fitted_mode_size(white[0], scale, problem.data, problem.errors_in_time)
+        fitted_mode_size(white[0], scale, problem.data, problem.errors_in_full)
         for white, scale, problem in zip(measured, scales, trials.problems, strict=True)
     ]
     labels = [phases(each, trials.of_clip(theta, c)) for c, each in enumerate(trials.problems)]

@@ -21,6 +21,7 @@ from galileo_jax.rollout.trajectory import Trajectory
 from galileo_jax.runtime.batching import FRAMES, MOTIONS, in_chunks, padded_motion, rounded_up
 from galileo_jax.runtime.progress import check_cancelled
 from galileo_jax.runtime.trace_cache import trace_cached
+from galileo_jax.similarity.discrepancy import across_path
 from galileo_jax.similarity.gaussian_likelihood import (
     GaussianLikelihood,
     NoiseModel,
@@ -83,14 +84,21 @@ class Problem:
         return GaussianLikelihood.prepare(self.observation, scene, self.noise)
 
     @cached_property
-    def errors_in_time(self) -> Float[np.ndarray, "mode mode"] | None:
-        """The covariance of errors that follow each other, along the modes of `data`; or None."""
-        count = self.observation.num_errors
-        if not count or self.observation.modes_m is None:
+    def errors_in_full(self) -> Float[np.ndarray, "mode mode"] | None:
+        """What of the modes of `data` has no size in common with the others, as covariance.
+
+        Errors that follow each other in time, whose size was measured, and what bodies do across
+        their path, of which more is allowed for than is there. None where there are neither.
+        """
+        seen, count = self.observation, self.observation.num_errors
+        found = [] if self.noise == "tracker" else across_path(seen, self.model.scene.surroundings)
+        if count and seen.modes_m is not None:
+            found = [*found, *seen.modes_m[-count:]]
+        if not found:
             return None
         root, basis = self.data.inverse_root, self.data.basis
-        white = np.einsum("oijt,mojt->moit", root, self.observation.modes_m[-count:])
-        along = basis.reshape(len(basis), -1) @ white.reshape(count, -1).T
+        white = np.einsum("oijt,mojt->moit", root, np.stack(found))
+        along = basis.reshape(len(basis), -1) @ white.reshape(len(found), -1).T
         return along @ along.T
 
     def predict(self, theta: Float[jax.Array, " parameter"]) -> Float[jax.Array, "object 2 frame"]:

@@ -31,6 +31,10 @@ SCALE_SD = 0.001
 # Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
 # millimetre; how fast they go along it shows none of that.
 WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
+# How much of that a track has is not known before. What is allowed for, of the size of the noise and
+# not there, makes the noise seem smaller than it is; so ten times as much is allowed for, which
+# takes up a place across the path whole. docs/history/intervals.md has the measurements.
+ACROSS_SD_M = 10 * WOBBLE_SD_M
 # Several cameras place a body in space by where each sees it: how they stand to each other, their
 # lenses and clocks shift it by a few millimetres, ever another way as it goes.
 WANDER_SD_M, WANDER_S = 2e-3, 0.15
@@ -72,7 +76,12 @@ def wander(
     return found
 
 
-def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True) -> np.ndarray:
+def modes(
+    observation: Observation,
+    scene: Surroundings,
+    is_filmed: bool = True,
+    across_sd_m: float = ACROSS_SD_M,
+) -> np.ndarray:
     """The patterns times their standard deviations, `[mode, object, 2, frame]`, m.
 
     Offsets of each object and axis; keystone about either axis, roll and scale of the
@@ -80,6 +89,12 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
     off-centre point and a box's length make when the object turns at the foot.
     After a hit the way each object goes is known to a tenth of a per cent. What only cameras
     and trackers do (keystone, roll, scale, a drift past a hit) is among them if `is_filmed`.
+
+    Args:
+      observation: the track.
+      scene: what it shows.
+      is_filmed: whether a camera took it.
+      across_sd_m: of what bodies do across their path; to draw tracks, `WOBBLE_SD_M`.
     """
     position = np.nan_to_num(observation.position_m)
     count, _, frames = position.shape
@@ -104,9 +119,8 @@ def modes(observation: Observation, scene: Surroundings, is_filmed: bool = True)
                 step = np.zeros((count, 2, frames))
                 step[i, axis] = sd * share
                 found.append(step)
-    if scene.has_surface:
-        found.extend(_wobble(position, observation, scene))
-    elif not scene.moves_in_plane:
+    found.extend(across_path(observation, scene, across_sd_m))
+    if not scene.has_surface and not scene.moves_in_plane:
         found.extend(_aside(position))
     found.extend(after_hits(position, observation, is_filmed))
     for i in range(count):
@@ -162,20 +176,26 @@ def _lens(aside: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
     return found
 
 
-def _wobble(
-    position: np.ndarray, observation: Observation, scene: Surroundings
+def across_path(
+    observation: Observation, scene: Surroundings, sd_m: float = ACROSS_SD_M
 ) -> list[np.ndarray]:
-    """For each object a rough wobble across its path (an Ornstein-Uhlenbeck process)."""
+    """For each object a rough wobble across its path (an Ornstein-Uhlenbeck process).
+
+    None where no surface leads a body, nor where it is seen from above or in space.
+    """
+    if not scene.has_surface or scene.is_level or observation.position_m.shape[1] != 2:
+        return []
+    position = np.nan_to_num(observation.position_m)
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    patterns = random_patterns(WOBBLE_SD_M**2 * np.exp(-apart / WOBBLE_S))
+    patterns = random_patterns(sd_m**2 * np.exp(-apart / WOBBLE_S))
     found = []
     for i, corner in enumerate(scene.corner_m):
         is_on_ramp = scene.comes_down[i] & (position[i, 0] < corner) | (not scene.has_table)
         slope = np.where(is_on_ramp, scene.angle_rad, 0.0)
-        across = np.stack([np.sin(slope), np.cos(slope)])
+        normal = np.stack([np.sin(slope), np.cos(slope)])
         for pattern in patterns:
             wobble = np.zeros_like(position)
-            wobble[i] = pattern * across
+            wobble[i] = pattern * normal
             found.append(wobble)
     return found
 

@@ -1,5 +1,6 @@
 """Tracks for the calibration of `compare`'s p are what the likelihood says, and are fitted well."""
 
+import functools
 import importlib
 from pathlib import Path
 
@@ -7,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from galileo_jax.similarity.discrepancy import crossings, modes
+from galileo_jax.similarity import gaussian_likelihood
+from galileo_jax.similarity.discrepancy import WOBBLE_SD_M, crossings, modes
 from tests.precision import in_64_bit
 
 NUM_TRACKS = 16
@@ -35,11 +37,14 @@ def drawn(p_values, seed):
     return p_values.measured(problem, position, "camera"), clean, position - noisy
 
 
-def test_drawn_tracks_are_what_their_own_likelihood_says(p_values):
+def test_drawn_tracks_are_what_their_own_likelihood_says(p_values, monkeypatch):
     """At the truth whitened residuals are unit normal, whatever the patterns moved.
 
+    That is, if it allows for as much across the path as was drawn, and not for ten times that.
     Where patterns were those of another track, a quarter of these were below 0.01, down to 1e-100.
     """
+    as_drawn = functools.partial(modes, across_sd_m=WOBBLE_SD_M)
+    monkeypatch.setattr(gaussian_likelihood, "modes", as_drawn)
     chances = []
     for seed in range(NUM_TRACKS):
         problem, clean, _ = drawn(p_values, seed)
@@ -52,7 +57,8 @@ def test_drawn_tracks_are_what_their_own_likelihood_says(p_values):
 def test_imperfections_are_as_large_as_the_likelihood_says(p_values):
     problem, _, away = drawn(p_values, 0)
     scene, seen = problem.model.scene.surroundings, problem.observation
-    patterns = np.concatenate([modes(seen, scene), crossings(seen, scene)])
+    allowed = modes(seen, scene, across_sd_m=WOBBLE_SD_M)
+    patterns = np.concatenate([allowed, crossings(seen, scene)])
     flat = patterns.reshape(len(patterns), -1)
     amplitude, *_ = np.linalg.lstsq(flat.T, away.ravel(), rcond=None)
     np.testing.assert_allclose(amplitude @ flat, away.ravel(), atol=1e-6)

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import LENS_SD, WOBBLE_S, WOBBLE_SD_M, modes
+from galileo_jax.similarity.discrepancy import (
+    ACROSS_SD_M,
+    LENS_SD,
+    WOBBLE_S,
+    WOBBLE_SD_M,
+    modes,
+)
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from galileo_jax.similarity.hit_discrepancy import (
     CLOSE_M,
@@ -24,9 +30,9 @@ SCENE = make_surroundings(HIT)
 STOPS = replace(HIT, friction=(0.34, 0.2))  # before object 2
 
 
-def covariance(observation):
+def covariance(observation, across_sd_m=ACROSS_SD_M):
     """`[object, 2, frame, object, 2, frame]`, m^2."""
-    patterns = modes(observation, SCENE)
+    patterns = modes(observation, SCENE, across_sd_m=across_sd_m)
     return np.einsum("moit,mpju->oitpju", patterns, patterns)
 
 
@@ -43,24 +49,22 @@ def along_and_across(observation):
     return along, np.stack([np.sin(slope), np.cos(slope)])
 
 
-def test_wobble_is_across_the_path_and_of_its_size(hit, monkeypatch):
+def test_wobble_is_across_the_path_and_of_its_size(hit):
     """The modes with it less those without: all of it across, none along."""
-    whole = covariance(hit)
-    monkeypatch.setattr("galileo_jax.similarity.discrepancy.WOBBLE_SD_M", 0.0)
-    wobble = (whole - covariance(hit))[0, :, :, 0]
+    wobble = (covariance(hit) - covariance(hit, 0.0))[0, :, :, 0]
     along, across = along_and_across(hit)
     frames = range(len(hit.times_s))
     for t in frames:
         assert across[:, t] @ wobble[:, t, :, t] @ across[:, t] == pytest.approx(
-            WOBBLE_SD_M**2, rel=0.05
+            ACROSS_SD_M**2, rel=0.05
         )
-        assert abs(along[:, t] @ wobble[:, t, :, t] @ along[:, t]) < 1e-3 * WOBBLE_SD_M**2
+        assert abs(along[:, t] @ wobble[:, t, :, t] @ along[:, t]) < 1e-3 * ACROSS_SD_M**2
     # Neighbours in time wobble together, and the ends of the clip do not.
     first, last = frames[0], frames[-1]
     near = across[:, first] @ wobble[:, first, :, first + 1] @ across[:, first + 1]
     far = across[:, first] @ wobble[:, first, :, last] @ across[:, last]
-    assert near > 0.8 * WOBBLE_SD_M**2
-    assert abs(far) < 0.05 * WOBBLE_SD_M**2
+    assert near > 0.8 * ACROSS_SD_M**2
+    assert abs(far) < 0.05 * ACROSS_SD_M**2
 
 
 def test_a_hit_loosens_only_what_follows(hit):
