@@ -3,8 +3,11 @@
     laplace     what a diagnosis ranks by: the fit's, by Laplace (`inference/fits/evidence.py`)
     weighed     what it ranks the leading ones by: mended by a few rollouts (`fits/weighed.py`)
     far         a third opinion: 4 to 16 times as many draws, from a t 1.4 times as wide
-    smc         adaptive tempered sequential Monte Carlo from the prior (`tempering.py`), two
-                seeds; of as many hypotheses as `--smc` says, first where `far` and Laplace differ
+    wide        adaptive tempered sequential Monte Carlo (`tempering.py`) from a normal distribution
+                twice as wide as the fit's, two seeds; of as many hypotheses as `--wide` says, first
+                where `far` and Laplace differ, none that a diagnosis leaves out of the race
+    smc         the same from the prior, of as many as `--smc` says: knows nothing of the fit, but
+                where seeds differ by more than a nat its particles lost the way
 
 Tracks are drawn with one of the library's effects or none, at strengths from hardly visible to
 full, with the small faults of real clips. Of each track four hypotheses are looked at: the hidden
@@ -19,12 +22,14 @@ import argparse
 import json
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 import tables
 from tempering import temper
@@ -37,9 +42,11 @@ from galileo_jax.commands import command
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.density import likelihood_of
-from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.gradient import OUT_OF_THE_RACE, GradientFitter
 from galileo_jax.inference.fits.weighed import Weighed, weighed
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.laplace import root_of
+from galileo_jax.inference.samplers.sampler import LogDensity
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime import compilation_cache
@@ -60,7 +67,9 @@ NO_EFFECT = 0.2  # share of the tracks
 PER_TRACK, NUM_FAR, FAR_WIDTH = 4, 4096, 1.4
 BAR_NATS = 1.0
 RELIABLE_K = 0.7  # of the weights' tail: above, their mean is not to be relied on
-COLUMNS = ("lead", "weighed", "far", "smc0", "smc1", "ess", "far_k", "smc0_s")
+COLUMNS = ("lead", "weighed", "far", "smc0", "smc1", "wide0", "wide1", "ess", "far_k", "wide0_s")
+OVER_LAPLACE = COLUMNS[1:7]
+WIDE = 2.0  # standard deviations of the fit
 
 
 @dataclass(frozen=True)
@@ -90,9 +99,12 @@ def main(argv: Sequence[str]) -> int | None:
         if seed not in {row["seed"] for row in rows.values()}:
             for row in examine(seed):
                 _keep(row, rows, call.out)
-    worst = sorted(rows.values(), key=lambda row: -abs(row["far"] - row["laplace"]))
-    for row in [row for row in worst[: call.smc] if "smc1" not in row]:
-        _keep(smc(row, call.particles), rows, call.out)
+    worst = sorted(_in_race(rows.values()), key=lambda row: -abs(row["far"] - row["laplace"]))
+    for i, row in enumerate(worst):
+        asked = [way for way, num in (("wide", call.wide), ("smc", call.smc)) if i < num]
+        ways = [f"{way}{seed}" for way in asked for seed in range(2)]
+        if missing := [way for way in ways if way not in row]:
+            _keep(smc(row, missing, call.particles), rows, call.out)
     tables.finish("evidence", summary(list(rows.values())))
     return None
 
@@ -150,16 +162,34 @@ def examine(seed: int) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def smc(row: dict[str, Any], num_particles: int) -> dict[str, Any]:
-    """The row with the log evidence by smc, from two seeds."""
+class RoundFit(eqx.Module):
+    """A posterior in u, z = mean + root u: its density over that of a standard normal u."""
+
+    likelihood: LogDensity
+    mean: jax.Array
+    root: jax.Array
+
+    def __call__(self, u: jax.Array) -> jax.Array:
+        """The logarithm of that ratio."""
+        z = self.mean + self.root @ u
+        volume = jnp.sum(jnp.log(jnp.abs(jnp.diag(self.root))))
+        return self.likelihood(z) + 0.5 * (jnp.sum(u**2) - jnp.sum(z**2)) + volume
+
+
+def smc(row: dict[str, Any], ways: Sequence[str], num_particles: int) -> dict[str, Any]:
+    """The row with the log evidence by smc, `ways`: wide0, wide1, smc0, smc1."""
     trials = trials_of(draw_track(row["seed"]), [row["effect"]])
-    likelihood, found = likelihood_of(trials), dict(row)
-    for i in range(2):
+    likelihood, found = likelihood_of(trials), row | {"particles": num_particles}
+    fit = GradientFitter(trials).fit(0)
+    root = WIDE * root_of(fit.covariance)
+    round_fit = RoundFit(likelihood, jnp.asarray(fit.z), jnp.asarray(root))
+    for way in ways:
         began = time.process_time()
-        key, dim = jax.random.key(i), len(trials.names)
-        population = temper(key, likelihood, dim, num_particles=num_particles, is_moved=False)
-        found |= {f"smc{i}": population.log_evidence, "particles": num_particles}
-        found[f"smc{i}_s"] = time.process_time() - began
+        key, dim = jax.random.key(int(way[-1])), len(trials.names)
+        density = round_fit if way.startswith("wide") else likelihood
+        population = temper(key, density, dim, num_particles=num_particles, is_moved=False)
+        found[way] = population.log_evidence
+        found[f"{way}_s"] = time.process_time() - began
     return found
 
 
@@ -179,10 +209,18 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """How far Laplace's evidence and the mended one are from the others, nats."""
     found: dict[str, Any] = {"hypotheses": len(rows)}
     found["weighed_too_few"] = sum(row["weighed"] is None for row in rows)
+    rows = _in_race(rows)
+    found["in_race"] = len(rows)
     sure = [row for row in rows if row["far_k"] < RELIABLE_K]
     found["far_reliable"] = len(sure)
-    with_smc = [row for row in rows if "smc1" in row]
-    pairs = (("far", sure, lambda row: row["far"]), ("smc", with_smc, _mean_smc))
+    by_way = {way: [row for row in rows if f"{way}1" in row] for way in ("smc", "wide")}
+    agreeing = {way: [row for row in some if _apart(row, way) <= BAR_NATS]
+                for way, some in by_way.items()}  # fmt: skip
+    pairs = (
+        ("far", sure, lambda row: row["far"]),
+        ("smc", agreeing["smc"], lambda row: _mean(row, "smc")),
+        ("wide", agreeing["wide"], lambda row: _mean(row, "wide")),
+    )
     for name in ("laplace", "weighed"):
         for other, some, value in pairs:
             own = [row for row in some if row[name] is not None]
@@ -193,9 +231,9 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
                 "worst": np.max(off),
                 "beyond_1": int(np.sum(off > BAR_NATS)),
             }
-    apart = [abs(row["smc0"] - row["smc1"]) for row in with_smc]
-    found["smc_apart"] = sorted(apart)
-    for name in ("weighed_s", "far_s", "smc0_s"):
+    for way, some in by_way.items():
+        found[f"{way}_apart"] = sorted(_apart(row, way) for row in some)
+    for name in ("weighed_s", "far_s", "smc0_s", "wide0_s"):
         found[f"{name}_median"] = np.median([row[name] for row in rows if name in row] or [np.nan])
     return found
 
@@ -205,8 +243,21 @@ def trials_of(track: Track, names: Sequence[str]) -> JointProblem:
     return make_joint_problem([track.clip], [track.observation], effects=make_effects(list(names)))
 
 
-def _mean_smc(row: dict[str, Any]) -> float:
-    return float(np.logaddexp(row["smc0"], row["smc1"]) - np.log(2))
+def _in_race(rows: Collection[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Those that are not far behind the best of their track."""
+    best: dict[int, float] = {}
+    for row in rows:
+        best[row["seed"]] = max(best.get(row["seed"], 0.0), row["lead"])
+    return [row for row in rows if row["lead"] > best[row["seed"]] - OUT_OF_THE_RACE]
+
+
+def _mean(row: dict[str, Any], way: str) -> float:
+    """Of two estimates of an integral, whose logarithms these are."""
+    return float(np.logaddexp(row[f"{way}0"], row[f"{way}1"]) - np.log(2))
+
+
+def _apart(row: dict[str, Any], way: str) -> float:
+    return abs(row[f"{way}0"] - row[f"{way}1"])
 
 
 def _keep(row: dict[str, Any], rows: dict[tuple[int, str], dict[str, Any]], out: Path) -> None:
@@ -214,8 +265,8 @@ def _keep(row: dict[str, Any], rows: dict[tuple[int, str], dict[str, Any]], out:
     with out.open("a") as file:
         file.write(json.dumps(row) + "\n")
     name = f"{row['seed']} {row['hidden'][:8]} {row['strength']:.2f}: {row['effect'][:12]}"
-    over = [None if row.get(key) is None else row[key] - row["laplace"] for key in COLUMNS[1:5]]
-    tables.row(name, [row["lead"], *over, row["ess"], row["far_k"], row.get("smc0_s")])
+    over = [None if row.get(key) is None else row[key] - row["laplace"] for key in OVER_LAPLACE]
+    tables.row(name, [row["lead"], *over, row["ess"], row["far_k"], row.get("wide0_s")])
 
 
 def _results(path: Path) -> dict[tuple[int, str], dict[str, Any]]:
@@ -229,8 +280,9 @@ def _parser() -> command.Parser:
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("--num", type=int, default=10, help="tracks, four hypotheses each")
     parser.add_argument("--first", type=int, default=81000, help="seed of the first track")
-    parser.add_argument("--particles", type=int, default=256, help="of smc")
-    parser.add_argument("--smc", type=int, default=40, help="hypotheses")
+    parser.add_argument("--particles", type=int, default=256, help="of smc and wide")
+    parser.add_argument("--wide", type=int, default=40, help="hypotheses")
+    parser.add_argument("--smc", type=int, default=12, help="hypotheses")
     parser.add_argument("--out", type=Path, required=True, help="one line of JSON per hypothesis")
     return parser
 
