@@ -22,7 +22,7 @@ from galileo_jax.comparison.compare import compare
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem, with_shared_parameters
-from galileo_jax.similarity.discrepancy import WOBBLE_SD_M, crossings, modes
+from galileo_jax.similarity.discrepancy import crossings, modes
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
 NOISE_M = 5e-5  # a twentieth of a pixel at 1000 px/m
@@ -102,7 +102,7 @@ def imperfect(
 ) -> np.ndarray:
     """`clean_m` with imperfections, those that the likelihood of the resulting track expects.
 
-    But for what bodies do across their path, of which it allows for more than they do.
+    But for what is rough across the path, of which it allows for more than bodies do.
 
     Which patterns there are depends on where objects are seen (which frames lie across the foot,
     when objects hit and how long they stay close), and so on the patterns themselves. About a third
@@ -115,7 +115,7 @@ def imperfect(
         before = clean_m
         for _ in range(NUM_ROUNDS):
             now = replace(seen, position_m=before)
-            found = modes(now, scene, is_filmed, WOBBLE_SD_M)
+            found = modes(now, scene, is_filmed, rough_sd_m=0.0)
             # A crossing is one coordinate of one frame, and keeps its own number.
             single = crossings(now, scene).sum(axis=0) * of_values
             position = clean_m + np.tensordot(normal[: len(found)], found, axes=1) + single

@@ -31,10 +31,12 @@ SCALE_SD = 0.001
 # Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
 # millimetre; how fast they go along it shows none of that.
 WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
-# How much of that a track has is not known before. What is allowed for, of the size of the noise and
-# not there, makes the noise seem smaller than it is; so ten times as much is allowed for, which
-# takes up a place across the path whole. docs/history/intervals.md has the measurements.
-ACROSS_SD_M = 10 * WOBBLE_SD_M
+# How much of that a track has is not known before. What is allowed for, of the noise's size and not
+# there, makes the noise seem smaller than it is. So ten times as much is allowed for in what is not
+# smooth: it says nothing of how large the noise is, and the path's shape is known as before.
+ROUGH_SD_M, SMOOTH_DEGREE = 4e-3, 3
+SAME_PLACE_M = 1e-3  # what moved by less has no shape of a path
+ALIKE = 1e-6  # shapes that differ by less are one
 # Several cameras place a body in space by where each sees it: how they stand to each other, their
 # lenses and clocks shift it by a few millimetres, ever another way as it goes.
 WANDER_SD_M, WANDER_S = 2e-3, 0.15
@@ -80,7 +82,7 @@ def modes(
     observation: Observation,
     scene: Surroundings,
     is_filmed: bool = True,
-    across_sd_m: float = ACROSS_SD_M,
+    rough_sd_m: float = ROUGH_SD_M,
 ) -> np.ndarray:
     """The patterns times their standard deviations, `[mode, object, 2, frame]`, m.
 
@@ -94,7 +96,7 @@ def modes(
       observation: the track.
       scene: what it shows.
       is_filmed: whether a camera took it.
-      across_sd_m: of what bodies do across their path; to draw tracks, `WOBBLE_SD_M`.
+      rough_sd_m: allowed for across the path beside the wobble; 0 to draw tracks.
     """
     position = np.nan_to_num(observation.position_m)
     count, _, frames = position.shape
@@ -119,7 +121,7 @@ def modes(
                 step = np.zeros((count, 2, frames))
                 step[i, axis] = sd * share
                 found.append(step)
-    found.extend(across_path(observation, scene, across_sd_m))
+    found.extend(across_path(observation, scene, rough_sd_m))
     if not scene.has_surface and not scene.moves_in_plane:
         found.extend(_aside(position))
     found.extend(after_hits(position, observation, is_filmed))
@@ -177,27 +179,46 @@ def _lens(aside: np.ndarray, seen: np.ndarray) -> list[np.ndarray]:
 
 
 def across_path(
-    observation: Observation, scene: Surroundings, sd_m: float = ACROSS_SD_M
+    observation: Observation, scene: Surroundings, rough_sd_m: float = ROUGH_SD_M
 ) -> list[np.ndarray]:
-    """For each object a rough wobble across its path (an Ornstein-Uhlenbeck process).
+    """For each object what it does across its path: a wobble, and more that is not smooth.
 
-    None where no surface leads a body, nor where it is seen from above or in space.
+    The wobble is an Ornstein-Uhlenbeck process. None where no surface leads a body, nor where it
+    is seen from above or in space.
     """
     if not scene.has_surface or scene.is_level or observation.position_m.shape[1] != 2:
         return []
     position = np.nan_to_num(observation.position_m)
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    patterns = random_patterns(sd_m**2 * np.exp(-apart / WOBBLE_S))
+    wobble = WOBBLE_SD_M**2 * np.exp(-apart / WOBBLE_S)
     found = []
     for i, corner in enumerate(scene.corner_m):
-        is_on_ramp = scene.comes_down[i] & (position[i, 0] < corner) | (not scene.has_table)
+        x = position[i, 0]
+        is_on_ramp = np.broadcast_to(
+            scene.comes_down[i] & (x < corner) | (not scene.has_table), x.shape
+        )
         slope = np.where(is_on_ramp, scene.angle_rad, 0.0)
         normal = np.stack([np.sin(slope), np.cos(slope)])
-        for pattern in patterns:
-            wobble = np.zeros_like(position)
-            wobble[i] = pattern * normal
-            found.append(wobble)
+        for pattern in random_patterns(
+            wobble + rough_sd_m**2 * _not_smooth(x, is_on_ramp, observation.mask[i])
+        ):
+            away = np.zeros_like(position)
+            away[i] = pattern * normal
+            found.append(away)
     return found
+
+
+def _not_smooth(x: np.ndarray, is_on_ramp: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """`[frame, frame]`, what a cubic over the ramp and one over the table leave of a path.
+
+    The ramp's direction, and a tilt of the table, are in the cubics.
+    """
+    powers = np.vander((x - x.mean()) / max(float(np.ptp(x)), SAME_PLACE_M), SMOOTH_DEGREE + 1)
+    both = np.concatenate([powers * is_on_ramp[:, None], powers * ~is_on_ramp[:, None]], axis=1)
+    both = both * seen[:, None]
+    shapes, size, _ = np.linalg.svd(both, full_matrices=False)
+    shapes = shapes[:, size > ALIKE * size[0]]
+    return np.eye(len(x)) - shapes @ shapes.T
 
 
 def _bent_scale(y: np.ndarray, observation: Observation) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from galileo_jax.similarity import gaussian_likelihood
-from galileo_jax.similarity.discrepancy import WOBBLE_SD_M, crossings, modes
+from galileo_jax.similarity.discrepancy import crossings, modes
 from tests.precision import in_64_bit
 
 NUM_TRACKS = 16
@@ -40,10 +40,10 @@ def drawn(p_values, seed):
 def test_drawn_tracks_are_what_their_own_likelihood_says(p_values, monkeypatch):
     """At the truth whitened residuals are unit normal, whatever the patterns moved.
 
-    That is, if it allows for as much across the path as was drawn, and not for ten times that.
+    That is, if it allows for as much across the path as was drawn, and not for more.
     Where patterns were those of another track, a quarter of these were below 0.01, down to 1e-100.
     """
-    as_drawn = functools.partial(modes, across_sd_m=WOBBLE_SD_M)
+    as_drawn = functools.partial(modes, rough_sd_m=0.0)
     monkeypatch.setattr(gaussian_likelihood, "modes", as_drawn)
     chances = []
     for seed in range(NUM_TRACKS):
@@ -57,7 +57,7 @@ def test_drawn_tracks_are_what_their_own_likelihood_says(p_values, monkeypatch):
 def test_imperfections_are_as_large_as_the_likelihood_says(p_values):
     problem, _, away = drawn(p_values, 0)
     scene, seen = problem.model.scene.surroundings, problem.observation
-    allowed = modes(seen, scene, across_sd_m=WOBBLE_SD_M)
+    allowed = modes(seen, scene, rough_sd_m=0.0)
     patterns = np.concatenate([allowed, crossings(seen, scene)])
     flat = patterns.reshape(len(patterns), -1)
     amplitude, *_ = np.linalg.lstsq(flat.T, away.ravel(), rcond=None)

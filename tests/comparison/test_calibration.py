@@ -12,7 +12,7 @@ from galileo_jax.comparison.compare import compare
 from galileo_jax.inference.fits.gradient import GradientFitter, Settings
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
-from galileo_jax.similarity.discrepancy import WOBBLE_SD_M, crossings, modes
+from galileo_jax.similarity.discrepancy import crossings, modes
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -52,7 +52,7 @@ def draw_imperfections(trials, seed):
     """What the likelihood allows for beside the tracker's noise: modes, and the foot."""
     (problem,) = trials.problems
     seen, scene = problem.observation, problem.model.scene.surroundings
-    patterns = np.concatenate([modes(seen, scene, across_sd_m=WOBBLE_SD_M), crossings(seen, scene)])
+    patterns = np.concatenate([modes(seen, scene, rough_sd_m=0.0), crossings(seen, scene)])
     normal = np.random.default_rng([seed, 8]).standard_normal(len(patterns))
     return np.tensordot(normal, patterns, axes=1)
 

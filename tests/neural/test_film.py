@@ -9,7 +9,7 @@ import pytest
 
 from galileo_jax.neural.film import Bodies, filmed, noisy
 from galileo_jax.observation.observation import Observation
-from galileo_jax.similarity.discrepancy import WOBBLE_SD_M, modes
+from galileo_jax.similarity.discrepancy import modes
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
 
@@ -57,7 +57,7 @@ def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, x64):
         covariance_m2=covariance,
         mask=np.ones((2, FRAMES), bool),
     )
-    allowed = modes(observation, scene, across_sd_m=WOBBLE_SD_M)
+    allowed = modes(observation, scene, rough_sd_m=0.0)
     # Along x; offsets of a whole track are wider in the likelihood, and displacements lack them.
     for rows in (extra[:, 0, 0], extra[:, 1, 0], extra[:, 1, 0] - extra[:, 0, 0]):
         assert np.isfinite(rows).all()

@@ -12,6 +12,7 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, White
 from tests.ramp_model import HIT, make_surroundings
 
 FRAMES = 7
+NUM_DRAWS = 16_000
 SCENE = make_surroundings(HIT)
 
 
@@ -97,11 +98,13 @@ def test_loo_is_that_of_a_linear_model():
     exact = 0.5 * np.sum(np.log(diagonal / (2 * np.pi)) - (marginal @ y) ** 2 / diagonal)
     precision = np.linalg.inv(covariance)
     spread = np.linalg.inv(design.T @ precision @ design + np.diag(prior_sd**-2))
-    draws = rng.multivariate_normal(spread @ design.T @ precision @ y, spread, 4000)
-    difference = np.zeros((4000, data.observed_m.size))
+    draws = rng.multivariate_normal(spread @ design.T @ precision @ y, spread, NUM_DRAWS)
+    difference = np.zeros((NUM_DRAWS, data.observed_m.size))
     difference[:, chosen] = y - draws @ design.T
-    shaped = difference.reshape(4000, *data.observed_m.shape)
-    density = conditional_log_density(shaped, np.ones(4000), data).reshape(4000, -1)[:, chosen]
+    shaped = difference.reshape(NUM_DRAWS, *data.observed_m.shape)
+    density = conditional_log_density(shaped, np.ones(NUM_DRAWS), data).reshape(NUM_DRAWS, -1)[
+        :, chosen
+    ]
     az = arviz()
     like = az.from_dict(posterior={"b": draws[None]}, log_likelihood={"y": density[None]})
     with warnings.catch_warnings():

@@ -7,10 +7,11 @@ import pytest
 
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import (
-    ACROSS_SD_M,
     LENS_SD,
+    ROUGH_SD_M,
     WOBBLE_S,
     WOBBLE_SD_M,
+    across_path,
     modes,
 )
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -30,9 +31,12 @@ SCENE = make_surroundings(HIT)
 STOPS = replace(HIT, friction=(0.34, 0.2))  # before object 2
 
 
-def covariance(observation, across_sd_m=ACROSS_SD_M):
+def covariance(observation):
     """`[object, 2, frame, object, 2, frame]`, m^2."""
-    patterns = modes(observation, SCENE, across_sd_m=across_sd_m)
+    return covariance_of(modes(observation, SCENE))
+
+
+def covariance_of(patterns):
     return np.einsum("moit,mpju->oitpju", patterns, patterns)
 
 
@@ -50,21 +54,45 @@ def along_and_across(observation):
 
 
 def test_wobble_is_across_the_path_and_of_its_size(hit):
-    """The modes with it less those without: all of it across, none along."""
-    wobble = (covariance(hit) - covariance(hit, 0.0))[0, :, :, 0]
+    """All of it across, none along."""
+    wobble = covariance_of(np.array(across_path(hit, SCENE, rough_sd_m=0.0)))[0, :, :, 0]
     along, across = along_and_across(hit)
     frames = range(len(hit.times_s))
     for t in frames:
         assert across[:, t] @ wobble[:, t, :, t] @ across[:, t] == pytest.approx(
-            ACROSS_SD_M**2, rel=0.05
+            WOBBLE_SD_M**2, rel=0.05
         )
-        assert abs(along[:, t] @ wobble[:, t, :, t] @ along[:, t]) < 1e-3 * ACROSS_SD_M**2
+        assert abs(along[:, t] @ wobble[:, t, :, t] @ along[:, t]) < 1e-3 * WOBBLE_SD_M**2
     # Neighbours in time wobble together, and the ends of the clip do not.
     first, last = frames[0], frames[-1]
     near = across[:, first] @ wobble[:, first, :, first + 1] @ across[:, first + 1]
     far = across[:, first] @ wobble[:, first, :, last] @ across[:, last]
-    assert near > 0.8 * ACROSS_SD_M**2
-    assert abs(far) < 0.05 * ACROSS_SD_M**2
+    assert near > 0.8 * WOBBLE_SD_M**2
+    assert abs(far) < 0.05 * WOBBLE_SD_M**2
+
+
+def test_what_is_not_smooth_across_the_path_does_not_tell_the_noise(hit):
+    """To and fro every frame: beside what is allowed for, noise of half a millimetre is nothing."""
+    _, across = along_and_across(hit)
+    to_and_fro = across * (-1.0) ** np.arange(len(hit.times_s)) / np.sqrt(len(hit.times_s))
+    whole = covariance_of(np.array(across_path(hit, SCENE)))[0, :, :, 0]
+    assert np.einsum("it,itju,ju", to_and_fro, whole, to_and_fro) > 0.9 * ROUGH_SD_M**2
+
+
+@pytest.mark.parametrize("noise_m", [2e-5, 2e-4])
+def test_how_a_path_lies_is_known_as_if_nothing_were_rough(hit, noise_m):
+    """A ramp that is a degree steeper, and a table a degree aslant: what they stand out by."""
+    x, corner = hit.position_m[0, 0], SCENE.corner_m[0]
+    _, across = along_and_across(hit)
+    for piece in (x < corner, x >= corner):
+        away = (across * np.where(piece, np.deg2rad(1.0) * (x - corner), 0.0)).ravel()
+        noise = noise_m**2 * np.eye(len(away))
+        stands_out = []
+        for rough in (0.0, ROUGH_SD_M):
+            cover = covariance_of(np.array(across_path(hit, SCENE, rough)))[0, :, :, 0]
+            cover = cover.reshape(noise.shape) + noise
+            stands_out.append(away @ np.linalg.solve(cover, away))
+        assert stands_out[1] > 0.7 * stands_out[0] > 3.0
 
 
 def test_a_hit_loosens_only_what_follows(hit):
