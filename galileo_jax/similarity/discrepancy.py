@@ -190,7 +190,10 @@ def across_path(
         return []
     position = np.nan_to_num(observation.position_m)
     apart = np.abs(observation.times_s[:, None] - observation.times_s)
-    wobble = WOBBLE_SD_M**2 * np.exp(-apart / WOBBLE_S)
+    wobble = random_patterns(WOBBLE_SD_M**2 * np.exp(-apart / WOBBLE_S))
+    # What is faster than the wobble has no allowance: it is the tracker's noise alone.
+    size_m = np.linalg.norm(wobble, axis=1)
+    shapes = wobble / size_m[:, None]
     found = []
     for i, corner in enumerate(scene.corner_m):
         x = position[i, 0]
@@ -199,9 +202,9 @@ def across_path(
         )
         slope = np.where(is_on_ramp, scene.angle_rad, 0.0)
         normal = np.stack([np.sin(slope), np.cos(slope)])
-        for pattern in random_patterns(
-            wobble + rough_sd_m**2 * _not_smooth(x, is_on_ramp, observation.mask[i])
-        ):
+        rough = shapes @ _not_smooth(x, is_on_ramp, observation.mask[i]) @ shapes.T
+        every = random_patterns(np.diag(size_m**2) + rough_sd_m**2 * rough, smallest=0.0)
+        for pattern in every @ shapes:
             away = np.zeros_like(position)
             away[i] = pattern * normal
             found.append(away)
