@@ -11,13 +11,13 @@ from galileo_jax.diagnosis.candidate_starts import matched, scattered
 from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
 from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.gradient import GradientFitter, Settings
 from galileo_jax.model.effects.registry import make_effects
 from tests.precision import in_64_bit
 
 LIBRARY = ("air_drag", "friction_patch", "stribeck", "spring_tether", "viscous_drag")
 DECIDING_NATS = 12.8  # behind the best: what luck may make of 3 nats
-AGREES_NATS = 0.1
+AGREES_NATS = Settings().settled_in_turn  # a race is not followed any further
 SEEDS = {(): 911, ("air_drag",): 912, ("friction_patch",): 913}
 
 
