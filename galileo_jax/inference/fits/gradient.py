@@ -360,14 +360,13 @@ class GradientFitter:
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
         """Polishes z and variants of it; the most evident fit.
 
-        Where noise does not explain that, each positive nuisance is moved alone as well, as long
-        as that leads on: bodies that leave a gap need not be those that rebound little.
+        Each positive nuisance is moved alone as well, as long as that leads on: bodies that leave a
+        gap need not be those that rebound little. Noise may explain the fit all the same, for such
+        a misfit is one of two or three frames.
         """
         best = self._most_evident(self._variants(z, free), free, num_steps)
         own = np.flatnonzero(self._is_positive_nuisance & free)
         for _ in own if len(own) > 1 else ():
-            if self.is_explained(best):
-                break
             z, each = best.z[: self._count], np.eye(self._count, dtype=bool)[own]
             alone = [np.where(one, other, z) for one in each for other in VARIANTS_Z]
             found = self._most_evident(alone, free, num_steps)
