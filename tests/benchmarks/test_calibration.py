@@ -28,6 +28,7 @@ def test_no_rebound_and_gap_lead_to_a_better_fit(calibration):
     _, track = calibration.make_track("fine", SIDE_VALLEY, NOISE_M)
     found = fit(track, seed=SIDE_VALLEY)
     names, best = found.problem.names, found.gradient
+    assert best is not None
     count = len(best.steps)
     rebound, gap = names.index("impact_restitution"), names.index("contact_gap")
     starts = np.tile(best.z[:count], (len(STARTS_Z) ** 2, 1))
