@@ -172,8 +172,8 @@ class RoundFit(eqx.Module):
     def __call__(self, u: jax.Array) -> jax.Array:
         """The logarithm of that ratio."""
         z = self.mean + self.root @ u
-        volume = jnp.sum(jnp.log(jnp.abs(jnp.diag(self.root))))
-        return self.likelihood(z) + 0.5 * (jnp.sum(u**2) - jnp.sum(z**2)) + volume
+        log_volume = jnp.linalg.slogdet(self.root)[1]
+        return self.likelihood(z) + 0.5 * (jnp.sum(u**2) - jnp.sum(z**2)) + log_volume
 
 
 def smc(row: dict[str, Any], ways: Sequence[str], num_particles: int) -> dict[str, Any]:
@@ -214,12 +214,13 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     sure = [row for row in rows if row["far_k"] < RELIABLE_K]
     found["far_reliable"] = len(sure)
     by_way = {way: [row for row in rows if f"{way}1" in row] for way in ("smc", "wide")}
-    agreeing = {way: [row for row in some if _apart(row, way) <= BAR_NATS]
-                for way, some in by_way.items()}  # fmt: skip
+    smc, wide = (
+        [row for row in by_way[way] if _apart(row, way) <= BAR_NATS] for way in ("smc", "wide")
+    )
     pairs = (
         ("far", sure, lambda row: row["far"]),
-        ("smc", agreeing["smc"], lambda row: _mean(row, "smc")),
-        ("wide", agreeing["wide"], lambda row: _mean(row, "wide")),
+        ("smc", smc, lambda row: _mean(row, "smc")),
+        ("wide", wide, lambda row: _mean(row, "wide")),
     )
     for name in ("laplace", "weighed"):
         for other, some, value in pairs:

@@ -23,6 +23,7 @@ from galileo_jax.similarity.hit_discrepancy import (
     _speeds_at,
 )
 from galileo_jax.similarity.level_discrepancy import level_modes
+from galileo_jax.similarity.noise_scale import fitted_noise_scale
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
@@ -93,6 +94,17 @@ def test_how_a_path_lies_is_known_as_if_nothing_were_rough(hit, noise_m):
             cover = cover.reshape(noise.shape) + noise
             stands_out.append(away @ np.linalg.solve(cover, away))
         assert stands_out[1] > 0.7 * stands_out[0] > 3.0
+
+
+def test_ideal_tracks_have_the_noise_that_they_are_drawn_with():
+    """With a wobble as large as the noise, that is not there, a tenth was missing."""
+    found = []
+    for seed in range(12):
+        seen, clean = observe(HIT, seed, 2e-4), observe(HIT, seed, 0.0)
+        data = GaussianLikelihood.prepare(seen, SCENE)
+        left = GaussianLikelihood.whiten_batch(seen.position_m - clean.position_m, 1.0, data)
+        found.extend(fitted_noise_scale(left[None], np.ones(1), np.zeros(1), 1e3, data))
+    assert 0.93 < np.mean(found) < 1.02
 
 
 def test_a_hit_loosens_only_what_follows(hit):
