@@ -55,7 +55,9 @@ def track_clip(clip: Clip) -> Track:
     if passes == 3:
         square = _with_points(square, open_frames, advance)
     starts = [_start(square, item) for item in square.objects if item.point_px is not None]
-    found = track_video(open_frames, starts, clip.fps, advance=advance)
+    # Half a pixel of the picture is no half pixel of a view that is drawn anew.
+    coded = decode.predicted_from_before(video) if view is None else None
+    found = track_video(open_frames, starts, clip.fps, is_predicted=coded, advance=advance)
     return found if view is None else view.track(found, clip)
 
 

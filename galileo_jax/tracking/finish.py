@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
+from galileo_jax.tracking.motion_compensation import without_pull
 from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
     MEMORY_FRAMES,
@@ -40,7 +41,10 @@ class Finished:
 
 
 def finished(
-    fits: Sequence[list[Refined | None]], pieces: Sequence[Piece], shares: Sequence[float]
+    fits: Sequence[list[Refined | None]],
+    pieces: Sequence[Piece],
+    shares: Sequence[float],
+    is_predicted: np.ndarray,
 ) -> list[Finished]:
     """The pieces' tracks from their fits of every frame (None: not found).
 
@@ -48,11 +52,17 @@ def finished(
       fits: per piece, per frame.
       pieces: with the points to follow, each in its piece's first frame.
       shares: per piece, the open share of a frame's time.
+      is_predicted: `[frame]`, which frames a coder has predicted from the frame before them.
     """
     seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
     seen = [
         _at_mid_exposure(poses, noise, share, piece)
         for (poses, noise), piece, share in zip(seen, pieces, shares, strict=True)
+    ]
+    places = without_pull([(poses[:, :2], noise) for poses, noise in seen], is_predicted)
+    seen = [
+        (np.column_stack([place, poses[:, 2]]), noise)
+        for place, (poses, noise) in zip(places, seen, strict=True)
     ]
     excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
     return [

@@ -37,6 +37,7 @@ def track_video(
     starts: Sequence[Start],
     fps: float,
     *,
+    is_predicted: np.ndarray | None = None,
     advance: Callable[[Seen | None], None] = lambda _: None,
 ) -> Track:
     """Follows the point of each start through a video.
@@ -55,6 +56,8 @@ def track_video(
         grey); called again if the video is long.
       starts: at least one.
       fps: frames per second.
+      is_predicted: `[frame]`, which frames a coder has predicted from the frame before them, so
+        that motion compensation shifts what they show. None: none.
       advance: called after every frame of both passes (a progress bar), of the first one with
         what it has found.
     """
@@ -91,7 +94,8 @@ def track_video(
             found.append(refine_pose(picture, template, poses[index], velocities, share))
         advance(None)
 
-    done = finished(fits, [piece for _, piece in flat], shares)
+    coded = np.zeros(count, bool) if is_predicted is None else is_predicted[:count]
+    done = finished(fits, [piece for _, piece in flat], shares, coded)
     objects = [
         joined([one for (of, _), one in zip(flat, done, strict=True) if of == k], count)
         for k in range(len(starts))

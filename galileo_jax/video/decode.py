@@ -72,10 +72,9 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
     Raises `InputError` if the file is missing, empty, no video, a picture, or cut off; or if
     its frames are unevenly spaced, because then frame number / fps is not the time.
     """
-    found = path.stat() if path.is_file() else None
-    stamp = (found.st_mtime_ns, found.st_size, found.st_ino) if found is not None else ()
-    announced, container_fps, size_px, times_ms = _scanned(path, path.resolve(), *stamp)
-    count = len(times_ms)
+    scan = _scan(path)
+    announced, container_fps, size_px = scan.announced, scan.container_fps, scan.size_px
+    count = len(scan.times_ms)
     if count == 0:
         raise InputError(f"{path}: not one frame can be decoded; a video expected")
     if count < MIN_FRAMES:
@@ -92,7 +91,7 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
         )
     if missing > 0:
         warnings.append(f"{path}: {count} of {int(announced)} announced frames can be decoded")
-    _check_even_spacing(path, np.array(times_ms))
+    _check_even_spacing(path, np.array(scan.times_ms))
 
     fps = fps_declared or container_fps
     if fps <= 0:
@@ -103,6 +102,20 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
             f"{fps:g} is used"
         )
     return VideoInfo(count, size_px, fps, container_fps, tuple(warnings))
+
+
+def predicted_from_before(path: Path) -> np.ndarray:
+    """`[frame]`, bool: whether a frame was coded as what changes since the frame before it.
+
+    Not so are whole frames (I), frames that are predicted from both sides (B), and those that
+    follow them. Where a file does not say, frames count as predicted.
+
+    Raises `InputError` as `frames`.
+    """
+    kinds = np.array([chr(kind) if kind > 0 else "P" for kind in _scan(path).kinds])
+    is_predicted = kinds == "P"
+    is_predicted[1:] &= kinds[:-1] != "B"
+    return is_predicted
 
 
 @contextmanager
@@ -128,15 +141,28 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         capture.release()
 
 
-@functools.lru_cache(64)
-def _scanned(
-    path: Path, _whole: Path, *_stamp: int
-) -> tuple[float, float, tuple[int, int], tuple[float, ...]]:
-    """Frames announced, the container's rate, the frames' size and times, ms.
+@dataclass(frozen=True)
+class _Scan:
+    """Frames announced, the container's rate, the frames' size, times (ms) and kinds."""
 
-    Once for each content: who draws marks has the clip checked at every step.
-    """
+    announced: float
+    container_fps: float
+    size_px: tuple[int, int]
+    times_ms: tuple[float, ...]
+    kinds: tuple[int, ...]  # the letter's code; 0: not known
+
+
+def _scan(path: Path) -> _Scan:
+    found = path.stat() if path.is_file() else None
+    stamp = (found.st_mtime_ns, found.st_size, found.st_ino) if found is not None else ()
+    return _scanned(path, path.resolve(), *stamp)
+
+
+@functools.lru_cache(64)
+def _scanned(path: Path, _whole: Path, *_stamp: int) -> _Scan:
+    """Once for each content: who draws marks has the clip checked at every step."""
     times_ms: list[float] = []
+    kinds: list[int] = []
     with _opened(path) as capture:
         announced = capture.get(cv2.CAP_PROP_FRAME_COUNT)
         container_fps = max(capture.get(cv2.CAP_PROP_FPS), 0.0)
@@ -148,7 +174,8 @@ def _scanned(
                     break
                 size_px = (frame.shape[1], frame.shape[0])
             times_ms.append(capture.get(cv2.CAP_PROP_POS_MSEC))
-    return announced, container_fps, size_px, tuple(times_ms)
+            kinds.append(int(capture.get(cv2.CAP_PROP_FRAME_TYPE)))
+    return _Scan(announced, container_fps, size_px, tuple(times_ms), tuple(kinds))
 
 
 def _check_even_spacing(path: Path, times_ms: np.ndarray) -> None:

@@ -40,7 +40,7 @@ def followed(steps_px: np.ndarray) -> Finished:
         Refined(np.array([at, 40.0, 0.0]), FIRST_PX2 if i == 0 else NOISE_PX2, 0.99, 0.0, 0.0)
         for i, at in enumerate(x)
     ]
-    (found,) = finished([list(fits)], [Whole()], [SHUTTER])
+    (found,) = finished([list(fits)], [Whole()], [SHUTTER], np.zeros(len(x), bool))
     return found
 
 

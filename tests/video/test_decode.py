@@ -1,5 +1,6 @@
 import os
 import tracemalloc
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -35,6 +36,24 @@ def test_frames_are_bgr_in_order(video: Path) -> None:
     # The square moves one pixel per frame on grey ground.
     left = [int((np.abs(frame[92].astype(int) - 128).sum(axis=1) > 60).argmax()) for frame in seen]
     assert np.allclose(left, 20 + np.arange(24), atol=2)
+
+
+def test_whole_frames_are_told_from_predicted_ones(video: Path, tmp_path: Path) -> None:
+    whole = np.flatnonzero(~decode.predicted_from_before(video))
+    np.testing.assert_array_equal(whole, [0, 12])  # as often as OpenCV's MPEG-4 has them
+    # MJPEG codes every frame for itself.
+    assert not decode.predicted_from_before(write_video(tmp_path / "clip.avi")).any()
+
+
+def test_frames_predicted_from_both_sides_do_not_count(
+    video: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scan = decode._scan(video)  # pyright: ignore[reportPrivateUsage]
+    for kinds, expected in (("IPPBPP", "011001"), ("IBBPP", "00001"), ("\0\0", "11")):
+        there = replace(scan, kinds=tuple(map(ord, kinds)))
+        monkeypatch.setattr(decode, "_scan", lambda _, there=there: there)
+        found = decode.predicted_from_before(video)
+        assert "".join("1" if one else "0" for one in found) == expected
 
 
 def test_frames_keep_one_frame_in_memory(tmp_path: Path) -> None:

@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+
+from galileo_jax.tracking.motion_compensation import (
+    STEPS_PER_PX,
+    pull_amplitudes_px,
+    without_pull,
+)
+
+NOISE_PX, FRAMES = 0.01, 90
+TIME = np.arange(float(FRAMES))
+ACCELERATED = np.stack([0.7 * TIME + 0.031 * TIME**2, 0.3 * TIME + 0.012 * TIME**2], axis=1)
+
+
+def seen(path, amplitudes, is_predicted, rng):
+    """The path as a coder shows it: e of the displacement from what the frame before showed."""
+    shown = path + NOISE_PX * rng.standard_normal(path.shape)
+    for t in range(1, len(path)):
+        if is_predicted[t]:
+            true, before = shown[t].copy(), shown[t - 1]
+            for _ in range(50):  # e depends on where the object is shown
+                phase = 2 * np.pi * STEPS_PER_PX * (shown[t] - before)[:, None]
+                shown[t] = true + np.sin(phase) @ amplitudes
+    return shown, np.tile(0.005**2 * np.eye(2), (len(path), 1, 1))
+
+
+def coded(frames=FRAMES, whole=12):
+    return np.arange(frames) % whole != 0
+
+
+@pytest.mark.parametrize("amplitudes", [(-0.03, 0.0), (0.0, -0.02), (-0.02, -0.01), (0.0, 0.0)])
+def test_amplitudes_of_a_coder_are_found(amplitudes):
+    rng = np.random.default_rng(1)
+    found = [
+        pull_amplitudes_px(
+            [seen(path, np.array(amplitudes), coded(), rng) for path in both], coded()
+        )
+        for both in [(ACCELERATED, 1.1 * ACCELERATED)] * 20
+    ]
+    np.testing.assert_allclose(np.mean(found, axis=0), amplitudes, atol=0.003)
+    np.testing.assert_allclose(np.std(found, axis=0), 0.0, atol=0.004)
+
+
+def test_places_are_nearer_to_the_truth_and_their_errors_independent():
+    rng = np.random.default_rng(2)
+    before, after, neighbours = 0.0, 0.0, 0.0
+    for _ in range(20):
+        place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
+        (mended,) = without_pull([(place, noise)], coded())
+        wrong, left = place - ACCELERATED, mended - ACCELERATED
+        before, after = before + np.sum(wrong**2), after + np.sum(left**2)
+        neighbours += np.sum(left[1:] * left[:-1])
+    assert np.sqrt(after / before) < 0.6  # noise alone: 0.42
+    assert abs(neighbours / after) < 0.1
+
+
+def test_whole_frames_and_what_rests_stay():
+    rng = np.random.default_rng(3)
+    place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
+    (mended,) = without_pull([(place, noise)], coded())
+    np.testing.assert_array_equal(mended[::12], place[::12])
+    resting = np.tile([30.0, 40.0], (FRAMES, 1))
+    (alone,) = without_pull([(resting, noise)], coded())
+    np.testing.assert_array_equal(alone, resting)
+
+
+@pytest.mark.parametrize("speed", [3.0, 3.1, 3.25])
+def test_noise_of_a_steady_motion_is_not_smoothed_away(speed):
+    """All displacements lie alike between half pixels there, and noise is all that varies."""
+    rng = np.random.default_rng(4)
+    noise = 0.02 * rng.standard_normal((60, 2))
+    place = speed * np.arange(60.0)[:, None] + noise
+    (mended,) = without_pull([(place, np.tile(1e-4**2 * np.eye(2), (60, 1, 1)))], coded(60))
+    assert np.std(mended - place + noise) == pytest.approx(np.std(noise), rel=0.1)
+
+
+def test_gaps_and_short_tracks_are_left_as_they_are():
+    noise = np.tile(0.005**2 * np.eye(2), (FRAMES, 1, 1))
+    place = ACCELERATED.copy()
+    place[20:24] = np.nan
+    (mended,) = without_pull([(place, noise)], coded())
+    np.testing.assert_array_equal(np.isnan(mended), np.isnan(place))
+    (short,) = without_pull([(place[:5], noise[:5])], coded(5))
+    np.testing.assert_array_equal(short, place[:5])
+    (empty,) = without_pull([(place[:0], noise[:0])], coded(0))
+    assert empty.shape == (0, 2)
