@@ -56,9 +56,11 @@ def without_pull(
     """
     amplitudes_px = pull_amplitudes_px(paths, is_predicted)
     found = []
-    for place, _ in paths:
-        pull = _patterns(_displacement(place), is_predicted) @ amplitudes_px
-        found.append(place - pull)
+    for place, covariance in paths:
+        step = _displacement(place)
+        pull = _patterns(step, is_predicted) @ amplitudes_px
+        # What does not move is shown where it was; noise in its steps would only add noise.
+        found.append(place - np.where(_moves(step, covariance), pull, 0.0))
     return found
 
 
