@@ -3,6 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
 from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.pieces import Start
 from galileo_jax.tracking.square_view import square_view
 from galileo_jax.tracking.template import Outline, grey
@@ -55,9 +57,10 @@ def track_clip(clip: Clip) -> Track:
     if passes == 3:
         square = _with_points(square, open_frames, advance)
     starts = [_start(square, item) for item in square.objects if item.point_px is not None]
-    # Half a pixel of the picture is no half pixel of a view that is drawn anew.
-    coded = decode.predicted_from_before(video) if view is None else None
-    found = track_video(open_frames, starts, clip.fps, is_predicted=coded, advance=advance)
+    coding = Coding(decode.predicted_from_before(video))
+    if view is not None:
+        coding = replace(coding, to_coded=view.to_picture, from_coded=view.from_picture)
+    found = track_video(open_frames, starts, clip.fps, coding=coding, advance=advance)
     return found if view is None else view.track(found, clip)
 
 

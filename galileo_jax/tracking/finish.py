@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
-from galileo_jax.tracking.motion_compensation import without_pull
+from galileo_jax.tracking.motion_compensation import Coding, without_pull
 from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
     MEMORY_FRAMES,
     SAMPLING_SD_PX,
     blow_shift,
     is_in_motion,
+    motion_scale2,
     motion_variance,
 )
 from galileo_jax.tracking.pieces import Piece
@@ -44,7 +45,7 @@ def finished(
     fits: Sequence[list[Refined | None]],
     pieces: Sequence[Piece],
     shares: Sequence[float],
-    is_predicted: np.ndarray,
+    coding: Coding,
 ) -> list[Finished]:
     """The pieces' tracks from their fits of every frame (None: not found).
 
@@ -52,14 +53,14 @@ def finished(
       fits: per piece, per frame.
       pieces: with the points to follow, each in its piece's first frame.
       shares: per piece, the open share of a frame's time.
-      is_predicted: `[frame]`, which frames a coder has predicted from the frame before them.
+      coding: of the frames.
     """
     seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
     seen = [
         _at_mid_exposure(poses, noise, share, piece)
         for (poses, noise), piece, share in zip(seen, pieces, shares, strict=True)
     ]
-    places = without_pull([(poses[:, :2], noise) for poses, noise in seen], is_predicted)
+    places = without_pull([(poses[:, :2], noise) for poses, noise in seen], coding)
     seen = [
         (np.column_stack([place, poses[:, 2]]), noise)
         for place, (poses, noise) in zip(places, seen, strict=True)
@@ -129,6 +130,8 @@ def _anchored(
     frames = np.flatnonzero(np.isfinite(poses[:, 0]))
     moves = is_in_motion(poses[frames, :2], noise[frames])
     covariance[frames] += np.einsum("fi,ij->fij", moves * excess, np.eye(2))
+    scale = np.sqrt(np.where(moves, motion_scale2(poses[:, :2], covariance), 1.0))
+    covariance[frames] *= scale[:, :, None] * scale[:, None, :]
 
     first_frame, point_px = piece.first_frame, np.array(piece.point_px)
     first_fit = fits[first_frame] if first_frame < len(fits) else None

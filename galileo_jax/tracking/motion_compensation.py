@@ -21,7 +21,8 @@ Processing Magazine 15 (1998) 74, doi:10.1109/79.733497 (motion-compensated pred
 what was measured: docs/explanation/tracking.md.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -44,23 +45,45 @@ MOVED_SDS = 4.0
 """As in `noise`: a step of more standard deviations is a motion."""
 
 
+def _same(place_px: np.ndarray) -> np.ndarray:
+    return place_px
+
+
+@dataclass(frozen=True)
+class Coding:
+    """How the frames that are tracked were coded.
+
+    Attributes:
+      is_predicted: `[frame]`, which frames a coder has predicted from the frame before them.
+      to_coded: pixels of the frames that are tracked, `[*, 2]`, to those that were coded.
+      from_coded: the way back.
+    """
+
+    is_predicted: Bool[np.ndarray, " frame"]
+    to_coded: Callable[[np.ndarray], np.ndarray] = _same
+    from_coded: Callable[[np.ndarray], np.ndarray] = _same
+
+
 def without_pull(
     paths: Sequence[tuple[Float[np.ndarray, "frame 2"], Float[np.ndarray, "frame 2 2"]]],
-    is_predicted: Bool[np.ndarray, " frame"],
+    coding: Coding,
 ) -> list[Float[np.ndarray, "frame 2"]]:
     """The places of all objects without what motion compensation shifts them.
 
     Args:
       paths: per object `place`, px, and `covariance` of image noise, px^2; NaN where not visible.
-      is_predicted: which frames are predicted from the frame before them.
+      coding: of as many frames or more.
     """
-    amplitudes_px = pull_amplitudes_px(paths, is_predicted)
+    shown = [(coding.to_coded(place), covariance) for place, covariance in paths]
+    amplitudes_px = pull_amplitudes_px(shown, coding.is_predicted)
     found = []
-    for place, covariance in paths:
-        step = _displacement(place)
-        pull = _patterns(step, is_predicted) @ amplitudes_px
+    for (place, _), (coded, covariance) in zip(paths, shown, strict=True):
+        step = _displacement(coded)
+        pull = _patterns(step, coding.is_predicted[: len(step)]) @ amplitudes_px
         # What does not move is shown where it was; noise in its steps would only add noise.
-        found.append(place - np.where(_moves(step, covariance), pull, 0.0))
+        shift = np.where(_moves(step, covariance), pull, 0.0)
+        is_shifted = shift.any(axis=1, keepdims=True)
+        found.append(np.where(is_shifted, coding.from_coded(coded - shift), place))
     return found
 
 
@@ -78,8 +101,8 @@ def pull_amplitudes_px(
     places, patterns, slopes = [], [], []
     for place, covariance in paths:
         step = _displacement(place)
-        pattern = _patterns(step, is_predicted)
-        slope = _slopes(step, is_predicted)
+        pattern = _patterns(step, is_predicted[: len(step)])
+        slope = _slopes(step, is_predicted[: len(step)])
         moves = _moves(step, covariance)
         for axis in range(2):
             for own in _pieces(moves[:, axis]):

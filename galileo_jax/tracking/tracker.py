@@ -9,6 +9,7 @@ import numpy as np
 from galileo_jax.tracking.exposure import LEARNT_FRAMES, Exposure
 from galileo_jax.tracking.finish import finished, joined
 from galileo_jax.tracking.follower import Follower
+from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pieces import Piece, Start, follow_on, keep_apart
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
@@ -37,7 +38,7 @@ def track_video(
     starts: Sequence[Start],
     fps: float,
     *,
-    is_predicted: np.ndarray | None = None,
+    coding: Coding | None = None,
     advance: Callable[[Seen | None], None] = lambda _: None,
 ) -> Track:
     """Follows the point of each start through a video.
@@ -56,8 +57,7 @@ def track_video(
         grey); called again if the video is long.
       starts: at least one.
       fps: frames per second.
-      is_predicted: `[frame]`, which frames a coder has predicted from the frame before them, so
-        that motion compensation shifts what they show. None: none.
+      coding: how the frames were coded. None: each for itself.
       advance: called after every frame of both passes (a progress bar), of the first one with
         what it has found.
     """
@@ -94,8 +94,8 @@ def track_video(
             found.append(refine_pose(picture, template, poses[index], velocities, share))
         advance(None)
 
-    coded = np.zeros(count, bool) if is_predicted is None else is_predicted[:count]
-    done = finished(fits, [piece for _, piece in flat], shares, coded)
+    coding = coding or Coding(np.zeros(count, bool))
+    done = finished(fits, [piece for _, piece in flat], shares, coding)
     objects = [
         joined([one for (of, _), one in zip(flat, done, strict=True) if of == k], count)
         for k in range(len(starts))

@@ -7,6 +7,7 @@ from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
     blow_shift,
     is_in_motion,
+    motion_scale2,
     motion_variance,
 )
 from galileo_jax.tracking.picture import Picture
@@ -102,6 +103,20 @@ def test_scatter_beyond_the_stated_noise_is_found_along_the_motion_only():
     assert y < 1e-4
     x, _ = motion_variance([(shaken, stated + 0.05**2 * np.eye(2))])
     assert x < 0.03**2
+
+
+def test_an_object_that_scatters_otherwise_than_is_stated_says_so():
+    rng = np.random.default_rng(8)
+    time = np.arange(400.0)
+    path = np.stack([1.0 * time + 0.01 * time**2, 0 * time], axis=1)
+    stated = np.tile(0.02**2 * np.eye(2), (400, 1, 1))
+    for own in (0.01, 0.02, 0.03):
+        shaken = path + own * rng.standard_normal(path.shape)
+        x, y = motion_scale2(shaken, stated)
+        assert x == pytest.approx((own / 0.02) ** 2, rel=0.3)
+        assert y == 1.0  # nothing moves there
+    few, _ = motion_scale2(shaken[:8], stated[:8])
+    assert few == 1.0
 
 
 def test_blows_are_not_taken_for_scatter():

@@ -9,6 +9,7 @@ import pytest
 
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.tracking.finish import Finished, finished, joined
+from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.noise import MEMORY_FRAMES, SAMPLING_SD_PX
 from galileo_jax.tracking.pieces import Piece
 from galileo_jax.tracking.refiner import Refined, velocities_at
@@ -40,7 +41,7 @@ def followed(steps_px: np.ndarray) -> Finished:
         Refined(np.array([at, 40.0, 0.0]), FIRST_PX2 if i == 0 else NOISE_PX2, 0.99, 0.0, 0.0)
         for i, at in enumerate(x)
     ]
-    (found,) = finished([list(fits)], [Whole()], [SHUTTER], np.zeros(len(x), bool))
+    (found,) = finished([list(fits)], [Whole()], [SHUTTER], Coding(np.zeros(len(x), bool)))
     return found
 
 
