@@ -57,14 +57,10 @@ def finished(
     """
     seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
     # A coder sees what is shown, before anything else is put right.
-    places = without_pull([(poses[:, :2], noise) for poses, noise in seen], coding)
-    seen = [
-        (np.column_stack([place, poses[:, 2]]), noise)
-        for place, (poses, noise) in zip(places, seen, strict=True)
-    ]
+    mended = without_pull(seen, coding)
     seen = [
         _at_mid_exposure(poses, noise, share, piece)
-        for (poses, noise), piece, share in zip(seen, pieces, shares, strict=True)
+        for poses, (_, noise), piece, share in zip(mended, seen, pieces, shares, strict=True)
     ]
     excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
     return [

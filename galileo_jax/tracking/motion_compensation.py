@@ -41,6 +41,8 @@ MOST_ALIKE = 0.8
 phasor), a piece tells nothing."""
 SLOPE_MOST = 0.9
 """Of e': beyond 1, two places of the object would give the same picture."""
+TURNS_RAD = 0.01
+"""From a frame to the next: a third of a pixel at the rim of a middling object."""
 MOVED_SDS = 4.0
 """As in `noise`: a step of more standard deviations is a motion."""
 
@@ -65,25 +67,29 @@ class Coding:
 
 
 def without_pull(
-    paths: Sequence[tuple[Float[np.ndarray, "frame 2"], Float[np.ndarray, "frame 2 2"]]],
+    paths: Sequence[tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame 2 2"]]],
     coding: Coding,
-) -> list[Float[np.ndarray, "frame 2"]]:
-    """The places of all objects without what motion compensation shifts them.
+) -> list[Float[np.ndarray, "frame 3"]]:
+    """The poses of all objects without what motion compensation shifts them.
 
     Args:
-      paths: per object `place`, px, and `covariance` of image noise, px^2; NaN where not visible.
+      paths: per object the poses x, y, px, and angle, rad, as the frames show them, and `covariance`
+        of image noise, px^2; NaN where not visible.
       coding: of as many frames or more.
     """
-    shown = [(coding.to_coded(place), covariance) for place, covariance in paths]
+    shown = [(coding.to_coded(poses[:, :2]), covariance) for poses, covariance in paths]
     amplitudes_px = pull_amplitudes_px(shown, coding.is_predicted)
     found = []
-    for (place, _), (coded, covariance) in zip(paths, shown, strict=True):
+    for (poses, _), (coded, covariance) in zip(paths, shown, strict=True):
         step = _displacement(coded)
         pull = _patterns(step, coding.is_predicted[: len(step)]) @ amplitudes_px
-        # What does not move is shown where it was; noise in its steps would only add noise.
-        shift = np.where(_moves(step, covariance), pull, 0.0)
+        # What does not move is shown where it was, and noise in its steps would only add noise.
+        # What turns no shifted block predicts, so that it is coded anew.
+        is_turning = np.abs(np.diff(poses[:, 2:], axis=0, prepend=np.nan)) > TURNS_RAD
+        shift = np.where(_moves(step, covariance) & ~is_turning, pull, 0.0)
         is_shifted = shift.any(axis=1, keepdims=True)
-        found.append(np.where(is_shifted, coding.from_coded(coded - shift), place))
+        place = np.where(is_shifted, coding.from_coded(coded - shift), poses[:, :2])
+        found.append(np.column_stack([place, poses[:, 2]]))
     return found
 
 

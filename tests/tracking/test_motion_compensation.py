@@ -25,6 +25,14 @@ def seen(path, amplitudes, is_predicted, rng):
     return shown, np.tile(0.005**2 * np.eye(2), (len(path), 1, 1))
 
 
+def mended_places(paths, coding, angle_rad=0.0):
+    poses = [
+        (np.column_stack([place, np.broadcast_to(angle_rad, len(place))]), noise)
+        for place, noise in paths
+    ]
+    return [found[:, :2] for found in without_pull(poses, coding)]
+
+
 def coded(frames=FRAMES, whole=12):
     return np.arange(frames) % whole != 0
 
@@ -50,7 +58,7 @@ def test_places_are_nearer_to_the_truth_and_their_errors_independent():
     before, after, neighbours = 0.0, 0.0, 0.0
     for _ in range(20):
         place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
-        (mended,) = without_pull([(place, noise)], CODING)
+        (mended,) = mended_places([(place, noise)], CODING)
         wrong, left = place - ACCELERATED, mended - ACCELERATED
         before, after = before + np.sum(wrong**2), after + np.sum(left**2)
         neighbours += np.sum(left[1:] * left[:-1])
@@ -61,10 +69,10 @@ def test_places_are_nearer_to_the_truth_and_their_errors_independent():
 def test_whole_frames_and_what_rests_stay():
     rng = np.random.default_rng(3)
     place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
-    (mended,) = without_pull([(place, noise)], CODING)
+    (mended,) = mended_places([(place, noise)], CODING)
     np.testing.assert_array_equal(mended[::12], place[::12])
     resting = np.tile([30.0, 40.0], (FRAMES, 1))
-    (alone,) = without_pull([(resting, noise)], CODING)
+    (alone,) = mended_places([(resting, noise)], CODING)
     np.testing.assert_array_equal(alone, resting)
 
 
@@ -74,7 +82,9 @@ def test_noise_of_a_steady_motion_is_not_smoothed_away(speed):
     rng = np.random.default_rng(4)
     noise = 0.02 * rng.standard_normal((60, 2))
     place = speed * np.arange(60.0)[:, None] + noise
-    (mended,) = without_pull([(place, np.tile(1e-4**2 * np.eye(2), (60, 1, 1)))], Coding(coded(60)))
+    (mended,) = mended_places(
+        [(place, np.tile(1e-4**2 * np.eye(2), (60, 1, 1)))], Coding(coded(60))
+    )
     assert np.std(mended - place + noise) == pytest.approx(np.std(noise), rel=0.1)
 
 
@@ -82,11 +92,11 @@ def test_gaps_and_short_tracks_are_left_as_they_are():
     noise = np.tile(0.005**2 * np.eye(2), (FRAMES, 1, 1))
     place = ACCELERATED.copy()
     place[20:24] = np.nan
-    (mended,) = without_pull([(place, noise)], CODING)
+    (mended,) = mended_places([(place, noise)], CODING)
     np.testing.assert_array_equal(np.isnan(mended), np.isnan(place))
-    (short,) = without_pull([(place[:5], noise[:5])], Coding(coded(5)))
+    (short,) = mended_places([(place[:5], noise[:5])], Coding(coded(5)))
     np.testing.assert_array_equal(short, place[:5])
-    (empty,) = without_pull([(place[:0], noise[:0])], Coding(coded(0)))
+    (empty,) = mended_places([(place[:0], noise[:0])], Coding(coded(0)))
     assert empty.shape == (0, 2)
 
 
@@ -94,6 +104,16 @@ def test_a_view_that_is_drawn_anew_is_mended_in_the_pixels_that_were_coded():
     rng = np.random.default_rng(5)
     place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
     view = Coding(coded(), lambda px: px / 1.3 - 7.0, lambda px: 1.3 * (px + 7.0))
-    (plain,) = without_pull([(place, noise)], CODING)
-    (mended,) = without_pull([(view.from_coded(place), noise)], view)
+    (plain,) = mended_places([(place, noise)], CODING)
+    (mended,) = mended_places([(view.from_coded(place), noise)], view)
     np.testing.assert_allclose(view.to_coded(mended), plain, atol=1e-6)
+
+
+def test_what_turns_is_coded_anew():
+    rng = np.random.default_rng(6)
+    place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
+    angle = np.where(TIME < 45, 0.0, 0.05 * (TIME - 45))
+    (turning,) = mended_places([(place, noise)], CODING, angle)
+    (plain,) = mended_places([(place, noise)], CODING)
+    np.testing.assert_array_equal(turning[:46], plain[:46])
+    np.testing.assert_array_equal(turning[46:], place[46:])
