@@ -3,7 +3,7 @@
     1. From the fit, draw data: the predicted positions, and errors from the covariance with
        which they were fitted, the modes as large as they are in the data (the likelihood allows
        for imperfections that a good clip need not have); and draw the prior's centre, which is
-       data, too. In a film the errors of what moves follow each other now and then.
+       data, too.
     2. Refit each replicate: Gauss-Newton steps with the fit's Jacobian, each checked with true
        rollouts, so that no residual is taken from a linear model.
 
@@ -21,11 +21,6 @@ from galileo_jax.inference.problem import Problem
 from galileo_jax.similarity.noise_scale import mode_covariance
 
 NUM_STEPS = 4
-# In so many tracks of an object along an axis a coder's errors in motion follow each other: so much
-# of their variance, over so many frames. Rounded from a mixture fitted once to the errors of 60
-# rendered films (docs/history/verdicts.md, Alarms of films). Which tracks they are, a clip hardly
-# tells; a fit takes all to be independent, as most are.
-FOLLOW_OFTEN, FOLLOW_SHARE, FOLLOW_FRAMES = 0.2, 0.9, 2.0
 
 
 def whitened(trials: JointProblem, theta: np.ndarray, noise_scale: np.ndarray) -> list[np.ndarray]:
@@ -48,7 +43,6 @@ def replicates(
     fit: GradientFit,
     noise_scale: np.ndarray,
     mode_size: Sequence[float],
-    wanders: Sequence[np.ndarray],
     count: int,
     seed: int,
 ) -> list[np.ndarray]:
@@ -59,7 +53,6 @@ def replicates(
       fit: whose hypothesis, parameters and Jacobian are taken as true.
       noise_scale: `[clip]`, at which residuals are whitened; the fit's own may differ.
       mode_size: of each clip, the modes' amplitudes over their sd.
-      wanders: of each clip `[object, frame]`, where tracking errors may follow each other.
       count: how many.
       seed: of the draws.
     """
@@ -79,9 +72,9 @@ def replicates(
     ]
     noise = np.concatenate(
         [
-            _errors(problem, scale, size, where, count, generator) * mask
-            for problem, scale, size, where, mask in zip(
-                trials.problems, noise_scale, mode_size, wanders, masks, strict=True
+            _errors(problem, scale, size, count, generator) * mask
+            for problem, scale, size, mask in zip(
+                trials.problems, noise_scale, mode_size, masks, strict=True
             )
         ],
         axis=1,
@@ -111,18 +104,13 @@ def _errors(
     problem: Problem,
     noise_scale: float,
     mode_size: float,
-    wanders: np.ndarray,
     count: int,
     generator: np.random.Generator,
 ) -> np.ndarray:
     """Whitened errors of a clip, `[replicate, value]`: the tracker's, and modes of a size."""
     data, errors = problem.data, problem.errors_in_full
     gain2, basis = data.gain**2, data.basis.reshape(len(data.gain), -1)
-    shape = (count, *problem.observation.position_m.shape)
-    found = generator.standard_normal(shape)
-    if wanders.any():
-        _follow_each_other(found, wanders, generator)
-    found = found.reshape(count, -1)
+    found = generator.standard_normal((count, problem.observation.position_m.size))
     along = generator.standard_normal((count, len(gain2)))
     if errors is None:
         along = along * (mode_size * data.gain)
@@ -133,24 +121,6 @@ def _errors(
     own = found @ basis.T
     left = noise_scale / np.sqrt(noise_scale**2 + gain2)
     return found + ((own + along / noise_scale) * left - own) @ basis
-
-
-def _follow_each_other(
-    errors: np.ndarray, wanders: np.ndarray, generator: np.random.Generator
-) -> None:
-    """Lets errors `[replicate, object, axis, frame]` follow each other, in some of the first three.
-
-    Args:
-      errors: independent standard normal numbers; changed where they follow each other.
-      wanders: `[object, frame]`, where they may.
-      generator: of what is drawn.
-    """
-    frames = errors.shape[-1]
-    apart = np.abs(np.subtract.outer(np.arange(frames), np.arange(frames)))
-    cover = FOLLOW_SHARE * np.exp(-apart / FOLLOW_FRAMES) + (1 - FOLLOW_SHARE) * np.eye(frames)
-    chosen = generator.random(errors.shape[:-1]) < FOLLOW_OFTEN
-    where = np.broadcast_to(wanders[None, :, None], errors.shape)[chosen]
-    errors[chosen] = np.where(where, errors[chosen] @ np.linalg.cholesky(cover).T, errors[chosen])
 
 
 def _at(

@@ -22,7 +22,7 @@ from scipy.special import ndtr
 
 from galileo_jax.comparison.bootstrap import replicates, whitened
 from galileo_jax.comparison.local_tests import Cell, find_cells, statistics
-from galileo_jax.comparison.phases import PHASES, phases
+from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
 from galileo_jax.inference.result import error_of
@@ -42,7 +42,6 @@ ABSORBED = 0.9
 # Of the chance of a false alarm, how much is spent on the nuisances. They are far inside their
 # priors in most clips, so that an equal share would cost the residuals half of theirs.
 PULL_SHARE = 0.05
-AT_REST = PHASES.index("at rest")
 
 
 @dataclass(frozen=True)
@@ -121,11 +120,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         for white, scale, problem in zip(measured, scales, trials.problems, strict=True)
     ]
     labels = [phases(each, trials.of_clip(theta, c)) for c, each in enumerate(trials.problems)]
-    wanders = [
-        (label != AT_REST) & problem.observation.is_filmed
-        for label, problem in zip(labels, trials.problems, strict=True)
-    ]
-    drawn = replicates(trials, fit, scales, sizes, wanders, NUM_REPLICATES, seed)
+    drawn = replicates(trials, fit, scales, sizes, NUM_REPLICATES, seed)
     cells = []
     for clip, (problem, label) in enumerate(zip(trials.problems, labels, strict=True)):
         observation = problem.observation

@@ -145,7 +145,7 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         assert clip.track is not None  # load_clip requires one of the two
         return _to_last(clip, read_track(clip.path, clip.track, clip, clip.fps).observation), None
     pixels = track_once(clip)
-    observation = with_noise_at_rest(replace(observe(clip, pixels), is_filmed=True))
+    observation = with_noise_at_rest(observe(clip, pixels))
     observation = with_camera_modes(clip, observation, pixels)
     return with_turning(observation) if clip.turning else observation, pixels
 

@@ -28,7 +28,6 @@ class Observation:
         shift with which a coder holds what has come to rest; None where there are none.
       num_errors: how many of `modes_m`, the last, are errors that follow each other in time: unlike
         imperfections, which a good clip need not have, these are there.
-      is_filmed: tracked here, in a video.
       is_turning: the third axis is how far each object has turned, rad, not a place.
       turned_rad: `[object, frame]`, how far each puck has turned by its picture, counter-clockwise:
         to know how it starts, not to be fitted; NaN where nothing shows it, None where nobody
@@ -45,7 +44,6 @@ class Observation:
     modes_m: Float[np.ndarray, "mode object 2 frame"] | None = None
     is_squared: bool = False
     num_errors: int = 0
-    is_filmed: bool = False
     is_turning: bool = False
     turned_rad: Float[np.ndarray, "object frame"] | None = None
     wander_m: float | None = None

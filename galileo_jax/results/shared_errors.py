@@ -14,7 +14,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import replacing
 
 ERRORS = "errors.npz"
-FLAGS = ("is_squared", "is_filmed", "num_errors")
+FLAGS = ("is_squared", "num_errors")
 NOTHING = np.zeros((0, 0, 0, 0))
 
 
@@ -30,7 +30,6 @@ def save_shared_errors(folder: Path, observation: Observation) -> None:
             path,
             modes_m=modes,
             is_squared=observation.is_squared,
-            is_filmed=observation.is_filmed,
             num_errors=observation.num_errors,
         )
 
@@ -41,11 +40,10 @@ def with_shared_errors(folder: Path, observation: Observation) -> Observation:
         return observation
     with np.load(folder / ERRORS) as file:
         modes = file["modes_m"]
-        squared, filmed, num_errors = (int(file[name]) for name in FLAGS)
+        squared, num_errors = (int(file[name]) for name in FLAGS)
     return replace(
         observation,
         modes_m=modes if modes.size else None,
         is_squared=bool(squared),
-        is_filmed=bool(filmed),
         num_errors=num_errors,
     )

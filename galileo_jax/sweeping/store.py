@@ -33,7 +33,7 @@ from galileo_jax.sweeping.work import PAGE, CellResult, MeasuredClip
 
 RESULT, FAILURE = "result.json", "failure.json"
 ARRAYS = ("times_s", "position_m", "covariance_m2", "mask")
-FLAGS = ("is_squared", "is_turning", "is_filmed")
+FLAGS = ("is_squared", "is_turning")
 
 
 class Store:

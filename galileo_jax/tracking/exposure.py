@@ -15,8 +15,9 @@ UNLEARNT = (0.0, 0.25, 0.5)
 LEARNT_FRAMES = 3
 SAME_MOTION_PX = 0.3
 """Motions during the exposure that differ by less are not tried separately."""
-MAX_FRAMES = 24
-"""After so many moving frames the share is known to some percent; more would only take time."""
+ENOUGH_PX2 = 15e3
+"""After moving frames whose speeds' squares add up to this, the share is known to some percent;
+more would only take time. A slow object needs more frames than a fast one."""
 
 
 def own_motion(velocity: np.ndarray, angle_rad: float) -> np.ndarray:
@@ -43,6 +44,7 @@ class Exposure:
     def __init__(self) -> None:
         self.misfit = np.zeros(len(SHARES))
         self.frames = 0
+        self.told_px2 = 0.0
 
     @property
     def share(self) -> float:
@@ -74,10 +76,12 @@ class Exposure:
         A template that is smeared itself tells by how much more or less the picture is, not how
         long the shutter is open.
         """
-        is_slow = np.hypot(*velocity[:2]) < MIN_SPEED_PX
-        if is_slow or not template.is_sharp or self.frames >= MAX_FRAMES:
+        speed_px = float(np.hypot(*velocity[:2]))
+        is_slow, is_enough = speed_px < MIN_SPEED_PX, self.told_px2 >= ENOUGH_PX2
+        if is_slow or not template.is_sharp or is_enough:
             return
         self.frames += 1
+        self.told_px2 += speed_px**2
         motion = own_motion(velocity, pose[2])
         for i, share in enumerate(SHARES):
             fit = align(picture, template.target(share * motion, FINE_PX), pose, steps=1)

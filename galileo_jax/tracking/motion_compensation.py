@@ -73,8 +73,8 @@ def without_pull(
     """The poses of all objects without what motion compensation shifts them.
 
     Args:
-      paths: per object the poses x, y, px, and angle, rad, as the frames show them, and `covariance`
-        of image noise, px^2; NaN where not visible.
+      paths: per object the poses as the frames show them (x and y in px, angle in rad) and
+        `covariance` of image noise, px^2; NaN where not visible.
       coding: of as many frames or more.
     """
     shown = [(coding.to_coded(poses[:, :2]), covariance) for poses, covariance in paths]

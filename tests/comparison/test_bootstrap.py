@@ -21,16 +21,11 @@ def fitted():
         return trials, GradientFitter(trials).fit(0)
 
 
-def still(trials):
-    """Errors of which none follow each other."""
-    return [np.zeros_like(problem.observation.mask) for problem in trials.problems]
-
-
 def squares(trials, fit, num_steps=bootstrap.NUM_STEPS):
     """Sums of the replicates' squared residuals after so many steps of the refit."""
     with in_64_bit(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(bootstrap, "NUM_STEPS", num_steps)
-        (white,) = bootstrap.replicates(trials, fit, np.ones(1), [1.0], still(trials), COUNT, 0)
+        (white,) = bootstrap.replicates(trials, fit, np.ones(1), [1.0], COUNT, 0)
     return np.sum(white**2, axis=1)
 
 
@@ -72,23 +67,3 @@ def test_a_jacobian_that_does_not_hold_makes_no_wild_replicates(fitted, noise):
     left = squares(trials, replace(fit, jacobian=0.1 * fit.jacobian))
     # A step is only taken if it lowers the cost, in which the prior counts as well.
     assert np.max(left - noise) < 3 * np.count_nonzero(fit.free)
-
-
-def test_errors_that_follow_each_other_do_so_where_they_may(fitted):
-    """Their variance stays, their neighbours go together; at rest they are independent."""
-    trials, _ = fitted
-    count, (objects, frames) = 400, trials.problems[0].observation.mask.shape
-    moves = np.zeros((objects, frames), bool)
-    moves[0, : frames // 2] = True
-    generator = np.random.default_rng(3)
-    errors = generator.standard_normal((count, objects, 2, frames))
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(bootstrap, "FOLLOW_OFTEN", 1.0)
-        bootstrap._follow_each_other(errors, moves, generator)
-    lags = np.mean(errors[..., 1:] * errors[..., :-1], axis=(0, 2))
-    assert np.mean(errors**2) == pytest.approx(1.0, abs=0.05)
-    half = frames // 2
-    expected = bootstrap.FOLLOW_SHARE * np.exp(-1 / bootstrap.FOLLOW_FRAMES)
-    assert lags[0, : half - 1].mean() == pytest.approx(expected, abs=0.05)
-    assert lags[0, half:].mean() == pytest.approx(0.0, abs=0.05)
-    assert lags[1].mean() == pytest.approx(0.0, abs=0.05)

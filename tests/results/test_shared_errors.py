@@ -12,16 +12,16 @@ from tests.ramp_model import HIT
 def test_modes_and_where_the_track_is_from_come_back(tmp_path):
     plain = observe(HIT, 0)
     modes = np.random.default_rng(0).standard_normal((3, *plain.position_m.shape))
-    seen = replace(plain, modes_m=modes, num_errors=2, is_filmed=True, is_squared=True)
+    seen = replace(plain, modes_m=modes, num_errors=2, is_squared=True)
     save_shared_errors(tmp_path, seen)
     found = with_shared_errors(tmp_path, plain)
     assert found.modes_m is not None and (found.modes_m == modes).all()
-    assert (found.num_errors, found.is_filmed, found.is_squared) == (2, True, True)
+    assert (found.num_errors, found.is_squared) == (2, True)
 
 
 def test_a_track_without_any_leaves_no_file(tmp_path):
     plain = observe(HIT, 0)
-    save_shared_errors(tmp_path, replace(plain, is_filmed=True))
+    save_shared_errors(tmp_path, replace(plain, is_squared=True))
     assert (tmp_path / ERRORS).is_file()
     save_shared_errors(tmp_path, plain)
     assert not (tmp_path / ERRORS).exists()

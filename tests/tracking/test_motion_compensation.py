@@ -9,6 +9,7 @@ from galileo_jax.tracking.motion_compensation import (
 )
 
 NOISE_PX, FRAMES = 0.01, 90
+STILL = np.zeros(1)
 TIME = np.arange(float(FRAMES))
 ACCELERATED = np.stack([0.7 * TIME + 0.031 * TIME**2, 0.3 * TIME + 0.012 * TIME**2], axis=1)
 
@@ -25,7 +26,7 @@ def seen(path, amplitudes, is_predicted, rng):
     return shown, np.tile(0.005**2 * np.eye(2), (len(path), 1, 1))
 
 
-def mended_places(paths, coding, angle_rad=0.0):
+def mended_places(paths, coding, angle_rad=STILL):
     poses = [
         (np.column_stack([place, np.broadcast_to(angle_rad, len(place))]), noise)
         for place, noise in paths
