@@ -27,7 +27,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
 from galileo_jax.tracking import motion_compensation
 from galileo_jax.tracking.clip import track_clip
-from galileo_jax.tracking.motion_compensation import pull_amplitudes_px
+from galileo_jax.tracking.motion_compensation import coding_shift_amplitudes_px
 
 OPTIONS = {
     "mpeg4": None,  # as `simulate` writes it
@@ -102,7 +102,7 @@ def errors(path: Path) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
     found: list[np.ndarray] = []
 
     def watched(*given: Any) -> np.ndarray:
-        found.append(pull_amplitudes_px(*given))
+        found.append(coding_shift_amplitudes_px(*given))
         return found[-1]
 
     def none(*_: Any) -> np.ndarray:
@@ -110,7 +110,7 @@ def errors(path: Path) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
 
     both = []
     for search in (none, watched):
-        with patch.object(motion_compensation, "pull_amplitudes_px", search):
+        with patch.object(motion_compensation, "coding_shift_amplitudes_px", search):
             track = track_clip(clip)
         stretches = []
         for i in range(len(track.names)):

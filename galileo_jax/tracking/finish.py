@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
-from galileo_jax.tracking.motion_compensation import Coding, without_pull
+from galileo_jax.tracking.motion_compensation import Coding, without_coding_shift
 from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
     MEMORY_FRAMES,
@@ -57,7 +57,7 @@ def finished(
     """
     seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
     # A coder sees what is shown, before anything else is put right.
-    mended = without_pull(seen, coding)
+    mended = without_coding_shift(seen, coding)
     seen = [
         _at_mid_exposure(poses, noise, share, piece)
         for poses, (_, noise), piece, share in zip(mended, seen, pieces, shares, strict=True)

@@ -66,7 +66,7 @@ class Coding:
     from_coded: Callable[[np.ndarray], np.ndarray] = _same
 
 
-def without_pull(
+def without_coding_shift(
     paths: Sequence[tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame 2 2"]]],
     coding: Coding,
 ) -> list[Float[np.ndarray, "frame 3"]]:
@@ -78,22 +78,22 @@ def without_pull(
       coding: of as many frames or more.
     """
     shown = [(coding.to_coded(poses[:, :2]), covariance) for poses, covariance in paths]
-    amplitudes_px = pull_amplitudes_px(shown, coding.is_predicted)
+    amplitudes_px = coding_shift_amplitudes_px(shown, coding.is_predicted)
     found = []
     for (poses, _), (coded, covariance) in zip(paths, shown, strict=True):
         step = _displacement(coded)
-        pull = _patterns(step, coding.is_predicted[: len(step)]) @ amplitudes_px
+        predicted = _patterns(step, coding.is_predicted[: len(step)]) @ amplitudes_px
         # What does not move is shown where it was, and noise in its steps would only add noise.
         # What turns no shifted block predicts, so that it is coded anew.
         is_turning = np.abs(np.diff(poses[:, 2:], axis=0, prepend=np.nan)) > TURNS_RAD
-        shift = np.where(_moves(step, covariance) & ~is_turning, pull, 0.0)
+        shift = np.where(_moves(step, covariance) & ~is_turning, predicted, 0.0)
         is_shifted = shift.any(axis=1, keepdims=True)
         place = np.where(is_shifted, coding.from_coded(coded - shift), poses[:, :2])
         found.append(np.column_stack([place, poses[:, 2]]))
     return found
 
 
-def pull_amplitudes_px(
+def coding_shift_amplitudes_px(
     paths: Sequence[tuple[Float[np.ndarray, "frame 2"], Float[np.ndarray, "frame 2 2"]]],
     is_predicted: Bool[np.ndarray, " frame"],
 ) -> Float[np.ndarray, " step"]:

@@ -4,8 +4,8 @@ import pytest
 from galileo_jax.tracking.motion_compensation import (
     STEPS_PER_PX,
     Coding,
-    pull_amplitudes_px,
-    without_pull,
+    coding_shift_amplitudes_px,
+    without_coding_shift,
 )
 
 NOISE_PX, FRAMES = 0.01, 90
@@ -31,7 +31,7 @@ def mended_places(paths, coding, angle_rad=STILL):
         (np.column_stack([place, np.broadcast_to(angle_rad, len(place))]), noise)
         for place, noise in paths
     ]
-    return [found[:, :2] for found in without_pull(poses, coding)]
+    return [found[:, :2] for found in without_coding_shift(poses, coding)]
 
 
 def coded(frames=FRAMES, whole=12):
@@ -45,7 +45,7 @@ CODING = Coding(coded())
 def test_amplitudes_of_a_coder_are_found(amplitudes):
     rng = np.random.default_rng(1)
     found = [
-        pull_amplitudes_px(
+        coding_shift_amplitudes_px(
             [seen(path, np.array(amplitudes), coded(), rng) for path in both], coded()
         )
         for both in [(ACCELERATED, 1.1 * ACCELERATED)] * 20
