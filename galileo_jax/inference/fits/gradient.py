@@ -44,6 +44,7 @@ ELSEWHERE_Z = (-2.0, -1.0, 1.0, 2.0)  # of what a fit leaves open: elsewhere it 
 FAR_SDS = 8.0  # from a fit that tells a parameter: there it should be far worse (32 nats)
 UNTOLD_SD_Z = 0.9  # of the prior's 1: a parameter left so open does not show
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
+CROSSED_Z = (-3.0, 1.0)  # one of them next to nothing, the others a lot
 ALONG_Z = np.linspace(-2.0, 2.5, 19)  # of a positive nuisance: where another valley may begin
 LEADS_ON = 1.0  # nats: less is no other valley
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
@@ -360,16 +361,18 @@ class GradientFitter:
     def _best_variant(self, z: np.ndarray, free: np.ndarray, num_steps: int) -> GradientFit:
         """Polishes z and variants of it; the most evident fit.
 
-        Each positive nuisance is moved alone as well, as long as that leads on: bodies that leave a
-        gap need not be those that rebound little. Noise may explain the fit all the same, for such
-        a misfit is one of two or three frames.
+        Each positive nuisance is moved alone as well, and against the others, as long as that leads
+        on: bodies that leave a gap need not be those that rebound little. Noise may explain the fit
+        all the same, for such a misfit is one of two or three frames.
         """
         best = self._most_evident(self._variants(z, free), free, num_steps)
         own = np.flatnonzero(self._is_positive_nuisance & free)
         for _ in own if len(own) > 1 else ():
             z, each = best.z[: self._count], np.eye(self._count, dtype=bool)[own]
             alone = [np.where(one, other, z) for one in each for other in VARIANTS_Z]
-            found = self._most_evident(alone, free, num_steps)
+            little, lot = CROSSED_Z
+            crossed = [np.where(one, little, np.where(each.any(axis=0), lot, z)) for one in each]
+            found = self._most_evident([*alone, *crossed], free, num_steps)
             if not _evidence(found) - _evidence(best) > LEADS_ON:  # nor if both failed
                 break
             best = found
