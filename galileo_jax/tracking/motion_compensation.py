@@ -28,6 +28,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize
 
+from galileo_jax.tracking.noise import has_moved
+
 STEPS_PER_PX = np.array([2.0, 4.0])
 USUAL_PX = 0.03
 """Prior standard deviation of the amplitudes: those of rendered MPEG-4 were 0.03 px."""
@@ -43,8 +45,6 @@ SLOPE_MOST = 0.9
 """Of e': beyond 1, two places of the object would give the same picture."""
 TURNS_RAD = 0.01
 """From a frame to the next: a third of a pixel at the rim of a middling object."""
-MOVED_SDS = 4.0
-"""As in `noise`: a step of more standard deviations is a motion."""
 
 
 def _same(place_px: np.ndarray) -> np.ndarray:
@@ -86,7 +86,7 @@ def without_coding_shift(
         # What does not move is shown where it was, and noise in its steps would only add noise.
         # What turns no shifted block predicts, so that it is coded anew.
         is_turning = np.abs(np.diff(poses[:, 2:], axis=0, prepend=np.nan)) > TURNS_RAD
-        shift = np.where(_moves(step, covariance) & ~is_turning, predicted, 0.0)
+        shift = np.where(_moves(coded, covariance) & ~is_turning, predicted, 0.0)
         is_shifted = shift.any(axis=1, keepdims=True)
         place = np.where(is_shifted, coding.from_coded(coded - shift), poses[:, :2])
         found.append(np.column_stack([place, poses[:, 2]]))
@@ -109,7 +109,7 @@ def coding_shift_amplitudes_px(
         step = _displacement(place)
         pattern = _patterns(step, is_predicted[: len(step)])
         slope = _slopes(step, is_predicted[: len(step)])
-        moves = _moves(step, covariance)
+        moves = _moves(place, covariance)
         for axis in range(2):
             for own in _pieces(moves[:, axis]):
                 if _alike(step[own, axis]) < MOST_ALIKE:
@@ -169,12 +169,11 @@ def _slopes(
 
 
 def _moves(
-    step: Float[np.ndarray, "frame 2"], covariance: Float[np.ndarray, "frame 2 2"]
+    place: Float[np.ndarray, "frame 2"], covariance: Float[np.ndarray, "frame 2 2"]
 ) -> Bool[np.ndarray, "frame 2"]:
-    """Whether the step into a frame is beyond noise; a NaN compares False."""
-    variance = np.einsum("fii->fi", covariance)
-    before = np.concatenate([variance[:1], variance[:-1]])
-    return step**2 > MOVED_SDS**2 * (variance + before)
+    """Whether the step into a frame is beyond noise."""
+    steps = has_moved(place, np.einsum("fii->fi", covariance))
+    return np.pad(steps, ((len(place) - len(steps), 0), (0, 0)))
 
 
 def _pieces(moves: Bool[np.ndarray, " frame"]) -> list[slice]:

@@ -28,6 +28,10 @@ MAX_MISSING_SHARE = 0.02
 """Frames announced but not decodable that are only warned of: containers miscount by one or two."""
 
 
+UNKNOWN_KINDS = (0, ord("?"))
+"""What OpenCV gives for the kind of a frame where the file does not say."""
+
+
 @dataclass(frozen=True)
 class VideoInfo:
     """What decoding a whole video showed.
@@ -112,7 +116,9 @@ def predicted_from_before(path: Path) -> np.ndarray:
 
     Raises `InputError` as `frames`.
     """
-    kinds = np.array([chr(kind) if kind > 0 else "P" for kind in _scan(path).kinds])
+    kinds = np.array(
+        [chr(kind) if kind not in UNKNOWN_KINDS else "P" for kind in _scan(path).kinds]
+    )
     is_predicted = kinds == "P"
     is_predicted[1:] &= kinds[:-1] != "B"
     return is_predicted
@@ -149,7 +155,7 @@ class _Scan:
     container_fps: float
     size_px: tuple[int, int]
     times_ms: tuple[float, ...]
-    kinds: tuple[int, ...]  # the letter's code; 0: not known
+    kinds: tuple[int, ...]  # the letter's code
 
 
 def _scan(path: Path) -> _Scan:

@@ -49,7 +49,12 @@ def test_frames_predicted_from_both_sides_do_not_count(
     video: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scan = decode._scan(video)  # pyright: ignore[reportPrivateUsage]
-    for kinds, expected in (("IPPBPP", "011001"), ("IBBPP", "00001"), ("\0\0", "11")):
+    for kinds, expected in (
+        ("IPPBPP", "011001"),
+        ("IBBPP", "00001"),
+        ("\0\0", "11"),
+        ("I??", "011"),
+    ):
         there = replace(scan, kinds=tuple(map(ord, kinds)))
         monkeypatch.setattr(decode, "_scan", lambda _, there=there: there)
         found = decode.predicted_from_before(video)
