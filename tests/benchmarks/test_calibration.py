@@ -12,7 +12,8 @@ from galileo_jax.inference.fits.gradient import GradientFitter
 from tests.precision import in_64_bit
 
 # Noise explains the fit of a valley beside the best, by 6 nats: what it misses are two frames.
-SIDE_VALLEY, NOISE_M = 360030, 1e-5
+# From that of the video only less of one and more of the other lead on, by 104 nats.
+SIDE_VALLEYS, NOISE_M = (("fine", 360030), ("rendered-faults", 370047)), 1e-5
 STARTS_Z = (-2.0, 0.0, 1.0)
 SAME_NATS = 0.5
 
@@ -24,9 +25,10 @@ def calibration():
         yield importlib.import_module("calibration")
 
 
-def test_no_rebound_and_gap_lead_to_a_better_fit(calibration):
-    _, track = calibration.make_track("fine", SIDE_VALLEY, NOISE_M)
-    found = fit(track, seed=SIDE_VALLEY)
+@pytest.mark.parametrize(("sort", "seed"), SIDE_VALLEYS)
+def test_no_rebound_and_gap_lead_to_a_better_fit(calibration, sort, seed):
+    _, track = calibration.make_track(sort, seed, NOISE_M)
+    found = fit(track, seed=seed)
     names, best = found.problem.names, found.gradient
     assert best is not None
     count = len(best.steps)
