@@ -8,11 +8,11 @@ other than OpenCV's MPEG-4 need `pip install imageio-ffmpeg`. The last line is J
 """
 
 import argparse
+import itertools
 import json
 import subprocess
 import tempfile
-from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
@@ -24,10 +24,12 @@ import tables
 from tracking import true_points
 
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.schema import Clip
 from galileo_jax.commands import command
 from galileo_jax.tracking import motion_compensation
 from galileo_jax.tracking.clip import track_clip
 from galileo_jax.tracking.motion_compensation import coding_shift_amplitudes_px
+from galileo_jax.tracking.track import Track
 
 OPTIONS = {
     "mpeg4": None,  # as `simulate` writes it
@@ -45,16 +47,17 @@ def main(argv: Sequence[str]) -> int | None:
     tables.row("coder", ("sd before", "sd", "lag1 before", "lag1", "half px", "quarter px"))
     figures = {}
     for name in call.only or OPTIONS:
-        parts: dict[bool, list[np.ndarray]] = defaultdict(list)
-        amplitudes = []
+        amplitudes: list[np.ndarray] = []
+        plain: list[np.ndarray] = []
+        mended: list[np.ndarray] = []
         for seed in range(call.seed, call.seed + call.num):
             with tempfile.TemporaryDirectory() as folder:
                 path = filmed(Path(folder), seed, OPTIONS[name])
-                found, plain, mended = errors(path)
+                found, without, with_it = errors(path)
             amplitudes.append(found)
-            parts[False] += plain
-            parts[True] += mended
-        before, after = scatter(parts[False]), scatter(parts[True])
+            plain += without
+            mended += with_it
+        before, after = scatter(plain), scatter(mended)
         half, quarter = np.median(amplitudes, axis=0)
         row = (before[0], after[0], before[1], after[1], half, quarter)
         tables.row(name, [float(value) for value in row])
@@ -98,7 +101,6 @@ def filmed(folder: Path, seed: int, options: Sequence[str] | None) -> Path:
 def errors(path: Path) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
     """The amplitudes, px, and the errors of each stretch, px, without and with the correction."""
     clip, record = load_clip(path), json.loads(path.with_suffix(".truth.json").read_text())
-    events = [time * clip.fps for time in map(record["events_s"].get, ("foot", "hit")) if time]
     found: list[np.ndarray] = []
 
     def watched(*given: Any) -> np.ndarray:
@@ -111,23 +113,25 @@ def errors(path: Path) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
     both = []
     for search in (none, watched):
         with patch.object(motion_compensation, "coding_shift_amplitudes_px", search):
-            track = track_clip(clip)
-        stretches = []
-        for i in range(len(track.names)):
-            true = true_points(clip, record, i)[: len(track.times_s)]
-            frames = np.arange(len(true))
-            error = track.position_px[i, : len(true)] - true
-            near = np.any([abs(frames - event) < NEAR_FRAMES for event in events], axis=0)
-            usable = track.is_visible[i, : len(true)] & ~near
-            part = np.searchsorted(events, frames)
-            moves = np.abs(np.diff(true, axis=0, prepend=true[:1])) > MOVES_PX
-            for axis in range(2):
-                for number in range(len(events) + 1):
-                    own = usable & moves[:, axis] & (part == number)
-                    if own.sum() >= FEWEST:
-                        stretches.append(error[own, axis] - error[own, axis].mean())
-        both.append(stretches)
+            both.append(list(stretches(clip, record, track_clip(clip))))
     return found[0], both[0], both[1]
+
+
+def stretches(clip: Clip, record: dict[str, Any], track: Track) -> Iterator[np.ndarray]:
+    """Errors of what moves along an axis between two events, px, less their mean."""
+    events = [time * clip.fps for time in map(record["events_s"].get, ("foot", "hit")) if time]
+    for i in range(len(track.names)):
+        true = true_points(clip, record, i)[: len(track.times_s)]
+        frames = np.arange(len(true))
+        error = track.position_px[i, : len(true)] - true
+        near = np.any([abs(frames - event) < NEAR_FRAMES for event in events], axis=0)
+        usable = track.is_visible[i, : len(true)] & ~near
+        moves = np.abs(np.diff(true, axis=0, prepend=true[:1])) > MOVES_PX
+        part = np.searchsorted(events, frames)
+        for axis, number in itertools.product(range(2), range(len(events) + 1)):
+            own = usable & moves[:, axis] & (part == number)
+            if own.sum() >= FEWEST:
+                yield error[own, axis] - error[own, axis].mean()
 
 
 def scatter(stretches: Sequence[np.ndarray]) -> tuple[float, float]:
