@@ -26,10 +26,11 @@ from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.base_again import better_base
 from galileo_jax.diagnosis.candidates import Hypothesis, reduced
-from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Round, Verdict
+from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Reason, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.fitted_pairs import (
+    best_of_each,
     fitted_pairs,
     pairs_from_base,
     pairs_like_the_best,
@@ -42,8 +43,9 @@ from galileo_jax.diagnosis.library_again import singles_beside, singles_of_pairs
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
 from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.second_effect import (
-    promised_by_a_second,
-    promises_of_seconds,
+    NearPair,
+    contesting_pairs,
+    pairs_near,
     with_second,
 )
 from galileo_jax.diagnosis.slow_errors import unless_slow_errors
@@ -135,17 +137,9 @@ def diagnose(
     compared: dict[tuple[str, ...], Comparison] = {}
     decisive = decisive_margin(is_adequate)
     candidates = _compared(trials, candidates, decisive, seed, compared)
-    must = needs_pairs(candidates)
-    promises = [] if must else promises_of_seconds(race, candidates, library)
-    second = promised_by_a_second(promises)
-    if must or second is not None:
-        on_stage("fitting pairs of effects")
-        pairs = fitted_pairs(race, candidates, library)
-        form, single = form_that_leads(candidates), best_named(candidates)
-        if pairs and second is not None:
-            why = (*why, reasons.pairs_promised(single, second, len(pairs)))
-        elif pairs:
-            why = (*why, reasons.pairs_tried(single, form, len(pairs)))
+    pairs, near, because = _pairs(race, candidates, library, decisive, on_stage)
+    why = (*why, *because)
+    if pairs:
         for candidate in pairs:
             on_candidate(candidate)
         on_stage("comparing the best pairs with the data")
@@ -172,10 +166,10 @@ def diagnose(
         on_stage("inferring the missing force")
         # Where much is missing, friction without it is far from the truth: to 0, say. Beside a
         # wrong effect it may be so, too.
-        near = reduced(trials, candidates[0].hypothesis, ())
-        views = views_of(trials, near, base)
+        start = reduced(trials, candidates[0].hypothesis, ())
+        views = views_of(trials, start, base)
         on_stage("looking for a law: comparing formulas with the missing force")
-        laws = law_candidates(trials, base, near, views, len(library), candidates, on_stage)
+        laws = law_candidates(trials, base, start, views, len(library), candidates, on_stage)
         for candidate in ranked(laws):
             on_candidate(candidate)
         both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
@@ -195,7 +189,7 @@ def diagnose(
         verdict = _or_pair(trials, verdict, candidates, decisive, on_stage)
         verdict = unless_slow_errors(trials, base, verdict, candidates, decisive)
     verdict = with_known_constants(trials, verdict, candidates, seed)
-    verdict = with_second(verdict, candidates, promises)
+    verdict = with_second(verdict, candidates, near)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
@@ -228,6 +222,33 @@ def diagnose(
 def fitter_of(trials: JointProblem) -> GradientFitter:
     """What fits all hypotheses."""
     return GradientFitter(trials)
+
+
+def _pairs(
+    race: Race,
+    candidates: Sequence[Candidate],
+    library: Sequence[str],
+    decisive: float,
+    on_stage: Callable[[str], None],
+) -> tuple[Sequence[Candidate], list[NearPair], list[Reason]]:
+    """Pairs of effects that may explain the data, fitted; pairs that come near; and why these."""
+    form, single = form_that_leads(candidates), best_named(candidates)
+    if needs_pairs(candidates):
+        on_stage("fitting pairs of effects")
+        pairs = fitted_pairs(race, candidates, library)
+        return pairs, [], [reasons.pairs_tried(single, form, len(pairs))] if pairs else []
+    on_stage("looking at pairs of effects that could be confused with it")
+    near = pairs_near(race, candidates, library, decisive)
+    pairs: Sequence[Candidate] = contesting_pairs(race, candidates, near, decisive)
+    if any(pair.log_odds > single.log_odds for pair in pairs):
+        pairs = best_of_each([*pairs, *fitted_pairs(race, candidates, library)])
+    if pairs:
+        return pairs, near, [reasons.pairs_beside(single, len(near), len(pairs))]
+    if near:
+        first, behind = near[0], single.log_odds - near[0].log_odds
+        contested = reasons.no_pair_contests(single, "+".join(first.effects), behind, len(near))
+        return [], near, [contested]
+    return [], [], []
 
 
 def _judged(

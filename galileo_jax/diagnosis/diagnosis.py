@@ -96,25 +96,6 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Promise:
-    """What a second effect would add to one of the best single ones, as far as its slope tells.
-
-    Attributes:
-      beside: the name of that.
-      effect: its own.
-      nats: by which both have more evidence than the best single one.
-      price: nats by which two effects are less probable than one, before the data.
-      gain: by which both have more evidence than the one that it stands beside.
-    """
-
-    beside: str
-    effect: str
-    nats: float
-    price: float
-    gain: float
-
-
-@dataclass(frozen=True)
 class Reason:
     """A rule of the verdict that fired.
 

@@ -67,7 +67,7 @@ def fitted_pairs(
             break
     for _ in range(NUM_ROUNDS):
         best = ranked(made)[0]
-        made = _best_of_each([*made, *_in_its_place(race, best, library)])
+        made = best_of_each([*made, *_in_its_place(race, best, library)])
         if ranked(made)[0].effects == best.effects:
             break
     known = {frozenset(c.effects) for c in made}
@@ -141,7 +141,7 @@ def _in_its_place(race: Race, best: Candidate, library: Sequence[str]) -> list[C
     return race(bases, sets, starts) if sets else []
 
 
-def _best_of_each(made: Sequence[Candidate]) -> list[Candidate]:
+def best_of_each(made: Sequence[Candidate]) -> list[Candidate]:
     """Of fits of the same effects the one with the most evidence."""
     found: dict[frozenset[str], Candidate] = {}
     for one in sorted(made, key=lambda c: c.log_evidence):

@@ -67,14 +67,14 @@ class Race:
             known = [*(made.hypothesis for made in self._made.values()), *hypotheses]
             if not any(self.fitter.is_explained(one.fit) for one in known):
                 return np.ones(len(hypotheses), bool)  # any fit may yet be the one that does
-            log_odds = np.array([self._log_odds(one) for one in hypotheses])
+            log_odds = np.array([self.log_odds(one) for one in hypotheses])
             is_form = np.array(
                 [any(name in FORM_NAMES for name in one.effects) for one in hypotheses]
             )
             return may_decide(log_odds, is_form, best, decisive, self.is_adequate)
 
         def needs_mending(hypotheses: Sequence[Hypothesis]) -> np.ndarray:
-            log_odds = np.array([self._log_odds(one) for one in hypotheses])
+            log_odds = np.array([self.log_odds(one) for one in hypotheses])
             close = is_close_call(log_odds, best, decisive, self.is_adequate)
             if close.any() and self.base.weighed is None:
                 _, found = mended(self.fitter, [self.base.fit], self.seed, None)
@@ -105,7 +105,8 @@ class Race:
             for one in found
         ]
 
-    def _log_odds(self, hypothesis: Hypothesis) -> float:
+    def log_odds(self, hypothesis: Hypothesis) -> float:
+        """Over the model without effects, nats."""
         return self._log_evidence(hypothesis) + self._log_prior(hypothesis)
 
     def _log_evidence(self, hypothesis: Hypothesis) -> float:

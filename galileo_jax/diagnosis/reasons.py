@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import exp, log
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
-from galileo_jax.diagnosis.diagnosis import Candidate, Promise, Reason
+from galileo_jax.diagnosis.diagnosis import Candidate, Reason
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.model.effects.forms.form import Form
 
@@ -100,28 +100,46 @@ def pairs_tried(single: Candidate, form: Candidate | None, count: int) -> Reason
     )
 
 
-def pairs_promised(single: Candidate, second: Promise, count: int) -> Reason:
-    """Why pairs were tried although a single effect leaves only noise.
+def pairs_beside(single: Candidate, num_near: int, count: int) -> Reason:
+    """Which pairs were tried although a single effect leaves only noise.
 
     Args:
       single: the best effect alone.
-      second: what another one promises beside it, or beside one of the next.
-      count: how many pairs.
+      num_near: how many pairs a short search of all brought near.
+      count: how many of them were fitted.
     """
     return Reason(
-        "pairs_promised",
-        f"{single.title} explains the data ({p_equals(single.p_value or 0.0)}), but "
-        f"{second.beside} together with {second.effect} may make them "
-        f"{times_text(second.nats)} as probable (two effects are {times_text(second.price)} less "
-        f"probable than one before the data), so {count} pairs of effects were tried.",
+        "pairs_beside",
+        f"{single.title} explains the data ({p_equals(single.p_value or 0.0)}), but two effects "
+        f"together may as well: of all pairs {num_near} come near, and the {count} most probable "
+        "of them were fitted with care.",
         {
             "hypothesis": single.name,
             "p_value": single.p_value,
-            "beside": second.beside,
-            "second": second.effect,
-            "nats": second.nats,
-            "price": second.price,
+            "num_near": num_near,
             "num_pairs": count,
+        },
+    )
+
+
+def no_pair_contests(single: Candidate, pair: str, behind: float, num_near: int) -> Reason:
+    """No pair of effects comes so near a single effect that it could contest its name.
+
+    Args:
+      single: the best effect alone.
+      pair: the most probable of all pairs.
+      behind: by how much it is behind, nats.
+      num_near: how many pairs a short search of all brought near.
+    """
+    return Reason(
+        "no_pair_contests",
+        f"Of all pairs of effects {num_near} come near {single.title}; the most probable of them, "
+        f"{pair}, is {times_text(behind)} less probable.",
+        {
+            "hypothesis": single.name,
+            "rival": pair,
+            "log_odds_behind": behind,
+            "num_near": num_near,
         },
     )
 

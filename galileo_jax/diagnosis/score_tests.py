@@ -8,20 +8,18 @@ time, a wavelength) one for each shape that is tried: a matched filter.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import log_softmax, logsumexp, ndtri
+from scipy.special import ndtri
 
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.model.parameters import Prior, in_units
+from galileo_jax.model.parameters import in_units
 from galileo_jax.runtime.latin_hypercube import latin_hypercube
 
 # Of a strength's prior: small enough to be a slope, large enough to be seen.
 PROBE_Z = 0.1
 SMALL_QUANTILE_Z = -2.0
 NUM_SHAPES = 96  # tried per candidate whose effect has a shape
-# Nodes of the average over a strength's prior: of equal steps in its logarithm, but near zero.
-NUM_NODES, MOST_NODE_Z, NODE_FOLDS = 2001, 5.0, 8.0
 SHOWS = 1e-9  # a slope below does not
 # Standard deviations by which a probe may change the track and still be a slope: a nuisance that
 # is bent far to take an effect's place follows its slope, but not a large effect.
@@ -64,46 +62,6 @@ def best_gains(
     gains = np.split(explained(*_along(base, residual, change)), first[1:-1])
     best = first[:-1] + [np.argmax(own) for own in gains]
     return 0.5 * _explained_by(trials, base, every[best], candidates, residual, change[best])
-
-
-def promised_evidence(
-    trials: JointProblem, base: GradientFit, candidates: Sequence[tuple[str, ...]], seed: int
-) -> np.ndarray:
-    """By how many nats the last effect of each candidate raises the evidence, as slopes tell.
-
-    The likelihood, in which the track changes in proportion to the strength, averaged over the
-    priors of strength and shape: unlike `best_gains` it is charged for both.
-
-    Returns:
-      `[candidate]`.
-    """
-    probes = [shapes_beside(trials, base, effects, seed)[1] for effects in candidates]
-    ends = np.cumsum([len(own) for own in probes])[:-1]
-    found = slopes_along(trials, base, np.concatenate(probes))
-    parts = (np.split(values, ends) for values in found)
-    promised = []
-    for effects, along, power in zip(candidates, *parts, strict=True):
-        where, size = strength_of(trials, effects[-1])
-        prior = trials.model_parameters[where[0]].prior
-        promised.append(average_gain(along, power, prior, size))
-    return np.array(promised)
-
-
-def average_gain(along: np.ndarray, power: np.ndarray, prior: Prior, size: float) -> float:
-    """Log of the likelihood ratio averaged over a strength's prior and its effect's shapes, nats.
-
-    Args:
-      along: `[shape]`, the slopes to probes along the residuals.
-      power: `[shape]`, the squares of the slopes.
-      prior: of the strength.
-      size: of the strength that the probes have.
-    """
-    steps = np.linspace(-NODE_FOLDS, NODE_FOLDS, NUM_NODES)
-    nodes = MOST_NODE_Z * np.sinh(steps) / np.sinh(NODE_FOLDS)
-    weights = log_softmax(np.log(np.cosh(steps)) - 0.5 * nodes**2)
-    strength = in_units(prior, nodes) / size
-    gains = np.outer(along, strength) - 0.5 * np.outer(power, strength**2)
-    return float(logsumexp(gains + weights) - np.log(len(along)))
 
 
 def strength_of(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:

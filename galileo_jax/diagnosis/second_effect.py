@@ -1,99 +1,153 @@
-"""Whether a second effect is there as well, where one effect explains the data already.
+"""Whether two effects say as well what one effect explains alone.
 
-A comparison that looks for any misfit overlooks a small one of a known shape: a frame rate that is
-wrong by 7 % beside a strip of friction left p = 0.03, and was 17 nats of evidence. Pairs are tried
-where a second effect promises more than it costs; what promises less may be there unseen, and how
-probable that is, is said beside the name.
+Two effects may pass for one: a force and another friction of the second surface move the objects as
+a wrong frame rate does. And a comparison that looks for any misfit overlooks a small one of a known
+shape: a frame rate that is wrong by 7 % beside a strip of friction left p = 0.03, and was 17 nats
+of evidence. Slopes beside the single effect may show neither: all else has moved to make up for
+what is missing. So before one effect is named, all pairs of the library are searched for, shortly;
+what comes near is refined roughly; and what may contest the name is fitted with care.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import combinations
 from math import exp
 
-from galileo_jax.diagnosis import reasons
-from galileo_jax.diagnosis.diagnosis import Candidate, Promise, Verdict
-from galileo_jax.diagnosis.race import Race
-from galileo_jax.diagnosis.score_tests import promised_evidence
-from galileo_jax.diagnosis.verdict import DECISIVE, NUM_JOINED, best_named, log_prior
+import numpy as np
 
-# Nats by which slopes may promise too little: they promised 1.1 and 4.1 of what were 2.3 and 4.7.
-SLOPE_NATS = 0.5
+from galileo_jax.diagnosis import reasons
+from galileo_jax.diagnosis.candidates import MAY_STILL_GAIN, Hypothesis
+from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
+from galileo_jax.diagnosis.race import Race
+from galileo_jax.diagnosis.short_search import short_search
+from galileo_jax.diagnosis.verdict import DECISIVE, NUM_SWAPPED, best_named
+from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH
+
+NUM_AT_ONCE = 8  # refined in one batch
+ROUGH_NATS = 1.0  # by which log odds may be too low, where a pair was refined roughly
 # The probability from which on it is said that something else may be there beside what is named.
 WORTH_SAYING = 0.1
 
 
-def promises_of_seconds(
-    race: Race, candidates: Sequence[Candidate], library: Sequence[str]
-) -> list[Promise]:
-    """What every effect promises beside each of the best ones.
+@dataclass(frozen=True)
+class NearPair:
+    """A pair that comes near a single effect.
+
+    Attributes:
+      hypothesis: refined roughly.
+      log_odds: over the model without effects, nats.
+    """
+
+    hypothesis: Hypothesis
+    log_odds: float
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Their names."""
+        return self.hypothesis.effects
+
+
+def pairs_near(
+    race: Race, candidates: Sequence[Candidate], library: Sequence[str], decisive: float
+) -> list[NearPair]:
+    """Pairs that a short search of all brings near the best single effect, refined roughly.
 
     Args:
       race: of the candidates.
       candidates: ranked, single effects.
       library: names of the effects.
+      decisive: nats by which a rival must be behind.
+
+    Returns:
+      The most probable first.
     """
-    if len(library) < 2:
+    singles = sorted((c for c in candidates if c.name in library), key=lambda c: -c.log_evidence)
+    pairs = [(one.name, other.name) for one, other in combinations(singles, 2)]
+    if not pairs:
         return []
-    best = best_named(candidates)
-    one, two = (log_prior([1.0] * count, len(library)) for count in (1, 2))
-    promises = []
-    for first in [c for c in candidates if c.name in library][:NUM_JOINED]:
-        others = [name for name in library if name not in first.effects]
-        if others:
-            pairs = [(*first.effects, name) for name in others]
-            fit = first.hypothesis.fit
-            evidence = promised_evidence(race.fitter.trials, fit, pairs, race.seed)
-            behind = best.log_evidence - first.log_evidence
-            promises += [
-                Promise(first.name, other, float(own) - behind, one - two, float(own))
-                for other, own in zip(others, evidence, strict=True)
-            ]
-    return promises
+    best, count = best_named(candidates), len(race.fitter.trials.model_parameters)
+    fit, alone = best.hypothesis.fit, {c.name: c.hypothesis.fit for c in singles}
+    lowest = float(race.fitter.search_costs(fit.z[None, :count], fit.free[None, :count])[0])
+    bases = [alone[first] for first, _ in pairs]
+    z, costs = short_search(race.fitter, bases, pairs, race.seed, lowest, most=len(pairs))
+    order = np.argsort(costs, kind="stable")
+    is_near = costs[order] < min(lowest, float(costs.min())) + BEHIND_IN_SEARCH
+    found = _best_first(_refined(race, [(pairs[i], z[i]) for i in order[is_near]]))
+    least = best.log_odds - decisive - MAY_STILL_GAIN
+    some = [pair.hypothesis for pair in found if pair.log_odds > least][:NUM_SWAPPED]
+    variants = [(one.effects, z) for one in some for z in race.fitter.with_variants(one.fit)[1:]]
+    return _best_first([*found, *_refined(race, variants)])
 
 
-def promised_by_a_second(promises: Sequence[Promise]) -> Promise | None:
-    """The effect that promises most beside one of the best; None if none promises enough.
+def contesting_pairs(
+    race: Race, candidates: Sequence[Candidate], near: Sequence[NearPair], decisive: float
+) -> list[Candidate]:
+    """Of pairs those that may contest the best single effect, fitted with care.
 
-    Enough is more evidence, and so much that the pair would be less than `DECISIVE` nats behind the
-    single effect: it might contest the name.
+    Args:
+      race: of the candidates.
+      candidates: ranked, single effects.
+      near: what `pairs_near` found.
+      decisive: nats by which a rival must be behind.
     """
-    if not promises:
-        return None
-    found = max(promises, key=lambda promise: promise.nats)
-    least = max(found.price - DECISIVE - SLOPE_NATS, 0.0)
-    return found if found.nats > least else None
+    least = best_named(candidates).log_odds - decisive - ROUGH_NATS
+    some = [pair.hypothesis for pair in near if pair.log_odds > least][:NUM_SWAPPED]
+    if not some:
+        return []
+    count = len(race.fitter.trials.model_parameters)
+    alone = {c.name: c.hypothesis for c in candidates if len(c.effects) == 1}
+    bases = [alone[one.effects[0]] for one in some]
+    return race(bases, [one.effects for one in some], [one.fit.z[None, :count] for one in some])
+
+
+def _refined(race: Race, starts: Sequence[tuple[tuple[str, ...], np.ndarray]]) -> list[NearPair]:
+    """Pairs refined roughly from `(effects, z)`, a few at once; without those far behind."""
+    if not starts:
+        return []
+    trials, count = race.fitter.trials, len(race.fitter.trials.model_parameters)
+    free = np.stack([trials.free(effects)[:count] for effects, _ in starts])
+    parts = np.split(np.arange(len(starts)), range(NUM_AT_ONCE, len(starts), NUM_AT_ONCE))
+    fits = race.fitter.polish_in_turn(np.stack([z for _, z in starts]), free, parts)
+    found = [Hypothesis(starts[i][0], fit) for i, fit in fits]
+    return [NearPair(one, race.log_odds(one)) for one in found]
+
+
+def _best_first(pairs: Sequence[NearPair]) -> list[NearPair]:
+    """Of each pair the most probable fit, the most probable pair first."""
+    best = {pair.effects: pair for pair in sorted(pairs, key=lambda pair: pair.log_odds)}
+    return sorted(best.values(), key=lambda pair: -pair.log_odds)
 
 
 def shares_of_seconds(
-    named: Candidate, candidates: Sequence[Candidate], promises: Sequence[Promise]
+    named: Candidate, candidates: Sequence[Candidate], near: Sequence[NearPair]
 ) -> dict[str, float]:
     """The probability of each other effect that it is there beside a named one, as far as is known.
 
-    Of a pair that was fitted by its log odds; of another by what its slope promises.
-
     Args:
       named: a single effect.
-      candidates: all that were fitted.
-      promises: of seconds beside the best effects.
+      candidates: all that were fitted with care.
+      near: pairs that were refined roughly.
     """
-    over_named = {p.effect: p.gain - p.price for p in promises if p.beside == named.name}
-    for c in candidates:
-        if len(c.effects) == 2 and named.name in c.effects and not c.is_form:
-            (other,) = set(c.effects) - {named.name}
-            over_named[other] = c.log_odds - named.log_odds
+    fitted = [c for c in candidates if len(c.effects) == 2 and not c.is_form]
+    over_named = {
+        other: pair.log_odds - named.log_odds
+        for pair in (*near, *fitted)  # what was fitted with care counts
+        if named.name in pair.effects
+        for other in set(pair.effects) - {named.name}
+    }
     weights = {name: exp(min(nats, DECISIVE)) for name, nats in over_named.items()}
     total = 1.0 + sum(weights.values())
     return {name: weight / total for name, weight in weights.items()}
 
 
 def with_second(
-    verdict: Verdict, candidates: Sequence[Candidate], promises: Sequence[Promise]
+    verdict: Verdict, candidates: Sequence[Candidate], near: Sequence[NearPair]
 ) -> Verdict:
     """The verdict; of a single effect that is named, with how probable a second one is."""
     if verdict.status != "named" or len(verdict.effects) != 1:
         return verdict
     named = next(c for c in candidates if c.effects == verdict.effects)
-    shares = shares_of_seconds(named, candidates, promises)
+    shares = shares_of_seconds(named, candidates, near)
     if sum(shares.values()) < WORTH_SAYING:
         return verdict
     why = reasons.second_possible(named, shares)

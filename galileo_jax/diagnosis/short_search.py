@@ -10,7 +10,7 @@ from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.fits.starts import scattered_starts
 
 NUM_SCATTERED = 32  # over all priors; the best of them descends
-MOST_DESCENDED = 32  # candidates, those whose first start costs least
+MOST_DESCENDED = 32  # candidates
 
 
 def short_search(
@@ -19,6 +19,7 @@ def short_search(
     candidates: Sequence[tuple[str, ...]],
     seed: int,
     lowest: float,
+    most: int = MOST_DESCENDED,
 ) -> tuple[Float[np.ndarray, "candidate parameter"], Float[np.ndarray, " candidate"]]:
     """Where candidates come to from two starts each.
 
@@ -32,6 +33,7 @@ def short_search(
       candidates: names of all effects of each.
       seed: of the starts.
       lowest: cost that others have already come to, nats.
+      most: candidates that descend, those whose first start costs least.
 
     Returns:
       z of the better end of each, and its cost at the search's noise, nats. Of many candidates
@@ -41,7 +43,7 @@ def short_search(
     free = np.stack([trials.free(effects)[:count] for effects in candidates])
     first = np.stack([own[0] for own in matched(fitter, bases, candidates, seed)[0]])
     z, cost = first.copy(), np.full(len(free), np.inf)
-    some = np.argsort(fitter.search_costs(first, free), kind="stable")[:MOST_DESCENDED]
+    some = np.argsort(fitter.search_costs(first, free), kind="stable")[:most]
     z[some], cost[some] = _descended(fitter, first[some], free[some], seed, lowest)
     return z, cost
 

@@ -70,5 +70,5 @@ def test_of_the_same_effects_the_best_fit_stays():
         candidate("b+a", 5.0),
         candidate("a+c", 2.0),
     ]
-    found = fitted_pairs._best_of_each(fits)
+    found = fitted_pairs.best_of_each(fits)
     assert sorted(c.effects for c in found) == [("a", "c"), ("b", "a")]
