@@ -48,9 +48,9 @@ from galileo_jax.commands import command
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.convergence import convergence
 from galileo_jax.inference.density import density_of, likelihood_of
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
 from galileo_jax.inference.samplers import dispersed_starts, sample
 from galileo_jax.inference.samplers.driver import Settings
@@ -272,7 +272,7 @@ def summary(
 
 def fit_grad(track: Track, same: Same, seed: int) -> Answer:
     fit, seconds = _fit(track, seed)
-    posterior = laplace_posterior(track.trials, fit, seed)
+    posterior = fit_posterior(track.trials, fit, seed)
     draws = quantities(track.trials, posterior.draws)
     return Answer(draws, seconds, fit.stats["num_rollouts"], posterior.is_converged)
 

@@ -21,8 +21,8 @@ import tables
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
 from galileo_jax.measurement.measure import measure
 from galileo_jax.results.truth import true_parameters
@@ -72,7 +72,7 @@ def _fit(options: Mapping[str, Any], seed: int) -> tuple[Mapping[str, float], di
         measured, truth = measure(clip), true_parameters(clip)
     trials = make_joint_problem([measured.clip], [measured.observation])
     fit = GradientFitter(trials).fit(seed)
-    posterior = laplace_posterior(trials, fit, seed)
+    posterior = fit_posterior(trials, fit, seed)
     result = make_result(
         trials, posterior, fit.z, clips=[], method="grad", seed=seed, timings_s={}, notes={}
     )

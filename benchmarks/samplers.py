@@ -128,10 +128,10 @@ def main(argv: Sequence[str]) -> int | None:
 
 
 def fit_grad(case: synthetic_tracks.Case, seed: int) -> Answer:
-    from galileo_jax.inference.laplace import laplace_posterior
+    from galileo_jax.inference.fit_posterior import fit_posterior
 
     fit, began = _warm_fit(case.trials, seed)
-    posterior = laplace_posterior(case.trials, fit, seed)
+    posterior = fit_posterior(case.trials, fit, seed)
     seconds = time.perf_counter() - began
     return _of_draws(case.trials, fit, posterior, seconds, fit.stats["num_rollouts"])
 

@@ -21,8 +21,8 @@ import tables
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.result import make_result
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 from galileo_jax.runtime import compilation_cache
@@ -96,7 +96,7 @@ def one_fit(case: Case, seed: int) -> dict:
     clip = _clip(truth, len(frames.times_s), case.is_scaled)
     trials = make_joint_problem([clip], [observation])
     fit = GradientFitter(trials).fit(seed)
-    posterior = laplace_posterior(trials, fit, seed)
+    posterior = fit_posterior(trials, fit, seed)
     result = make_result(
         trials, posterior, fit.z, clips=[], method="grad", seed=seed, timings_s={}, notes={}
     )

@@ -27,10 +27,10 @@ from galileo_jax.diagnosis.restricted_fit import restricted_fit
 from galileo_jax.experiment.advise import with_next
 from galileo_jax.experiment.belief import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
@@ -197,7 +197,7 @@ class Diagnosis:
             part, gradient, posterior = wide.free.trials, wide.free.gradient, wide.posterior
             notes["discrepancy"] = wide.summary
         else:
-            posterior = laplace_posterior(part, gradient, seed)
+            posterior = fit_posterior(part, gradient, seed)
         return make_fit(
             self.measurements,
             part,

@@ -15,10 +15,11 @@ from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior, two_solutions
+from galileo_jax.inference.laplace import two_solutions
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.effects.free_quantities import make_free_quantities
@@ -262,7 +263,7 @@ def _fitted(
             problem, gradient, posterior = found.free.trials, found.free.gradient, found.posterior
             extra |= {"discrepancy": found.summary}
         else:
-            posterior = laplace_posterior(problem, gradient, options.seed)
+            posterior = fit_posterior(problem, gradient, options.seed)
         z_best = gradient.z
         extra = {"status": gradient.code.value} | extra
         if options.method == "mh":

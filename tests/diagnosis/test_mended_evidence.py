@@ -22,7 +22,7 @@ def at(z, log_evidence):
 
 
 def mended(log_evidence):
-    return Weighed(log_evidence, np.zeros(256), 200.0)
+    return Weighed(log_evidence, np.zeros(256), 200.0, np.zeros((256, 1)), np.zeros(256))
 
 
 def test_mended_with_mended_and_laplace_with_laplace():

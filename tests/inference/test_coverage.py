@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from tests.oracle_trials import NOISE_M, make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -36,7 +36,7 @@ def errors_in_sds() -> np.ndarray:
         own = JointProblem((replace(problem, observation=seen),))
         free = own.free(())[:-1]
         fit = GradientFitter(own).fit_from(z[None, :-1], free[None], np.zeros(1, int))[0]
-        draws = _quantities(laplace_posterior(own, fit, len(found)).flat(), own)
+        draws = _quantities(fit_posterior(own, fit, len(found)).flat(), own)
         found.append((draws.mean(0) - _quantities(theta, own)) / draws.std(0))
     return np.array(found)
 

@@ -6,7 +6,9 @@
     3. The same with fitted noise scales, until a new round gains nothing (`polish.py`).
     4. Where noise does not explain what is left, or the refined starts disagree, a second search,
        phase by phase (`stages.py`) and from more starts.
-    5. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace (`evidence.py`).
+    5. Where points round the fit say that the posterior is elsewhere, it goes on from these
+       (`look_round.py`).
+    6. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace (`evidence.py`).
 
 Compiled code (`programs.py`) contains no rollout. JAX can therefore cache it for every engine, and
 all clips share it; clips differ only in the data they pass in. From a single distant starting point
@@ -30,6 +32,7 @@ from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH, Ends
 from galileo_jax.inference.fits.evidence import Code as Code
 from galileo_jax.inference.fits.evidence import GradientFit as GradientFit
 from galileo_jax.inference.fits.evidence import laplace_fits
+from galileo_jax.inference.fits.look_round import to_go_on_from
 from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.fits.polish import BEHIND as BEHIND
 from galileo_jax.inference.fits.polish import polish
@@ -47,6 +50,7 @@ VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a
 CROSSED_Z = (-3.0, 1.0)  # one of them next to nothing, the others a lot
 ALONG_Z = np.linspace(-2.0, 2.5, 19)  # of a positive nuisance: where another valley may begin
 LEADS_ON = 1.0  # nats: less is no other valley
+NUM_LOOKS = 3  # round a fit, each from a better one
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
 LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
 CHANCE = 0.01  # a fit that noise leaves so seldom as bad or worse is searched for once more
@@ -153,13 +157,14 @@ class GradientFitter:
         on_stage("refining")
         fits = self._in_valleys(ends, free)
         if ends.num_agreeing >= LEAST_AGREEING and self.is_explained(_best_of(fits)):
-            return _with_beside(fits)
+            return self._looked_round(fits, seed)
         on_stage("searching on")
         num = self.settings.num_second_starts
         scattered = scattered_starts(self.trials, free, num, seed + 1)
         starts = np.concatenate([self._starts_by_phases(free, num, seed), scattered])
         second = self._ends(starts, free, self.settings.num_second_refined).without(ends)
-        fit = _with_beside([*fits, *(self._in_valleys(second, free) if second.any else ())])
+        fits += self._in_valleys(second, free) if second.any else []
+        fit = self._looked_round(fits, seed)
         if fit.code is Code.CONVERGED and not self.is_explained(fit, NOISE_SCALE_RANGE[1]):
             fit = replace(fit, code=Code.MISFIT)
         return fit
@@ -294,6 +299,20 @@ class GradientFitter:
         )
         left = fit.chi2 / noise_scale**2
         return bool(chdtrc(max(degrees - fit.num_used, 1.0), left) > CHANCE)
+
+    def _looked_round(self, fits: Sequence[GradientFit], seed: int) -> GradientFit:
+        """The most evident fit, and what is found round it; with the valleys beside it."""
+        best = _with_beside(fits)
+        for _ in range(NUM_LOOKS if self._descent.is_smooth else 0):
+            starts = to_go_on_from((best, *best.beside), self._residuals, seed)
+            if not len(starts):
+                break
+            points = self._batch(starts, best.free[: self._count])
+            found = self._polish(points, np.zeros(len(starts), int), 0)
+            known, best = best, _with_beside([best, *best.beside, *found.values()])
+            if not _evidence(best) - _evidence(known) > LEADS_ON:  # nor if both failed
+                break
+        return best
 
     def _ends(self, starts: np.ndarray, free: np.ndarray, num_refined: int) -> Ends:
         """Refines the best of some starts."""

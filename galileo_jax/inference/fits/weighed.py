@@ -54,12 +54,16 @@ class Weighed:
       log_evidence: up to the data's constant, as `GradientFit.log_evidence`.
       log_weights: `[draw]`.
       ess: how many draws of the posterior itself these are worth.
+      z: `[draw, parameter]`.
+      log_density: `[draw]`, of the posterior, up to a constant.
       better: `[parameter]`, z of a draw that is more probable than all fits; None: none is.
     """
 
     log_evidence: float
     log_weights: Float[np.ndarray, " draw"]
     ess: float
+    z: Float[np.ndarray, "draw parameter"]
+    log_density: Float[np.ndarray, " draw"]
     better: Float[np.ndarray, " parameter"] | None = None
 
     @property
@@ -106,8 +110,9 @@ def weighed(
     num: int = NUM_DRAWS,
     most: int = MOST_DRAWS,
     width: float = 1.0,
+    enough: float = ENOUGH_ESS,
 ) -> Weighed:
-    """The evidence of a hypothesis.
+    """The evidence of a hypothesis, and weighed draws of its posterior.
 
     Args:
       fits: of the hypothesis, the best of each valley.
@@ -117,6 +122,7 @@ def weighed(
       num: of draws at once, a rollout each.
       most: of draws in all; more than `num` only while too few of them count.
       width: of the t, in that of the posterior.
+      enough: draws of the posterior itself that they must be worth.
     """
     fit, generator = fits[0], np.random.default_rng([seed, 23])
     parts = [_part(one, fit, residuals, width) for one in fits]
@@ -128,7 +134,7 @@ def weighed(
     constant = np.sum(fit.free) / 2 * np.log(2 * np.pi)
     modes = np.stack([one.z for one in fits])
     best, better, made = -np.inf, None, _Mixture(parts)
-    while len(made.z) < num or (made.ess < ENOUGH_ESS and len(made.z) < most):
+    while len(made.z) < num or (made.ess < enough and len(made.z) < most):
         new = made.draw(generator, num, shares, fit.free)
         both = _log_densities(fit, residuals, np.concatenate([new, modes]))
         made.add(both[:num] - constant)
@@ -136,7 +142,7 @@ def weighed(
         if both[:num].max() > best:
             best, better = float(both[:num].max()), new[np.argmax(both[:num])]
     log_evidence = float(logsumexp(made.log_weights) - np.log(len(made.z)))
-    return Weighed(log_evidence, made.log_weights, made.ess, better)
+    return Weighed(log_evidence, made.log_weights, made.ess, made.z, made.log_density, better)
 
 
 class _Mixture:
@@ -145,20 +151,21 @@ class _Mixture:
     Attributes:
       z: `[draw, parameter]`.
       log_weights: `[draw]`; each by the mixture of all that have drawn.
+      log_density: `[draw]`, of what they are weighed for.
       ess: how many draws of the posterior itself these are worth.
     """
 
     def __init__(self, parts: Sequence[_Part]):
         self._parts, self._clouds = tuple(parts), list[Cloud]()
         self.z, self.log_weights, self.ess = np.empty((0, 0)), np.empty(0), 0.0
-        self._of, self._own, self._log_p = np.empty(0, int), np.empty(0), np.empty(0)
+        self._of, self._own, self.log_density = np.empty(0, int), np.empty(0), np.empty(0)
 
     def draw(
         self, generator: np.random.Generator, num: int, shares: np.ndarray, free: np.ndarray
     ) -> np.ndarray:
         """Further draws, `[draw, parameter]`; `shares`: of the parts, `free`: of the clouds."""
         which = np.arange(len(self._parts))
-        if self._log_p.size:
+        if self.log_density.size:
             self._clouds.append(Cloud.of(self.z, self.log_weights, free))
             which = np.append(which, len(self._parts) + len(self._clouds) - 1)
             shares = np.append((1 - SHARE_ADAPTED) * shares, SHARE_ADAPTED)
@@ -175,13 +182,15 @@ class _Mixture:
 
     def add(self, log_p: np.ndarray) -> None:
         """The log density of the draws made last, `[draw]`: all are weighed anew."""
-        self._log_p = np.append(self._log_p, log_p)
+        self.log_density = np.append(self.log_density, log_p)
         log_parts = np.stack([q.log_density(self.z) for q in (*self._parts, *self._clouds)])
         # A valley that bends much takes a draw so far that no map finds its way back from there.
         along = np.flatnonzero(self._of < len(self._parts))
         log_parts[self._of[along], along] = self._own[along]
         shares = np.bincount(self._of, minlength=len(log_parts)) / len(self.z)
-        self.log_weights = self._log_p - np.asarray(logsumexp(log_parts, axis=0, b=shares[:, None]))
+        self.log_weights = self.log_density - np.asarray(
+            logsumexp(log_parts, axis=0, b=shares[:, None])
+        )
         weights = np.exp(self.log_weights - self.log_weights.max())
         self.ess = float(weights.sum() ** 2 / np.sum(weights**2))
 
