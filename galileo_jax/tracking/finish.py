@@ -11,6 +11,7 @@ from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
     MEMORY_FRAMES,
     SAMPLING_SD_PX,
+    after_blow_scale2,
     blow_shift,
     is_in_motion,
     motion_scale2,
@@ -127,7 +128,9 @@ def _anchored(
     frames = np.flatnonzero(np.isfinite(poses[:, 0]))
     moves = is_in_motion(poses[frames, :2], noise[frames])
     covariance[frames] += np.einsum("fi,ij->fij", moves * excess, np.eye(2))
-    scale = np.sqrt(np.where(moves, motion_scale2(poses[:, :2], covariance), 1.0))
+    scale2 = motion_scale2(poses[:, :2], covariance)
+    scale2 = scale2 * after_blow_scale2(poses[frames, :2], noise[frames])
+    scale = np.sqrt(np.where(moves, scale2, 1.0))
     covariance[frames] *= scale[:, :, None] * scale[:, None, :]
 
     first_frame, point_px = piece.first_frame, np.array(piece.point_px)

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from galileo_jax.tracking.noise import (
+    AFTER_BLOW_SCALE2,
     BLOW_KNOWN_TO,
+    SETTLES_FRAMES,
+    after_blow_scale2,
     blow_shift,
     is_in_motion,
     motion_scale2,
@@ -136,6 +139,27 @@ def test_motion_is_told_from_noise_on_each_axis():
     assert not moves[:50].any()
     assert moves[50:, 0].all()
     assert not moves[:, 1].any()
+
+
+def test_what_has_come_to_rest_still_counts_as_moving_for_some_frames():
+    path = np.stack([np.minimum(np.arange(60.0), 30.0), np.zeros(60)], axis=1)
+    moves = is_in_motion(path, np.tile(0.01**2 * np.eye(2), (60, 1, 1)))[:, 0]
+    assert moves[: 31 + SETTLES_FRAMES].all() and not moves[31 + SETTLES_FRAMES :].any()
+
+
+def test_where_a_blow_begins_a_motion_errors_are_larger():
+    """Not where a slide begins by and by, nor where what moves is hit once more."""
+    time, few = np.arange(60.0), np.tile(0.01**2 * np.eye(2), (60, 1, 1))
+    hit = np.maximum(time - 20.4, 0) * 3.0
+    hit_again = hit + np.maximum(time - 40.2, 0) * 3.0
+    slides = 0.05 * np.maximum(time - 20, 0) ** 2
+    scale2 = after_blow_scale2(np.stack([hit_again, 0 * time], axis=1), few)
+    assert np.flatnonzero(scale2[:, 0] > 1).tolist() == [21, 22]
+    assert scale2[21:23, 0].tolist() == list(AFTER_BLOW_SCALE2)
+    assert (scale2[:, 1] == 1).all()
+    assert (after_blow_scale2(np.stack([slides, 0 * time], axis=1), few) == 1).all()
+    late = after_blow_scale2(np.stack([hit, 0 * time], axis=1)[:22], few[:22])  # the clip ends
+    assert late[:, 0].tolist() == [1.0] * 21 + [AFTER_BLOW_SCALE2[0]]
 
 
 @pytest.mark.parametrize("instant", [0.0, 0.05, 0.12, 0.3])
