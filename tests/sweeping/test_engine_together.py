@@ -10,10 +10,14 @@ from galileo_jax.sweeping.task import Task
 from tests.sweeping import work_to_do
 
 ROUNDING = 1e-9  # relative: sums of merged programs may have another order
+# Of a standard deviation: where rounding decides, one of 4,000 draws of the posterior is another.
+ONE_DRAW = 0.03
 
 
 def fitted(path):
-    return gx.fit(path).result["parameters"]
+    found = gx.fit(path)
+    assert found.gradient is not None
+    return found.gradient.z.tolist(), found.result["parameters"]
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +35,13 @@ def test_fits_are_those_of_each_clip_alone(tracks):
     engine = EngineTogether(3)
     merged = {outcome.key: outcome.value for outcome in engine.outcomes(tasks)}
     assert merged.keys() == alone.keys()
-    for key, parameters in alone.items():
+    for key, (z, parameters) in alone.items():
+        best, found = merged[key]
+        assert best == pytest.approx(z, rel=ROUNDING, abs=ROUNDING)
         for name, entry in parameters.items():
-            assert merged[key][name]["mean"] == pytest.approx(entry["mean"], rel=ROUNDING)
-            assert merged[key][name]["sd"] == pytest.approx(entry["sd"], rel=ROUNDING)
+            few = ONE_DRAW * entry["sd"]
+            assert found[name]["mean"] == pytest.approx(entry["mean"], abs=few)
+            assert found[name]["sd"] == pytest.approx(entry["sd"], abs=few)
     assert engine.num_made < 0.7 * engine.num_calls
 
 
@@ -60,7 +67,8 @@ def test_a_sweep_gives_the_same_table(tracks, tmp_path):
     one = gx.sweep(config, out=tmp_path / "one", workers=0).rows
     many = gx.sweep(config, out=tmp_path / "many", together=3).rows
     assert list(many["status"]) == ["done"] * 3
-    assert many["k1"].to_numpy() == pytest.approx(one["k1"].to_numpy(), rel=ROUNDING)
+    few = ONE_DRAW * one["k1_sd"].to_numpy()
+    assert (abs(many["k1"] - one["k1"]).to_numpy() <= few).all()
 
 
 def test_together_is_one_process(tracks, tmp_path):
