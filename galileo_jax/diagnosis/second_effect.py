@@ -24,6 +24,7 @@ from galileo_jax.diagnosis.verdict import DECISIVE, NUM_SWAPPED, best_named
 from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH
 
 NUM_AT_ONCE = 8  # refined in one batch
+MOST_OTHERS = 16  # pairs without the best single effect that are refined, those that come nearest
 ROUGH_NATS = 1.0  # by which log odds may be too low, where a pair was refined roughly
 # The probability from which on it is said that something else may be there beside what is named.
 WORTH_SAYING = 0.1
@@ -70,9 +71,11 @@ def pairs_near(
     lowest = float(race.fitter.search_costs(fit.z[None, :count], fit.free[None, :count])[0])
     bases = [alone[first] for first, _ in pairs]
     z, costs = short_search(race.fitter, bases, pairs, race.seed, lowest, most=len(pairs))
-    order = np.argsort(costs, kind="stable")
-    is_near = costs[order] < min(lowest, float(costs.min())) + BEHIND_IN_SEARCH
-    found = _best_first(_refined(race, [(pairs[i], z[i]) for i in order[is_near]]))
+    near = np.flatnonzero(costs < min(lowest, float(costs.min())) + BEHIND_IN_SEARCH)
+    near = near[np.argsort(costs[near], kind="stable")]
+    has_best = np.array([best.name in pairs[i] for i in near], bool)
+    near = near[has_best | (np.cumsum(~has_best) <= MOST_OTHERS)]
+    found = _best_first(_refined(race, [(pairs[i], z[i]) for i in near]))
     least = best.log_odds - decisive - MAY_STILL_GAIN
     some = [pair.hypothesis for pair in found if pair.log_odds > least][:NUM_SWAPPED]
     variants = [(one.effects, z) for one in some for z in race.fitter.with_variants(one.fit)[1:]]

@@ -20,9 +20,9 @@ M. D. Parno, Y. M. Marzouk, Transport map accelerated Markov chain Monte Carlo, 
 Uncertain. Quantif. 6 (2018), 10.1137/17M1134640.
 """
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -31,15 +31,18 @@ from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.programs import FAILED
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD
-from galileo_jax.inference.samplers.program import Program
-from galileo_jax.inference.samplers.sampler import LogDensity
+
+if TYPE_CHECKING:  # these need Equinox, and a gradient fit does not
+    from galileo_jax.inference.samplers.sampler import LogDensity
 
 REACH = 2.0  # standard deviations: what proposals mostly keep within
 LEAST_VARIANCE = 1e-18  # in z: where slopes are absurd, rounding leaves some below 0
 NUM_SCATTERED = 64  # that starts are chosen from
 
 
-class Valley(eqx.Module):
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Valley:
     """The map from `u`, in which the posterior is about N(0, 1), to `z`.
 
     Attributes:
@@ -89,8 +92,10 @@ class Coordinates(NamedTuple):
     covariance: np.ndarray
 
 
-def along(log_density: LogDensity, valley: Valley) -> LogDensity:
+def along(log_density: "LogDensity", valley: Valley) -> "LogDensity":
     """A log density of z as one of u."""
+    from galileo_jax.inference.samplers.program import Program
+
     if isinstance(log_density, Program):
         arrays = (jax.tree.map(jnp.asarray, valley), log_density.arrays)
         return Program((_program_along, log_density.code), arrays)
@@ -98,6 +103,8 @@ def along(log_density: LogDensity, valley: Valley) -> LogDensity:
 
 
 def _program_along(code: tuple, arrays: tuple[Valley, Any], u: jax.Array) -> jax.Array:
+    from galileo_jax.inference.samplers.program import Program
+
     valley, rest = arrays
     return Program(code, rest)(valley(u))
 

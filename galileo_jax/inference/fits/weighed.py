@@ -22,7 +22,6 @@ Bayesian inference in econometric models using Monte Carlo integration, Economet
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -31,11 +30,9 @@ from scipy.special import logsumexp
 from galileo_jax.inference.fits.cloud import Cloud, log_student_t, student_t
 from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.residuals import Batch, Residuals
+from galileo_jax.inference.fits.valley import Valley, valley_round
 from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
-
-if TYPE_CHECKING:
-    from galileo_jax.inference.fits.valley import Valley
 
 NUM_DRAWS, MOST_DRAWS = 256, 1536  # at once, and in all where few of them count
 ENOUGH_ESS = 40.0  # the error is a sixth of a nat
@@ -76,7 +73,7 @@ class Weighed:
 class _Part:
     """A part of q: a t along a valley; parameters that have none there, from their priors."""
 
-    valley: "Valley"
+    valley: Valley
     along: np.ndarray  # [parameter], which are moved along the valley
     others: np.ndarray  # indices of the others that the hypothesis has
     width: float
@@ -196,8 +193,6 @@ class _Mixture:
 
 
 def _part(one: GradientFit, whose: GradientFit, residuals: Residuals, width: float) -> _Part:
-    from galileo_jax.inference.fits.valley import valley_round  # and Equinox, which few calls need
-
     others = np.flatnonzero(whose.free & ~one.free)
     return _Part(valley_round(one, residuals), one.free, others, width)
 
