@@ -1,7 +1,9 @@
 """Pairs that say what one effect says are looked for before that is named."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 
@@ -19,7 +21,7 @@ from galileo_jax.diagnosis.second_effect import (
     shares_of_seconds,
     with_second,
 )
-from galileo_jax.diagnosis.verdict import DECISIVE, log_prior, ranked
+from galileo_jax.diagnosis.verdict import DECISIVE, NUM_SWAPPED, log_prior, ranked
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.registry import make_effects
@@ -94,6 +96,29 @@ def test_beside_the_only_effect_no_pair_is_as_probable(tmp_path):
 def test_a_library_of_one_effect_has_no_pairs():
     race: Any = None
     assert pairs_near(race, [candidate("air_drag", 40.0)], ["air_drag"], DECISIVE) == []
+
+
+def test_what_may_contest_a_name_is_fitted_from_where_it_was_refined_to():
+    """Less than the margin behind, and a nat, for it was refined roughly; at most six."""
+    asked = []
+
+    def race(bases, sets, starts):
+        asked.append((bases, sets, [len(own) for own in starts]))
+        return [candidate("+".join(effects), 38.0) for effects in sets]
+
+    fitter = SimpleNamespace(trials=SimpleNamespace(model_parameters=()))
+    stub: Any = MagicMock(side_effect=race, fitter=fitter)
+    singles = [NAMED, candidate("rolling", 10.0)]
+    near = [pair("rolling+restitution", 41.0), pair("air_drag+frame_rate", 36.1)]
+    far = pair("air_drag+restitution", 35.9)
+    found = contesting_pairs(stub, singles, [*near, far], DECISIVE)
+    assert [one.name for one in found] == ["rolling+restitution", "air_drag+frame_rate"]
+    ((bases, sets, starts),) = asked
+    assert bases == [singles[1].hypothesis, NAMED.hypothesis]
+    assert sets == [one.effects for one in near] and starts == [1, 1]
+    many = [pair(f"air_drag+{i}", 39.0) for i in range(9)]
+    assert len(contesting_pairs(stub, singles, many, DECISIVE)) == NUM_SWAPPED
+    assert contesting_pairs(stub, singles, [far], DECISIVE) == []
 
 
 def test_the_reasons_say_which_pairs_were_looked_at():
