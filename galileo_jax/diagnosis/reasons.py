@@ -105,14 +105,14 @@ def pairs_beside(single: Candidate, num_near: int, count: int) -> Reason:
 
     Args:
       single: the best effect alone.
-      num_near: how many pairs a short search of all brought near.
-      count: how many of them were fitted.
+      num_near: how many pairs were fitted roughly, the nearest of all by a short search.
+      count: how many of them were fitted with care.
     """
     return Reason(
         "pairs_beside",
         f"{single.title} explains the data ({p_equals(single.p_value or 0.0)}), but two effects "
-        f"together may as well: of all pairs {num_near} come near, and the {count} most probable "
-        "of them were fitted with care.",
+        f"together may as well: of all pairs the {num_near} nearest were fitted roughly, and the "
+        f"{count} most probable of them with care.",
         {
             "hypothesis": single.name,
             "p_value": single.p_value,
@@ -129,12 +129,12 @@ def no_pair_contests(single: Candidate, pair: str, behind: float, num_near: int)
       single: the best effect alone.
       pair: the most probable of all pairs.
       behind: by how much it is behind, nats.
-      num_near: how many pairs a short search of all brought near.
+      num_near: how many pairs were fitted roughly, the nearest of all by a short search.
     """
     return Reason(
         "no_pair_contests",
-        f"Of all pairs of effects {num_near} come near {single.title}; the most probable of them, "
-        f"{pair}, is {times_text(behind)} less probable.",
+        f"Of all pairs of effects the {num_near} nearest to {single.title} were fitted roughly; the "
+        f"most probable of them, {pair}, is {times_text(behind)} less probable.",
         {
             "hypothesis": single.name,
             "rival": pair,

@@ -18,8 +18,8 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import Posterior, Status
 
-# At once, and in all until they are worth `ENOUGH` draws: a mean is then good to .04 sd.
-NUM_AT_ONCE, MOST, ENOUGH = 512, 8192, 600.0
+# At once, and in all until they are worth `ENOUGH` draws: a mean is then good to .03 sd.
+NUM_AT_ONCE, MOST, ENOUGH = 512, 8192, 1200.0
 
 
 def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterior:

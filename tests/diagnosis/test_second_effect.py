@@ -123,7 +123,7 @@ def test_what_may_contest_a_name_is_fitted_from_where_it_was_refined_to():
 
 def test_the_reasons_say_which_pairs_were_looked_at():
     why = reasons.pairs_beside(NAMED, 16, 3)
-    assert "of all pairs 16 come near, and the 3 most probable" in why.sentence
+    assert "the 16 nearest were fitted roughly, and the 3 most probable" in why.sentence
     assert (why.numbers["num_near"], why.numbers["num_pairs"]) == (16, 3)
     why = reasons.no_pair_contests(NAMED, "air_drag+rolling", 4.4, 16)
     assert "air_drag+rolling, is 81 times less probable" in why.sentence
