@@ -133,8 +133,8 @@ def no_pair_contests(single: Candidate, pair: str, behind: float, num_near: int)
     """
     return Reason(
         "no_pair_contests",
-        f"Of all pairs of effects the {num_near} nearest to {single.title} were fitted roughly; the "
-        f"most probable of them, {pair}, is {times_text(behind)} less probable.",
+        f"Of all pairs of effects the {num_near} nearest to {single.title} were fitted roughly; "
+        f"the most probable of them, {pair}, is {times_text(behind)} less probable.",
         {
             "hypothesis": single.name,
             "rival": pair,
