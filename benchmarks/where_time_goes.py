@@ -53,6 +53,7 @@ STAGES = {
     "comparing": "replicates",
     "compared": "document",
     "fitted": "replicates",
+    "looking at pairs": "pairs",
     "looking at what": "leads",
     "inferring": "force",
     "looking for": "force",

@@ -59,6 +59,7 @@ STAGES = {  # how a stage begins, and how much is done by then
     "fitting": 0.2,
     "comparing the best": 0.6,
     "fitting pairs": 0.65,
+    "looking at pairs": 0.65,
     "looking at what": 0.82,
     "inferring": 0.83,
     "looking for": 0.86,

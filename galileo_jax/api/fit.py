@@ -15,11 +15,11 @@ from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.schema import Clip
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
-from galileo_jax.inference.fit_posterior import fit_posterior
+from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import two_solutions
+from galileo_jax.inference.laplace import laplace_posterior, two_solutions
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.effects.free_quantities import make_free_quantities
@@ -68,7 +68,7 @@ def fit(
     Args:
       tracks: a track or several (trials of the same objects: one joint fit); a clip or a file is
         tracked first.
-      method: "grad": best fit and normal approximation (seconds); "mh": Metropolis-Hastings chains,
+      method: "grad": best fit and rollouts round it (seconds); "mh": Metropolis-Hastings chains,
         started from it; "cnn": a trained network (at once).
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
@@ -263,7 +263,8 @@ def _fitted(
             problem, gradient, posterior = found.free.trials, found.free.gradient, found.posterior
             extra |= {"discrepancy": found.summary}
         else:
-            posterior = fit_posterior(problem, gradient, options.seed)
+            make = laplace_posterior if options.method == "mh" else fit_posterior
+            posterior = make(problem, gradient, options.seed)
         z_best = gradient.z
         extra = {"status": gradient.code.value} | extra
         if options.method == "mh":
@@ -276,7 +277,9 @@ def _fitted(
             }
     timings["fit"] = time.perf_counter() - began
     notes |= extra | {"motion": options.motion}
-    said = [] if gradient is None or options.method == "mh" else [two_solutions(problem, gradient)]
+    said: list[str | None] = []
+    if gradient is not None and options.method != "mh":
+        said = [two_solutions(problem, gradient), uncertain_width(posterior)]
     if options.motion == "planar" and any(item.z_m for clip in clips for item in clip.objects):
         said.append(OFF_THE_PLANE)
     if told := [line for line in said if line is not None]:

@@ -6,7 +6,8 @@
    charges for every parameter, and the prior, which charges for how many were tried. The model
    without effects will do and nothing convinces: the verdict is none.
 3. Compare the best with the data, too. Where the best single effect leaves more than noise, or a
-   form explains the data better, the best single effects are joined by others; pairs stand in the
+   form explains the data better, the best single effects are joined by others. Where it leaves only
+   noise, all pairs are searched for those that do so, too (`second_effect`). Pairs stand in the
    same table (rules: `verdict`, `law_verdict`).
 4. What leaves only noise and is far more probable than all else is named, unless a clip like this
    one would not tell it from another (`expected_lead`). Several are ambiguous.
@@ -237,13 +238,17 @@ def _pairs(
         on_stage("fitting pairs of effects")
         pairs = fitted_pairs(race, candidates, library)
         return pairs, [], [reasons.pairs_tried(single, form, len(pairs))] if pairs else []
-    on_stage("looking at pairs of effects that could be confused with it")
+    on_stage("looking at pairs of effects that could be confused with the best")
     near = pairs_near(race, candidates, library, decisive)
-    pairs: Sequence[Candidate] = contesting_pairs(race, candidates, near, decisive)
-    if any(pair.log_odds > single.log_odds for pair in pairs):
-        pairs = best_of_each([*pairs, *fitted_pairs(race, candidates, library)])
+    pairs = contesting_pairs(race, candidates, near, decisive)
     if pairs:
-        return pairs, near, [reasons.pairs_beside(single, len(near), len(pairs))]
+        why = [reasons.pairs_beside(single, len(near), len(pairs))]
+        ahead = max(pairs, key=lambda pair: pair.log_odds)
+        if ahead.log_odds > single.log_odds:
+            others = fitted_pairs(race, candidates, library)
+            why.append(reasons.pairs_further(ahead, single, len(others)))
+            pairs = best_of_each([*pairs, *others])
+        return pairs, near, why
     if near:
         first, behind = near[0], single.log_odds - near[0].log_odds
         contested = reasons.no_pair_contests(single, "+".join(first.effects), behind, len(near))

@@ -13,10 +13,12 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, 
 from galileo_jax.diagnosis.each_clip import kind_of
 from galileo_jax.diagnosis.law_verdict import best_formula
 from galileo_jax.diagnosis.verdict import explains
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.per_mass import SUFFIX
+from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import (
     IDENTIFIED_SD_Z,
     per_mass_entries,
@@ -96,14 +98,13 @@ def parameter_entries(
     trials: JointProblem, fit: GradientFit, seed: int
 ) -> dict[str, dict[str, Any]]:
     """Entries as in result.json of all that the hypothesis leaves free, nuisances left out."""
-    return _entries(trials, fit, seed)[0]
+    return _entries(trials, fit, fit_posterior(trials, fit, seed))[0]
 
 
 def _entries(
-    trials: JointProblem, fit: GradientFit, seed: int
+    trials: JointProblem, fit: GradientFit, posterior: Posterior
 ) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
     """Those of the parameters, and those of the force constants per mass."""
-    posterior = laplace_posterior(trials, fit, seed)
     spread = np.sqrt(np.diagonal(fit.covariance))
     free = [name for i, name in enumerate(trials.names) if fit.free[i]]
     forces = {
@@ -125,7 +126,8 @@ def _entries(
 
 
 def _candidate(trials: JointProblem, candidate: Candidate, seed: int) -> dict[str, Any]:
-    parameters, derived = _entries(candidate.hypothesis.of(trials), candidate.hypothesis.fit, seed)
+    whose, fit = candidate.hypothesis.of(trials), candidate.hypothesis.fit
+    parameters, derived = _entries(whose, fit, laplace_posterior(whose, fit, seed))
     return {
         "effect": candidate.name,
         "law": None if candidate.law is None else candidate.law.text,

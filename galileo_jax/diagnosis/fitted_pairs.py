@@ -1,4 +1,4 @@
-"""Pairs of effects, fitted: where no single effect explains the data."""
+"""Pairs of effects, fitted: where no single effect explains the data, or a pair is ahead of it."""
 
 from collections.abc import Sequence
 from itertools import combinations

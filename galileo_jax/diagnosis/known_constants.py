@@ -12,8 +12,8 @@ import numpy as np
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
 from galileo_jax.diagnosis.verdict import DECISIVE
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.model.effects.forms import FORMS
 
 INTERVAL = (0.025, 0.975)  # 95 %
@@ -40,7 +40,7 @@ def with_known_constants(
         if name not in form.named_values or rival is None:
             continue
         if table[name].log_evidence - rival.log_evidence < DECISIVE:
-            draws = laplace_posterior(trials, rival.hypothesis.fit, seed)
+            draws = fit_posterior(trials, rival.hypothesis.fit, seed)
             low, high = np.quantile(draws[f"{form.name}_{form.constant}"], INTERVAL).tolist()
             said.append(reasons.constant_by_data(table[name], form, low, high))
     return replace(verdict, reasons=(*verdict.reasons, *said))

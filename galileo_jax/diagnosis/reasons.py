@@ -105,20 +105,36 @@ def pairs_beside(single: Candidate, num_near: int, count: int) -> Reason:
 
     Args:
       single: the best effect alone.
-      num_near: how many pairs were fitted roughly, the nearest of all by a short search.
+      num_near: how many pairs were fitted roughly.
       count: how many of them were fitted with care.
     """
     return Reason(
         "pairs_beside",
         f"{single.title} explains the data ({p_equals(single.p_value or 0.0)}), but two effects "
-        f"together may as well: of all pairs the {num_near} nearest were fitted roughly, and the "
-        f"{count} most probable of them with care.",
+        f"together may as well: {num_near} pairs of effects that come near it were fitted roughly, "
+        f"and the {count} most probable of them with care.",
         {
             "hypothesis": single.name,
             "p_value": single.p_value,
             "num_near": num_near,
             "num_pairs": count,
         },
+    )
+
+
+def pairs_further(pair: Candidate, single: Candidate, count: int) -> Reason:
+    """Why more pairs were tried.
+
+    Args:
+      pair: the most probable of those that may contest a single effect.
+      single: that effect.
+      count: how many were tried.
+    """
+    return Reason(
+        "pairs_further",
+        f"{pair.title} is more probable than {single.title}, so {count} pairs of effects were "
+        "tried as where no single effect explains the data.",
+        {"hypothesis": pair.name, "rival": single.name, "num_pairs": count},
     )
 
 
@@ -129,12 +145,12 @@ def no_pair_contests(single: Candidate, pair: str, behind: float, num_near: int)
       single: the best effect alone.
       pair: the most probable of all pairs.
       behind: by how much it is behind, nats.
-      num_near: how many pairs were fitted roughly, the nearest of all by a short search.
+      num_near: how many pairs were fitted roughly.
     """
     return Reason(
         "no_pair_contests",
-        f"Of all pairs of effects the {num_near} nearest to {single.title} were fitted roughly; "
-        f"the most probable of them, {pair}, is {times_text(behind)} less probable.",
+        f"{num_near} pairs of effects that come near {single.title} were fitted roughly; the most "
+        f"probable of them, {pair}, is {times_text(behind)} less probable.",
         {
             "hypothesis": single.name,
             "rival": pair,

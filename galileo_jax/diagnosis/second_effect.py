@@ -36,7 +36,8 @@ class NearPair:
 
     Attributes:
       hypothesis: refined roughly.
-      log_odds: over the model without effects, nats.
+      log_odds: over the model without effects, nats; by Laplace, and as much too low or too high by
+        that as the single effect's.
     """
 
     hypothesis: Hypothesis
@@ -75,11 +76,13 @@ def pairs_near(
     near = near[np.argsort(costs[near], kind="stable")]
     has_best = np.array([best.name in pairs[i] for i in near], bool)
     near = near[has_best | (np.cumsum(~has_best) <= MOST_OTHERS)]
-    found = _best_first(_refined(race, [(pairs[i], z[i]) for i in near]))
+    # Like with like: the single effect's evidence may have been mended.
+    error = best.log_odds - race.log_odds(Hypothesis(best.effects, fit))
+    found = _best_first(_refined(race, [(pairs[i], z[i]) for i in near], error))
     least = best.log_odds - decisive - MAY_STILL_GAIN
     some = [pair.hypothesis for pair in found if pair.log_odds > least][:NUM_SWAPPED]
     variants = [(one.effects, z) for one in some for z in race.fitter.with_variants(one.fit)[1:]]
-    return _best_first([*found, *_refined(race, variants)])
+    return _best_first([*found, *_refined(race, variants, error)])
 
 
 def contesting_pairs(
@@ -103,8 +106,13 @@ def contesting_pairs(
     return race(bases, [one.effects for one in some], [one.fit.z[None, :count] for one in some])
 
 
-def _refined(race: Race, starts: Sequence[tuple[tuple[str, ...], np.ndarray]]) -> list[NearPair]:
-    """Pairs refined roughly from `(effects, z)`, a few at once; without those far behind."""
+def _refined(
+    race: Race, starts: Sequence[tuple[tuple[str, ...], np.ndarray]], error: float
+) -> list[NearPair]:
+    """Pairs refined roughly from `(effects, z)`, a few at once; without those far behind.
+
+    `error` is that of Laplace's evidence, nats, to be taken off.
+    """
     if not starts:
         return []
     trials, count = race.fitter.trials, len(race.fitter.trials.model_parameters)
@@ -112,7 +120,7 @@ def _refined(race: Race, starts: Sequence[tuple[tuple[str, ...], np.ndarray]]) -
     parts = np.split(np.arange(len(starts)), range(NUM_AT_ONCE, len(starts), NUM_AT_ONCE))
     fits = race.fitter.polish_in_turn(np.stack([z for _, z in starts]), free, parts)
     found = [Hypothesis(starts[i][0], fit) for i, fit in fits]
-    return [NearPair(one, race.log_odds(one)) for one in found]
+    return [NearPair(one, race.log_odds(one) + error) for one in found]
 
 
 def _best_first(pairs: Sequence[NearPair]) -> list[NearPair]:

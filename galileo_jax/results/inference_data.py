@@ -9,11 +9,12 @@
 Positions stand along one dimension `measurement`, as gaps (NaN) are allowed neither by `az.loo` nor
 by `az.plot_ppc`; its coordinates `clip`, `object`, `axis`, `frame` and `time_s` say what is what.
 
-Leave-one-out weighs draws by 1 / p(y_i | y_-i), so that a few draws far out would decide. Those of
-`--method grad` come from a normal approximation. So for `log_likelihood` draws are drawn again,
-with the weights posterior density over the density that they were drawn from, smoothed (PSIS). The
-attribute `importance_pareto_k` says whether that was possible: above 0.7 `az.loo` is not to be
-trusted.
+Leave-one-out weighs draws by 1 / p(y_i | y_-i), so that a few draws far out would decide. Where
+those of `--method grad` come from a normal approximation, draws are drawn again for
+`log_likelihood`, with the weights posterior density over the density that they were drawn from,
+smoothed (PSIS). The attribute `importance_pareto_k` says whether that was possible: above 0.7
+`az.loo` is not to be trusted. Where draws were weighed before (`inference/fit_posterior.py`), the
+attribute `importance_ess` says how many of the posterior they are worth.
 
 Source: Vehtari, Simpson, Gelman, Yao and Gabry (2024), Pareto smoothed importance sampling, Journal
 of Machine Learning Research 25(72); Magnusson, Andersen, Jonasson and Vehtari (2019), Bayesian
@@ -27,6 +28,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.convergence import arviz
+from galileo_jax.inference.fit_posterior import ESS, TOO_FEW
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 from galileo_jax.model.parameters import inverse
@@ -90,7 +92,9 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     indices, theta = _thinned(posterior, NUM_PREDICTIVE_DRAWS)
     predicted = _predictive(trials, theta.reshape(-1, theta.shape[-1]), rng)
     nats = {"units": "1", "long_name": "log p(y_i | y_-i), y in m"}
-    if _has_density(posterior):
+    if _is_weighed(posterior):
+        nats["importance_ess"] = f"{posterior.provenance[ESS]:.3g}"
+    if _has_density(posterior) and not _is_weighed(posterior):
         like_theta, pareto_k = _drawn_again(trials, posterior, rng)
         like_indices, like_theta = np.arange(len(like_theta)), like_theta[None]
         nats["importance_pareto_k"] = f"{pareto_k:.3g}"
@@ -162,6 +166,11 @@ def _thinned(posterior: Posterior, most: int) -> tuple[np.ndarray, np.ndarray]:
     count = min(length, max(1, most // chains))
     at = np.linspace(0, length - 1, count).round().astype(int)
     return at, posterior.draws[:, at].astype(float)
+
+
+def _is_weighed(posterior: Posterior) -> bool:
+    """Whether draws are of the posterior itself, by weights that are known no more."""
+    return posterior.provenance.get(ESS, 0.0) >= TOO_FEW
 
 
 def _has_density(posterior: Posterior) -> bool:

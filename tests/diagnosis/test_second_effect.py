@@ -10,6 +10,7 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis import diagnose as diagnose_module
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Verdict
@@ -84,7 +85,7 @@ def test_beside_the_only_effect_no_pair_is_as_probable(tmp_path):
     best, near, contesting = looked_at(
         tmp_path / "clip.csv", seed=11, angle=18.0, effects=effects, track_noise=3e-4, fps=60.0
     )
-    assert best.name == "air_drag"
+    assert best.name == "air_drag" and near
     assert all(pair.log_odds < best.log_odds - 2.0 for pair in contesting)
     beside = [pair for pair in near if "air_drag" in pair.effects]
     price = log_prior([1.0], len(LIBRARY)) - log_prior([1.0, 1.0], len(LIBRARY))
@@ -121,9 +122,26 @@ def test_what_may_contest_a_name_is_fitted_from_where_it_was_refined_to():
     assert contesting_pairs(stub, singles, [far], DECISIVE) == []
 
 
+def test_a_pair_that_is_ahead_brings_in_all_that_is_done_for_pairs(monkeypatch):
+    race: Any = None
+    monkeypatch.setattr(diagnose_module, "pairs_near", lambda *_: [pair("a+b", 41.0)])
+    for log_odds, names in ((41.0, ["a+b", "c+d"]), (39.0, ["a+b"])):
+        contesting = [candidate("a+b", log_odds)]
+        monkeypatch.setattr(diagnose_module, "contesting_pairs", lambda *_, it=contesting: it)
+        others = (candidate("a+b", 30.0), candidate("c+d", 35.0))
+        monkeypatch.setattr(diagnose_module, "fitted_pairs", lambda *_, it=others: it)
+        found, near, why = diagnose_module._pairs(race, [NAMED], LIBRARY, DECISIVE, lambda _: None)
+        assert sorted(one.name for one in found) == names and len(near) == 1
+        assert max(one.log_odds for one in found) == log_odds
+        rules = [one.rule for one in why]
+        assert rules == ["pairs_beside", "pairs_further"][: len(names)]
+        assert why[0].numbers["num_pairs"] == 1 and why[-1].numbers["num_pairs"] == len(names)
+
+
 def test_the_reasons_say_which_pairs_were_looked_at():
     why = reasons.pairs_beside(NAMED, 16, 3)
-    assert "the 16 nearest were fitted roughly, and the 3 most probable" in why.sentence
+    assert "16 pairs of effects that come near it were fitted roughly" in why.sentence
+    assert "the 3 most probable of them with care" in why.sentence
     assert (why.numbers["num_near"], why.numbers["num_pairs"]) == (16, 3)
     why = reasons.no_pair_contests(NAMED, "air_drag+rolling", 4.4, 16)
     assert "air_drag+rolling, is 81 times less probable" in why.sentence

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.inference import fit_posterior as module
-from galileo_jax.inference.fit_posterior import fit_posterior
+from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
 from galileo_jax.inference.fits.evidence import Code
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.look_round import to_go_on_from
@@ -104,10 +104,21 @@ def test_else_it_is_the_normal_one(posterior, monkeypatch, why):
     if why == "many":
         monkeypatch.setattr(module, "MOST_PARAMETERS", 1)
     if why == "few count":
-        monkeypatch.setattr(module, "LEAST_ESS", 1e9)
+        monkeypatch.setattr(module, "TOO_FEW", 1e9)
     found, normal = posterior(CORNER, fit, engine="c" if why == "slow" else "rigid")
     np.testing.assert_array_equal(found.draws, normal.draws)
     assert found.status is (Status.STEP_LIMIT if why == "not settled" else Status.CONVERGED)
+
+
+def test_it_says_where_too_few_draws_count(posterior, monkeypatch):
+    enough, normal = posterior(CORNER, AT_THE_CORNER)
+    assert uncertain_width(enough) is None and uncertain_width(normal) is None
+    monkeypatch.setattr(module, "MOST", 64)
+    monkeypatch.setattr(module, "NUM_AT_ONCE", 64)
+    few, _ = posterior(CORNER, AT_THE_CORNER)
+    said = uncertain_width(few)
+    assert said is not None and f"are worth {few.provenance['ess']:.0f} draws" in said
+    assert "--method mh" in said
 
 
 def test_of_a_simulated_hit_both_agree():
@@ -137,6 +148,23 @@ def test_from_beside_the_best_it_goes_on_to_the_best():
     costs = known.costs(points(starts))
     assert costs.min() < known.costs(points(beside.z))[0]
     assert starts[np.argmin(costs), 0] > 0
+
+
+@pytest.mark.parametrize("is_smooth", [True, False], ids=["rigid", "rough"])
+def test_a_fit_that_is_beside_the_posterior_goes_on(is_smooth, monkeypatch):
+    """Where motion is rough no points are drawn, and it stays where it is."""
+    with in_64_bit():
+        fitter = GradientFitter(make_trials([HIT]))
+        best = fitter.fit(0)
+        beside = best.z + 4 * np.sqrt(np.diag(best.covariance)) * (np.arange(len(best.z)) == 1)
+        stuck = replace(best, z=beside, log_evidence=best.log_evidence - 8.0)
+        monkeypatch.setattr(fitter, "_descent", replace(fitter._descent, is_smooth=is_smooth))
+        found = fitter._looked_round([stuck], 0)
+    if is_smooth:
+        assert found.log_evidence == pytest.approx(best.log_evidence, abs=0.2)
+        assert found.stats["num_rollouts"] > best.stats["num_rollouts"]
+    else:
+        np.testing.assert_array_equal(found.z, stuck.z)
 
 
 def test_so_many_parameters_that_no_draw_weighs_anything_are_left(monkeypatch):

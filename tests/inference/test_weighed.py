@@ -26,6 +26,7 @@ class Known:
     """Residuals `white(z)` of two parameters, without clips and noise scales."""
 
     clips = ()
+    num_rollouts = 0
 
     def __init__(self, white):
         self.white = white

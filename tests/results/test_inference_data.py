@@ -15,6 +15,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.convergence import arviz
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
@@ -146,6 +147,14 @@ def test_loo_prefers_the_model_that_fits(fitted, data):
         warnings.simplefilter("ignore", UserWarning)  # of its weights
         worse = az.loo(wrong)
     assert worse.elpd_loo < loo.elpd_loo - 10
+
+
+def test_draws_that_were_weighed_before_are_not_weighed_again(trials, fit):
+    """Their weights are known no more; what they are worth is."""
+    posterior = fit_posterior(trials, fit, 0)
+    found = inference_data(trials, posterior)["log_likelihood"]["position"].attrs
+    assert float(found["importance_ess"]) == pytest.approx(posterior.provenance["ess"], rel=0.01)
+    assert "importance_pareto_k" not in found
 
 
 def test_draws_of_a_poor_approximation_are_weighted(trials, fit, fitted):

@@ -152,12 +152,14 @@ def test_where_a_blow_begins_a_motion_errors_are_larger():
     time, few = np.arange(60.0), np.tile(0.01**2 * np.eye(2), (60, 1, 1))
     hit = np.maximum(time - 20.4, 0) * 3.0
     hit_again = hit + np.maximum(time - 40.2, 0) * 3.0
-    slides = 0.05 * np.maximum(time - 20, 0) ** 2
+    slides = 0.6 * np.maximum(time - 20, 0) ** 2  # steps of 0.6, 1.8, 3.0 px
     scale2 = after_blow_scale2(np.stack([hit_again, 0 * time], axis=1), few)
     assert np.flatnonzero(scale2[:, 0] > 1).tolist() == [21, 22]
     assert scale2[21:23, 0].tolist() == list(AFTER_BLOW_SCALE2)
     assert (scale2[:, 1] == 1).all()
     assert (after_blow_scale2(np.stack([slides, 0 * time], axis=1), few) == 1).all()
+    moves_at_first = np.stack([3.0 * time, 0 * time], axis=1)  # and may have moved before
+    assert (after_blow_scale2(moves_at_first, few) == 1).all()
     late = after_blow_scale2(np.stack([hit, 0 * time], axis=1)[:22], few[:22])  # the clip ends
     assert late[:, 0].tolist() == [1.0] * 21 + [AFTER_BLOW_SCALE2[0]]
 

@@ -8,7 +8,8 @@
        phase by phase (`stages.py`) and from more starts.
     5. Where points round the fit say that the posterior is elsewhere, it goes on from these
        (`look_round.py`).
-    6. Posterior: normal in z with covariance (J^T J + 1)^-1; evidence by Laplace (`evidence.py`).
+    6. The normal approximation in z, with covariance (J^T J + 1)^-1; evidence by Laplace
+       (`evidence.py`).
 
 Compiled code (`programs.py`) contains no rollout. JAX can therefore cache it for every engine, and
 all clips share it; clips differ only in the data they pass in. From a single distant starting point
@@ -308,11 +309,12 @@ class GradientFitter:
             if not len(starts):
                 break
             points = self._batch(starts, best.free[: self._count])
-            found = self._polish(points, np.zeros(len(starts), int), 0)
+            owner = np.zeros(len(starts), int)
+            found = self._polish(points, owner, int(best.stats.get("num_steps", 0)))
             known, best = best, _with_beside([best, *best.beside, *found.values()])
             if not _evidence(best) - _evidence(known) > LEADS_ON:  # nor if both failed
                 break
-        return best
+        return replace(best, stats={**best.stats, "num_rollouts": self._residuals.num_rollouts})
 
     def _ends(self, starts: np.ndarray, free: np.ndarray, num_refined: int) -> Ends:
         """Refines the best of some starts."""
