@@ -5,13 +5,14 @@ from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock
 
+import numpy as np
 import pytest
 
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.diagnosis import diagnose as diagnose_module
-from galileo_jax.diagnosis import reasons
+from galileo_jax.diagnosis import reasons, second_effect
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Verdict
 from galileo_jax.diagnosis.race import Race
@@ -97,6 +98,33 @@ def test_beside_the_only_effect_no_pair_is_as_probable(tmp_path):
 def test_a_library_of_one_effect_has_no_pairs():
     race: Any = None
     assert pairs_near(race, [candidate("air_drag", 40.0)], ["air_drag"], DECISIVE) == []
+
+
+def test_of_pairs_without_the_best_effect_only_the_nearest_are_refined(monkeypatch):
+    """All that have it come near, and of the others none that is far."""
+    library = ["air_drag", *(f"other{i}" for i in range(8))]
+    singles = [candidate(name, 40.0 - i) for i, name in enumerate(library)]
+    refined = []
+
+    def search(fitter, bases, pairs, seed, lowest, most):
+        assert most == len(pairs) == 36
+        costs = [99.0 if "other7" in pair and "air_drag" not in pair else 1.0 for pair in pairs]
+        return np.zeros((len(pairs), 0)), np.array(costs) + 0.01 * np.arange(len(pairs))
+
+    def refine(race, starts, error):
+        refined.extend(effects for effects, _ in starts)
+        return [pair("+".join(effects), 0.0) for effects, _ in starts]
+
+    monkeypatch.setattr(second_effect, "short_search", search)
+    monkeypatch.setattr(second_effect, "_refined", refine)
+    fitter = SimpleNamespace(
+        trials=SimpleNamespace(model_parameters=()), search_costs=lambda z, free: np.zeros(1)
+    )
+    stub: Any = SimpleNamespace(fitter=fitter, seed=0, log_odds=lambda _: 40.0)
+    pairs_near(stub, singles, library, DECISIVE)
+    with_best = [effects for effects in refined if "air_drag" in effects]
+    assert len(with_best) == 8 and len(refined) == 8 + second_effect.MOST_OTHERS
+    assert all("other7" not in effects for effects in refined if effects not in with_best)
 
 
 def test_what_may_contest_a_name_is_fitted_from_where_it_was_refined_to():
