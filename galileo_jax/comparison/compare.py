@@ -219,8 +219,11 @@ def _standardised(
     measured: np.ndarray, drawn: np.ndarray, cell: Cell
 ) -> tuple[np.ndarray, np.ndarray]:
     """A cell's statistics `[3]` and the replicates' `[replicate, 3]`, in standard deviations."""
-    least = float(np.mean(np.sum(drawn[:, cell.index] ** 2, axis=1)))
-    found, expected = statistics(measured, cell, least)[0], statistics(drawn, cell, least)
+    noise = drawn[:, cell.index]
+    least = float(np.mean(np.sum(noise**2, axis=1)))
+    together = float(np.mean(np.sum(noise[:, 1:] * noise[:, :-1], axis=1)))
+    usual = (least, together / least if least > 0 else 0.0)
+    found, expected = statistics(measured, cell, *usual)[0], statistics(drawn, cell, *usual)
     mean, sd = expected.mean(axis=0), expected.std(axis=0)
     sd = np.maximum(sd, 1e-9)
     return (found - mean) / sd, (expected - mean) / sd

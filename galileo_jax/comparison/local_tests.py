@@ -70,14 +70,16 @@ def find_cells(
     return found
 
 
-def statistics(white: np.ndarray, cell: Cell, least: float) -> np.ndarray:
+def statistics(white: np.ndarray, cell: Cell, least: float, correlation: float = 0.0) -> np.ndarray:
     """Power, slowness and whiteness of one cell, each about normal if the model is right.
 
     Args:
       white: `[replicate, value]`, residuals of the clip.
       cell: where to look.
       least: the sum of squares that noise alone gives there. Where there is less, neighbours that
-        go together count against it: a tracker's faint memory is no physics.
+        go together more than expected count against it: a tracker's faint memory is no physics.
+      correlation: of neighbours that noise alone has there. Where the patterns that the likelihood
+        allows for take up all that is smooth, what is left alternates.
 
     Returns:
       `[replicate, 3]`; sums of squares as their cube roots (Wilson and Hilferty 1931).
@@ -89,7 +91,8 @@ def statistics(white: np.ndarray, cell: Cell, least: float) -> np.ndarray:
     slowness = np.cbrt(np.mean(spectrum**2, axis=1))
     neighbours = np.sum(values[:, 1:] * values[:, :-1], axis=1)
     squares = np.sum(values**2, axis=1)
+    surplus = neighbours - correlation * squares
     # Residuals that are all exactly 0 (rows that stand still) follow nothing.
-    whole = np.where(neighbours > 0, np.maximum(squares, least), squares)
-    whiteness = neighbours / np.where(whole > 0, whole, 1.0)
+    whole = np.where(surplus > 0, np.maximum(squares, least), squares)
+    whiteness = surplus / np.where(whole > 0, whole, 1.0)
     return np.stack([power, slowness, whiteness], axis=1)
