@@ -272,9 +272,11 @@ def summary(
 
 def fit_grad(track: Track, same: Same, seed: int) -> Answer:
     fit, seconds = _fit(track, seed)
+    began = time.perf_counter()
     posterior = fit_posterior(track.trials, fit, seed)
+    seconds += time.perf_counter() - began
     draws = quantities(track.trials, posterior.draws)
-    return Answer(draws, seconds, fit.stats["num_rollouts"], posterior.is_converged)
+    return Answer(draws, seconds, posterior.stats["num_rollouts"], posterior.is_converged)
 
 
 def fit_mh(

@@ -133,7 +133,7 @@ def fit_grad(case: synthetic_tracks.Case, seed: int) -> Answer:
     fit, began = _warm_fit(case.trials, seed)
     posterior = fit_posterior(case.trials, fit, seed)
     seconds = time.perf_counter() - began
-    return _of_draws(case.trials, fit, posterior, seconds, fit.stats["num_rollouts"])
+    return _of_draws(case.trials, fit, posterior, seconds, posterior.stats["num_rollouts"])
 
 
 def fit_mh(case: synthetic_tracks.Case, seed: int) -> Answer:

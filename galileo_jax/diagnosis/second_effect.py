@@ -111,7 +111,7 @@ def _refined(
 ) -> list[NearPair]:
     """Pairs refined roughly from `(effects, z)`, a few at once; without those far behind.
 
-    `error` is that of Laplace's evidence, nats, to be taken off.
+    `error`: nats by which Laplace's evidence is too low; it is added.
     """
     if not starts:
         return []

@@ -14,10 +14,11 @@ import numpy as np
 from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
 from galileo_jax.inference.fits.look_round import MOST_PARAMETERS
 from galileo_jax.inference.fits.residuals import Residuals
-from galileo_jax.inference.fits.weighed import Weighed, weighed
+from galileo_jax.inference.fits.weighed import weighed
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import Posterior, Status
+from galileo_jax.inference.systematic import systematic
 
 # At once, and in all until they are worth `ENOUGH` draws: a mean is then good to .03 sd.
 NUM_AT_ONCE, MOST, ENOUGH = 512, 8192, 1200.0
@@ -48,7 +49,8 @@ def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterio
     if found.ess < TOO_FEW:
         normal = laplace_posterior(trials, fit, seed)
         return replace(normal, stats=stats, provenance={**normal.provenance, ESS: found.ess})
-    which = _resampled(found, np.random.default_rng([seed, 31]))
+    generator = np.random.default_rng([seed, 31])
+    which = generator.permutation(systematic(found.log_weights, NUM_DRAWS, generator))
     return Posterior(
         names=trials.names,
         draws=trials.theta(found.z[which], fit.free)[None],
@@ -68,15 +70,3 @@ def uncertain_width(posterior: Posterior) -> str | None:
         f"the intervals are uncertain: points round the fit are worth {ess:.0f} draws of the "
         f"posterior ({FEW:.0f} would do); --method mh draws more"
     )
-
-
-def _resampled(found: Weighed, generator: np.random.Generator) -> np.ndarray:
-    """`NUM_DRAWS` indices of draws, each as often as it weighs, in any order.
-
-    Systematically: one random number for all (G. Kitagawa, J. Comput. Graph. Stat. 5 (1996), 1).
-    """
-    weights = np.exp(found.log_weights - found.log_weights.max())
-    ends = np.cumsum(weights) / weights.sum()
-    at = (np.arange(NUM_DRAWS) + generator.uniform()) / NUM_DRAWS
-    which = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
-    return generator.permutation(which)

@@ -31,6 +31,7 @@ from galileo_jax.inference.convergence import arviz
 from galileo_jax.inference.fit_posterior import ESS, TOO_FEW
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
+from galileo_jax.inference.systematic import systematic
 from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -199,11 +200,8 @@ def _drawn_again(
         predicted = jnp.asarray(_positions(trials, theta, clip))
         weights += np.asarray(_log_densities(predicted, scale, problem.data))
     smoothed, pareto_k = arviz().psislw(weights)
-    share = np.cumsum(np.exp(smoothed))
-    # Evenly spaced through the weights: no draw comes in more or less often than its share.
-    count = min(len(theta), NUM_LIKELIHOOD_DRAWS)
-    places = (np.arange(count) + rng.uniform()) / count * share[-1]
-    return theta[np.searchsorted(share, places)], float(pareto_k)
+    which = systematic(np.asarray(smoothed), min(len(theta), NUM_LIKELIHOOD_DRAWS), rng)
+    return theta[which], float(pareto_k)
 
 
 _log_densities = jax.jit(jax.vmap(GaussianLikelihood.log_density, (0, 0, None)))
