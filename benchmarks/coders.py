@@ -28,7 +28,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.commands import command
 from galileo_jax.tracking import motion_compensation
 from galileo_jax.tracking.clip import track_clip
-from galileo_jax.tracking.motion_compensation import coding_shift_amplitudes_px
+from galileo_jax.tracking.motion_compensation import STEPS_PER_PX, coding_shift_amplitudes_px
 from galileo_jax.tracking.track import Track
 
 OPTIONS = {
@@ -58,8 +58,8 @@ def main(argv: Sequence[str]) -> int | None:
             plain += without
             mended += with_it
         before, after = scatter(plain), scatter(mended)
-        half, quarter = np.median(amplitudes, axis=0)
-        row = (before[0], after[0], before[1], after[1], half, quarter)
+        by_step = np.median(np.concatenate(amplitudes).reshape(-1, len(STEPS_PER_PX)), axis=0)
+        row = (before[0], after[0], before[1], after[1], *by_step)
         tables.row(name, [float(value) for value in row])
         figures[name] = row
     tables.finish("coders", figures | {"num": call.num, "seed": call.seed})
@@ -99,7 +99,7 @@ def filmed(folder: Path, seed: int, options: Sequence[str] | None) -> Path:
 
 
 def errors(path: Path) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
-    """The amplitudes, px, and the errors of each stretch, px, without and with the correction."""
+    """The amplitudes `[object, 2, step]`, px, and the errors of each stretch, px, without and with the correction."""
     clip, record = load_clip(path), json.loads(path.with_suffix(".truth.json").read_text())
     found: list[np.ndarray] = []
 
@@ -107,8 +107,8 @@ def errors(path: Path) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
         found.append(coding_shift_amplitudes_px(*given))
         return found[-1]
 
-    def none(*_: Any) -> np.ndarray:
-        return np.zeros(len(motion_compensation.STEPS_PER_PX))
+    def none(paths: Sequence[Any], _: Any) -> np.ndarray:
+        return np.zeros((len(paths), 2, len(STEPS_PER_PX)))
 
     both = []
     for search in (none, watched):

@@ -5,11 +5,12 @@ A coder predicts a moving block from the frame before it, shifted by a whole num
 is drawn towards the nearest such step: an object whose displacement from frame to frame is d is
 seen off its place by
 
-    e = sum_k a_k sin(2 pi k d)      k = 2: half pixels, k = 4: quarter pixels
+    e = sum_k a_k sin(2 pi k d)      k = 1: whole pixels, k = 2: half pixels, k = 4: quarter pixels
 
-and not at all in frames that are coded whole. How strongly depends on coder and bit rate, but is
-the same for all objects along both axes of the image. The a_k are found in the video itself, where
-objects move smoothly: the largest likelihood of
+and not at all in frames that are coded whole. How strongly depends on coder and bit rate, and a
+little on what is on the object and which way it moves: each object has amplitudes of its own along
+each axis of the image, about those of the video. They are found in the video itself, where objects
+move smoothly: the largest likelihood of
 
     x_t = path_t + e(x_t - x_(t-1)) + noise
 
@@ -23,6 +24,7 @@ what was measured: docs/explanation/tracking.md.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -30,9 +32,15 @@ from scipy.optimize import minimize
 
 from galileo_jax.tracking.noise import has_moved
 
-STEPS_PER_PX = np.array([2.0, 4.0])
-USUAL_PX = 0.03
-"""Prior standard deviation of the amplitudes: those of rendered MPEG-4 were 0.03 px."""
+STEPS_PER_PX = np.array([1.0, 2.0, 4.0])
+USUAL_PX = np.array([0.006, 0.03, 0.03])
+"""Prior standard deviations of a video's amplitudes: those of rendered MPEG-4 were -0.006 px (whole
+pixels) and -0.03 px (half pixels), those of H.264 and H.265 -0.02 px (quarter pixels)."""
+OWN_PX = np.array([0.003, 0.01, 0.004])
+"""Standard deviations of an object's own about those: half pixels, object 1 along x and y, object 2
+along x: -0.022, -0.019, -0.031 px (12 rendered clips that were looked at)."""
+OWN_NOISE_VALUES = 5.0
+"""An object's noise weighs against so many values with the noise of the whole video."""
 PIECE_FRAMES, DEGREE = 8, 2
 MIN_PIECES = 3
 """Fewer pieces tell no amplitude."""
@@ -43,6 +51,12 @@ MOST_ALIKE = 0.8
 phasor), a piece tells nothing."""
 SLOPE_MOST = 0.9
 """Of e': beyond 1, two places of the object would give the same picture."""
+LEAST_VOLUME = 1e-3
+SHARE_LEFT = 1 - (DEGREE + 1) / PIECE_FRAMES
+"""Of a piece's values, what a parabola leaves."""
+FASTEST_PX = 30.0
+"""From a frame to the next: amplitudes were -0.027 px up to 16 px, -0.02 px to 32 px and 0 beyond
+(object 1 in 60 rendered clips that were looked at); so far a coder finds no block again."""
 TURNS_RAD = 0.01
 """From a frame to the next: a third of a pixel at the rim of a middling object."""
 
@@ -80,9 +94,9 @@ def without_coding_shift(
     shown = [(coding.to_coded(poses[:, :2]), covariance) for poses, covariance in paths]
     amplitudes_px = coding_shift_amplitudes_px(shown, coding.is_predicted)
     found = []
-    for (poses, _), (coded, covariance) in zip(paths, shown, strict=True):
+    for (poses, _), (coded, covariance), own_px in zip(paths, shown, amplitudes_px, strict=True):
         step = _displacement(coded)
-        predicted = _patterns(step, coding.is_predicted[: len(step)]) @ amplitudes_px
+        predicted = np.sum(_patterns(step, coding.is_predicted[: len(step)]) * own_px, axis=-1)
         # What does not move is shown where it was, and noise in its steps would only add noise.
         # What turns no shifted block predicts, so that it is coded anew.
         is_turning = np.abs(np.diff(poses[:, 2:], axis=0, prepend=np.nan)) > TURNS_RAD
@@ -96,53 +110,114 @@ def without_coding_shift(
 def coding_shift_amplitudes_px(
     paths: Sequence[tuple[Float[np.ndarray, "frame 2"], Float[np.ndarray, "frame 2 2"]]],
     is_predicted: Bool[np.ndarray, " frame"],
-) -> Float[np.ndarray, " step"]:
-    """The amplitudes a_k, px, for each of `STEPS_PER_PX`; 0 where too little moves to tell.
+) -> Float[np.ndarray, "object 2 step"]:
+    """The amplitudes a_k, px, of each object along each axis, for each of `STEPS_PER_PX`.
+
+    0 where too little moves in the video to tell; the video's where too little of the object does.
 
     Args:
       paths: per object `place`, px, and `covariance` of image noise, px^2; NaN where not visible.
       is_predicted: which frames are predicted from the frame before them.
     """
-    off_path = _off_parabola()
-    places, patterns, slopes = [], [], []
-    for place, covariance in paths:
-        step = _displacement(place)
-        pattern = _patterns(step, is_predicted[: len(step)])
-        slope = _slopes(step, is_predicted[: len(step)])
-        moves = _moves(place, covariance)
-        for axis in range(2):
-            for own in _pieces(moves[:, axis]):
-                if _alike(step[own, axis]) < MOST_ALIKE:
-                    places.append(off_path @ place[own, axis])
-                    patterns.append(off_path @ pattern[own, axis])
-                    slopes.append(slope[own, axis])
-    if len(places) < MIN_PIECES:
-        return np.zeros(len(STEPS_PER_PX))
-    left, pattern, slope = np.array(places), np.array(patterns), np.array(slopes)
-    size = np.mean(left**2, axis=1)
+    found = np.zeros((len(paths), 2, len(STEPS_PER_PX)))
+    pieces = [
+        (index, axis, piece)
+        for index, (place, covariance) in enumerate(paths)
+        for axis in range(2)
+        for piece in _smooth_pieces(place, covariance, is_predicted, axis)
+    ]
+    if len(pieces) < MIN_PIECES:
+        return found
+    size = np.array([np.mean(piece.left**2) for _, _, piece in pieces])
     is_smooth = size < ROUGH * np.median(size)
-    return _likeliest(left[is_smooth], pattern[is_smooth], slope[is_smooth])
+    pieces = [each for each, smooth in zip(pieces, is_smooth, strict=True) if smooth]
+    whole = _joined([piece for _, _, piece in pieces])
+    found[:] = usual = _likeliest(whole, np.zeros(len(STEPS_PER_PX)), USUAL_PX, 0.0)
+    noise2 = float(np.sum(whole.errors(usual) ** 2)) / whole.degrees
+    for index, axis in sorted({(index, axis) for index, axis, _ in pieces}):
+        own = _joined([piece for i, a, piece in pieces if (i, a) == (index, axis)])
+        found[index, axis] = _likeliest(own, usual, OWN_PX, noise2)
+    return found
+
+
+class _Smooth(NamedTuple):
+    """Pieces of smooth motion, less a parabola each.
+
+    Attributes:
+      left: `[..., frame]`, px, what a parabola leaves of the places.
+      pattern: `[..., frame, step]`, what it leaves of the sines.
+      slope: `[..., frame, step]`, the sines' derivatives by the displacement, 1/px.
+    """
+
+    left: np.ndarray
+    pattern: np.ndarray
+    slope: np.ndarray
+
+    @property
+    def degrees(self) -> float:
+        """How many values a parabola in each piece leaves free."""
+        return SHARE_LEFT * self.left.size
+
+    def errors(self, amplitudes_px: Float[np.ndarray, " step"]) -> np.ndarray:
+        """What is left without the shifts, `[..., frame]`, px."""
+        return self.left - self.pattern @ amplitudes_px
+
+
+def _smooth_pieces(
+    place: Float[np.ndarray, "frame 2"],
+    covariance: Float[np.ndarray, "frame 2 2"],
+    is_predicted: Bool[np.ndarray, " frame"],
+    axis: int,
+) -> list[_Smooth]:
+    """Pieces of an object's motion along an axis, one after the other, that tell amplitudes."""
+    off_path, step = _off_parabola(), _displacement(place)
+    pattern = _patterns(step, is_predicted[: len(step)])[:, axis]
+    slope = _slopes(step, is_predicted[: len(step)])[:, axis]
+    return [
+        _Smooth(off_path @ place[own, axis], off_path @ pattern[own], slope[own])
+        for own in _pieces(_moves(place, covariance)[:, axis])
+        if _alike(step[own, axis]) < MOST_ALIKE
+    ]
+
+
+def _joined(pieces: Sequence[_Smooth]) -> _Smooth:
+    return _Smooth(*(np.stack(each) for each in zip(*pieces, strict=True)))
 
 
 def _likeliest(
-    left: Float[np.ndarray, "piece frame"],
-    pattern: Float[np.ndarray, "piece frame step"],
-    slope: Float[np.ndarray, "piece frame step"],
+    pieces: _Smooth,
+    usual_px: Float[np.ndarray, " step"],
+    sd_px: Float[np.ndarray, " step"],
+    usual_noise2: float,
 ) -> Float[np.ndarray, " step"]:
-    """The most probable amplitudes, px; the noise's size is integrated out."""
-    share = 1 - (DEGREE + 1) / PIECE_FRAMES  # of the values, what a parabola leaves
-    degrees = share * left.size
+    """The most probable amplitudes, px; the noise's size is integrated out.
 
-    def cost(amplitudes: np.ndarray) -> float:
-        square = np.sum((left - pattern @ amplitudes) ** 2)
-        volume = share * np.sum(np.log(np.maximum(1 - slope @ amplitudes, 1e-3)))
-        prior = np.sum(amplitudes**2) / (2 * USUAL_PX**2)
-        return float(degrees / 2 * np.log(square + 1e-12) - volume + prior)
+    Args:
+      pieces: `[piece, frame]` each.
+      usual_px, sd_px: of the prior.
+      usual_noise2: px^2, as much as `OWN_NOISE_VALUES` values have, beside the pieces'; 0: nothing
+        is known of the noise.
+    """
+    beside = OWN_NOISE_VALUES if usual_noise2 else 0.0
+    degrees = pieces.degrees + beside
+
+    def cost(amplitudes: np.ndarray) -> tuple[float, np.ndarray]:
+        errors, away = pieces.errors(amplitudes), (amplitudes - usual_px) / sd_px
+        square = np.sum(errors**2) + beside * usual_noise2 + 1e-12
+        volume = 1 - pieces.slope @ amplitudes
+        is_open = volume > LEAST_VOLUME
+        volume = np.maximum(volume, LEAST_VOLUME)
+        value = degrees / 2 * np.log(square) - SHARE_LEFT * np.sum(np.log(volume))
+        gradient = -degrees / square * np.einsum("pfk,pf->k", pieces.pattern, errors)
+        gradient += SHARE_LEFT * np.einsum("pfk,pf->k", pieces.slope, is_open / volume)
+        return float(value + np.sum(away**2) / 2), gradient + away / sd_px
 
     most = SLOPE_MOST / (2 * np.pi * STEPS_PER_PX)
     bounds = list(zip(-most, most, strict=True))
-    starts = (np.zeros(len(most)), -USUAL_PX / STEPS_PER_PX)
-    ends = [minimize(cost, start, bounds=bounds) for start in starts]
+    starts = (usual_px, usual_px - sd_px / STEPS_PER_PX)
+    ends = [
+        minimize(cost, np.clip(start, -most, most), jac=True, bounds=bounds) for start in starts
+    ]
     return np.asarray(min(ends, key=lambda end: float(end.fun)).x)
 
 
@@ -154,9 +229,9 @@ def _displacement(place: Float[np.ndarray, "frame 2"]) -> Float[np.ndarray, "fra
 def _patterns(
     step: Float[np.ndarray, "frame 2"], is_predicted: Bool[np.ndarray, " frame"]
 ) -> Float[np.ndarray, "frame 2 step"]:
-    """The sines; 0 where nothing is known of the frame before."""
+    """The sines; 0 where nothing is known of the frame before, or the object is too fast."""
     phase = 2 * np.pi * STEPS_PER_PX * np.nan_to_num(step)[..., None]
-    return np.where(is_predicted[:, None, None], np.sin(phase), 0.0)
+    return np.where(_is_found_again(step, is_predicted)[:, None, None], np.sin(phase), 0.0)
 
 
 def _slopes(
@@ -165,7 +240,14 @@ def _slopes(
     """The sines' derivatives by the displacement, 1/px."""
     rate = 2 * np.pi * STEPS_PER_PX
     slope = rate * np.cos(rate * np.nan_to_num(step)[..., None])
-    return np.where(is_predicted[:, None, None] & np.isfinite(step)[..., None], slope, 0.0)
+    return np.where(_is_found_again(step, is_predicted)[:, None, None], slope, 0.0)
+
+
+def _is_found_again(
+    step: Float[np.ndarray, "frame 2"], is_predicted: Bool[np.ndarray, " frame"]
+) -> Bool[np.ndarray, " frame"]:
+    """Whether a coder has predicted the object from the frame before."""
+    return is_predicted & (np.hypot(*step.T) < FASTEST_PX)  # not of NaN
 
 
 def _moves(

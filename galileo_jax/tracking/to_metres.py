@@ -32,9 +32,9 @@ def observe(clip: Clip, track: Track) -> Observation:
         )
     slope = plane.slope(track.position_px)
     is_level = SCENARIOS[clip.scenario].is_level
-    # Of pucks the likelihood has the point that was marked off the centre as what it is: one
-    # error, which turns with the puck. In every frame's own error it would hide the motion.
-    own_px2 = track.covariance_px2 - (track.common_px2 if is_level else 0.0)
+    # What the first frame is off by is one error of all frames, which the likelihood has as what it
+    # is: an offset of the track. As every frame's own error it would hide the motion.
+    own_px2 = track.covariance_px2 - track.common_px2
     covariance = slope @ own_px2 @ np.swapaxes(slope, -1, -2)
     return Observation(
         names=track.names,

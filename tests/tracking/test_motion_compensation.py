@@ -41,7 +41,10 @@ def coded(frames=FRAMES, whole=12):
 CODING = Coding(coded())
 
 
-@pytest.mark.parametrize("amplitudes", [(-0.03, 0.0), (0.0, -0.02), (-0.02, -0.01), (0.0, 0.0)])
+@pytest.mark.parametrize(
+    "amplitudes",
+    [(0.0, -0.03, 0.0), (0.0, 0.0, -0.02), (-0.006, -0.02, -0.01), (0.0, 0.0, 0.0)],
+)
 def test_amplitudes_of_a_coder_are_found(amplitudes):
     rng = np.random.default_rng(1)
     found = [
@@ -50,15 +53,37 @@ def test_amplitudes_of_a_coder_are_found(amplitudes):
         )
         for both in [(ACCELERATED, 1.1 * ACCELERATED)] * 20
     ]
+    found = np.reshape(found, (-1, len(STEPS_PER_PX)))  # each object's along each axis
     np.testing.assert_allclose(np.mean(found, axis=0), amplitudes, atol=0.003)
-    np.testing.assert_allclose(np.std(found, axis=0), 0.0, atol=0.004)
+    np.testing.assert_allclose(np.std(found, axis=0), 0.0, atol=0.005)
+
+
+def test_objects_have_amplitudes_of_their_own():
+    rng = np.random.default_rng(7)
+    each = [np.array([0.0, half, 0.0]) for half in (-0.02, -0.035)]
+    found = []
+    for _ in range(20):
+        paths = [seen(ACCELERATED, own, coded(), rng) for own in each]
+        found.append(coding_shift_amplitudes_px(paths, coded())[..., 1].mean(axis=1))
+    one, other = np.mean(found, axis=0)  # each drawn a little to what both have
+    assert -0.026 < one < -0.019
+    assert -0.036 < other < -0.029
+
+
+def test_of_an_object_that_hardly_moves_the_video_tells_the_amplitudes():
+    rng = np.random.default_rng(8)
+    moving = seen(ACCELERATED, np.array([0.0, -0.03, 0.0]), coded(), rng)
+    resting = (np.tile([30.0, 40.0], (FRAMES, 1)), moving[1])
+    alone, beside = coding_shift_amplitudes_px([moving, resting], coded())
+    np.testing.assert_array_equal(beside[0], beside[1])
+    assert abs(beside[0, 1] - alone[0, 1]) < 0.01
 
 
 def test_places_are_nearer_to_the_truth_and_their_errors_independent():
     rng = np.random.default_rng(2)
     before, after, neighbours = 0.0, 0.0, 0.0
     for _ in range(20):
-        place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
+        place, noise = seen(ACCELERATED, np.array([0.0, -0.03, 0.0]), coded(), rng)
         (mended,) = mended_places([(place, noise)], CODING)
         wrong, left = place - ACCELERATED, mended - ACCELERATED
         before, after = before + np.sum(wrong**2), after + np.sum(left**2)
@@ -69,7 +94,7 @@ def test_places_are_nearer_to_the_truth_and_their_errors_independent():
 
 def test_whole_frames_and_what_rests_stay():
     rng = np.random.default_rng(3)
-    place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
+    place, noise = seen(ACCELERATED, np.array([0.0, -0.03, 0.0]), coded(), rng)
     (mended,) = mended_places([(place, noise)], CODING)
     np.testing.assert_array_equal(mended[::12], place[::12])
     resting = np.tile([30.0, 40.0], (FRAMES, 1))
@@ -103,7 +128,7 @@ def test_gaps_and_short_tracks_are_left_as_they_are():
 
 def test_a_view_that_is_drawn_anew_is_mended_in_the_pixels_that_were_coded():
     rng = np.random.default_rng(5)
-    place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
+    place, noise = seen(ACCELERATED, np.array([0.0, -0.03, 0.0]), coded(), rng)
     view = Coding(coded(), lambda px: px / 1.3 - 7.0, lambda px: 1.3 * (px + 7.0))
     (plain,) = mended_places([(place, noise)], CODING)
     (mended,) = mended_places([(view.from_coded(place), noise)], view)
@@ -112,7 +137,7 @@ def test_a_view_that_is_drawn_anew_is_mended_in_the_pixels_that_were_coded():
 
 def test_what_turns_is_coded_anew():
     rng = np.random.default_rng(6)
-    place, noise = seen(ACCELERATED, np.array([-0.03, 0.0]), coded(), rng)
+    place, noise = seen(ACCELERATED, np.array([0.0, -0.03, 0.0]), coded(), rng)
     angle = np.where(TIME < 45, 0.0, 0.05 * (TIME - 45))
     (turning,) = mended_places([(place, noise)], CODING, angle)
     (plain,) = mended_places([(place, noise)], CODING)
