@@ -44,7 +44,8 @@ MOVES_PX, NEAR_FRAMES, FEWEST = 0.3, 2, 12
 
 def main(argv: Sequence[str]) -> int | None:
     call = _parser().parse_args(argv)
-    tables.row("coder", ("sd before", "sd", "lag1 before", "lag1", "half px", "quarter px"))
+    amplitude = ("whole px", "half px", "quarter px")
+    tables.row("coder", ("sd before", "sd", "lag1 before", "lag1", *amplitude))
     figures = {}
     for name in call.only or OPTIONS:
         amplitudes: list[np.ndarray] = []
@@ -99,7 +100,12 @@ def filmed(folder: Path, seed: int, options: Sequence[str] | None) -> Path:
 
 
 def errors(path: Path) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
-    """The amplitudes `[object, 2, step]`, px, and the errors of each stretch, px, without and with the correction."""
+    """Of a clip what tracking it shows.
+
+    Returns:
+      The amplitudes `[object, 2, step]`, px; the errors of each stretch, px, without and with the
+      correction.
+    """
     clip, record = load_clip(path), json.loads(path.with_suffix(".truth.json").read_text())
     found: list[np.ndarray] = []
 

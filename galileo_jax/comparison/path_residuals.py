@@ -9,9 +9,9 @@ from galileo_jax.comparison.document import pulled
 from galileo_jax.comparison.local_tests import AXES, WHOLE
 from galileo_jax.comparison.phases import PHASES, Phase, phases_of
 from galileo_jax.comparison.worst_interval import worst_interval
+from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.problem import Problem
 
 NUM_DRAWS = 60
@@ -65,7 +65,7 @@ def path_residuals(
     trials: JointProblem, fit: GradientFit, comparison: Comparison, seed: int
 ) -> tuple[PathResiduals, ...]:
     """All objects of all clips."""
-    drawn = laplace_posterior(trials, fit, seed).flat()
+    drawn = fit_posterior(trials, fit, seed).flat()
     drawn = drawn[np.random.default_rng(seed).choice(len(drawn), NUM_DRAWS, replace=False)]
     theta = trials.theta(fit.z, fit.free)
     found = []

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.comparison.document import comparison_document
+from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.diagnosis.each_clip import kind_of
 from galileo_jax.diagnosis.law_verdict import best_formula
@@ -26,6 +27,8 @@ from galileo_jax.inference.result import (
     undetermined_by_mass,
 )
 
+Entries = dict[str, dict[str, Any]]  # by parameter
+
 NO_FORMULA = "no formula explains it"
 
 
@@ -38,9 +41,15 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
       seed: of the posteriors' draws.
     """
     named = trials.problems[0].observation.names
+    rounds = [(one, _with_forces(trials, one.hypothesis, seed)) for one in diagnosis.rounds]
+    added = {one.hypothesis.effects: entries for one, entries in rounds}
     document = comparison_document(diagnosis.base) | {
         "probability_none": diagnosis.probability_none,
-        "candidates": [_candidate(trials, c, seed) for c in diagnosis.candidates],
+        "candidates": [
+            # What was added has the strength that its round has.
+            _candidate(c, added.get(c.effects) or _roughly(trials, c.hypothesis, seed))
+            for c in diagnosis.candidates
+        ],
         "verdict": {
             "status": diagnosis.verdict.status,
             "effects": list(diagnosis.verdict.effects),
@@ -52,7 +61,7 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             {"rule": why.rule, "sentence": why.sentence, **why.numbers}
             for why in diagnosis.verdict.reasons
         ],
-        "history": [history_row(trials, each, seed) for each in diagnosis.rounds],
+        "history": [_history_row(one, entries) for one, (entries, _) in rounds],
     }
     if diagnosis.missing is not None:
         document["missing_force"] = _missing_force(diagnosis, diagnosis.missing, named)
@@ -82,8 +91,11 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
 
 def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:
     """One round: effects, errors, p and what is said of the friction coefficients with them."""
+    return _history_row(one, _with_forces(trials, one.hypothesis, seed)[0])
+
+
+def _history_row(one: Round, entries: Entries) -> dict[str, Any]:
     error = one.comparison.error
-    entries = parameter_entries(one.hypothesis.of(trials), one.hypothesis.fit, seed)
     return {
         "effects": list(one.hypothesis.effects),
         "rmse": error["rmse"],
@@ -94,17 +106,24 @@ def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:
     }
 
 
-def parameter_entries(
-    trials: JointProblem, fit: GradientFit, seed: int
-) -> dict[str, dict[str, Any]]:
-    """Entries as in result.json of all that the hypothesis leaves free, nuisances left out."""
-    return _entries(trials, fit, fit_posterior(trials, fit, seed))[0]
+def _with_forces(
+    trials: JointProblem, hypothesis: Hypothesis, seed: int
+) -> tuple[Entries, Entries]:
+    """`_entries` of the posterior that `fit` gives."""
+    whose, fit = hypothesis.of(trials), hypothesis.fit
+    return _entries(whose, fit, fit_posterior(whose, fit, seed))
+
+
+def _roughly(trials: JointProblem, hypothesis: Hypothesis, seed: int) -> tuple[Entries, Entries]:
+    """`_entries` of the normal approximation: for many candidates the posterior takes seconds."""
+    whose, fit = hypothesis.of(trials), hypothesis.fit
+    return _entries(whose, fit, laplace_posterior(whose, fit, seed))
 
 
 def _entries(
     trials: JointProblem, fit: GradientFit, posterior: Posterior
-) -> tuple[dict[str, dict[str, Any]], dict[str, dict[str, Any]]]:
-    """Those of the parameters, and those of the force constants per mass."""
+) -> tuple[Entries, Entries]:
+    """As in result.json: of what is free, nuisances left out; and the force constants per mass."""
     spread = np.sqrt(np.diagonal(fit.covariance))
     free = [name for i, name in enumerate(trials.names) if fit.free[i]]
     forces = {
@@ -125,9 +144,8 @@ def _entries(
     return entries, forces
 
 
-def _candidate(trials: JointProblem, candidate: Candidate, seed: int) -> dict[str, Any]:
-    whose, fit = candidate.hypothesis.of(trials), candidate.hypothesis.fit
-    parameters, derived = _entries(whose, fit, laplace_posterior(whose, fit, seed))
+def _candidate(candidate: Candidate, entries: tuple[Entries, Entries]) -> dict[str, Any]:
+    parameters, derived = entries
     return {
         "effect": candidate.name,
         "law": None if candidate.law is None else candidate.law.text,

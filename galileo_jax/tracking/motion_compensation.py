@@ -194,7 +194,8 @@ def _likeliest(
 
     Args:
       pieces: `[piece, frame]` each.
-      usual_px, sd_px: of the prior.
+      usual_px: the prior's middle.
+      sd_px: the prior's standard deviations.
       usual_noise2: px^2, as much as `OWN_NOISE_VALUES` values have, beside the pieces'; 0: nothing
         is known of the noise.
     """

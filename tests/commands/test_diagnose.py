@@ -124,8 +124,11 @@ def test_finds_what_was_hidden(tmp_path, capsys):
     assert after["chi2_per_dof"] < 1.5 < before["chi2_per_dof"]
     assert after["rmse"] < 1.1 * after["noise"]
     assert "truth: air_drag" in told
-    assert [why["rule"] for why in document["reasons"]][:3] == [
+    [added] = [one for one in document["candidates"] if one["effect"] == "air_drag"]
+    assert added["parameters"]["k1"] == after["k1"], "one strength wherever it is said"
+    assert [why["rule"] for why in document["reasons"]][:4] == [
         "contradicted_without_effects",
+        "no_pair_contests",
         "explains",
         "decisive",
     ]
