@@ -3,7 +3,8 @@
     1. From the fit, draw data: the predicted positions, and errors from the covariance with
        which they were fitted, the modes as large as they are in the data (the likelihood allows
        for imperfections that a good clip need not have); and draw the prior's centre, which is
-       data, too.
+       data, too. How large a tracker's errors are is known to some per cent only: in each stretch
+       of a motion they are larger or smaller than stated (`Observation.noise_known_to`).
     2. Refit each replicate: Gauss-Newton steps with the fit's Jacobian, each checked with true
        rollouts, so that no residual is taken from a linear model.
 
@@ -18,6 +19,7 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
+from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.noise_scale import mode_covariance
 
 NUM_STEPS = 4
@@ -43,6 +45,7 @@ def replicates(
     fit: GradientFit,
     noise_scale: np.ndarray,
     mode_size: Sequence[float],
+    labels: Sequence[np.ndarray],
     count: int,
     seed: int,
 ) -> list[np.ndarray]:
@@ -53,6 +56,7 @@ def replicates(
       fit: whose hypothesis, parameters and Jacobian are taken as true.
       noise_scale: `[clip]`, at which residuals are whitened; the fit's own may differ.
       mode_size: of each clip, the modes' amplitudes over their sd.
+      labels: of each clip, `[object, frame]`, the phases of its motion.
       count: how many.
       seed: of the draws.
     """
@@ -72,9 +76,9 @@ def replicates(
     ]
     noise = np.concatenate(
         [
-            _errors(problem, scale, size, count, generator) * mask
-            for problem, scale, size, mask in zip(
-                trials.problems, noise_scale, mode_size, masks, strict=True
+            _errors(problem, scale, size, label, count, generator) * mask
+            for problem, scale, size, label, mask in zip(
+                trials.problems, noise_scale, mode_size, labels, masks, strict=True
             )
         ],
         axis=1,
@@ -104,6 +108,7 @@ def _errors(
     problem: Problem,
     noise_scale: float,
     mode_size: float,
+    label: np.ndarray,
     count: int,
     generator: np.random.Generator,
 ) -> np.ndarray:
@@ -111,6 +116,8 @@ def _errors(
     data, errors = problem.data, problem.errors_in_full
     gain2, basis = data.gain**2, data.basis.reshape(len(data.gain), -1)
     found = generator.standard_normal((count, problem.observation.position_m.size))
+    if problem.observation.noise_known_to:
+        found = found * _uneven(problem.observation, label, count, generator)
     along = generator.standard_normal((count, len(gain2)))
     if errors is None:
         along = along * (mode_size * data.gain)
@@ -121,6 +128,17 @@ def _errors(
     own = found @ basis.T
     left = noise_scale / np.sqrt(noise_scale**2 + gain2)
     return found + ((own + along / noise_scale) * left - own) @ basis
+
+
+def _uneven(
+    observation: Observation, label: np.ndarray, count: int, generator: np.random.Generator
+) -> np.ndarray:
+    """How large errors are over stated errors, `[replicate, value]`: of each stretch another."""
+    known_to, (objects, axes, frames) = observation.noise_known_to, observation.position_m.shape
+    log_variance = known_to * generator.standard_normal((count, objects, axes, label.max() + 1))
+    each = np.exp((log_variance - known_to**2 / 2) / 2)  # of a mean square of 1
+    index = np.broadcast_to(label[:, None], (count, objects, axes, frames))
+    return np.take_along_axis(each, index, axis=-1).reshape(count, -1)
 
 
 def _at(

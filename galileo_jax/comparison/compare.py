@@ -120,7 +120,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         for white, scale, problem in zip(measured, scales, trials.problems, strict=True)
     ]
     labels = [phases(each, trials.of_clip(theta, c)) for c, each in enumerate(trials.problems)]
-    drawn = replicates(trials, fit, scales, sizes, NUM_REPLICATES, seed)
+    drawn = replicates(trials, fit, scales, sizes, labels, NUM_REPLICATES, seed)
     cells = []
     for clip, (problem, label) in enumerate(zip(trials.problems, labels, strict=True)):
         observation = problem.observation

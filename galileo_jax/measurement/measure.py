@@ -13,6 +13,7 @@ from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.measurement.astray import Astray, find_astray, without_astray
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
+from galileo_jax.measurement.coding_errors import with_coding_errors
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.errors_in_time import with_errors_in_time
 from galileo_jax.measurement.errors_of_clock import with_errors_of_clock
@@ -146,6 +147,7 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         return _to_last(clip, read_track(clip.path, clip.track, clip, clip.fps).observation), None
     pixels = track_once(clip)
     observation = with_noise_at_rest(observe(clip, pixels))
+    observation = with_coding_errors(clip, observation, pixels)
     observation = with_camera_modes(clip, observation, pixels)
     return with_turning(observation) if clip.turning else observation, pixels
 

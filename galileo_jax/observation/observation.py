@@ -33,6 +33,8 @@ class Observation:
         to know how it starts, not to be fitted; NaN where nothing shows it, None where nobody
         looked.
       wander_m: how far camera and tracker wander in this clip, m; None where nobody looked.
+      noise_known_to: how well the size of the tracking errors is known in one stretch of a motion:
+        sd of the logarithm of their variance over what is stated; 0: exactly.
       is_squared: the modes tell how square the camera stands; else it is as good as usual.
     """
 
@@ -47,6 +49,7 @@ class Observation:
     is_turning: bool = False
     turned_rad: Float[np.ndarray, "object frame"] | None = None
     wander_m: float | None = None
+    noise_known_to: float = 0.0
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -15,12 +15,13 @@ from galileo_jax.runtime.atomic_write import replacing
 
 ERRORS = "errors.npz"
 FLAGS = ("is_squared", "num_errors")
+KNOWN_TO = "noise_known_to"
 NOTHING = np.zeros((0, 0, 0, 0))
 
 
 def save_shared_errors(folder: Path, observation: Observation) -> None:
     """Writes them, or removes those of an older run."""
-    is_plain = not any(getattr(observation, name) for name in FLAGS)
+    is_plain = not any(getattr(observation, name) for name in (*FLAGS, KNOWN_TO))
     modes = NOTHING if observation.modes_m is None else observation.modes_m
     if is_plain and not modes.size:
         (folder / ERRORS).unlink(missing_ok=True)
@@ -31,6 +32,7 @@ def save_shared_errors(folder: Path, observation: Observation) -> None:
             modes_m=modes,
             is_squared=observation.is_squared,
             num_errors=observation.num_errors,
+            noise_known_to=observation.noise_known_to,
         )
 
 
@@ -41,9 +43,11 @@ def with_shared_errors(folder: Path, observation: Observation) -> Observation:
     with np.load(folder / ERRORS) as file:
         modes = file["modes_m"]
         squared, num_errors = (int(file[name]) for name in FLAGS)
+        known_to = float(file.get(KNOWN_TO, 0.0))  # runs of earlier versions have none
     return replace(
         observation,
         modes_m=modes if modes.size else None,
         is_squared=bool(squared),
         num_errors=num_errors,
+        noise_known_to=known_to,
     )

@@ -132,6 +132,7 @@ class Store:
             **{name: bool(notes.get(name, False)) for name in FLAGS},
             num_errors=int(notes.get("num_errors", 0)),
             wander_m=notes.get("wander_m"),
+            noise_known_to=notes.get("noise_known_to", 0.0),
         )
         said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
         astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
@@ -148,6 +149,7 @@ class Store:
         notes["astray"] = [vars(entry) for entry in one.astray]
         notes |= {name: getattr(seen, name) for name in FLAGS}
         notes |= {"num_errors": seen.num_errors, "wander_m": seen.wander_m}
+        notes |= {"noise_known_to": seen.noise_known_to}
         arrays = {name: getattr(seen, name) for name in ARRAYS}
         if seen.modes_m is not None:
             arrays["modes_m"] = seen.modes_m

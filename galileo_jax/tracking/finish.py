@@ -16,6 +16,7 @@ from galileo_jax.tracking.noise import (
     is_in_motion,
     motion_scale2,
     motion_variance,
+    speed_scale2,
 )
 from galileo_jax.tracking.pieces import Piece
 from galileo_jax.tracking.pose import rotation
@@ -39,6 +40,7 @@ class Finished:
     position_px: np.ndarray
     covariance_px2: np.ndarray
     common_px2: np.ndarray
+    shifts_px: np.ndarray
     angle_rad: np.ndarray
 
 
@@ -60,13 +62,13 @@ def finished(
     # A coder sees what is shown, before anything else is put right.
     mended = without_coding_shift(seen, coding)
     seen = [
-        _at_mid_exposure(poses, noise, share, piece)
-        for poses, (_, noise), piece, share in zip(mended, seen, pieces, shares, strict=True)
+        _at_mid_exposure(one.poses, noise, share, piece)
+        for one, (_, noise), piece, share in zip(mended, seen, pieces, shares, strict=True)
     ]
     excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
     return [
-        _anchored(poses, noise, found, piece, excess)
-        for (poses, noise), found, piece in zip(seen, fits, pieces, strict=True)
+        _anchored(poses, noise, one.shifts_px, found, piece, excess)
+        for (poses, noise), one, found, piece in zip(seen, mended, fits, pieces, strict=True)
     ]
 
 
@@ -76,6 +78,7 @@ def joined(pieces: Sequence[Finished], count: int) -> Finished:
         np.full((count, 2), np.nan),
         np.full((count, 2, 2), np.nan),
         np.full((count, 2, 2), np.nan),
+        np.full((count, *pieces[0].shifts_px.shape[1:]), np.nan),
         np.full(count, np.nan),
     )
     for piece in pieces:
@@ -115,6 +118,7 @@ def _at_mid_exposure(
 def _anchored(
     poses: np.ndarray,
     noise: np.ndarray,
+    shifts_px: np.ndarray,
     fits: list[Refined | None],
     piece: Piece,
     excess: np.ndarray,
@@ -127,7 +131,8 @@ def _anchored(
     covariance = noise.copy()
     frames = np.flatnonzero(np.isfinite(poses[:, 0]))
     moves = is_in_motion(poses[frames, :2], noise[frames])
-    covariance[frames] += np.einsum("fi,ij->fij", moves * excess, np.eye(2))
+    grown = moves * excess * speed_scale2(poses[frames, :2])[:, None]
+    covariance[frames] += np.einsum("fi,ij->fij", grown, np.eye(2))
     scale2 = motion_scale2(poses[:, :2], covariance)
     scale2 = scale2 * after_blow_scale2(poses[frames, :2], noise[frames])
     scale = np.sqrt(np.where(moves, scale2, 1.0))
@@ -154,7 +159,7 @@ def _anchored(
     angle = poses[:, 2] - anchor[2]
     arm = point_px - anchor[:2]
     position = poses[:, :2] + np.stack([rotation(a) @ arm for a in angle])
-    return Finished(position, covariance, common, angle + piece.turned_rad)
+    return Finished(position, covariance, common, shifts_px, angle + piece.turned_rad)
 
 
 def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray:

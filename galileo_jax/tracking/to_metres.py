@@ -11,6 +11,11 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 
+NOISE_KNOWN_TO = 0.15
+"""Beyond chance, the logarithm of the mean square of errors over stated errors differed from one
+stretch of a path to the next by 0.18, 0.19, 0.10 and 0.10 (object 1 along x on the ramp and on the
+table, along y on the ramp, object 2 along x; 120 rendered clips that were looked at)."""
+
 
 def observe(clip: Clip, track: Track) -> Observation:
     """Turns a track in pixels into an observation in metres.
@@ -42,6 +47,7 @@ def observe(clip: Clip, track: Track) -> Observation:
         position_m=np.moveaxis(position, 1, 2),
         covariance_m2=np.moveaxis(covariance, 1, -1),
         mask=mask,
+        noise_known_to=NOISE_KNOWN_TO,
         turned_rad=_turned(track, slope, mask) if is_level else None,
     )
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.comparison import bootstrap
+from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFitter
-from tests.oracle_trials import make_trials
+from tests.oracle_trials import make_trials, observe
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
@@ -25,7 +26,8 @@ def squares(trials, fit, num_steps=bootstrap.NUM_STEPS):
     """Sums of the replicates' squared residuals after so many steps of the refit."""
     with in_64_bit(), pytest.MonkeyPatch.context() as patch:
         patch.setattr(bootstrap, "NUM_STEPS", num_steps)
-        (white,) = bootstrap.replicates(trials, fit, np.ones(1), [1.0], COUNT, 0)
+        labels = [phases(trials.problems[0], trials.theta(fit.z, fit.free))]
+        (white,) = bootstrap.replicates(trials, fit, np.ones(1), [1.0], labels, COUNT, 0)
     return np.sum(white**2, axis=1)
 
 
@@ -67,3 +69,19 @@ def test_a_jacobian_that_does_not_hold_makes_no_wild_replicates(fitted, noise):
     left = squares(trials, replace(fit, jacobian=0.1 * fit.jacobian))
     # A step is only taken if it lowers the cost, in which the prior counts as well.
     assert np.max(left - noise) < 3 * np.count_nonzero(fit.free)
+
+
+def test_errors_of_a_tracker_are_as_uneven_as_they_are_known_to_be():
+    """Of a stretch all errors are alike; over replicates their mean square is 1."""
+    seen = replace(observe(HIT, 0), noise_known_to=0.5)
+    label = np.repeat([[0, 1], [2, 1]], seen.mask.shape[1] // 2, axis=1)
+    label = np.pad(label, ((0, 0), (0, seen.mask.shape[1] % 2)), mode="edge")
+    drawn = bootstrap._uneven(seen, label, 4000, np.random.default_rng(0))
+    each = drawn.reshape(4000, *seen.position_m.shape)
+    for i in range(2):
+        for phase in np.unique(label[i]):
+            own = each[:, i, :, label[i] == phase]
+            assert (own == own[:1]).all()
+    assert (each[:, 0, 0, 0] != each[:, 0, 1, 0]).all(), "each axis has its own"
+    assert np.mean(drawn**2) == pytest.approx(1.0, abs=0.03)
+    assert np.std(2 * np.log(each[:, 1, 0, 0])) == pytest.approx(0.5, abs=0.02)

@@ -40,8 +40,8 @@ def looked_for(
     seen = Observation(NAMES, times, place, error, mask)
     square = np.zeros((2, FRAMES, 2, 2))
     pixels = Track(
-        NAMES, times, 1000 * np.moveaxis(place, 1, 2), square, square, np.zeros((2, FRAMES)),
-        mask, (1000, 1000),
+        NAMES, times, 1000 * np.moveaxis(place, 1, 2), square, square,
+        np.zeros((2, FRAMES, 0, 2)), np.zeros((2, FRAMES)), mask, (1000, 1000),
     )  # fmt: skip
     return seen, find_astray(clip, seen, pixels)
 

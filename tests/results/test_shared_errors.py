@@ -12,11 +12,20 @@ from tests.ramp_model import HIT
 def test_modes_and_where_the_track_is_from_come_back(tmp_path):
     plain = observe(HIT, 0)
     modes = np.random.default_rng(0).standard_normal((3, *plain.position_m.shape))
-    seen = replace(plain, modes_m=modes, num_errors=2, is_squared=True)
+    seen = replace(plain, modes_m=modes, num_errors=2, is_squared=True, noise_known_to=0.15)
     save_shared_errors(tmp_path, seen)
     found = with_shared_errors(tmp_path, plain)
     assert found.modes_m is not None and (found.modes_m == modes).all()
-    assert (found.num_errors, found.is_squared) == (2, True)
+    assert (found.num_errors, found.is_squared, found.noise_known_to) == (2, True, 0.15)
+
+
+def test_a_run_of_an_earlier_version_is_read(tmp_path):
+    plain = observe(HIT, 0)
+    save_shared_errors(tmp_path, replace(plain, is_squared=True))
+    with np.load(tmp_path / ERRORS) as file:
+        older = {name: file[name] for name in file.files if name != "noise_known_to"}
+    np.savez_compressed(tmp_path / ERRORS, **older)
+    assert with_shared_errors(tmp_path, plain).noise_known_to == 0.0
 
 
 def test_a_track_without_any_leaves_no_file(tmp_path):

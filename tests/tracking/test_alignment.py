@@ -6,12 +6,14 @@ import pytest
 from galileo_jax.tracking.noise import (
     AFTER_BLOW_SCALE2,
     BLOW_KNOWN_TO,
+    FAST_PX,
     SETTLES_FRAMES,
     after_blow_scale2,
     blow_shift,
     is_in_motion,
     motion_scale2,
     motion_variance,
+    speed_scale2,
 )
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import rotation
@@ -106,6 +108,19 @@ def test_scatter_beyond_the_stated_noise_is_found_along_the_motion_only():
     assert y < 1e-4
     x, _ = motion_variance([(shaken, stated + 0.05**2 * np.eye(2))])
     assert x < 0.03**2
+
+
+def test_what_scatters_more_the_faster_it_is_scatters_as_much_as_it_does_when_slow():
+    rng = np.random.default_rng(9)
+    time = np.arange(400.0)
+    fast = np.stack([10 * time + 0.1 * time**2, 0 * time], axis=1)
+    grown = np.sqrt(speed_scale2(fast))
+    assert grown[-1] == pytest.approx(np.sqrt(1 + (89.7 / FAST_PX) ** 2))
+    scatter = np.stack([0.02 * grown, 1e-5 * grown], axis=1)
+    found = [motion_variance([noisy(fast, scatter, rng)])[0] for _ in range(10)]
+    assert np.sqrt(np.mean(found)) == pytest.approx(0.02, rel=0.05)
+    hidden = np.where(time[:, None] == 7, np.nan, fast)
+    assert (speed_scale2(hidden)[7:9] == 1).all()
 
 
 def test_an_object_that_scatters_otherwise_than_is_stated_says_so():
