@@ -16,6 +16,7 @@ from scipy.special import chdtri
 from galileo_jax.measurement.errors_at_rest import errors_at_rest
 from galileo_jax.observation.observation import Observation
 from galileo_jax.observation.random_patterns import random_patterns
+from galileo_jax.tracking.noise import SETTLES_FRAMES
 
 WINDOW = 9  # frames
 STILL_SDS = 5.0  # of the stated noise: whoever goes no further in a window is at rest in it
@@ -23,6 +24,9 @@ MIN_WINDOWS = 20  # fewer do not tell a variance
 LEAST_SCALE = 0.3  # a coder repeats what stands still: less scatter than that is no less noise
 # Of a rest's frames beside a motion so many may hold its slow end: errors are not learnt from them.
 BESIDE = WINDOW // 2
+# What slows down to a stop goes as far in its last frames as noise does, and a coder that leaves a
+# picture as it is shows it where it was: errors were 3 times, once 15 times, those of a rest.
+SETTLES = WINDOW // 2 + SETTLES_FRAMES
 FAINT = 0.1  # of the independent errors: a weaker pattern of errors is left out
 
 
@@ -41,7 +45,7 @@ def with_noise_at_rest(observation: Observation) -> Observation:
         white = (place - place.mean(axis=-1, keepdims=True)) / np.sqrt(_windows(variance))
         seen, away = _windows(mask).all(axis=-1), np.abs(white).max(axis=(0, 2))
         still = seen & (np.nan_to_num(away, nan=np.inf) < STILL_SDS)
-        is_still[i] = _covered(still, len(mask))
+        is_still[i] = _settled(_covered(still, len(mask)))
         squares.append(np.sum(white[:, still] ** 2, axis=-1).reshape(-1))
     found = np.concatenate(squares)
     if len(found) < MIN_WINDOWS:
@@ -113,6 +117,15 @@ def _stretches(is_there: Bool[np.ndarray, " frame"]) -> list[slice]:
     steps = np.diff(np.concatenate([[0], is_there.astype(int), [0]]))
     ends = zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True)
     return [slice(first, after) for first, after in ends]
+
+
+def _settled(still: Bool[np.ndarray, " frame"]) -> Bool[np.ndarray, " frame"]:
+    """Without the first frames of each rest that follows a motion: there it comes to rest."""
+    settled = still.copy()
+    for rest in _stretches(still):
+        if rest.start:
+            settled[rest.start : rest.start + SETTLES] = False
+    return settled
 
 
 def _windows(values: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """What stands still is given the noise that it has; what moves keeps what is stated."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,18 @@ def test_it_is_not_lowered_without_end():
     assert scales(filmed(0.01))[:55] == pytest.approx(LEAST_SCALE, rel=0.1)
 
 
+def test_what_comes_to_rest_is_not_yet_at_rest():
+    """A coder that leaves a picture as it is shows it where it was: seen late by half its noise."""
+    times = np.arange(FRAMES) / 60
+    left_s = np.maximum(1.0 - times, 0.0)
+    path = np.stack([0.3 - 0.2 * left_s**2, 0 * times])[None]  # slows down to a stop
+    sd = SD_M * np.where(times < 1.0, 1.0, 0.4)
+    noise = sd * np.random.default_rng(3).standard_normal((1, 2, FRAMES))
+    found = scales(replace(filmed(0.4), position_m=path + noise))
+    assert (found[:65] == 1.0).all(), "five frames more"
+    assert (found[75:] < 0.8).all()
+
+
 def test_a_short_track_is_left_as_it_is():
     whole = filmed(0.5)
     short = Observation(
@@ -70,11 +84,13 @@ def test_the_shift_of_what_came_to_rest_is_one_error():
         assert not mode[0, 1 - axis].any()
         at_rest = mode[0, axis, 75:]
         assert (at_rest == at_rest[0]).all()
+        # What is stated is now 1, now 1.5 times that: a median of it is either.
         moving, resting = (
-            np.median(np.diag(covariance_of(found, axis))[part]) * SD_M**2
+            np.diag(covariance_of(found, axis))[part] * SD_M**2
             for part in (slice(55), slice(75, None))
         )
-        assert at_rest[0] ** 2 + resting == pytest.approx(moving, rel=0.25)
+        shift2 = at_rest[0] ** 2
+        assert moving.min() < shift2 + np.median(resting) < 1.1 * moving.max()
     first = with_noise_at_rest(seen)
     shifts = 0 if first.modes_m is None else len(first.modes_m) - first.num_errors
     assert shifts == 0, "the first picture is coded by itself"

@@ -8,11 +8,13 @@ from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
     FAST_PX,
     SETTLES_FRAMES,
+    SLOW_SCALE2,
     after_blow_scale2,
     blow_shift,
     is_in_motion,
     motion_scale2,
     motion_variance,
+    slow_scale2,
     speed_scale2,
 )
 from galileo_jax.tracking.picture import Picture
@@ -121,6 +123,12 @@ def test_what_scatters_more_the_faster_it_is_scatters_as_much_as_it_does_when_sl
     assert np.sqrt(np.mean(found)) == pytest.approx(0.02, rel=0.05)
     hidden = np.where(time[:, None] == 7, np.nan, fast)
     assert (speed_scale2(hidden)[7:9] == 1).all()
+
+
+def test_along_an_axis_where_hardly_anything_moves_a_coder_is_late():
+    place = np.stack([0.4 * np.arange(8.0), 0.02 * np.arange(8.0)], axis=1)
+    np.testing.assert_array_equal(slow_scale2(place)[1:, 0], 1.0)
+    np.testing.assert_array_equal(slow_scale2(place)[:, 1], SLOW_SCALE2)
 
 
 def test_an_object_that_scatters_otherwise_than_is_stated_says_so():
