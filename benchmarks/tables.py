@@ -16,7 +16,7 @@ WIDTH = 11
 
 def row(first: str, values: Sequence[Any]) -> None:
     """Prints one row at once, so that a long benchmark shows how far it is."""
-    print(f"{first:<28}" + "".join(f"{_cell(value):>{WIDTH}}" for value in values), flush=True)
+    print(f"{first:<28}" + "".join(f" {_cell(v):>{WIDTH - 1}}" for v in values), flush=True)
 
 
 def finish(name: str, figures: Mapping[str, Any]) -> None:
