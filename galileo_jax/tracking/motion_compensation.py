@@ -38,7 +38,7 @@ USUAL_PX = np.array([0.006, 0.03, 0.03])
 pixels) and -0.03 px (half pixels), those of H.264 and H.265 -0.02 px (quarter pixels)."""
 OWN_PX = np.array([0.003, 0.01, 0.004])
 """Standard deviations of an object's own about those: half pixels, object 1 along x and y, object 2
-along x: -0.022, -0.019, -0.031 px (12 rendered clips that were looked at)."""
+along x: -0.026, -0.023, -0.033 px (60 rendered clips that were looked at)."""
 OWN_NOISE_VALUES = 5.0
 """An object's noise weighs against so many values with the noise of the whole video."""
 PIECE_FRAMES, DEGREE = 8, 2

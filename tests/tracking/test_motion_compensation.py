@@ -56,7 +56,7 @@ def test_amplitudes_of_a_coder_are_found(amplitudes):
     ]
     found = np.reshape(found, (-1, len(STEPS_PER_PX)))  # each object's along each axis
     np.testing.assert_allclose(np.mean(found, axis=0), amplitudes, atol=0.003)
-    np.testing.assert_allclose(np.std(found, axis=0), 0.0, atol=0.005)
+    np.testing.assert_allclose(np.std(found, axis=0), 0.0, atol=0.004)
 
 
 def test_objects_have_amplitudes_of_their_own():
