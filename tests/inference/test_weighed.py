@@ -12,6 +12,8 @@ from galileo_jax.inference.fits import weighed as weighed_module
 from galileo_jax.inference.fits.cloud import Cloud
 from galileo_jax.inference.fits.evidence import Code, GradientFit
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
+from galileo_jax.inference.fits.ridge import bent_direction, ridge_along
+from galileo_jax.inference.fits.valley import valley_round
 from galileo_jax.inference.fits.weighed import ENOUGH_ESS, weighed
 
 STEP = 1e-5
@@ -78,6 +80,10 @@ AT_THE_EDGE: Any = Known(lambda a, b: (8 * np.maximum(a + 1.0, 0.0) ** 2, (b - 0
 # An effect that hardly shows, and nothing of it where its place is beyond what was seen.
 LEFT = 1.5
 UNSEEN: Any = Known(lambda a, b: (6 * np.exp(a) / (1 + np.exp(8 * b)) - LEFT, 0 * a))
+# Each makes up for the other, but not in proportion, by hundreds of the deviations of the rest.
+CRESCENT: Any = Known(
+    lambda a, b: ((a - 0.1) / 0.4, 300 * (np.exp(b / 3) + np.exp(a / 2 + a**3 / 8) - 2))
+)
 TWO: Any = Known(lambda a, b: ((a**2 - 1) / 0.1, (b - 0.2 * a) / 0.3))
 
 
@@ -175,3 +181,37 @@ def test_a_draw_from_which_no_map_finds_back_has_the_density_it_was_drawn_with(m
     monkeypatch.setattr(weighed_module._Part, "log_density", nowhere)
     found = weighed([BENT.best((0.3, 0.1))], BENT, 0, num=4096)
     assert found.log_evidence == pytest.approx(BENT.exact(), abs=AGREES_NATS)
+
+
+def test_a_crescent_is_followed_along_its_ridge(monkeypatch):
+    """Draws beside a ridge count for nothing, and those in its middle know nothing of its ends."""
+    fit, exact = CRESCENT.best((0.1, -0.2)), CRESCENT.exact()
+    found = weighed([fit], CRESCENT, 0, num=512, most=512)
+    assert found.log_evidence == pytest.approx(exact, abs=AGREES_NATS)
+    assert found.ess > 300
+    weights = np.exp(found.log_weights - logsumexp(found.log_weights))
+    mean = weights @ found.z[:, 0]
+    assert np.sqrt(weights @ (found.z[:, 0] - mean) ** 2) == pytest.approx(0.298, rel=0.08)
+    monkeypatch.setattr(weighed_module, "bent_direction", lambda valley: None)
+    blind = [weighed([fit], CRESCENT, seed, num=512, most=512).log_evidence for seed in range(3)]
+    assert np.abs(np.array(blind) - exact).max() > 1.0, "a map of two powers does not follow it"
+
+
+def test_the_density_along_a_ridge_is_that_of_its_draws():
+    fit = CRESCENT.best((0.1, -0.2))
+    valley = valley_round(fit, CRESCENT)
+    direction = bent_direction(valley)
+    assert direction is not None
+    ridge = ridge_along(fit, valley, direction, CRESCENT)
+    assert ridge is not None
+    a, b = np.linspace(-1.8, 1.6, 681), np.linspace(-8, 3, 8801)
+    grid = np.stack([each.ravel() for each in np.meshgrid(a, b)], axis=1)
+    share = np.exp(ridge.log_density(grid, fit.free)) * (a[1] - a[0]) * (b[1] - b[0])
+    assert share.sum() == pytest.approx(1.0, abs=5e-3)
+    z = ridge.draw(np.random.default_rng(1), 20_000)
+    np.testing.assert_allclose(z.mean(axis=0), share @ grid, atol=0.02)
+    np.testing.assert_allclose(
+        z.std(axis=0)[0] ** 2, share @ (grid[:, 0] - z[:, 0].mean()) ** 2, rtol=0.05
+    )
+    beyond = fit.z + 1.1 * ridge.edges[-1] * valley.root[:, direction]
+    assert ridge.log_density(beyond[None], fit.free) == -np.inf

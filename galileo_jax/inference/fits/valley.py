@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # these need Equinox, and a gradient fit does not
 
 REACH = 2.0  # standard deviations: what proposals mostly keep within
 LEAST_VARIANCE = 1e-18  # in z: where slopes are absurd, rounding leaves some below 0
+EVERY = slice(None)
 NUM_SCATTERED = 64  # that starts are chosen from
 
 
@@ -61,13 +62,18 @@ class Valley:
         """From u to z, `[..., parameter]`; in NumPy or JAX, whichever u is of."""
         return self.mode + (u + u**2 @ self.quadratic.T + u**3 @ self.cubic.T) @ self.root.T
 
-    def straight(self, z: np.ndarray) -> np.ndarray:
-        """(z - mode) in standard deviations along the directions: u, if there were no bend."""
-        return np.linalg.solve(self.root, (z - self.mode).T).T
+    def straight(self, z: np.ndarray, free: np.ndarray | slice = EVERY) -> np.ndarray:
+        """(z - mode) in standard deviations along the directions: u, if there were no bend.
+
+        Args:
+          z: `[point, parameter]`.
+          free: `[parameter]`, those that have directions, if not all.
+        """
+        return np.linalg.solve(self.root[free], (z - self.mode)[:, free].T).T
 
     def inverse(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """From z `[point, parameter]` to u; `free`: `[parameter]`, those that have directions."""
-        u = np.linalg.solve(self.root[free], (z - self.mode)[:, free].T).T
+        """From z to u; arguments as of `straight`."""
+        u = self.straight(z, free)
         for i in range(1, u.shape[1]):
             u[:, i] -= u[:, :i] ** 2 @ self.quadratic[i, :i] + u[:, :i] ** 3 @ self.cubic[i, :i]
         return u

@@ -7,7 +7,8 @@ cut off by the end of a prior, they are not, and their mean is the evidence all 
 they differ says how good it is: the error of log Z is about sqrt(1 / ess - 1 / num).
 
 q has a part for each valley that was found: Student's t along it (`valley.py`), so that valleys add
-up and do not count twice where they overlap. Where the hypothesis is hardly better than the one
+up and do not count twice where they overlap. One that bends too much for that has a second part,
+which follows its ridge (`ridge.py`). Where the hypothesis is hardly better than the one
 without its last effect, a quarter of the draws come from there: all else along that one's valley,
 the effect's own parameters from their priors. While an effect is too weak to show, its place or its
 speed may be anything, and Laplace at the best of them sees nothing of that.
@@ -30,6 +31,7 @@ from scipy.special import logsumexp
 from galileo_jax.inference.fits.cloud import Cloud, log_student_t, student_t
 from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.residuals import Batch, Residuals
+from galileo_jax.inference.fits.ridge import Ridge, bent_direction, ridge_along
 from galileo_jax.inference.fits.valley import Valley, valley_round
 from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -39,6 +41,7 @@ ENOUGH_ESS = 40.0  # the error is a sixth of a nat
 LEAST_ESS = 10.0  # of so many the error is a third of a nat; of fewer nobody knows it
 BETTER_NATS = 0.5  # by which a draw beats all fits where these are not at their best
 SHARE_WITHOUT = 0.25  # of the draws, from the hypothesis without its last effect
+SHARE_RIDGE = 0.75  # of a valley's draws, where it bends too much
 SHARE_ADAPTED = 0.5  # of further draws, from where those before say that the posterior is
 HARDLY_BETTER = 10.0  # nats: beyond, an effect too weak to show is e^-10 of the evidence
 
@@ -99,6 +102,22 @@ class _Part:
         return log_student_t(far, dim) - volume + from_priors
 
 
+@dataclass(frozen=True)
+class _AlongRidge:
+    """A part of q: along the ridge of a valley that bends much; `free`: the parameters it has."""
+
+    ridge: Ridge
+    free: np.ndarray
+
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
+        """Points, and their log density in this part."""
+        z = self.ridge.draw(generator, num)
+        return z, self.log_density(z)
+
+    def log_density(self, z: np.ndarray) -> np.ndarray:
+        return self.ridge.log_density(z, self.free)
+
+
 def weighed(
     fits: Sequence[GradientFit],
     residuals: Residuals,
@@ -122,8 +141,7 @@ def weighed(
       enough: draws of the posterior itself that they must be worth.
     """
     fit, generator = fits[0], np.random.default_rng([seed, 23])
-    parts = [_part(one, fit, residuals, width) for one in fits]
-    shares = np.full(len(parts), 1 / len(parts))
+    parts, shares = _parts(fits, residuals, width)
     if without is not None and fit.log_evidence < without.log_evidence + HARDLY_BETTER:
         parts.append(_part(without, fit, residuals, width))
         shares = np.append((1 - SHARE_WITHOUT) * shares, SHARE_WITHOUT)
@@ -152,7 +170,7 @@ class _Mixture:
       ess: how many draws of the posterior itself these are worth.
     """
 
-    def __init__(self, parts: Sequence[_Part]):
+    def __init__(self, parts: Sequence[_Part | _AlongRidge]):
         self._parts, self._clouds = tuple(parts), list[Cloud]()
         self.z, self.log_weights, self.ess = np.empty((0, 0)), np.empty(0), 0.0
         self._of, self._own, self.log_density = np.empty(0, int), np.empty(0), np.empty(0)
@@ -190,6 +208,23 @@ class _Mixture:
         )
         weights = np.exp(self.log_weights - self.log_weights.max())
         self.ess = float(weights.sum() ** 2 / np.sum(weights**2))
+
+
+def _parts(
+    fits: Sequence[GradientFit], residuals: Residuals, width: float
+) -> tuple[list[_Part | _AlongRidge], np.ndarray]:
+    """Those of the valleys, and which shares of the draws they have."""
+    parts, shares = list[_Part | _AlongRidge](), list[float]()
+    for one in fits:
+        part = _part(one, fits[0], residuals, width)
+        parts.append(part)
+        shares.append(1 / len(fits))
+        direction = bent_direction(part.valley)
+        ridge = None if direction is None else ridge_along(one, part.valley, direction, residuals)
+        if ridge is not None:
+            parts.append(_AlongRidge(ridge, one.free))
+            shares[-1:] = [(1 - SHARE_RIDGE) * shares[-1], SHARE_RIDGE * shares[-1]]
+    return parts, np.array(shares)
 
 
 def _part(one: GradientFit, whose: GradientFit, residuals: Residuals, width: float) -> _Part:
