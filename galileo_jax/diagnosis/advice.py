@@ -56,7 +56,7 @@ SEPARATES = (
 )
 
 # Rules by which several explanations are left.
-OPEN = ("contested", "contested_together", "not_told_apart")
+OPEN = ("contested", "contested_together", "not_told_apart", "separated_by_prior")
 
 
 def advice(verdict: Verdict, scene: Surroundings, num_clips: int) -> tuple[str, ...]:

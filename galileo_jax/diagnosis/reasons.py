@@ -351,6 +351,33 @@ def contested_together(
     )
 
 
+def separated_by_prior(best: Candidate, rival: Candidate, needed: float) -> Reason:
+    """The data themselves hardly tell a rival from the best.
+
+    Args:
+      best: the most probable that explains the data.
+      rival: another that does, and that was less probable before the data.
+      needed: nats of evidence by which it must be behind.
+    """
+    behind = best.log_evidence - rival.log_evidence
+    ahead = best.log_prior - rival.log_prior
+    return Reason(
+        "separated_by_prior",
+        f"{rival.title} explains the data, too. That {best.title} is "
+        f"{times_text(best.log_odds - rival.log_odds)} as probable comes from what was believed "
+        f"beforehand ({times_text(ahead)}); the data alone say {times_text(behind)}, and "
+        f"{times_text(needed)} would be needed for a name.",
+        {
+            "hypothesis": best.name,
+            "rival": rival.name,
+            "log_odds_behind": best.log_odds - rival.log_odds,
+            "log_evidence_behind": behind,
+            "log_prior_behind": ahead,
+            "least_log_evidence": needed,
+        },
+    )
+
+
 def _before_the_data(best: Candidate, rival: Candidate) -> str:
     """How much of a lead is prior, a sentence; empty where that is little."""
     ahead = best.log_prior - rival.log_prior

@@ -23,6 +23,10 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
 # Difference in log odds, in nats, at which the weaker of two hypotheses is given up: it is then
 # twenty times less probable (e^3 = 20).
 DECISIVE = 3.0
+# Log evidence, in nats, by which the data themselves must speak for a name: with less, only what was
+# believed beforehand separates it from its rival (10^0.5 times: H. Jeffreys, Theory of Probability,
+# 3rd ed. 1961, app. B, 'substantial').
+SUBSTANTIAL = log(10) / 2
 # How much wider that margin is where the base model already passes its comparison: the effect is
 # then so faint that more hypotheses stay possible.
 FAINT_FACTOR = 2.0
@@ -107,8 +111,8 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
     """The candidates whose fits are to be compared with the data, the best first.
 
     Always the best, the best with a name and the best formula; beyond these what could be confused
-    with the best, alone or together: all others together come to less than a twentieth of it.
-    Where the best is a form that says the same as the best formula, beyond it what could be
+    with the best, alone or together: all others together come to less than a twentieth of it; and
+    what the data themselves hardly tell from it. Where the best is a form that says the same as the best formula, beyond it what could be
     confused with the formula.
 
     Args:
@@ -121,7 +125,8 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
     if law is not None and best.is_form and best.family == law.family:
         leaders.append(law)
     in_sum = [c for leader in leaders for c in _in_sum(leader, candidates)]
-    always = [id(c) for c in (best, best_named(candidates), law, *in_sum)]
+    same = _same_by_data(best, candidates)
+    always = [id(c) for c in (best, best_named(candidates), law, *in_sum, *same)]
     return tuple(
         c
         for c in candidates
@@ -143,6 +148,18 @@ def _in_sum(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]
 def _without(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
     """Hypotheses by which not all of the best one's effects are there."""
     return [c for c in candidates if not set(best.effects) <= set(c.effects)]
+
+
+def _same_by_data(best: Candidate, candidates: Sequence[Candidate]) -> list[Candidate]:
+    """Hypotheses that the data themselves hardly tell from the best, of the table without laws.
+
+    None where the clip leads to expect an effect: that a ball is slowed down by the air needs no
+    proof against a drag of any other power.
+    """
+    if best.law is not None or best.num_expected:
+        return []
+    others = [c for c in _without(best, candidates) if c.law is None]
+    return [c for c in others if best.log_evidence - c.log_evidence < SUBSTANTIAL]
 
 
 def _sum_of(candidates: Sequence[Candidate]) -> float:
@@ -237,7 +254,7 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
 
     Returns:
       Named: one hypothesis explains the data, and nothing else does about as well, nor all others
-      together. Ambiguous: several do; a form without a name stands last, and an effect that
+      together, nor does it owe that to its prior alone. Ambiguous: several do; a form without a name stands last, and an effect that
       explains the data alone is not repeated with others. Unknown: only a form does, or nothing,
       or what does is far behind what does not.
     """
@@ -263,6 +280,12 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
         named, forms = [[c for c in together if c.is_form is it] for it in (False, True)]
         alike = [top, *_without_more(named), *forms[:1]]
         return Verdict("ambiguous", tuple(c.name for c in alike), reasons=why)
+    same = [c for c in _same_by_data(top, possible) if c in explaining and len(equal) == 1]
+    if same:
+        named, forms = [[c for c in same if c.is_form is it] for it in (False, True)]
+        alike = [top, *_without_more(named), *forms[:1]]
+        because = (reasons.separated_by_prior(top, each, SUBSTANTIAL) for each in alike[1:])
+        return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *because))
     if len(equal) == 1:
         out = [reasons.out_of_the_race(best, top, _least_p(best))] if best is not top else []
         behind = [c for c in candidates if c in possible or top.log_odds - c.log_odds >= decisive]

@@ -136,7 +136,7 @@ def _anchored(
     covariance[frames] += np.einsum("fi,ij->fij", grown, np.eye(2))
     scale2 = motion_scale2(poses[:, :2], covariance)
     scale2 = scale2 * after_blow_scale2(poses[frames, :2], noise[frames])
-    scale2 = scale2 * slow_scale2(poses[frames, :2])
+    scale2 = scale2 * slow_scale2(poses[frames, :2], noise[frames])
     scale = np.sqrt(np.where(moves, scale2, 1.0))
     covariance[frames] *= scale[:, :, None] * scale[:, None, :]
 

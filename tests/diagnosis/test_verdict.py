@@ -159,6 +159,48 @@ def test_rivals_that_are_given_up_one_by_one_are_not_all_together(behind, p_valu
         assert found.reasons[-1].numbers["log_odds_behind"] == pytest.approx(share)
 
 
+@pytest.mark.parametrize(
+    ("lead", "p_value", "is_told"),
+    [
+        (0.0, 0.5, False),
+        (1.1512925 - EDGE, 0.5, False),  # ln 10 / 2
+        (1.1512925 + EDGE, 0.5, True),
+        (0.0, 1e-9, True),  # contradicted
+        (0.0, None, True),  # not compared: `to_compare` would have had it compared
+    ],
+)
+@pytest.mark.parametrize("other", [FORM, "restitution+rolling"])
+def test_what_was_believed_beforehand_makes_no_name(lead, p_value, is_told, other):
+    """A rival four nats behind that had at least three of these before the data."""
+    best, behind = candidate("viscous_drag", 40.0), 4.0
+    rival = candidate(other, 40.0 - behind, p_value, log_prior=-2.0 - behind + lead)
+    assert best.log_evidence - rival.log_evidence == pytest.approx(lead)
+    found = verdict(best, rival)
+    if is_told:
+        assert told(found) == ("named", ("viscous_drag",), None)
+        return
+    assert told(found) == ("ambiguous", ("viscous_drag", other), None)
+    assert rules(found) == ["explains", "separated_by_prior"]
+    numbers = found.reasons[-1].numbers
+    assert numbers["log_evidence_behind"] == pytest.approx(lead)
+    assert numbers["log_prior_behind"] == pytest.approx(behind - lead)
+
+
+def test_what_is_expected_or_only_adds_to_a_name_needs_no_proof_by_data():
+    same, much_rarer = candidate(FORM, 36.0, log_prior=-6.0), -9.0
+    expected = replace(candidate("air_drag", 40.0), num_expected=1)
+    assert told(verdict(expected, same)) == ("named", ("air_drag",), None)
+    more = candidate(PAIR, 33.0, log_prior=much_rarer)
+    assert told(verdict(candidate("air_drag", 40.0), more)) == ("named", ("air_drag",), None)
+
+
+def test_what_the_data_hardly_tell_from_the_best_is_compared():
+    same = candidate("restitution+rolling", 34.0, log_prior=-8.0)
+    less = candidate("stribeck", 36.0, log_prior=-4.0)
+    table = ranked([candidate("air_drag", 40.0), same, less])
+    assert [c.name for c in to_compare(table, DECISIVE)] == ["air_drag", "restitution+rolling"]
+
+
 def test_pairs_with_what_is_named_do_not_contest_it_together():
     others = [f"air_drag+{name}" for name in ("rolling", "restitution", "stribeck")]
     found = verdict(candidate("air_drag", 40.0), *(candidate(pair, 36.5) for pair in others))

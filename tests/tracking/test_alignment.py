@@ -127,8 +127,14 @@ def test_what_scatters_more_the_faster_it_is_scatters_as_much_as_it_does_when_sl
 
 def test_along_an_axis_where_hardly_anything_moves_a_coder_is_late():
     place = np.stack([0.4 * np.arange(8.0), 0.02 * np.arange(8.0)], axis=1)
-    np.testing.assert_array_equal(slow_scale2(place)[1:, 0], 1.0)
-    np.testing.assert_array_equal(slow_scale2(place)[:, 1], SLOW_SCALE2)
+    place[5:] = place[5]  # at rest from there on
+    noise = 0.001**2 * np.tile(np.eye(2), (8, 1, 1))
+    scale2 = slow_scale2(place, noise)
+    np.testing.assert_array_equal(scale2[:6, 0], 1.0)
+    assert scale2[6, 0] == SLOW_SCALE2, "it may have moved in the course of the last step"
+    np.testing.assert_array_equal(scale2[1:7, 1], SLOW_SCALE2)
+    np.testing.assert_array_equal(scale2[7], 1.0)
+    assert (slow_scale2(place, 100 * noise)[:, 1] == 1.0).all(), "noise is no motion"
 
 
 def test_an_object_that_scatters_otherwise_than_is_stated_says_so():
