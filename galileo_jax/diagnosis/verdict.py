@@ -23,9 +23,9 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
 # Difference in log odds, in nats, at which the weaker of two hypotheses is given up: it is then
 # twenty times less probable (e^3 = 20).
 DECISIVE = 3.0
-# Log evidence, in nats, by which the data themselves must speak for a name: with less, only what was
-# believed beforehand separates it from its rival (10^0.5 times: H. Jeffreys, Theory of Probability,
-# 3rd ed. 1961, app. B, 'substantial').
+# Log evidence, in nats, by which the data themselves must speak for a name: with less, only what
+# was believed beforehand separates it from its rival (10^0.5 times: H. Jeffreys, Theory of
+# Probability, 3rd ed. 1961, app. B, 'substantial').
 SUBSTANTIAL = log(10) / 2
 # How much wider that margin is where the base model already passes its comparison: the effect is
 # then so faint that more hypotheses stay possible.
@@ -112,8 +112,8 @@ def to_compare(candidates: Sequence[Candidate], margin: float) -> tuple[Candidat
 
     Always the best, the best with a name and the best formula; beyond these what could be confused
     with the best, alone or together: all others together come to less than a twentieth of it; and
-    what the data themselves hardly tell from it. Where the best is a form that says the same as the best formula, beyond it what could be
-    confused with the formula.
+    what the data themselves hardly tell from it. Where the best is a form that says the same as the
+    best formula, beyond it what could be confused with the formula.
 
     Args:
       candidates: ranked.
@@ -254,9 +254,9 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
 
     Returns:
       Named: one hypothesis explains the data, and nothing else does about as well, nor all others
-      together, nor does it owe that to its prior alone. Ambiguous: several do; a form without a name stands last, and an effect that
-      explains the data alone is not repeated with others. Unknown: only a form does, or nothing,
-      or what does is far behind what does not.
+      together, nor does it owe that to its prior alone. Ambiguous: several do; a form without a
+      name stands last, and an effect that explains the data alone is not repeated with others.
+      Unknown: only a form does, or nothing, or what does is far behind what does not.
     """
     best, explaining = candidates[0], _explaining(candidates)
     if not explaining:
