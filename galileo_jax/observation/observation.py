@@ -52,6 +52,11 @@ class Observation:
     noise_known_to: float = 0.0
 
     @property
+    def is_tracked_here(self) -> bool:
+        """Whether a video was tracked: what others tracked states its errors, and is believed."""
+        return self.noise_known_to > 0
+
+    @property
     def axes(self) -> tuple[str, ...]:
         """Names of the axes."""
         third = "turning" if self.is_turning else "z"

@@ -13,9 +13,10 @@ HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none
 # last of its impulse.
 HIT_END_S = 0.005
 MIN_FRAMES_APART = 4  # to tell how fast friction pulls bodies apart
-# Trackers are pulled along by what they pass: ours by nothing that 40 rendered clips show (without
-# any drift errors were 0.55, 0.82 and 0.73 of the stated ones: k1, k2, log ratio).
-HIT_DRIFT_SD_M, HIT_DRIFT_S = 5e-5, 0.15
+HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # trackers are pulled along by what they pass
+# Ours by nothing that 40 rendered clips show (without any drift errors were 0.55, 0.82 and 0.73 of
+# the stated ones: k1, k2, log ratio).
+OWN_DRIFT_SD_M = 5e-5
 # Boxes turn a little at a hit, however straight, and while they are close a corner of one pushes
 # the other on: they come apart, or together, otherwise than points do.
 PUSH_SD_M_S2, PUSH_S = 0.05, 0.2
@@ -165,7 +166,8 @@ def _drift(
     """What a hit in frame `hit` leaves behind in either object's track."""
     after = observation.times_s[hit + 1 :]
     apart_s = (after[:, None] - after) / HIT_DRIFT_S
-    patterns = random_patterns(HIT_DRIFT_SD_M**2 * np.exp(-0.5 * apart_s**2))
+    sd_m = OWN_DRIFT_SD_M if observation.is_tracked_here else HIT_DRIFT_SD_M
+    patterns = random_patterns(sd_m**2 * np.exp(-0.5 * apart_s**2))
     found = []
     for i in objects:
         for pattern in patterns:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
+from galileo_jax.similarity import hit_discrepancy
 from galileo_jax.similarity.discrepancy import (
     LENS_SD,
     ROUGH_SD_M,
@@ -261,3 +262,22 @@ def test_pucks_wander_in_full_however_fast():
     step = np.diff(x, axis=1)
     expected = 2 * WOBBLE_SD_M**2 * (1 - np.exp(-1 / fps / WOBBLE_S))
     assert np.sum(step**2, axis=0) == pytest.approx(np.full(count - 1, expected), rel=0.01)
+
+
+def test_a_video_tracked_here_drifts_past_a_hit_by_a_quarter_of_what_others_do():
+    frames = 60
+    times = np.arange(frames) / 60
+    x = np.stack([0.3 * times, 0.15 + 0.2 * np.maximum(times - 0.5, 0.0)])
+    seen = Observation(
+        names=("object1", "object2"),
+        times_s=times,
+        position_m=np.stack([x, 0 * x], axis=1),
+        covariance_m2=1e-8 * np.tile(np.eye(2)[None, ..., None], (2, 1, 1, frames)),
+        mask=np.ones((2, frames), bool),
+    )
+    hit, both = 30, (0, 1)
+    others, own = (
+        np.stack(hit_discrepancy._drift(hit, both, seen.position_m, one))
+        for one in (seen, replace(seen, noise_known_to=0.15))
+    )
+    np.testing.assert_allclose(np.sum(own**2), np.sum(others**2) / 16, rtol=0.01)
