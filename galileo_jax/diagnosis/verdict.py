@@ -276,15 +276,13 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
     together = [c for c in _in_sum(top, possible) if c in explaining and len(equal) == 1]
     if together:
         ahead = top.log_odds - _sum_of(_without(top, possible))
-        why = (why, reasons.contested_together(top, together, ahead, DECISIVE))
-        named, forms = [[c for c in together if c.is_form is it] for it in (False, True)]
-        alike = [top, *_without_more(named), *forms[:1]]
-        return Verdict("ambiguous", tuple(c.name for c in alike), reasons=why)
+        because = [reasons.contested_together(top, together, ahead, DECISIVE)]
+        alike = _with_rivals(top, together)
+        return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *because))
     same = [c for c in _same_by_data(top, possible) if c in explaining and len(equal) == 1]
     if same:
-        named, forms = [[c for c in same if c.is_form is it] for it in (False, True)]
-        alike = [top, *_without_more(named), *forms[:1]]
-        because = (reasons.separated_by_prior(top, each, SUBSTANTIAL) for each in alike[1:])
+        alike = _with_rivals(top, same)
+        because = [reasons.separated_by_prior(top, each, SUBSTANTIAL) for each in alike[1:]]
         return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *because))
     if len(equal) == 1:
         out = [reasons.out_of_the_race(best, top, _least_p(best))] if best is not top else []
@@ -297,6 +295,12 @@ def verdict_of(candidates: Sequence[Candidate], decisive: float) -> Verdict:
         alike = names
     contests = (reasons.contested(names[0], rival, decisive) for rival in alike[1:])
     return Verdict("ambiguous", tuple(c.name for c in alike), reasons=(why, *contests))
+
+
+def _with_rivals(top: Candidate, rivals: Sequence[Candidate]) -> list[Candidate]:
+    """What an ambiguous verdict lists: the best, its rivals with a name, and the best form."""
+    named, forms = [[c for c in rivals if c.is_form is it] for it in (False, True)]
+    return [top, *_without_more(named), *forms[:1]]
 
 
 def _without_more(names: Sequence[Candidate]) -> list[Candidate]:

@@ -107,7 +107,8 @@ def after_blow_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 def slow_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     """`[frame, 2]`: how many times the variance of motion an axis has along which hardly any is.
 
-    What has come to rest is not in motion: one frame after its last step it is as usual.
+    What has come to rest is not in motion: from the second frame after its last step on it has the
+    usual variance.
 
     Args:
       place: `[frame, 2]`, px, finite.

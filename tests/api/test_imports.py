@@ -8,7 +8,7 @@ import pytest
 # Each takes a tenth of a second and more of the processor.
 OF_OTHERS = {
     *("arviz", "blackjax", "cv2", "equinox", "flax", "matplotlib", "mujoco", "optimistix"),
-    *("pandas", "plotly", "rich", "scipy.stats", "xarray"),
+    *("pandas", "plotly", "rich", "scipy.interpolate", "scipy.stats", "xarray"),
 }
 
 

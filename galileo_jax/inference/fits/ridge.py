@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.interpolate import CubicSpline
 from scipy.special import logsumexp
 
 from galileo_jax.inference.fits.cloud import log_student_t, student_t
@@ -47,6 +46,7 @@ class Ridge:
 
     Attributes:
       valley: whose mode and R these are.
+      free: `[parameter]`, those that R leads along.
       direction: the column of R that the way goes along.
       knots: `[knot]`, a, ascending.
       best: of a, the others, `[point, other]`.
@@ -56,6 +56,7 @@ class Ridge:
     """
 
     valley: Valley
+    free: Bool[np.ndarray, " parameter"]
     direction: int
     knots: Float[np.ndarray, " knot"]
     best: Callable[[np.ndarray], np.ndarray]
@@ -63,25 +64,19 @@ class Ridge:
     edges: Float[np.ndarray, " edge"]
     log_share: Float[np.ndarray, " cell"]
 
-    def draw(self, generator: np.random.Generator, num: int) -> Float[np.ndarray, "draw parameter"]:
-        """Points, z."""
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
+        """Points z, `[draw, parameter]`, and their log density."""
         cell = generator.choice(len(self.log_share), num, p=np.exp(self.log_share))
         a = self.edges[cell] + np.diff(self.edges)[cell] * generator.random(num)
         t = student_t(generator, num, self.root.shape[1])
         root = np.swapaxes(self._root_at(a), 1, 2)
         others = self.best(a) + np.linalg.solve(root, t[..., None])[..., 0]
-        return self.valley.mode + np.insert(others, self.direction, a, axis=1) @ self.valley.root.T
+        z = self.valley.mode + np.insert(others, self.direction, a, axis=1) @ self.valley.root.T
+        return z, self.log_density(z)
 
-    def log_density(
-        self, z: Float[np.ndarray, "point parameter"], free: Bool[np.ndarray, " parameter"]
-    ) -> Float[np.ndarray, " point"]:
-        """Of q; -inf beyond the ends of the ridge.
-
-        Args:
-          z: points.
-          free: the parameters that R leads along.
-        """
-        u = self.valley.straight(z, free)
+    def log_density(self, z: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, " point"]:
+        """Of q at points z; -inf beyond the ends of the ridge."""
+        u = self.valley.straight(z, self.free)
         a, others = u[:, self.direction], np.delete(u, self.direction, axis=1)
         cell = np.searchsorted(self.edges, a) - 1
         is_inside = (cell >= 0) & (cell < len(self.log_share))
@@ -129,6 +124,8 @@ def ridge_along(
       direction: which the way goes along.
       residuals: of the trials that were fitted.
     """
+    from scipy.interpolate import CubicSpline  # most fits never come here
+
     size = valley.root.shape[1] - (len(fit.z) - len(fit.steps))
     others = np.delete(np.arange(size), direction)
     look = _looker(fit, valley.root[: len(fit.steps), :size], residuals)
@@ -150,8 +147,9 @@ def ridge_along(
     line = np.pad(line, ((0, 0), (0, num_noise)))
     whole = np.tile(np.eye(size - 1 + num_noise), (len(knots), 1, 1))
     whole[:, : size - 1, : size - 1] = root
+    log_share -= logsumexp(log_share)
     best = CubicSpline(knots, line)
-    return Ridge(valley, direction, knots, best, whole, edges, log_share - logsumexp(log_share))
+    return Ridge(valley, fit.free, direction, knots, best, whole, edges, log_share)
 
 
 def _looker(

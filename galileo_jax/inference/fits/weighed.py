@@ -102,22 +102,6 @@ class _Part:
         return log_student_t(far, dim) - volume + from_priors
 
 
-@dataclass(frozen=True)
-class _AlongRidge:
-    """A part of q: along the ridge of a valley that bends much; `free`: the parameters it has."""
-
-    ridge: Ridge
-    free: np.ndarray
-
-    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
-        """Points, and their log density in this part."""
-        z = self.ridge.draw(generator, num)
-        return z, self.log_density(z)
-
-    def log_density(self, z: np.ndarray) -> np.ndarray:
-        return self.ridge.log_density(z, self.free)
-
-
 def weighed(
     fits: Sequence[GradientFit],
     residuals: Residuals,
@@ -170,7 +154,7 @@ class _Mixture:
       ess: how many draws of the posterior itself these are worth.
     """
 
-    def __init__(self, parts: Sequence[_Part | _AlongRidge]):
+    def __init__(self, parts: Sequence[_Part | Ridge]):
         self._parts, self._clouds = tuple(parts), list[Cloud]()
         self.z, self.log_weights, self.ess = np.empty((0, 0)), np.empty(0), 0.0
         self._of, self._own, self.log_density = np.empty(0, int), np.empty(0), np.empty(0)
@@ -212,9 +196,9 @@ class _Mixture:
 
 def _parts(
     fits: Sequence[GradientFit], residuals: Residuals, width: float
-) -> tuple[list[_Part | _AlongRidge], np.ndarray]:
+) -> tuple[list[_Part | Ridge], np.ndarray]:
     """Those of the valleys, and which shares of the draws they have."""
-    parts, shares = list[_Part | _AlongRidge](), list[float]()
+    parts, shares = list[_Part | Ridge](), list[float]()
     for one in fits:
         part = _part(one, fits[0], residuals, width)
         parts.append(part)
@@ -222,7 +206,7 @@ def _parts(
         direction = bent_direction(part.valley)
         ridge = None if direction is None else ridge_along(one, part.valley, direction, residuals)
         if ridge is not None:
-            parts.append(_AlongRidge(ridge, one.free))
+            parts.append(ridge)
             shares[-1:] = [(1 - SHARE_RIDGE) * shares[-1], SHARE_RIDGE * shares[-1]]
     return parts, np.array(shares)
 
