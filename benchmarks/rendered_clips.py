@@ -21,8 +21,9 @@ def render(folder: Path, sort: str, seed: int) -> gx.Simulated:
     Args:
       folder: of the files.
       sort: IDEAL: the engine that fits, a camera square to the scene; FAULTY: another solver,
-        release, foot and hit that are not ideal, and a camera held askew; MEASURED: as FAULTY, and
-        the scale is declared as well as somebody measures it: `SCALE_SD` off, as fits allow for.
+        release, foot and hit that are not ideal, and a camera held askew; both declare their
+        scale as exact; MEASURED: as FAULTY, with a scale that is `SCALE_SD` off, and nothing
+        said about how well it is known.
       seed: of all that is drawn.
     """
     rng = np.random.default_rng([seed, 7])
@@ -39,5 +40,6 @@ def render(folder: Path, sort: str, seed: int) -> gx.Simulated:
             declared = clip.with_suffix(".yaml")
             content = yaml.safe_load(declared.read_text())
             content["pixels_per_metre"] *= 1.0 + SCALE_SD * float(rng.standard_normal())
+            del content["pixels_per_metre_sd"]
             declared.write_text(yaml.safe_dump(content, sort_keys=False))
     return made

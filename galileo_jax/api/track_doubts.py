@@ -20,6 +20,10 @@ UNCERTAINTY_OF = {
     "ramp_angle_deg": "ramp_angle_sd_deg",
     "pixels_per_metre": "pixels_per_metre_sd",
 }
+TAKEN = {
+    "ramp_angle_deg": "ramp_angle_deg as exact",
+    "pixels_per_metre": "pixels_per_metre as known to a thousandth",
+}
 
 
 def with_track_doubts(
@@ -59,7 +63,7 @@ def _far(measurements: Sequence[Measurement], chi2: float) -> str:
 
 
 def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
-    """Which marks in a video's pixels the fit takes as exact, and how much hangs on them.
+    """Which marks in a video the fit takes as exact or nearly so, and how much hangs on them.
 
     A line that is read off with an error e at either end, half a pixel, and is as long as the
     way L of object 1 down the ramp has its angle off by sqrt(2) e / L and its length by as much
@@ -72,7 +76,8 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
       k1: the friction found; None where there is none.
 
     Returns:
-      One line; None of tracks, and where all is declared with its uncertainty.
+      One line; None of tracks, and where all is declared with its uncertainty (a scale may be
+      declared to be exact).
     """
     clip, scenario = measured.clip, SCENARIOS[measured.clip.scenario]
     if clip.video is None:
@@ -80,11 +85,11 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
     exact = []
     if scenario.has_ramp and not clip.ramp_angle_sd_deg:
         exact.append("ramp_angle_deg")
-    if clip.pixels_per_metre is not None and not clip.pixels_per_metre_sd:
+    if clip.pixels_per_metre is not None and clip.pixels_per_metre_sd is None:
         exact.append("pixels_per_metre")
     if not exact:
         return None
-    text = f"{clip.path}: the fit takes {' and '.join(exact)} as exact"
+    text = f"{clip.path}: the fit takes {' and '.join(TAKEN[key] for key in exact)}"
     way_px = _way_px(measured)
     if k1 is None or clip.ramp_angle_deg is None or way_px < 1:
         return text
@@ -92,9 +97,10 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
     change = {"ramp_angle_deg": (1 + k1 * slope) * off, "pixels_per_metre": (slope - k1) * off}
     by = " and ".join(f"{abs(change[key]):.2g}" for key in exact)
     keys = " and ".join(UNCERTAINTY_OF[key] for key in exact)
+    they_were = "it was" if len(exact) == 1 else "they were"
     return (
-        f"{text}. If they were read off the picture, half a pixel at either end of a line as long "
-        f"as object 1's way down the ramp ({way_px:.0f} px) would change k1 by {by}: declare "
+        f"{text}. If {they_were} read off the picture, half a pixel at either end of a line as "
+        f"long as object 1's way down the ramp ({way_px:.0f} px) would change k1 by {by}: declare "
         f"{keys} to include that in its interval"
     )
 

@@ -184,7 +184,7 @@ def _check_uncertainties(clip: Clip, fail: Any) -> None:
         if getattr(clip, key) and getattr(clip, of) is None:
             fail(key, f"{getattr(clip, key):g} given without {of}; give both, or leave it out")
     scale, sd = clip.pixels_per_metre, clip.pixels_per_metre_sd
-    if scale is not None and sd > MAX_SCALE_SD_SHARE * scale:
+    if scale is not None and (sd or 0.0) > MAX_SCALE_SD_SHARE * scale:
         fail(
             "pixels_per_metre_sd",
             f"{sd:g} is more than {MAX_SCALE_SD_SHARE:.0%} of pixels_per_metre ({scale:g}); "

@@ -121,7 +121,7 @@ class ClipFile(BaseModel):
     ramp_angle_sd_deg: AngleSd = 0.0
     direction: Annotated[Direction, one_of(get_args(Direction))] = "right"
     pixels_per_metre: Scale | None = None
-    pixels_per_metre_sd: ScaleSd = 0.0
+    pixels_per_metre_sd: ScaleSd | None = None
     rectangle: Rectangle | None = None
     lens: Lens | None = None
     origin_px: Point | None = None
@@ -158,7 +158,8 @@ class Clip(ClipFile):
       ramp_angle_sd_deg: how well it is known (one standard deviation); 0 = taken at its word.
       direction: which way object 1 travels in the image.
       pixels_per_metre: None = unknown.
-      pixels_per_metre_sd: how well it is known (one standard deviation); 0 = taken at its word.
+      pixels_per_metre_sd: how well it is known (one standard deviation); 0 = exactly, None = not
+        said: a thousandth of it is allowed for.
       rectangle: four corners in the plane of the motion, which tell the scale and how the camera
         stands; `pixels_per_metre` is then that of its middle.
       lens: how the lens bends straight lines; None = it does not.

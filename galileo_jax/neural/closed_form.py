@@ -75,7 +75,8 @@ class Setting(NamedTuple):
       frame: `[frame]`, 0, 1, ...
       dt_s: between two frames.
       sin, cos: of the ramp's angle.
-      imperfect: 0 in an ideal world, 1 where a camera stands between.
+      imperfect: 0 in an ideal world, 1 for bodies that are no points.
+      filmed: 1 where a camera stands between, 0 where none does.
       along_m: `[frame]`, object 1's place along the ramp.
       corner_m: `[object]`, x at which the centre turns from the ramp's direction to the table's.
       margin_m: either side of it, where object 1 stands on two edges.
@@ -87,6 +88,7 @@ class Setting(NamedTuple):
     sin: jax.Array
     cos: jax.Array
     imperfect: jax.Array
+    filmed: jax.Array
     along_m: jax.Array
     corner_m: jax.Array
     margin_m: jax.Array
@@ -307,6 +309,7 @@ def _setting(seen: Seen) -> Setting:
         sin=sin,
         cos=cos,
         imperfect=1.0 - seen.is_ideal,
+        filmed=seen.is_filmed,
         along_m=x1 * cos - y1 * sin,
         corner_m=seen.half_height_m * jnp.tan(seen.angle_rad / 2),
         margin_m=AT_FOOT * seen.half_length_m[0],
@@ -351,7 +354,7 @@ def _ramp(seen: Seen, setting: Setting, onset: Onset) -> Ramp:
         at_once=parabola(t, along - start, going, noise),
         friction=Estimate(
             (sin - path.curve / g) / cos,
-            jnp.hypot(path.curve_sd, setting.imperfect * CAMERA_SD_M_S2) / (g * cos),
+            jnp.hypot(path.curve_sd, setting.filmed * CAMERA_SD_M_S2) / (g * cos),
         ),
         friction_at_once=(sin - from_rest / g) / cos,
         release_s=jnp.clip(release, -0.5, 1.0),
@@ -364,7 +367,7 @@ def _table(seen: Seen, setting: Setting, onset: Onset) -> Table:
     end, rest = _at_end(x, mask, noise)
     sliding = is_there & (onset.is_hit | (end - x > setting.moved_m[0]) | (rest < 3))
     path = parabola(seen.times_s, x, sliding, noise)
-    sd = jnp.hypot(path.curve_sd, setting.imperfect * 2 * CAMERA_SD_M_S2) / seen.gravity
+    sd = jnp.hypot(path.curve_sd, setting.filmed * 2 * CAMERA_SD_M_S2) / seen.gravity
     friction = Estimate(-path.curve / seen.gravity, sd)
     return Table(is_there, sliding, path, friction, end, rest)
 
@@ -411,7 +414,7 @@ def _after(seen: Seen, setting: Setting, onset: Onset, table: Table) -> After:
         rests2=rests2,
         decay2=Estimate(
             jnp.clip(rate, 1e-3, seen.gravity),
-            jnp.hypot(rate_sd, setting.imperfect * 2 * CAMERA_SD_M_S2),
+            jnp.hypot(rate_sd, setting.filmed * 2 * CAMERA_SD_M_S2),
         ),
         way2_m=jnp.maximum(end2 - onset.place2_m, 1e-5),
     )
@@ -512,7 +515,7 @@ def _mass_ratio(setting: Setting, hit: Hit) -> Estimate:
     lost = jnp.maximum(v1.value - hit.after1.value, 0.003 * jnp.abs(v1.value) + 1e-3)
     ratio = jnp.clip(v2.value / lost, 3e-3, 300.0)
     sd = jnp.hypot(v2.sd / v2.value, jnp.hypot(v1.sd, hit.after1.sd) / lost)
-    return Estimate(ratio, jnp.hypot(sd, CAMERA_RATIO_SD * setting.imperfect) + 1e-4)
+    return Estimate(ratio, jnp.hypot(sd, CAMERA_RATIO_SD * setting.filmed) + 1e-4)
 
 
 def _friction2(

@@ -24,6 +24,7 @@ from galileo_jax.neural.seen import Seen, see
 from galileo_jax.neural.summary import DECLARED, Summary, summarise
 from galileo_jax.runtime.batching import one_at_a_time
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.similarity.discrepancy import SCALE_SD
 
 TRAINED = Path(__file__).parent / "trained" / "galileo.npz"
 NUM_DRAWS = 4000
@@ -70,7 +71,7 @@ def cnn_posterior(
     if infers_gravity(problem.model.nuisances):
         raise InputError("--method cnn: its network takes gravity as declared; use --method grad")
     network = network or trained_network()
-    seen = see(problem.observation, scene)
+    seen = see(problem.observation, scene, is_filmed=problem.noise == "camera")
     summary = one_at_a_time(_summarise)(seen)
     found = _estimate(network, seen, summary, seed)
     theta = _complete(trials, found, seed)
@@ -154,7 +155,7 @@ def _complete(trials: JointProblem, found: Estimates, seed: int) -> np.ndarray:
     theta = trials.theta(z).copy()
     # The ratio shows, the product does not: of two log-normal masses they are independent.
     log_product = 2 * math.log(MASS_PRIOR.median) + math.sqrt(2) * MASS_PRIOR.sd * z[:, 0]
-    k1, k2 = _with_declared_errors(trials, found, theta)
+    k1, k2 = _with_declared_errors(trials, found, theta, generator)
     known: Mapping[str, np.ndarray] = {
         "k1": k1,
         "k2": k2,
@@ -169,19 +170,25 @@ def _complete(trials: JointProblem, found: Estimates, seed: int) -> np.ndarray:
 
 
 def _with_declared_errors(
-    trials: JointProblem, found: Estimates, theta: np.ndarray
+    trials: JointProblem, found: Estimates, theta: np.ndarray, generator: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Draws of k1 and k2 with the errors of declared angle and scale in `theta`, to first order.
+    """Draws of k1 and k2 with the errors of angle and scale, to first order.
 
     k1 = tan a - acceleration / (g cos a) and k2 = deceleration / g, of a ramp steeper by da and
     of lengths measured too long by a share s:
 
         dk1 = (1 + k1 tan a) da + (tan a - k1) s,    dk2 = -k2 s
+
+    Stated errors are drawn in `theta`; of a scale of which nothing is said, here.
     """
     columns = {name: theta[:, i] for i, name in enumerate(trials.names)}
     zero = np.zeros(len(theta))
     steeper = columns.get(DeclaredAngle.name, zero)
     longer = columns.get(DeclaredScale.name, zero)
-    slope = math.tan(trials.problems[0].model.scene.surroundings.angle_rad)
+    (problem,) = trials.problems
+    scene = problem.model.scene.surroundings
+    if problem.noise == "camera" and not scene.is_scale_stated:
+        longer = longer + SCALE_SD * generator.standard_normal(len(theta))
+    slope = math.tan(scene.angle_rad)
     k1 = found.k1 + (1 + found.k1 * slope) * steeper + (slope - found.k1) * longer
     return np.maximum(k1, 0.0), found.k2 * (1 - longer)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.measurement.noise_at_rest import LEAST_SCALE
+from galileo_jax.measurement.noise_at_rest import LEAST_SCALE, SHIFT_SHARE
 from galileo_jax.similarity import discrepancy, hit_discrepancy
 
 NUM_WAVES = 8
@@ -36,13 +36,26 @@ class Bodies(NamedTuple):
     mass_kg: jax.Array
 
 
-def filmed(position: jax.Array, times: jax.Array, bodies: Bodies, normal: Normal) -> jax.Array:
-    """Centres `[object, 2, frame]`, m, as a camera sees them, but for the noise."""
-    x, y = position[:, 0], position[:, 1]
-    keystone = discrepancy.KEYSTONE_SD * normal((2,))
-    extra = keystone[0] * jnp.stack([x * x, x * y], 1) + keystone[1] * jnp.stack([x * y, y * y], 1)
-    extra += discrepancy.ROLL_SD_RAD * normal() * jnp.stack([-y, x], 1)
-    extra += discrepancy.SCALE_SD * normal() * position
+def measured(
+    position: jax.Array,
+    times: jax.Array,
+    bodies: Bodies,
+    is_filmed: jax.Array,
+    is_tracked_here: jax.Array,
+    normal: Normal,
+) -> jax.Array:
+    """Centres `[object, 2, frame]`, m, of bodies that are no points, but for the noise.
+
+    Args:
+      position: of points, the same shape.
+      times: `[frame]`, s.
+      bodies: see `Bodies`.
+      is_filmed: 1.0 where a camera sees them, 0.0 where none does.
+      is_tracked_here: 1.0 where our own tracker follows them.
+      normal: see `Normal`.
+    """
+    x = position[:, 0]
+    extra = is_filmed * _by_camera(position, normal)
     extra += discrepancy.POINT_SD_M * normal((2, 2, 1))
     extra = extra.at[0].add(_step_at_foot(x[0], bodies, normal))
     extra += _wobble(x, times, bodies, normal)
@@ -54,14 +67,27 @@ def filmed(position: jax.Array, times: jax.Array, bodies: Bodies, normal: Normal
     # What moves no more drifts no more, and nothing pushes it any further.
     moves = jnp.abs(jnp.diff(x, prepend=x[:, :1])) > 1e-7
     moving_s = jax.lax.cummax(jnp.where(moves, times, 0.0), axis=1)
-    drift = hit_discrepancy.HIT_DRIFT_SD_M * _wave(
-        moving_s / hit_discrepancy.HIT_DRIFT_S, (2,), normal
+    drift_sd_m = jnp.where(
+        is_tracked_here > 0, hit_discrepancy.OWN_DRIFT_SD_M, hit_discrepancy.HIT_DRIFT_SD_M
     )
+    wave = _wave(moving_s / hit_discrepancy.HIT_DRIFT_S, (2,), normal)
+    drift = is_filmed * drift_sd_m * wave
     further = _apart_after_hit(x, times, is_after, bodies, normal)
     m1, m2 = bodies.mass_kg
     shares = jnp.stack([-m2, m1]) / (m1 + m2)  # momentum is conserved
     pushed = shares[:, None] * _until_rest(further, moves & is_after)
     return position + extra.at[:, 0].add(jnp.where(is_after, along + step + drift + pushed, 0.0))
+
+
+def _by_camera(position: jax.Array, normal: Normal) -> jax.Array:
+    """How far a camera that is not quite square to the scene shifts what it sees, as `position`.
+
+    Its scale is exact: how well it is known is added to the network's answer (`estimate.py`).
+    """
+    x, y = position[:, 0], position[:, 1]
+    keystone = discrepancy.KEYSTONE_SD * normal((2,))
+    shift = keystone[0] * jnp.stack([x * x, x * y], 1) + keystone[1] * jnp.stack([x * y, y * y], 1)
+    return shift + discrepancy.ROLL_SD_RAD * normal() * jnp.stack([-y, x], 1)
 
 
 def _step_at_foot(x: jax.Array, bodies: Bodies, normal: Normal) -> jax.Array:
@@ -150,7 +176,7 @@ def noisy(
     """What is seen, with the noise of a tracker and a coder.
 
     A coder shifts what moves from frame to frame, and what rests once: of an object at rest
-    less scatters, and what scatters less is one shift of the whole rest.
+    less scatters, and a share of what scatters less is one shift of the whole rest.
 
     Args:
       position: `[object, 2, frame]`, m, the motion itself, which tells who rests.
@@ -165,7 +191,7 @@ def noisy(
     rests = (speed < RESTS_M_S)[:, None]
     has_moved = (jax.lax.cummax(speed, axis=1) >= RESTS_M_S)[:, None]
     scatter = jnp.clip(scatter, LEAST_SCALE, 1.0)
-    before, after = normal((2, 2, 2, 1)) * jnp.sqrt(1 - scatter**2)
+    before, after = normal((2, 2, 2, 1)) * jnp.sqrt(SHIFT_SHARE * (1 - scatter**2))
     shift = jnp.where(has_moved, after, before)
     each = normal(seen.shape)
     return seen + noise[:, None, None] * jnp.where(rests, shift + scatter * each, each)

@@ -28,6 +28,8 @@ class Seen(NamedTuple):
       half_length_m, half_height_m: `[object]`.
       is_ideal: 1.0 where nothing but noise stands between the rigid bodies and their
         positions (a simulated world, the thesis's priors); 0.0 for clips.
+      is_filmed: 1.0 where a camera saw the bodies; 0.0 for positions in metres of unknown origin.
+      is_tracked_here: 1.0 where our own tracker found them in the pictures.
     """
 
     times_s: jax.Array
@@ -39,9 +41,11 @@ class Seen(NamedTuple):
     half_length_m: jax.Array
     half_height_m: jax.Array
     is_ideal: jax.Array
+    is_filmed: jax.Array
+    is_tracked_here: jax.Array
 
 
-def see(observation: Observation, scene: Surroundings, is_ideal: bool = False) -> Seen:
+def see(observation: Observation, scene: Surroundings, is_filmed: bool = True) -> Seen:
     """A clip of the ramp scene as the network sees it.
 
     A clip with one object gets a second one that is never seen.
@@ -74,7 +78,9 @@ def see(observation: Observation, scene: Surroundings, is_ideal: bool = False) -
         gravity=jnp.asarray(scene.gravity),
         half_length_m=jnp.asarray(np.pad(scene.half_length_m, objects, mode="edge")),
         half_height_m=jnp.asarray(np.pad(scene.half_height_m, objects, mode="edge")),
-        is_ideal=jnp.asarray(float(is_ideal)),
+        is_ideal=jnp.asarray(0.0),
+        is_filmed=jnp.asarray(float(is_filmed)),
+        is_tracked_here=jnp.asarray(float(is_filmed and observation.is_tracked_here)),
     )
 
 

@@ -17,7 +17,7 @@ from galileo_jax.similarity import discrepancy
 
 QUARTIC = 0.02  # of t^4 / 4, what no parabola fits, root mean square
 
-NUM_FEATURES, NUM_CHANNELS = 67, 8
+NUM_FEATURES, NUM_CHANNELS = 69, 8
 # What features (by their place) say of the scene itself; for warnings.
 DECLARED = {
     1: "the ramp's angle",
@@ -109,7 +109,7 @@ def _features(seen: Seen, phases: Phases, centre: jax.Array, scale: jax.Array) -
 def _features_always(
     seen: Seen, phases: Phases, centre: jax.Array, scale: jax.Array
 ) -> list[jax.Array]:
-    """Features 0 to 30: of the scene, and of object 1 before the hit."""
+    """Features 0 to 32: of the scene, and of object 1 before the hit."""
     ramp, table, (k1, k1_sd) = phases.ramp, phases.table, phases.friction1
     num_going, num_sliding = ramp.is_going.sum(), table.is_sliding.sum()
     count = len(seen.times_s)
@@ -126,14 +126,14 @@ def _features_always(
         *(_sized((ramp.friction.value - k1) / k1_sd), _sized((table.friction.value - k1) / k1_sd)),
         *(_sized((ramp.friction_at_once - k1) / k1_sd), _sized(ramp.at_once.slope)),
         *(1 / scale[0]) ** 0.5 * jnp.ones(1) / 10,
-        phases.after.rests1,
+        *(phases.after.rests1, seen.is_filmed, seen.is_tracked_here),
     ]
 
 
 def _features_of_hit(
     seen: Seen, phases: Phases, centre: jax.Array, scale: jax.Array
 ) -> list[jax.Array]:
-    """Features 31 to 66: of the hit and of what comes after it."""
+    """Features 33 to 68: of the hit and of what comes after it."""
     table, after, hit = phases.table, phases.after, phases.hit
     k1, g = phases.friction1.value, seen.gravity
     x1 = seen.position_m[0, 0]

@@ -1,10 +1,11 @@
 """Random ramp experiments, filmed: what the posterior network is trained on.
 
-Two worlds are mixed, and the network is told which one it looks at:
+Three worlds are mixed, and the network is told which one it looks at:
 
-    clips   priors and nuisances of the fit (foot, restitution, release, points off the centre)
+    videos  priors and nuisances of the fit (foot, restitution, release, points off the centre)
             and the imperfections of camera, coder and bodies (`film.py`); friction of object 1
-            uniform among those at which it slides.
+            uniform among those at which it slides. Tracked by us, or by others.
+    tracks  the same without a camera: positions in metres, whatever measured them.
     ideal   the thesis's: masses uniform in (0, 1) kg, friction in (0, 0.3), rigid bodies
             exactly as declared, noise only.
 
@@ -25,13 +26,14 @@ from galileo_jax.model.effects.nuisances import (
     impact_restitution,
 )
 from galileo_jax.model.model import FRICTION_PRIOR, MASS_PRIOR
-from galileo_jax.neural.film import Bodies, filmed, noisy
+from galileo_jax.neural.film import Bodies, measured, noisy
 from galileo_jax.neural.seen import NUM_FRAMES, Seen
 from galileo_jax.rollout.engine_rigid import roll_out
 from galileo_jax.rollout.rollout import at_times
 from galileo_jax.rollout.trajectory import Trajectory
 
-IDEAL_SHARE = 0.3
+IDEAL_SHARE = 0.25
+FILMED_SHARE, OWN_SHARE = 0.7, 0.8  # of clips that a camera saw; of those, tracked by us
 IDEAL_FRICTION = (0.0, 0.3)
 RECORD_DT_S, NUM_RECORDS = 1 / 120, 512  # constant forces: exact at any step
 ANGLE_DEG = (8.0, 35.0)
@@ -72,6 +74,8 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
 
     is_ideal = uniform(0, 1) < IDEAL_SHARE
     imperfect = 1.0 - is_ideal
+    is_filmed = imperfect * (uniform(0, 1) < FILMED_SHARE)
+    is_tracked_here = is_filmed * (uniform(0, 1) < OWN_SHARE)
     angle = jnp.deg2rad(jnp.where(uniform(0, 1) < 0.2, 20.0, uniform(*ANGLE_DEG)))
     half_length, half_height = uniform(*SIZE_M, (2,)) / 2, uniform(*SIZE_M, (2,)) / 2
     corner = half_height * jnp.tan(angle / 2)
@@ -115,11 +119,12 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     motion = Trajectory(records, position, velocity)
     clean, _ = at_times(motion, times - instant)
     bodies = Bodies(angle, half_length, corner[0], jnp.stack([m1, m2]))
-    seen = jnp.where(imperfect > 0, filmed(clean, times, bodies, normal), clean)
+    real = measured(clean, times, bodies, is_filmed, is_tracked_here, normal)
+    seen = jnp.where(imperfect > 0, real, clean)
     noise = log_uniform(*NOISE_PX, (2,)) / log_uniform(*SCALE_PX_PER_M)
     noise = jnp.where(uniform(0, 1) < 0.3, noise[0], noise)
     truly = noise * jnp.exp(imperfect * NOISE_SCALE_SD * normal())
-    is_coded = imperfect * uniform(0, 1) > 1 - CODED_SHARE
+    is_coded = is_filmed * uniform(0, 1) > 1 - CODED_SHARE
     scatter = jnp.where(is_coded, uniform(LEAST_SCALE, 1.0), 1.0)
     seen = noisy(clean, seen, times, truly, scatter, normal)
     frames = jnp.arange(NUM_FRAMES)
@@ -140,6 +145,8 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
             half_length_m=half_length,
             half_height_m=half_height,
             is_ideal=1.0 - imperfect,
+            is_filmed=is_filmed,
+            is_tracked_here=is_tracked_here,
         ),
         Truth(k1, k2, m1 / m2),
     )

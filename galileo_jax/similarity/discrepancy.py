@@ -27,7 +27,7 @@ THROW_SD_RAD = 0.05  # nobody throws square to the camera: what comes nearer gro
 # centre which is not quite the motion's; what is thrown is filmed to fill the picture.
 LENS_SD, LENS_CENTRE_SD = 0.005, 0.3
 READ_OFF = 10.0  # times an angle's sd: so wide that the direction tells nothing more
-SCALE_SD = 0.001
+SCALE_SD = 0.001  # of a scale of which nobody says how well it is known; of gravity, as well
 # Bodies rock, sink into contacts and are lifted at a hit, across their path, by some tenths of a
 # millimetre; how fast they go along it shows none of that.
 WOBBLE_SD_M, WOBBLE_S = 4e-4, 0.3
@@ -131,7 +131,10 @@ def modes(
 
 
 def camera(position: np.ndarray, observation: Observation, scene: Surroundings) -> list[np.ndarray]:
-    """Keystone about either axis, the lens and scale, of all objects; none where declared."""
+    """Keystone about either axis, the lens and scale, of all objects; none where declared.
+
+    How well the scale is known is inferred with the rest where it is stated (`declared_scale`).
+    """
     if observation.is_squared:
         return []
     found = []
@@ -151,7 +154,8 @@ def camera(position: np.ndarray, observation: Observation, scene: Surroundings) 
         found.extend(_lens(aside, seen))
     else:
         found.append(_bent_scale(y, observation))
-    found.append(SCALE_SD * position)
+    if not scene.is_scale_stated:
+        found.append(SCALE_SD * position)
     return found
 
 

@@ -51,6 +51,7 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
             "video": out.name,
             "direction": settings.direction,
             "pixels_per_metre": round(camera.pixels_per_metre / magnified, 2),
+            "pixels_per_metre_sd": 0.0,
             **_origin(camera),
             **content,
         }

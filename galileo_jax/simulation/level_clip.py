@@ -87,6 +87,7 @@ def _write(settings: Settings, truth: LevelTruth, looks: np.random.Generator, ou
         content |= {
             "direction": settings.direction,
             "pixels_per_metre": camera.pixels_per_metre,
+            "pixels_per_metre_sd": 0.0,
             "origin_px": list(camera.origin_px),
         }
         record["pixels_per_metre_true"] = camera.pixels_per_metre

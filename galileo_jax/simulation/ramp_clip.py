@@ -158,6 +158,7 @@ def _content(
         picture = {
             "direction": settings.direction,
             "pixels_per_metre": round(camera.pixels_per_metre / declared.scale, 2),
+            "pixels_per_metre_sd": 0.0,
             "origin_px": np.round(camera.origin_px + off["origin"][0], 1).tolist(),
         }
         if not settings.no_points:

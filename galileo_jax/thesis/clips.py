@@ -66,6 +66,8 @@ def to_clips(theta: np.ndarray, seen_m: np.ndarray, scene: Surroundings, noise_m
             half_length_m=jnp.asarray(scene.half_length_m),
             half_height_m=jnp.asarray(scene.half_height_m),
             is_ideal=jnp.ones(()),
+            is_filmed=jnp.zeros(()),
+            is_tracked_here=jnp.zeros(()),
         )
         return to_sample(clip, Truth(theta[1], theta[3], theta[0] / theta[2]))
 

@@ -67,15 +67,17 @@ def test_half_a_pixel_changes_k1_as_a_steeper_ramp_and_longer_lengths_would(meas
     text = taken_as_exact(measured, k1)
     assert text is not None
     assert f"(200 px) would change k1 by {steeper:.2g} and {longer:.2g}:" in text
-    assert "the fit takes ramp_angle_deg and pixels_per_metre as exact" in text
+    taken = "ramp_angle_deg as exact and pixels_per_metre as known to a thousandth"
+    assert f"the fit takes {taken}. If they were read off" in text
     assert "declare ramp_angle_sd_deg and pixels_per_metre_sd" in text
 
 
 def test_what_has_an_uncertainty_is_not_taken_as_exact(measured) -> None:
     text = taken_as_exact(declared(measured, ramp_angle_sd_deg=0.1), 0.1)
     assert text is not None and "angle" not in text
-    both = declared(measured, ramp_angle_sd_deg=0.1, pixels_per_metre_sd=1.0)
-    assert taken_as_exact(both, 0.1) is None
+    for scale_sd in (0.0, 1.0):
+        both = declared(measured, ramp_angle_sd_deg=0.1, pixels_per_metre_sd=scale_sd)
+        assert taken_as_exact(both, 0.1) is None
 
 
 def test_a_track_without_a_video_has_no_marks(measured) -> None:
@@ -116,6 +118,6 @@ def test_the_run_says_what_is_taken_as_exact(tmp_path: Path, capsys) -> None:
     out = tmp_path / "run"
     assert command.run(fit_command.main, [str(tmp_path / "clip.mp4"), "--out", str(out)]) == 0
     (told,) = json.loads((out / "result.json").read_text())["taken_as_exact"]
-    assert "the fit takes ramp_angle_deg and pixels_per_metre as exact" in told
+    assert "the fit takes ramp_angle_deg as exact. If it was read off" in told
     assert f"note: {told}" in capsys.readouterr().err
-    assert "pixels_per_metre as exact" in (out / "report.html").read_text()
+    assert "ramp_angle_deg as exact" in (out / "report.html").read_text()

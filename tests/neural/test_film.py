@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.neural.film import Bodies, filmed, noisy
+from galileo_jax.measurement.noise_at_rest import SHIFT_SHARE
+from galileo_jax.neural.film import Bodies, measured, noisy
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import modes
 from tests.ramp_model import HIT, make_surroundings
@@ -33,11 +34,13 @@ def motion(experiment) -> tuple[np.ndarray, np.ndarray]:
     return times, solve(experiment, times).position_m
 
 
+@pytest.mark.parametrize("is_tracked_here", [True, False])
+@pytest.mark.parametrize("is_filmed", [True, False])
 @pytest.mark.parametrize("case", CASES)
-def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, x64):
+def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, is_filmed, is_tracked_here, x64):
     experiment = CASES[case]
     times, exact = motion(experiment)
-    scene = make_surroundings(experiment)
+    scene = dataclasses.replace(make_surroundings(experiment), is_scale_stated=True)
     bodies = Bodies(
         jnp.asarray(scene.angle_rad),
         jnp.asarray(scene.half_length_m),
@@ -46,7 +49,9 @@ def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, x64):
     )
 
     def drawn(key):
-        return filmed(jnp.asarray(exact), jnp.asarray(times), bodies, normals(key)) - exact
+        place, flags = jnp.asarray(exact), (1.0 * is_filmed, 1.0 * is_tracked_here)
+        seen = measured(place, jnp.asarray(times), bodies, *map(jnp.asarray, flags), normals(key))
+        return seen - exact
 
     extra = np.asarray(jax.jit(jax.vmap(drawn))(jax.random.split(jax.random.key(0), NUM_DRAWS)))
     covariance = np.broadcast_to(1e-16 * np.eye(2)[None, ..., None], (2, 2, 2, FRAMES)).copy()
@@ -56,8 +61,9 @@ def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, x64):
         position_m=exact,
         covariance_m2=covariance,
         mask=np.ones((2, FRAMES), bool),
+        noise_known_to=0.1 if is_tracked_here else 0.0,
     )
-    allowed = modes(observation, scene, rough_sd_m=0.0)
+    allowed = modes(observation, scene, is_filmed, rough_sd_m=0.0)
     # Along x; offsets of a whole track are wider in the likelihood, and displacements lack them.
     for rows in (extra[:, 0, 0], extra[:, 1, 0], extra[:, 1, 0] - extra[:, 0, 0]):
         assert np.isfinite(rows).all()
@@ -80,7 +86,6 @@ def test_a_rest_scatters_less_and_is_shifted_once(x64):
         return noisy(position, position, jnp.asarray(times), noise, scatter, normals(key)) - exact
 
     errors = np.asarray(jax.jit(jax.vmap(drawn))(jax.random.split(jax.random.key(1), NUM_DRAWS)))
-    np.testing.assert_allclose(errors.std(axis=0), NOISE_M, rtol=0.1)
     before = exact[1, 0] == exact[1, 0, 0]
     rest = errors[:, 1, 0, before]
     assert rest.std(axis=1).mean() == pytest.approx(0.4 * NOISE_M, rel=0.05)
@@ -88,5 +93,6 @@ def test_a_rest_scatters_less_and_is_shifted_once(x64):
     assert errors[:, 1, 0, moving].std(axis=1).mean() == pytest.approx(NOISE_M, rel=0.05)
     last = errors[:, 1, 0, -1]
     shift = rest.mean(axis=1)
-    assert shift.std() == pytest.approx(np.sqrt(1 - 0.4**2) * NOISE_M, rel=0.1)
+    expected = np.sqrt(SHIFT_SHARE * (1 - 0.4**2)) * NOISE_M
+    assert shift.std() == pytest.approx(expected, rel=0.1)
     assert abs(np.corrcoef(shift, last)[0, 1]) < 0.1

@@ -38,6 +38,8 @@ def seen_of(experiment: Experiment, fps: float = 30.0, noise_m: float = 1e-5) ->
         half_length_m=jnp.asarray(half[:, 0]),
         half_height_m=jnp.asarray(half[:, 1]),
         is_ideal=jnp.ones(()),
+        is_filmed=jnp.zeros(()),
+        is_tracked_here=jnp.zeros(()),
     )
 
 

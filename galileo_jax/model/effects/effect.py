@@ -117,6 +117,7 @@ _STATIC = (
     "has_table",
     "comes_down",
     "is_scale_known",
+    "is_scale_stated",
     "has_surface",
     "rolls",
     "moves_in_plane",
@@ -146,6 +147,7 @@ class Surroundings:
       release_s: when the release was, after the first frame: expected, and its standard
         deviation.
       is_scale_known: whether the observation's metres are metres (`pixels_per_metre` given).
+      is_scale_stated: whether the clip says how well its scale is known.
       has_surface: whether objects slide on something; not in a fall, in the air, in a liquid.
       mass_kg: `[object]`, as weighed, None where not; empty: none is.
       rolls: `[object]`, whether it is round and may turn; empty: none does.
@@ -172,6 +174,7 @@ class Surroundings:
     comes_down: tuple[bool, ...]
     release_s: tuple[float, float] = (0.0, 0.01)
     is_scale_known: bool = True
+    is_scale_stated: bool = False
     has_surface: bool = True
     mass_kg: tuple[float | None, ...] = ()
     rolls: tuple[bool, ...] = ()

@@ -95,7 +95,7 @@ def _declared(clip: Clip) -> dict[str, tuple[float, float]]:
     scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M
     sds = {
         DeclaredAngle.name: math.radians(angle_sd_deg),
-        DeclaredScale.name: clip.pixels_per_metre_sd / scale,
+        DeclaredScale.name: (clip.pixels_per_metre_sd or 0.0) / scale,
         ORIGIN: clip.origin_sd_px / scale,
     }
     return {name: (0.0, sd) for name, sd in sds.items() if sd} | _carried_air(clip)

@@ -171,6 +171,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         comes_down=tuple(has_table and at[0] < c for at, c in zip(starts, corner, strict=True)),
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.is_scale_known,
+        is_scale_stated=clip.pixels_per_metre_sd is not None,
         has_surface=has_surface,
         mass_kg=tuple(declared.mass_kg for declared in clip.objects),
         **(rolling(clip.objects) if scenario.has_ramp else {}),
