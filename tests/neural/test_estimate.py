@@ -19,6 +19,8 @@ from galileo_jax.neural.estimate import TRAINED, cnn_posterior, trained_network
 from galileo_jax.neural.world import IDEAL_FRICTION
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.similarity.discrepancy import SCALE_SD
+from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 from tests.ramp_model import HIT
 from tests.reference_ramp import Experiment, solve
 
@@ -27,17 +29,21 @@ LARGEST_FILE = 4e6  # bytes
 
 
 def trials_of(
-    experiment: Experiment, fps: float = 30.0, frames: int = 90, **declared: Any
+    experiment: Experiment,
+    fps: float = 30.0,
+    frames: int = 90,
+    noise: NoiseModel = "bodies",
+    **declared: Any,
 ) -> JointProblem:
     times = np.arange(frames) / fps
     exact = solve(experiment, times).position_m
     count = len(exact)
-    noise = NOISE_M * np.random.default_rng(0).standard_normal(exact.shape)
+    errors = NOISE_M * np.random.default_rng(0).standard_normal(exact.shape)
     names = ("object1", "object2")[:count]
     observation = Observation(
         names=names,
         times_s=times,
-        position_m=exact + noise,
+        position_m=exact + errors,
         covariance_m2=np.broadcast_to(
             NOISE_M**2 * np.eye(2)[None, ..., None], (count, 2, 2, frames)
         ).copy(),
@@ -57,8 +63,7 @@ def trials_of(
         frame_count=frames,
         **declared,
     )
-    # An ideal track, whether or not the yaml has a scale.
-    return make_joint_problem([clip], [observation], noise="bodies")
+    return make_joint_problem([clip], [observation], noise=noise)
 
 
 def phi(posterior: Posterior) -> np.ndarray:
@@ -113,6 +118,18 @@ def test_angle_and_scale_known_within_so_much_widen_the_frictions(x64):
     with_angle = np.corrcoef(posterior["k1"].ravel(), posterior["declared_angle"].ravel())[0, 1]
     assert with_angle > 0.5
     assert np.corrcoef(posterior["k2"].ravel(), posterior["declared_scale"].ravel())[0, 1] < -0.2
+
+
+def test_what_a_camera_does_to_a_track_widens_the_answer(x64):
+    """And a scale of which nobody says how well it is known, as `SCALE_SD` does."""
+    track, _, _ = cnn_posterior(trials_of(HIT), seed=0)
+    exact = trials_of(HIT, noise="camera", pixels_per_metre=500.0, pixels_per_metre_sd=0.0)
+    video, _, _ = cnn_posterior(exact, seed=0)
+    assert video["k1"].std() > 1.2 * track["k1"].std()
+    unsaid, _, _ = cnn_posterior(trials_of(HIT, noise="camera", pixels_per_metre=500.0), seed=0)
+    added = (np.tan(HIT.angle_rad) - HIT.friction[0]) * SCALE_SD
+    expected = np.hypot(video["k1"].std(), added)
+    assert unsaid["k1"].std() == pytest.approx(expected, rel=0.05)
 
 
 def test_what_a_clip_cannot_tell_stays_open(x64):

@@ -10,6 +10,7 @@ from galileo_jax.similarity import hit_discrepancy
 from galileo_jax.similarity.discrepancy import (
     LENS_SD,
     ROUGH_SD_M,
+    SCALE_SD,
     WOBBLE_S,
     WOBBLE_SD_M,
     across_path,
@@ -130,6 +131,14 @@ def test_without_a_camera_only_the_bodies_are_left(hit):
     assert len(bodies) == kept.sum() < len(both) - 4
     is_everywhere = (both[~kept][..., 0] != 0).any(axis=(1, 2))
     assert is_everywhere.sum() == 4, "two keystones, roll, scale; the others begin at the hit"
+
+
+def test_a_scale_that_says_how_well_it_is_known_is_not_widened_again(hit):
+    both, stated = modes(hit, SCENE), modes(hit, replace(SCENE, is_scale_stated=True))
+    kept = np.array([any(np.array_equal(mode, other) for other in stated) for mode in both])
+    (left_out,) = both[~kept]
+    assert left_out == pytest.approx(SCALE_SD * np.nan_to_num(hit.position_m))
+    assert len(stated) == len(both) - 1
 
 
 def thrown(bend_m: np.ndarray | float = 0.0) -> Observation:
