@@ -5,7 +5,7 @@
        being the second block, for all starts (and, in a diagnosis, all hypotheses) in one batch.
     3. The same with fitted noise scales, until a new round gains nothing (`polish.py`).
     4. Where noise does not explain what is left, or the refined starts disagree, a second search,
-       phase by phase (`stages.py`) and from more starts.
+       phase by phase (`stages.py`), from more starts, and round what has been found.
     5. Where points round the fit say that the posterior is elsewhere, it goes on from these
        (`look_round.py`).
     6. The normal approximation in z, with covariance (J^T J + 1)^-1; evidence by Laplace
@@ -49,6 +49,7 @@ FAR_SDS = 8.0  # from a fit that tells a parameter: there it should be far worse
 UNTOLD_SD_Z = 0.9  # of the prior's 1: a parameter left so open does not show
 VARIANTS_Z = (-2.0, -0.5, 1.0)  # of positive nuisances: hardly any, a little, a lot; from every fit
 CROSSED_Z = (-3.0, 1.0)  # one of them next to nothing, the others a lot
+MOVED_Z = (-1.0, -0.5, 0.5, 1.0)  # one parameter of an end, to come to the valleys beside it
 ALONG_Z = np.linspace(-2.0, 2.5, 19)  # of a positive nuisance: where another valley may begin
 LEADS_ON = 1.0  # nats: less is no other valley
 NUM_LOOKS = 3  # round a fit, each from a better one
@@ -165,6 +166,9 @@ class GradientFitter:
         starts = np.concatenate([self._starts_by_phases(free, num, seed), scattered])
         second = self._ends(starts, free, self.settings.num_second_refined).without(ends)
         fits += self._in_valleys(second, free) if second.any else []
+        if not self.is_explained(best := _best_of(fits)):
+            beside = self._ends_round(best, free).without(ends).without(second)
+            fits += self._in_valleys(beside, free) if beside.any else []
         fit = self._looked_round(fits, seed)
         if fit.code is Code.CONVERGED and not self.is_explained(fit, NOISE_SCALE_RANGE[1]):
             fit = replace(fit, code=Code.MISFIT)
@@ -322,6 +326,19 @@ class GradientFitter:
         best = np.argsort(self._residuals.costs(points))[:num_refined]
         found = self._search(points.take(best), np.zeros(len(best), int))
         return Ends.of(found)
+
+    def _ends_round(self, fit: GradientFit, free: np.ndarray) -> Ends:
+        """Refines starts round a fit, each with one of the objects' parameters moved.
+
+        A valley in which boxes meet again a frame later than they did may lie beside that in which
+        they do: all starts that came near may have ended there. None of these is given up, however
+        far behind the others it is on its way.
+        """
+        main = np.flatnonzero(free & self._is_main)
+        which, by = np.repeat(main, len(MOVED_Z)), np.tile(MOVED_Z, len(main))
+        z = fit.z[: self._count] + by[:, None] * np.eye(self._count)[which]
+        points = self._batch(z, free)
+        return Ends.of(self._search(points, np.arange(len(points.z))))
 
     def _starts_by_phases(self, free: np.ndarray, num: int, seed: int) -> np.ndarray:
         """Starts that suit what was seen before each further object moved, or a bounce."""
