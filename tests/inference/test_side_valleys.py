@@ -26,6 +26,10 @@ FRICTION_OFF, RATIO_OFF = 0.005, 0.05
 CYLINDER = {"shapes": ("cylinder", "box"), "angle": 10, "k1": 0.05, "k2": 0.1, "seed": 11}
 TORUS = {"shapes": ("torus", "box"), "angle": 10, "k1": 0.058, "k2": 0.013, "seed": 1}
 TORUS |= {"m1": 0.95, "m2": 0.2}
+# Boxes that meet again at once: nearly all starts end where they do so a frame too early.
+AGAIN = {"seed": 520014, "angle": 11.120331896, "fps": 30, "faults": True, "solver": "fine"}
+AGAIN |= {"track_noise": 5e-5}
+SIDE_VALLEYS = [(CYLINDER, 3), (CYLINDER, 4), (TORUS, 0), (AGAIN, 4), (AGAIN, 9)]
 
 
 @pytest.fixture(autouse=True)
@@ -42,9 +46,9 @@ def simulated(folder, **settings):
     return trials, made.truths[0]
 
 
-@pytest.mark.parametrize(("settings", "seed"), [(CYLINDER, 3), (CYLINDER, 4), (TORUS, 0)], ids=str)
+@pytest.mark.parametrize(("settings", "seed"), SIDE_VALLEYS, ids=str)
 def test_a_fit_leaves_a_side_valley(tmp_path, settings, seed):
-    """From these seeds all four refined starts once ended in one, chi2 of 7 to 56 per value."""
+    """From these seeds all refined starts once ended in one, chi2 of 7 to 77 per value."""
     trials, truth = simulated(tmp_path, **settings)
     found = GradientFitter(trials).fit(seed)
     value = dict(zip(trials.names, trials.theta(found.z), strict=True))
