@@ -52,6 +52,12 @@ REPLACES = {
     "rectangle": ("pixels_per_metre",),
     "pixels_per_metre": ("rectangle",),
 }
+# How well a value is known, and what stands there where nobody says it: a new value without it
+# is not known as well as the old one was.
+UNCERTAINTIES: dict[str, tuple[str, float | None]] = {
+    "ramp_angle_deg": ("ramp_angle_sd_deg", 0.0),
+    "pixels_per_metre": ("pixels_per_metre_sd", None),
+}
 
 
 @dataclass(frozen=True)
@@ -98,6 +104,9 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     for key, others in REPLACES.items():
         if key in values:
             content |= {other: None for other in others if content.get(other)}
+    for key, (sd, unsaid) in UNCERTAINTIES.items():
+        if key in values and sd not in values and sd in content:
+            content[sd] = unsaid
     if objects:
         content["objects"] = _with_objects(yaml_path, content.get("objects"), objects)
     clip = check_clip(yaml_path, content)

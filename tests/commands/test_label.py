@@ -65,6 +65,16 @@ def test_of_a_typed_angle_and_scale_nothing_is_said(video: Path) -> None:
     assert (clip.ramp_angle_sd_deg, clip.pixels_per_metre_sd) == (0, None)
 
 
+def test_a_new_value_is_not_known_as_well_as_the_old_one_was(video: Path) -> None:
+    assert run(video, *NEW) == 0
+    assert run(video, "--ramp-angle", 21, "--pixels-per-metre", 310) == 0
+    clip = load_clip(video)
+    assert (clip.ramp_angle_deg, clip.pixels_per_metre) == (21, 310)
+    assert (clip.ramp_angle_sd_deg, clip.pixels_per_metre_sd) == (0, None)
+    assert run(video, "--pixels-per-metre-sd", 2) == 0
+    assert load_clip(video).pixels_per_metre_sd == 2
+
+
 def test_frame_rate_of_the_container_is_noted(video: Path, capsys) -> None:
     without_fps = [*NEW[: NEW.index("--fps")], *NEW[NEW.index("--fps") + 2 :]]
     assert run(video, *without_fps) == 0
