@@ -4,8 +4,10 @@ Minimises over pose, gain and offset
 
     sum_x  w(x) [I(W(x; pose)) - gain T(x) - offset]^2
 
-by inverse-compositional Gauss-Newton with Huber weights. Because the template stays the same
-for the whole clip, errors do not add up from frame to frame; gain and offset take up flicker.
+by inverse-compositional Gauss-Newton with Huber weights; in the end T is stretched a little, too,
+as a camera that is not square to the scene stretches what goes along. Because the template stays
+the same for the whole clip, errors do not add up from frame to frame; gain and offset take up
+flicker.
 
 Source: S. Baker, I. Matthews, "Lucas-Kanade 20 Years On: A Unifying Framework",
 Int. J. Computer Vision 56 (2004), doi:10.1023/B:VISI.0000011205.11775.fd.
@@ -30,6 +32,10 @@ error small; coarse: reaches 5 px and 10 degrees."""
 TURNLESS = 0.02
 """A disc without texture looks the same however it is turned. An object whose gradients tell the
 angle less than this share of what they could is taken as one: its angle is not followed."""
+HELD = 1e12
+STRETCH_SD, ALIKE_GREY = 0.02, 10.0
+"""How much a patch may be stretched (one standard deviation), against noise, grey
+levels, of a pixel whose neighbours have the same."""
 COVERED = 4.0
 """A pixel that differs by more noise sigmas shows something else than the object."""
 NEIGHBOURS = (0.1, 0.9)
@@ -78,16 +84,24 @@ class Target:
         dy = cv2.Sobel(smooth, cv2.CV_32F, 0, 1, ksize=3, scale=1 / 8).take(inside)
         turned = dy * self.places[0] - dx * self.places[1]
         self.values = smooth.take(inside).astype(np.float64)
-        # Rows: the pose in the object's axes, gain, offset.
-        self.jacobian = np.stack([dx, dy, turned, self.values, np.ones_like(self.values)])
+        stretched = [dx * self.places[0], dy * self.places[1]]
+        stretched += [dx * self.places[1] + dy * self.places[0]]
+        # Rows: the pose in the object's axes, gain, offset, how it is stretched.
+        rows = [dx, dy, turned, self.values, np.ones_like(self.values), *stretched]
+        self.jacobian = np.stack(rows)
         self.normal = self.jacobian @ self.jacobian.T
 
         self.shows_turns = self._shows_turns()
         # Holds the angle fast where it cannot be told; otherwise only against 0 / 0.
-        self.ridge = np.diag([1e-9, 1e-9, 1e-9 if self.shows_turns else 1e12, 1e-9, 1e-9])
+        self._turn = 1e-9 if self.shows_turns else HELD
+
+    def ridge(self, stretches: bool) -> np.ndarray:
+        """What holds fast, `[row, row]`: the angle where it cannot be told, and a rigid shape."""
+        stretch = (ALIKE_GREY / STRETCH_SD) ** 2 if stretches and self.shows_turns else HELD
+        return np.diag([1e-9, 1e-9, self._turn, 1e-9, 1e-9, *3 * [stretch]])
 
     def _shows_turns(self) -> bool:
-        normal = self.normal + 1e-9 * np.eye(5)
+        normal = self.normal[:5, :5] + 1e-9 * np.eye(5)
         information = 1 / np.linalg.inv(normal)[2, 2]
         possible = self.radius**2 * (normal[0, 0] + normal[1, 1]) / 2
         return bool(information > TURNLESS * possible)
@@ -98,16 +112,28 @@ class Target:
 
 
 def align(
-    picture: Picture, target: Target, start: np.ndarray, *, steps: int = 12, robust: bool = True
+    picture: Picture,
+    target: Target,
+    start: np.ndarray,
+    *,
+    steps: int = 12,
+    robust: bool = True,
+    stretches: bool = False,
 ) -> Fit:
-    """Aligns `target` with the `picture` from the pose `start`; see the module."""
+    """Aligns `target` with the `picture` from the pose `start`; see the module.
+
+    With `stretches` the patch may be stretched and sheared a little, as a camera that is not
+    quite square to the scene does along the way: a rigid patch whose texture is not the same on
+    all sides of its centre would be shifted by it.
+    """
+    ridge = target.ridge(stretches)
     pose = np.array(start, dtype=float)
     jacobian, values = target.jacobian, target.values
     weight, weighted, normal = np.ones_like(values), jacobian, target.normal
     limit_px = 2 * target.width_px
     for step in range(steps):
         seen = target.values_at(picture, pose)
-        solution = np.linalg.solve(normal + target.ridge, weighted @ seen)
+        solution = np.linalg.solve(normal + ridge, weighted @ seen)
         residual = seen - solution @ jacobian
         size = np.abs(residual)
         # The median of an even number but for one place, in a fraction of np.median's time.
@@ -149,7 +175,7 @@ def _middle(size: np.ndarray) -> float:
     return float(np.partition(size.astype(np.float32), len(size) // 2)[len(size) // 2])
 
 
-def covariance_of(fit: Fit, target: Target) -> np.ndarray:
+def covariance_of(fit: Fit, target: Target, stretches: bool = False) -> np.ndarray:
     """The `[3, 3]` covariance of a fit's pose, in image axes, that the image noise makes.
 
     The sandwich A^-1 B A^-1 of least squares with correlated noise: smoothing with a Gaussian of
@@ -159,8 +185,8 @@ def covariance_of(fit: Fit, target: Target) -> np.ndarray:
     """
     width_px = _correlation_width_px(fit, target)
     weighted = target.jacobian * fit.weight
-    inverse = np.linalg.inv(weighted @ target.jacobian.T + target.ridge)
-    scores = np.zeros((*target.region.shape, 5))
+    inverse = np.linalg.inv(weighted @ target.jacobian.T + target.ridge(stretches))
+    scores = np.zeros((*target.region.shape, len(target.jacobian)))
     scores[target.region] = weighted.T
     spread = cv2.GaussianBlur(
         scores, (0, 0), np.sqrt(2) * width_px, borderType=cv2.BORDER_CONSTANT

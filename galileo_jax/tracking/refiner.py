@@ -69,9 +69,9 @@ def refine_pose(
     fits: list[tuple[Fit, Target]] = []
     for motion in distinct(motions, template.radius):
         target = template.target(motion, FINE_PX)
-        fits.append((align(picture, target, pose), target))
+        fits.append((align(picture, target, pose, stretches=True), target))
     best, target = max(fits, key=lambda item: item[0].correlation)
-    covariance = covariance_of(best, target)[:2, :2]
+    covariance = covariance_of(best, target, stretches=True)[:2, :2]
     return Refined(
         pose=best.pose,
         covariance=covariance,

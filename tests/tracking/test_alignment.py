@@ -1,5 +1,6 @@
 """Alignment against known shifts and turns; the rigid motion; the noise terms."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -61,11 +62,13 @@ def test_alignment_finds_the_turn(target, turn):
     assert fit.pose[2] == pytest.approx(turn, abs=0.002)
 
 
-def test_covariance_of_white_noise_is_the_scatter(target):
+@pytest.mark.parametrize("stretches", [False, True])
+def test_covariance_of_white_noise_is_the_scatter(target, stretches):
     pose = START + np.array([0.3, 0.45, 0.01])
-    fits = [align(picture(pose, noise=6.0, seed=seed), target, pose) for seed in range(60)]
+    pictures = [picture(pose, noise=6.0, seed=seed) for seed in range(60)]
+    fits = [align(each, target, pose, stretches=stretches) for each in pictures]
     scatter = np.var([fit.pose[:2] for fit in fits], axis=0)
-    stated = np.mean([np.diag(covariance_of(fit, target))[:2] for fit in fits], axis=0)
+    stated = np.mean([np.diag(covariance_of(fit, target, stretches))[:2] for fit in fits], axis=0)
     # 60 draws know a variance to 18 %.
     np.testing.assert_allclose(scatter / stated, 1, atol=0.6)
 
@@ -77,6 +80,21 @@ def test_alignment_ignores_what_covers_a_quarter(target):
     fit = align(Picture(covered), target, pose)
     assert 0.1 < fit.covered < 0.45
     assert np.abs(fit.pose[:2] - pose[:2]).max() < 0.05
+
+
+def test_what_grows_is_not_shifted_towards_its_texture():
+    """Nearly all texture is on one side of the point; a camera that is askew enlarges the box."""
+    image = grey_picture(START)
+    image[:, :60] = (0.9 * image[:, :60].mean() + 0.1 * image[:, :60]).round()
+    target = template_at(image, START[:2], OUTLINE).target(np.zeros(3), FINE_PX)
+    grown, middle = 1.01, START[:2]
+    warp = np.column_stack([grown * np.eye(2), (1 - grown) * middle])
+    larger = cv2.warpAffine(image, warp, image.shape[::-1], flags=cv2.INTER_LANCZOS4)
+    rigid, stretched = (
+        align(Picture(larger), target, START, stretches=each).pose[:2] for each in (False, True)
+    )
+    assert np.abs(rigid - middle).max() > 0.06
+    assert np.abs(stretched - middle).max() < ALIGNED_PX
 
 
 def test_rigid_motion_withstands_a_third_of_outliers():
