@@ -49,9 +49,9 @@ def test_what_is_drawn_is_as_large_as_what_is_allowed_for(case, is_filmed, is_tr
     )
 
     def drawn(key):
-        place, flags = jnp.asarray(exact), (1.0 * is_filmed, 1.0 * is_tracked_here)
-        seen = measured(place, jnp.asarray(times), bodies, *map(jnp.asarray, flags), normals(key))
-        return seen - exact
+        filmed, ours = jnp.asarray(1.0 * is_filmed), jnp.asarray(1.0 * is_tracked_here)
+        place = jnp.asarray(exact)
+        return measured(place, jnp.asarray(times), bodies, filmed, ours, normals(key)) - exact
 
     extra = np.asarray(jax.jit(jax.vmap(drawn))(jax.random.split(jax.random.key(0), NUM_DRAWS)))
     covariance = np.broadcast_to(1e-16 * np.eye(2)[None, ..., None], (2, 2, 2, FRAMES)).copy()
