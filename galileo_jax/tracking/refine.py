@@ -32,7 +32,8 @@ error small; coarse: reaches 5 px and 10 degrees."""
 TURNLESS = 0.02
 """A disc without texture looks the same however it is turned. An object whose gradients tell the
 angle less than this share of what they could is taken as one: its angle is not followed."""
-HELD = 1e12
+NUM_RIGID = 5
+"""Rows of the Jacobian without those of a stretched patch."""
 STRETCH_SD, ALIKE_GREY = 0.02, 10.0
 """How much a patch may be stretched (one standard deviation), against noise, grey
 levels, of a pixel whose neighbours have the same."""
@@ -92,16 +93,17 @@ class Target:
         self.normal = self.jacobian @ self.jacobian.T
 
         self.shows_turns = self._shows_turns()
-        # Holds the angle fast where it cannot be told; otherwise only against 0 / 0.
-        self._turn = 1e-9 if self.shows_turns else HELD
+        # Holds the angle fast where it cannot be told, and the shape nearly so; otherwise only
+        # against 0 / 0.
+        turn, stretch = 1e-9 if self.shows_turns else 1e12, (ALIKE_GREY / STRETCH_SD) ** 2
+        self.ridge = np.diag([1e-9, 1e-9, turn, 1e-9, 1e-9, *3 * [stretch]])
 
-    def ridge(self, stretches: bool) -> np.ndarray:
-        """What holds fast, `[row, row]`: the angle where it cannot be told, and a rigid shape."""
-        stretch = (ALIKE_GREY / STRETCH_SD) ** 2 if stretches and self.shows_turns else HELD
-        return np.diag([1e-9, 1e-9, self._turn, 1e-9, 1e-9, *3 * [stretch]])
+    def num_rows(self, stretches: bool) -> int:
+        """How many rows of the Jacobian are fitted: a shape that shows no turns stays rigid."""
+        return len(self.jacobian) if stretches and self.shows_turns else NUM_RIGID
 
     def _shows_turns(self) -> bool:
-        normal = self.normal[:5, :5] + 1e-9 * np.eye(5)
+        normal = self.normal[:NUM_RIGID, :NUM_RIGID] + 1e-9 * np.eye(NUM_RIGID)
         information = 1 / np.linalg.inv(normal)[2, 2]
         possible = self.radius**2 * (normal[0, 0] + normal[1, 1]) / 2
         return bool(information > TURNLESS * possible)
@@ -126,10 +128,11 @@ def align(
     quite square to the scene does along the way: a rigid patch whose texture is not the same on
     all sides of its centre would be shifted by it.
     """
-    ridge = target.ridge(stretches)
+    rows = target.num_rows(stretches)
+    ridge = target.ridge[:rows, :rows]
     pose = np.array(start, dtype=float)
-    jacobian, values = target.jacobian, target.values
-    weight, weighted, normal = np.ones_like(values), jacobian, target.normal
+    jacobian, values = target.jacobian[:rows], target.values
+    weight, weighted, normal = np.ones_like(values), jacobian, target.normal[:rows, :rows]
     limit_px = 2 * target.width_px
     for step in range(steps):
         seen = target.values_at(picture, pose)
@@ -184,9 +187,11 @@ def covariance_of(fit: Fit, target: Target, stretches: bool = False) -> np.ndarr
     wider, what sampling does to a sharp texture is narrower): s is told by the residual.
     """
     width_px = _correlation_width_px(fit, target)
-    weighted = target.jacobian * fit.weight
-    inverse = np.linalg.inv(weighted @ target.jacobian.T + target.ridge(stretches))
-    scores = np.zeros((*target.region.shape, len(target.jacobian)))
+    rows = target.num_rows(stretches)
+    jacobian = target.jacobian[:rows]
+    weighted = jacobian * fit.weight
+    inverse = np.linalg.inv(weighted @ jacobian.T + target.ridge[:rows, :rows])
+    scores = np.zeros((*target.region.shape, rows))
     scores[target.region] = weighted.T
     spread = cv2.GaussianBlur(
         scores, (0, 0), np.sqrt(2) * width_px, borderType=cv2.BORDER_CONSTANT
