@@ -9,6 +9,7 @@ import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import UNCERTAINTY_OF
 from galileo_jax.measurement.astray import longest_absence
 from galileo_jax.measurement.measure import Measurement
 
@@ -16,10 +17,6 @@ FAR = 1000.0
 """chi2 per degree of freedom: residuals of thirty standard deviations on average. Few effects
 leave as much; a track of something else does."""
 
-UNCERTAINTY_OF = {
-    "ramp_angle_deg": "ramp_angle_sd_deg",
-    "pixels_per_metre": "pixels_per_metre_sd",
-}
 TAKEN = {
     "ramp_angle_deg": "ramp_angle_deg as exact",
     "pixels_per_metre": "pixels_per_metre as known to a thousandth",

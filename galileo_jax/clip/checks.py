@@ -10,7 +10,7 @@ import numpy as np
 from galileo_jax.clip import placement
 from galileo_jax.clip.fields import MAX_SCALE_SD_SHARE, SIZE_MEANING, short
 from galileo_jax.clip.scenarios import SCENARIOS
-from galileo_jax.clip.schema import Clip, ClipFile, ClipObject
+from galileo_jax.clip.schema import UNCERTAINTY_OF, Clip, ClipFile, ClipObject
 from galileo_jax.clip.walls import distance_to_wall
 from galileo_jax.observation.observation import Observation
 
@@ -176,11 +176,7 @@ def check_frames(key: str, item: ClipObject, clip: Clip, fail: Any) -> None:
 
 def _check_uncertainties(clip: Clip, fail: Any) -> None:
     """Refuses the uncertainty of what nobody declared, and of a scale that is a guess."""
-    for key, of in (
-        ("ramp_angle_sd_deg", "ramp_angle_deg"),
-        ("pixels_per_metre_sd", "pixels_per_metre"),
-        ("origin_sd_px", "origin_px"),
-    ):
+    for of, key in UNCERTAINTY_OF.items():
         if getattr(clip, key) and getattr(clip, of) is None:
             fail(key, f"{getattr(clip, key):g} given without {of}; give both, or leave it out")
     scale, sd = clip.pixels_per_metre, clip.pixels_per_metre_sd

@@ -16,7 +16,7 @@ from galileo_jax.clip.load import (
     with_unused,
 )
 from galileo_jax.clip.ramp_in_plane import ramp_in_plane
-from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.schema import UNCERTAINTY_OF, Clip, ClipFile
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_files.read import is_track
 from galileo_jax.clip.yaml_file import read_mapping, yaml_text
@@ -51,12 +51,6 @@ KEY_ORDER = (
 REPLACES = {
     "rectangle": ("pixels_per_metre",),
     "pixels_per_metre": ("rectangle",),
-}
-# How well a value is known, and what stands there where nobody says it: a new value without it
-# is not known as well as the old one was.
-UNCERTAINTIES: dict[str, tuple[str, float | None]] = {
-    "ramp_angle_deg": ("ramp_angle_sd_deg", 0.0),
-    "pixels_per_metre": ("pixels_per_metre_sd", None),
 }
 
 
@@ -104,9 +98,10 @@ def label_clip(path: Path, declared: Declaration) -> LabelledClip:
     for key, others in REPLACES.items():
         if key in values:
             content |= {other: None for other in others if content.get(other)}
-    for key, (sd, unsaid) in UNCERTAINTIES.items():
+    for key, sd in UNCERTAINTY_OF.items():
+        # A new value is not known as well as the old one was, unless somebody says so.
         if key in values and sd not in values and sd in content:
-            content[sd] = unsaid
+            content[sd] = ClipFile.model_fields[sd].default
     if objects:
         content["objects"] = _with_objects(yaml_path, content.get("objects"), objects)
     clip = check_clip(yaml_path, content)

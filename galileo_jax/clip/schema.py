@@ -104,6 +104,14 @@ class ClipObject(BaseModel):
         return self.shape == "sphere"
 
 
+UNCERTAINTY_OF = {
+    "ramp_angle_deg": "ramp_angle_sd_deg",
+    "pixels_per_metre": "pixels_per_metre_sd",
+    "origin_px": "origin_sd_px",
+}
+"""By key the one that says how well it is known."""
+
+
 class ClipFile(BaseModel):
     """The keys of a clip yaml; see `Clip` for their meaning."""
 
