@@ -43,9 +43,9 @@ from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.density import likelihood_of
 from galileo_jax.inference.fits.gradient import OUT_OF_THE_RACE, GradientFitter
+from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.fits.weighed import Weighed, weighed
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import root_of
 from galileo_jax.inference.samplers.sampler import LogDensity
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.observation.observation import Observation
@@ -181,7 +181,7 @@ def smc(row: dict[str, Any], ways: Sequence[str], num_particles: int) -> dict[st
     trials = trials_of(draw_track(row["seed"]), [row["effect"]])
     likelihood, found = likelihood_of(trials), row | {"particles": num_particles}
     fit = GradientFitter(trials).fit(0)
-    root = WIDE * root_of(fit.covariance)
+    root = WIDE * symmetric_root(fit.covariance)
     round_fit = RoundFit(likelihood, jnp.asarray(fit.z), jnp.asarray(root))
     for way in ways:
         began = time.process_time()

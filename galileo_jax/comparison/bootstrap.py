@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.fits.normal_matrix import inverse
+from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.observation.observation import Observation
@@ -122,9 +122,7 @@ def _errors(
     if errors is None:
         along = along * (mode_size * data.gain)
     else:
-        cover = mode_covariance(0.0, mode_size, data, errors)
-        values, vectors = np.linalg.eigh(cover)
-        along = along @ (vectors * np.sqrt(np.maximum(values, 0.0))).T
+        along = along @ symmetric_root(mode_covariance(0.0, mode_size, data, errors))
     own = found @ basis.T
     left = noise_scale / np.sqrt(noise_scale**2 + gain2)
     return found + ((own + along / noise_scale) * left - own) @ basis

@@ -19,8 +19,8 @@ import numpy as np
 
 from galileo_jax.experiment.belief import Belief
 from galileo_jax.experiment.proposal import Proposal, seen_as
+from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.laplace import root_of
 
 NUM_DRAWS = 63  # and the mode: 64 rollouts for each hypothesis
 MOVED_M = 0.002  # an object that goes so far was hit
@@ -91,7 +91,7 @@ def _draws(
         for p in problem.parameters
     ]
     shared = np.array(sorted({i for i in source if i >= 0 and belief.free[i]}), int)
-    root = root_of(belief.covariance[np.ix_(shared, shared)])
+    root = symmetric_root(belief.covariance[np.ix_(shared, shared)])
     own = [i for i, s in enumerate(source) if s < 0 and own_free[i]]
     count = len(shared) + len(own)
     from scipy.stats import qmc  # half a second
@@ -100,7 +100,7 @@ def _draws(
     u = sobol.random(NUM_DRAWS + 1)[1:]
     u = np.vstack([np.zeros(count), np.clip(u, -FARTHEST_Z, FARTHEST_Z)])
     z = np.tile(belief.z, (len(u), 1))
-    z[:, shared] += u[:, : len(shared)] @ root.T
+    z[:, shared] += u[:, : len(shared)] @ root
     theirs = trials.theta(z, belief.free)
     theta = np.tile([p.absent for p in problem.parameters], (len(u), 1))
     for i, (parameter, s) in enumerate(zip(problem.parameters, source, strict=True)):

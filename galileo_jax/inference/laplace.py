@@ -4,6 +4,7 @@ import numpy as np
 from scipy.special import softmax
 
 from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
+from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior, Status
 
@@ -24,8 +25,8 @@ def laplace_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Post
     ends = np.rint(NUM_DRAWS * np.cumsum(shares(fit))).astype(int)
     for one, begin, end in zip((fit, *fit.beside), [0, *ends], ends, strict=False):
         z[begin:end] = one.z
-        root = root_of(one.covariance[np.ix_(fit.free, fit.free)])
-        z[begin:end, fit.free] += normal[begin:end] @ root.T
+        root = symmetric_root(one.covariance[np.ix_(fit.free, fit.free)])
+        z[begin:end, fit.free] += normal[begin:end] @ root
     if fit.beside:  # who takes every tenth draw takes of every valley
         order = generator.permutation(NUM_DRAWS)
         z, normal = z[order], normal[order]
@@ -66,15 +67,3 @@ def two_solutions(trials: JointProblem, fit: GradientFit) -> str | None:
 def shares(fit: GradientFit) -> np.ndarray:
     """The probability of a fit's own valley and of each beside it, `[valley]`; they sum to 1."""
     return softmax([one.log_evidence for one in (fit, *fit.beside)])
-
-
-def root_of(covariance: np.ndarray) -> np.ndarray:
-    """R with R R^T the covariance; of one that rounding left indefinite, the nearest that is not.
-
-    Where a hypothesis is absurd its slopes are, too, and eigenvalues span more than sixteen digits.
-    """
-    try:
-        return np.linalg.cholesky(covariance)
-    except np.linalg.LinAlgError:
-        variance, vectors = np.linalg.eigh(covariance)
-        return vectors * np.sqrt(np.maximum(variance, 0.0))

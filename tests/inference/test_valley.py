@@ -49,14 +49,16 @@ def gentle():
 def any_valley(seed: int = 0) -> Valley:
     generator = np.random.default_rng(seed)
     bends = [np.tril(generator.standard_normal((DIM, DIM)), -1) for _ in range(2)]
-    return Valley(generator.standard_normal(DIM), generator.standard_normal((DIM, DIM)), *bends)
+    axes = np.linalg.qr(generator.standard_normal((DIM, DIM)))[0]
+    root = generator.standard_normal((DIM, DIM))
+    return Valley(generator.standard_normal(DIM), root, axes, *bends)
 
 
 def test_the_determinant_is_the_same_everywhere():
     valley = any_valley()
     for u in np.random.default_rng(1).standard_normal((5, DIM)):
         slope = jax.jacfwd(valley)(jnp.asarray(u))
-        expected = np.linalg.det(valley.root)
+        expected = np.linalg.det(valley.axes @ valley.root)
         assert float(jnp.linalg.det(slope)) == pytest.approx(expected, rel=1e-9)
 
 
@@ -148,10 +150,10 @@ def test_draws_of_another_shape_get_coordinates_of_their_own():
 
 def u_of(valley, straight):
     """The inverse of the bends: each direction is bent by those before it alone."""
-    u = np.zeros(DIM)
+    u, unbent = np.zeros(DIM), straight @ valley.axes
     for i in range(DIM):
-        u[i] = straight[i] - valley.quadratic[i] @ u**2 - valley.cubic[i] @ u**3
-    return u
+        u[i] = unbent[i] - valley.quadratic[i] @ u**2 - valley.cubic[i] @ u**3
+    return valley.axes @ u
 
 
 @pytest.mark.slow

@@ -14,6 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import gammaln
 
+from galileo_jax.inference.fits.normal_matrix import symmetric_root
+
 DEGREES_OF_FREEDOM = 5.0
 POWERS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.15, 0.1, 0.05)  # of the weights, until enough draws count
 DRAWS_PER_PARAMETER = 4.0
@@ -26,7 +28,7 @@ class Cloud:
 
     Attributes:
       mean: `[free]`, z.
-      root: `[free, free]`, R; R R^T is the covariance of a normal of the same width.
+      root: `[free, free]`, symmetric; its square is the covariance of a normal of the same width.
       free: `[parameter]`, which those are; the others are 0.
     """
 
@@ -50,13 +52,12 @@ class Cloud:
                 break
         mean = weights @ own
         far = own - mean
-        variance, vectors = np.linalg.eigh((weights * far.T) @ far)
-        return cls(mean, vectors * np.sqrt(np.maximum(variance, LEAST_VARIANCE)), free)
+        return cls(mean, symmetric_root((weights * far.T) @ far, LEAST_VARIANCE), free)
 
     def draw(self, generator: np.random.Generator, num: int) -> np.ndarray:
         """Points, `[draw, parameter]`, z."""
         z = np.zeros((num, len(self.free)))
-        z[:, self.free] = self.mean + student_t(generator, num, len(self.mean)) @ self.root.T
+        z[:, self.free] = self.mean + student_t(generator, num, len(self.mean)) @ self.root
         return z
 
     def log_density(self, z: Float[np.ndarray, "draw parameter"]) -> np.ndarray:

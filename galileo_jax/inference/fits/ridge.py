@@ -25,6 +25,7 @@ from scipy.special import logsumexp
 
 from galileo_jax.inference.fits.cloud import log_student_t, student_t
 from galileo_jax.inference.fits.evidence import GradientFit
+from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.fits.residuals import Batch, Residuals, quadratic
 from galileo_jax.inference.fits.valley import Valley
 from galileo_jax.inference.joint_problem import NOISE_SD
@@ -50,7 +51,7 @@ class Ridge:
       direction: the column of R that the way goes along.
       knots: `[knot]`, a, ascending.
       best: of a, the others, `[point, other]`.
-      root: `[knot, other, other]`, lower triangular L: the others' precision is L L^T.
+      root: `[knot, other, other]`, the symmetric root of the others' precision.
       edges: `[cell + 1]`, of a.
       log_share: `[cell]`, of q(a), in a cell.
     """
@@ -68,24 +69,24 @@ class Ridge:
         """Points z, `[draw, parameter]`, and their log density."""
         cell = generator.choice(len(self.log_share), num, p=np.exp(self.log_share))
         a = self.edges[cell] + np.diff(self.edges)[cell] * generator.random(num)
-        t = student_t(generator, num, self.root.shape[1])
-        root = np.swapaxes(self._root_at(a), 1, 2)
-        others = self.best(a) + np.linalg.solve(root, t[..., None])[..., 0]
+        t = student_t(generator, num, len(self.valley.axes)) @ self.valley.axes
+        t = np.delete(t, self.direction, axis=1)
+        others = self.best(a) + np.linalg.solve(self._root_at(a), t[..., None])[..., 0]
         z = self.valley.mode + np.insert(others, self.direction, a, axis=1) @ self.valley.root.T
         return z, self.log_density(z)
 
     def log_density(self, z: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, " point"]:
         """Of q at points z; -inf beyond the ends of the ridge."""
-        u = self.valley.straight(z, self.free)
+        u = self.valley.straight(z, self.free) @ self.valley.axes
         a, others = u[:, self.direction], np.delete(u, self.direction, axis=1)
         cell = np.searchsorted(self.edges, a) - 1
         is_inside = (cell >= 0) & (cell < len(self.log_share))
         cell, a = np.where(is_inside, cell, 0), np.where(is_inside, a, self.edges[0])
         root = self._root_at(a)
         with np.errstate(over="ignore", invalid="ignore"):  # far off, where it draws none
-            t = np.einsum("pij,pi->pj", root, others - self.best(a))
+            t = np.einsum("pij,pj->pi", root, others - self.best(a))
             far = np.nan_to_num(np.sum(t**2, axis=1), nan=np.inf)
-        volume = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+        volume = np.linalg.slogdet(root)[1]
         along = self.log_share[cell] - np.log(np.diff(self.edges)[cell])
         found = along + log_student_t(far, t.shape[1]) + volume - self.valley.log_volume
         return np.where(is_inside, found, -np.inf)
@@ -137,8 +138,8 @@ def ridge_along(
     if len(order) < 3:
         return None
     u, cost, _, normal = (values[order] for values in places)
-    root = np.linalg.cholesky(normal[:, others[:, None], others])
-    log_q = -cost - np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    root = symmetric_root(normal[:, others[:, None], others])
+    log_q = -cost - np.linalg.slogdet(root)[1]
     knots, line = u[:, direction], u[:, others]
     edges = np.linspace(knots[0], knots[-1], CELLS + 1)
     log_share = FLATTER * np.interp((edges[1:] + edges[:-1]) / 2, knots, log_q)

@@ -1,12 +1,17 @@
 """Coordinates in which a curved valley of the posterior is straight.
 
-    z = mode + R (u + B u^2 + C u^3)        R R^T the covariance; B, C strictly lower triangular
-
-The columns of R are the eigenvectors of the covariance, least determined direction first. Along
-such a direction the well-determined ones shift by several of their own standard deviations (for
+    z = mode + R (u + B u^2 + C u^3),  u = V^T w      R R^T the covariance; B, C strictly lower
+                                                    triangular; V orthogonal
+The columns of R are the eigenvectors V of the covariance, each times its standard deviation, least
+determined direction first. Along such a direction the well-determined ones shift by several of their own standard deviations (for
 example if object 2 hardly slides). A normal proposal with any covariance is then almost always
 rejected. B and C describe this shift. Each direction shifts only better-determined ones, so the map
-is invertible and its determinant constant: the densities of u and z differ by a constant factor.
+is invertible and its determinant constant: the densities of w and z differ by a constant factor.
+
+Random numbers are drawn for w, not for u. An eigenvector has no sign, and those of equal
+eigenvalues (two parameters that do not show) are any basis of their plane; which ones come out
+depends on the processor's rounding. The map from w has the symmetric root V D^1/2 V^T in the place
+of R and does not depend on that choice.
 
 How far a direction must be moved follows from the misfit's slopes G (in u, with the mode's
 Jacobian) where another, j, is moved by h = 2 standard deviations, two rollouts each:
@@ -44,53 +49,60 @@ NUM_SCATTERED = 64  # that starts are chosen from
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Valley:
-    """The map from `u`, in which the posterior is about N(0, 1), to `z`.
+    """The map from `w`, in which the posterior is about N(0, 1), to `z`.
 
     Attributes:
-      mode: `[parameter]`, z at u = 0.
+      mode: `[parameter]`, z at w = 0.
       root: `[parameter, direction]`, R; pinned parameters have no direction.
+      axes: `[direction, direction]`, V: w in terms of u.
       quadratic: `[direction, direction]`, B.
       cubic: `[direction, direction]`, C.
     """
 
     mode: Any
     root: Any
+    axes: Any
     quadratic: Any
     cubic: Any
 
-    def __call__(self, u: Any) -> Any:
-        """From u to z, `[..., parameter]`; in NumPy or JAX, whichever u is of."""
+    def __call__(self, w: Any) -> Any:
+        """From w to z, `[..., parameter]`; in NumPy or JAX, whichever w is of."""
+        u = w @ self.axes
         return self.mode + (u + u**2 @ self.quadratic.T + u**3 @ self.cubic.T) @ self.root.T
 
     def straight(self, z: np.ndarray, free: np.ndarray | slice = EVERY) -> np.ndarray:
-        """(z - mode) in standard deviations along the directions: u, if there were no bend.
+        """W of z, `[point, direction]`, if there were no bend.
 
         Args:
           z: `[point, parameter]`.
           free: `[parameter]`, those that have directions, if not all.
         """
-        return np.linalg.solve(self.root[free], (z - self.mode)[:, free].T).T
+        return self._along_directions(z, free) @ self.axes.T
 
     def inverse(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
-        """From z to u; arguments as of `straight`."""
-        u = self.straight(z, free)
+        """W of z, `[point, direction]`; arguments as of `straight`."""
+        u = self._along_directions(z, free)
         for i in range(1, u.shape[1]):
             u[:, i] -= u[:, :i] ** 2 @ self.quadratic[i, :i] + u[:, :i] ** 3 @ self.cubic[i, :i]
-        return u
+        return u @ self.axes.T
+
+    def _along_directions(self, z: np.ndarray, free: np.ndarray | slice) -> np.ndarray:
+        """R^-1 (z - mode), `[point, direction]`: standard deviations along each direction."""
+        return np.linalg.solve(self.root[free], (z - self.mode)[:, free].T).T
 
     @property
     def log_volume(self) -> float:
-        """Log of what a unit of u is in z, which is the same everywhere."""
+        """Log of what a unit of w is in z, which is the same everywhere."""
         return float(np.sum(np.log(np.linalg.svd(self.root, compute_uv=False))))
 
 
 class Coordinates(NamedTuple):
-    """Coordinates u for chains, and what a density looks like in them.
+    """Coordinates w for chains, and what a density looks like in them.
 
     Attributes:
-      valley: from u to z.
-      mean: `[parameter]`, of u.
-      covariance: `[parameter, parameter]`, of u.
+      valley: from w to z.
+      mean: `[parameter]`, of w.
+      covariance: `[parameter, parameter]`, of w.
     """
 
     valley: Valley
@@ -99,20 +111,20 @@ class Coordinates(NamedTuple):
 
 
 def along(log_density: "LogDensity", valley: Valley) -> "LogDensity":
-    """A log density of z as one of u."""
+    """A log density of z as one of w."""
     from galileo_jax.inference.samplers.program import Program
 
     if isinstance(log_density, Program):
         arrays = (jax.tree.map(jnp.asarray, valley), log_density.arrays)
         return Program((_program_along, log_density.code), arrays)
-    return lambda u: log_density(valley(u))
+    return lambda w: log_density(valley(w))
 
 
-def _program_along(code: tuple, arrays: tuple[Valley, Any], u: jax.Array) -> jax.Array:
+def _program_along(code: tuple, arrays: tuple[Valley, Any], w: jax.Array) -> jax.Array:
     from galileo_jax.inference.samplers.program import Program
 
     valley, rest = arrays
-    return Program(code, rest)(valley(u))
+    return Program(code, rest)(valley(w))
 
 
 def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
@@ -124,10 +136,11 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     """
     count, own = len(fit.steps), np.flatnonzero(fit.free[: len(fit.steps)])
     size, directions = len(own), len(fit.z) - count + len(own)
-    root = np.zeros((len(fit.z), directions))
+    root, axes = np.zeros((len(fit.z), directions)), np.eye(directions)
     quadratic, cubic = np.zeros((directions, directions)), np.zeros((directions, directions))
     variance, vectors = np.linalg.eigh(fit.covariance[np.ix_(own, own)])
-    root[own, :size] = (vectors * np.sqrt(np.maximum(variance, LEAST_VARIANCE)))[:, ::-1]
+    axes[:size, :size] = vectors[:, ::-1]
+    root[own, :size] = axes[:size, :size] * np.sqrt(np.maximum(variance, LEAST_VARIANCE))[::-1]
     # Noise scales, behind the others, hardly depend on these.
     root[count:, size:] = np.diag(np.sqrt(np.diag(fit.covariance)[count:]))
     slopes = residuals.slopes(_near(fit, fit.z[None]), fit.steps[None], is_central=True)
@@ -141,10 +154,10 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     ahead, behind = gradient[1:].reshape(2, size, size) - gradient[0]
     quadratic[:size, :size] = _stiffer(-(ahead + behind) / (2 * REACH**2))
     cubic[:size, :size] = _stiffer(-(ahead - behind) / (2 * REACH**3))
-    return Valley(fit.z, root, quadratic, cubic)
+    return Valley(fit.z, root, axes, quadratic, cubic)
 
 
-def learned(valley: Valley, u: np.ndarray) -> Coordinates:
+def learned(valley: Valley, w: np.ndarray) -> Coordinates:
     """Coordinates that suit draws, and the draws' mean and covariance in them.
 
     The valley's own; or straight ones, if in these a normal density comes closer to the draws: a
@@ -153,34 +166,35 @@ def learned(valley: Valley, u: np.ndarray) -> Coordinates:
 
     Args:
       valley: in whose coordinates the draws were made.
-      u: `[draw, parameter]`.
+      w: `[draw, parameter]`.
     """
-    z = valley(u)
-    bent, straight = np.cov(u, rowvar=False), np.cov(z, rowvar=False)
+    z = valley(w)
+    bent, straight = np.cov(w, rowvar=False), np.cov(z, rowvar=False)
     size = np.linalg.slogdet(bent)[1] + 2 * valley.log_volume
     if size <= np.linalg.slogdet(straight)[1]:
-        return Coordinates(valley, u.mean(axis=0), bent)
+        return Coordinates(valley, w.mean(axis=0), bent)
     dim = len(straight)
     none = np.zeros((dim, dim))
-    unbent = Valley(z.mean(axis=0), np.linalg.cholesky(straight), none, none)
-    return Coordinates(unbent, np.zeros(dim), np.eye(dim))
+    axes = np.eye(dim)
+    unbent = Valley(z.mean(axis=0), np.linalg.cholesky(straight), axes, none, none)
+    return Coordinates(unbent, np.zeros(dim), axes)
 
 
 def scattered(
     valley: Valley, fit: GradientFit, residuals: Residuals, seed: int, num: int
 ) -> np.ndarray:
-    """Starts for chains, `[chain, parameter]`, in u; wider than the posterior, as R-hat asks.
+    """Starts for chains, `[chain, parameter]`, in w; wider than the posterior, as R-hat asks.
 
     Drawn from the density to the power 1/2, by importance from N(0, 2): where the map leads
     astray, far off, none is left.
     """
     size = int(np.sum(fit.free[: len(fit.steps)]))
     generator = np.random.default_rng([seed, 10])
-    u = np.sqrt(2) * generator.standard_normal((max(NUM_SCATTERED, num), valley.root.shape[1]))
-    points = _near(fit, valley(u))
-    surplus = 0.25 * np.sum(u[:, :size] ** 2, axis=1) - 0.5 * residuals.costs(points)
+    w = np.sqrt(2) * generator.standard_normal((max(NUM_SCATTERED, num), valley.root.shape[1]))
+    points = _near(fit, valley(w))
+    surplus = 0.25 * np.sum(w[:, :size] ** 2, axis=1) - 0.5 * residuals.costs(points)
     # The largest of log-weights with Gumbel noise: a draw without replacement.
-    return u[np.argsort(-(surplus + generator.gumbel(size=len(u))))[:num]]
+    return w[np.argsort(-(surplus + generator.gumbel(size=len(w))))[:num]]
 
 
 def _stiffer(moved: np.ndarray) -> np.ndarray:

@@ -1,0 +1,178 @@
+"""The frozen corpus: the same data through two commits, or two processors, and who differs.
+
+    python benchmarks/corpus.py run A.jsonl --num 300 [--task fit|mh|compare|diagnose] [--videos]
+    PYTHONPATH=../other python benchmarks/corpus.py run B.jsonl --num 300   # another checkout
+    XLA_FLAGS=--xla_cpu_max_isa=SSE4_2 XDG_CACHE_HOME=build/sse \
+        python benchmarks/corpus.py run C.jsonl --num 300                   # another processor
+    python benchmarks/corpus.py differences A.jsonl B.jsonl
+
+Cases are seeds, not files: scenarios in turn, two in three with an effect of the library hidden in
+them, noise and frame rate drawn. `run` makes each clip once in --clips, and appends its outcome to
+the file; what is there is not done again. `differences` counts means and ends of intervals in
+standard deviations of the first file, log evidences against the best hypothesis in nats, verdicts,
+and processor seconds. Only the public API is called, so that older commits run, too.
+"""
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import journal
+import numpy as np
+import tables
+
+import galileo_jax as gx
+from galileo_jax.runtime.errors import InputError
+
+SCENARIOS = (
+    *("ramp", "incline", "ramp", "fall", "multi", "ramp", "flight", "spring"),
+    *("ramp", "liquid", "ramp", "pendulum", "from_above"),
+)
+FRAME_RATES, NOISE_M, STRENGTHS = (30.0, 60.0, 120.0), (1e-4, 1e-3), (0.3, 1.0)
+TASKS = ("fit", "mh", "compare", "diagnose")
+ENDS = ("q025", "q975")
+SETTLED_SD = 0.02  # what differs by more is printed
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Runs the corpus, or prints the differences between two runs."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    run = commands.add_parser("run")
+    run.add_argument("out", type=Path)
+    run.add_argument("--num", type=int, default=300)
+    run.add_argument("--first", type=int, default=0)
+    run.add_argument("--task", choices=TASKS, default="fit")
+    run.add_argument("--videos", action="store_true", help="rendered clips in place of tracks")
+    run.add_argument("--clips", type=Path, default=Path("build/corpus"))
+    differences = commands.add_parser("differences")
+    differences.add_argument("files", type=Path, nargs=2)
+    call = parser.parse_args(argv)
+    if call.command == "run":
+        _run(call)
+    else:
+        _print_differences(*(journal.finished(path) for path in call.files))
+
+
+def recipes(index: int, is_video: bool) -> Iterator[dict[str, Any]]:
+    """Arguments of `simulate` for a case; the next ones where an effect has no place."""
+    generator = np.random.default_rng([index, 50])
+    scenario = "ramp" if is_video else SCENARIOS[index % len(SCENARIOS)]
+    plain: dict[str, Any] = {
+        "seed": 600_000 + index,
+        "scenario": scenario,
+        "track_only": not is_video,
+        "fps": float(generator.choice(FRAME_RATES)),
+    }
+    if is_video:
+        plain |= {"fps": 30.0, "faults": True, "solver": "fine"}
+    else:
+        plain["track_noise"] = float(np.exp(generator.uniform(*np.log(NOISE_M))))
+    if index // len(SCENARIOS) % 3:
+        for effect in generator.permutation(sorted(gx.effects())):
+            strength = float(generator.uniform(*STRENGTHS))
+            yield plain | {"effects": {str(effect): {}}, "strength": strength}
+    yield plain
+
+
+def _clip(index: int, call: argparse.Namespace) -> tuple[Path, dict[str, Any]]:
+    name = f"{'video' if call.videos else 'track'}{index}"
+    kept = call.clips / f"{name}.recipe.json"
+    if not kept.is_file():
+        call.clips.mkdir(parents=True, exist_ok=True)
+        for recipe in recipes(index, call.videos):
+            try:
+                gx.simulate(call.clips / f"{name}.{'mp4' if call.videos else 'csv'}", **recipe)
+            except InputError:  # the effect has no place in this scene
+                continue
+            kept.write_text(json.dumps(recipe))
+            break
+    return call.clips / f"{name}.yaml", json.loads(kept.read_text())
+
+
+def _run(call: argparse.Namespace) -> None:
+    call.out.parent.mkdir(parents=True, exist_ok=True)
+    done = journal.finished(call.out)
+    for index in range(call.first, call.first + call.num):
+        case = f"{call.task} {'video' if call.videos else 'track'}{index}"
+        if case in done:
+            continue
+        path, recipe = _clip(index, call)
+        began = time.process_time()
+        try:
+            row = _outcome(path, call.task)
+        except Exception as error:
+            row = {"failed": f"{type(error).__name__}: {error}"}
+        row |= {"case": case, "recipe": recipe, "cpu_s": time.process_time() - began}
+        journal.add(call.out, row)
+        tables.row(case, (recipe["scenario"], *recipe.get("effects", ["none"]), row["cpu_s"]))
+
+
+def _outcome(path: Path, task: str) -> dict[str, Any]:
+    if task in ("fit", "mh"):
+        fit = gx.fit(path, method="mh" if task == "mh" else "grad")
+        assert fit.gradient is not None
+        return {
+            "values": fit.parameters | fit.result["derived"],
+            "log_evidence": {"fit": fit.gradient.log_evidence},
+            "chi2": fit.gradient.chi2,
+            "verdict": str(fit.gradient.code.name),
+        }
+    if task == "compare":
+        check = gx.compare(path)
+        return {"log_evidence": {"p": math.log(check.p_value)}, "verdict": check.p_value > 0.01}
+    found = gx.diagnose(path)
+    best = max(candidate["score"] for candidate in found.candidates)
+    return {
+        "log_evidence": {
+            "+".join(candidate["effects"]) if "effects" in candidate else candidate["effect"]: (
+                candidate["score"] - best
+            )
+            for candidate in found.candidates
+        },
+        "verdict": f"{found.verdict.status} {' '.join(sorted(found.verdict.effects))}",
+    }
+
+
+def _print_differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
+    tables.row("case", ("mean, sd", "ends, sd", "nats", "verdicts"))
+    both = [case for case in first if case in second]
+    rows = np.array([_difference(first[case], second[case]) for case in both])
+    for case, (mean, end, nats, is_other) in zip(both, rows, strict=True):
+        if not max(mean, end, nats) < SETTLED_SD or is_other:
+            words = [
+                str(run[case].get("verdict", run[case].get("failed"))) for run in (first, second)
+            ]
+            tables.row(case, (mean, end, nats, words[0] if not is_other else " / ".join(words)))
+    quantiles = {str(q): np.nanquantile(rows[:, :3], q, axis=0).tolist() for q in (0.5, 0.9, 1.0)}
+    for name, values in quantiles.items():
+        tables.row(f"quantile {name}", values)
+    seconds = [sum(run[case]["cpu_s"] for case in both) for run in (first, second)]
+    figures = {"cases": len(both), "other_verdicts": int(rows[:, 3].sum()), "cpu_s": seconds}
+    tables.finish("corpus", figures | {"quantiles": quantiles})
+
+
+def _difference(one: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, ...]:
+    """Of means and ends in sds, of log evidence in nats, and whether the verdicts differ."""
+    if "failed" in one or "failed" in other:
+        return (math.nan,) * 3 + (float(one.get("failed") != other.get("failed")),)
+    means, ends = [0.0], [0.0]
+    for name, value in one.get("values", {}).items():
+        sd, there = value["sd"], other["values"].get(name)
+        if there is None or not sd > 0:
+            continue
+        means.append(abs(there["mean"] - value["mean"]) / sd)
+        ends += [abs(there[end] - value[end]) / sd for end in ENDS]
+    nats = [
+        abs(other["log_evidence"][name] - own) if name in other["log_evidence"] else math.inf
+        for name, own in one["log_evidence"].items()
+    ]
+    return max(means), max(ends), max(nats), float(one["verdict"] != other["verdict"])
+
+
+if __name__ == "__main__":
+    main()
