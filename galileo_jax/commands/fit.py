@@ -61,22 +61,22 @@ def main(argv: Sequence[str]) -> int | None:
 def table(found: "Fit", truth: Mapping[str, float]) -> str:
     """What the user asked for, in a few lines; with a column for the truth if it is known."""
     from galileo_jax.inference.per_mass import SUFFIX
+    from galileo_jax.results.shown_digits import shown
     from galileo_jax.results.shown_parameters import shown_parameters
 
     result: Mapping[str, Any] = found.result
-    shown = shown_parameters(result)
+    entries = shown_parameters(result)
     title = f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"
-    lines = [title] if shown else []
-    for name, entry in shown.items():
+    lines = [title] if entries else []
+    for name, entry in entries.items():
         unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-        interval = f"[{entry['q025']:.4g}, {entry['q975']:.4g}]{unit}"
+        mean, sd, low, high = (shown(entry, key) for key in ("mean", "sd", "q025", "q975"))
+        interval = f"[{low}, {high}]{unit}"
         known = "" if entry["identified"] else "   not determined by this clip"
         if f"{name}{SUFFIX}" in result["derived"]:
             known = "   not determined by this clip: only per mass, below"
         true = f"{truth[name]:.4g}" if name in truth else ""
-        lines.append(
-            f"{name:<18}{true:>10}{entry['mean']:>10.4g}{entry['sd']:>10.2g}   {interval}{known}"
-        )
+        lines.append(f"{name:<18}{true:>10}{mean:>10}{sd:>10}   {interval}{known}")
     error = result["error"]
     lines.append(
         f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "

@@ -23,9 +23,9 @@ from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import (
     IDENTIFIED_SD_Z,
     per_mass_entries,
-    summarise,
     undetermined_by_mass,
 )
+from galileo_jax.inference.summarise import summary_of
 
 Entries = dict[str, dict[str, Any]]  # by parameter
 
@@ -128,13 +128,13 @@ def _entries(
     free = [name for i, name in enumerate(trials.names) if fit.free[i]]
     forces = {
         name: entry
-        for name, entry in per_mass_entries(trials, posterior.flat()).items()
+        for name, entry in per_mass_entries(trials, posterior).items()
         if name.removesuffix(SUFFIX) in free
     }
     unknown = undetermined_by_mass(trials, forces)
     entries = {
         parameter.name: {
-            **summarise(posterior[parameter.name].reshape(-1)),
+            **summary_of(posterior, posterior[parameter.name].reshape(-1)),
             "unit": parameter.unit,
             "identified": bool(spread[i] < IDENTIFIED_SD_Z) and parameter.name not in unknown,
         }

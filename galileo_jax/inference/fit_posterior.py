@@ -17,14 +17,13 @@ from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.weighed import weighed
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
-from galileo_jax.inference.posterior import Posterior, Status
+from galileo_jax.inference.posterior import ESS, Posterior, Status
 from galileo_jax.inference.systematic import systematic
 
 # At once, and in all until they are worth `ENOUGH` draws: a mean is then good to .03 sd.
 NUM_AT_ONCE, MOST, ENOUGH = 512, 8192, 1200.0
 # Worth so few, widths are good to a tenth, and it is said; to a quarter, and slopes know as much.
 FEW, TOO_FEW = 100.0, 10.0
-ESS = "ess"  # of the provenance: what the draws are worth
 
 
 def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterior:

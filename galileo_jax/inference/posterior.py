@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from arviz import InferenceData
 
 
+ESS = "ess"  # of the provenance: what weighed draws are worth
+
+
 class Status(StrEnum):
     """How a sampling ended; the value is the sentence for the user."""
 
@@ -26,19 +29,6 @@ class Status(StrEnum):
     )
     STUCK_CHAIN = "a chain never moved; check its start and the scale of the proposals"
     FIXED_LENGTH = "ran its fixed number of steps; convergence was not tested"
-
-
-@dataclass(frozen=True)
-class Summary:
-    """One parameter in numbers, in its own unit; `rhat` and `ess_*` as in `Convergence`."""
-
-    mean: float
-    sd: float
-    q025: float
-    q975: float
-    rhat: float
-    ess_bulk: float
-    ess_tail: float
 
 
 @dataclass(frozen=True)
@@ -97,23 +87,19 @@ class Posterior:
         """The marginal of some parameters, under other names."""
         return replace(self, draws=self.draws[..., columns], names=tuple(names))
 
-    def summary(self) -> dict[str, Summary]:
-        """Mean, standard deviation, central 95 % interval and convergence, by name."""
-        table = {}
-        for name in self.names:
-            draws = self[name].astype(np.float64)
-            low, high = np.quantile(draws, [0.025, 0.975])
-            state = convergence(draws)
-            table[name] = Summary(
-                mean=float(draws.mean()),
-                sd=float(draws.std(ddof=1)),
-                q025=float(low),
-                q975=float(high),
-                rhat=state.rhat,
-                ess_bulk=state.ess_bulk,
-                ess_tail=state.ess_tail,
-            )
-        return table
+    def worth(self, values: np.ndarray) -> float:
+        """How many independent draws the posterior's are worth for a function of them.
+
+        Args:
+          values: `[chain * draw]`, the function at each draw, chain after chain.
+        """
+        if ESS in self.provenance:
+            return float(self.provenance[ESS])
+        if "sampler" not in self.provenance:  # drawn one by one, not by a chain
+            return float(len(values))
+        found = convergence(values.reshape(self.draws.shape[:2]))
+        worth = float(np.fmin(found.ess_bulk, found.ess_tail))
+        return worth if np.isfinite(worth) else 1.0
 
     def _notes(self) -> dict[str, Any]:
         """What is not draws, as JSON can hold it."""

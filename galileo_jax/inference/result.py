@@ -22,6 +22,7 @@ from galileo_jax.inference.per_mass import (
 )
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.summarise import summary_of
 from galileo_jax.model.effects.effect import true_surroundings
 from galileo_jax.model.parameters import inverse, prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -41,17 +42,6 @@ FREE_SCALE_WARNING = (
 UNSHOWN = ("latent", "given")  # roles that have no entry of their own in result.json
 
 PULLED_Z = 3.0  # of a nuisance's prior standard deviations; one in four hundred is by chance
-
-
-def summarise(draws: np.ndarray) -> dict[str, float]:
-    """Mean, standard deviation and central 95 % interval of draws `[draw]`."""
-    low, high = np.quantile(draws, [0.025, 0.975])
-    return {
-        "mean": float(draws.mean()),
-        "sd": float(draws.std(ddof=1)),
-        "q025": float(low),
-        "q975": float(high),
-    }
 
 
 def velocity_error(
@@ -116,19 +106,20 @@ def error_of(
     return error
 
 
-def per_mass_entries(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[str, Any]]:
+def per_mass_entries(trials: JointProblem, posterior: Posterior) -> dict[str, dict[str, Any]]:
     """Entries of the force constants over m1, by name; empty where the mass is known.
 
     Args:
       trials: what was fitted.
-      draws: `[draw, parameter]`, in the parameters' units.
+      posterior: in the parameters' units.
     """
+    draws = posterior.flat()
     if not force_constants(trials) or is_mass_known(trials, draws):
         return {}
     before = per_mass(trials, trials.prior_draws)
     return {
         name: {
-            **summarise(values),
+            **summary_of(posterior, values),
             "unit": unit,
             "identified": _width(values) < IDENTIFIED_SD_Z * _width(before[name][0]),
         }
@@ -156,8 +147,8 @@ def _width(values: np.ndarray) -> float:
     return float(np.diff(np.quantile(values, [0.16, 0.84]))[0])
 
 
-def _derived_by_laws(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[str, Any]]:
-    """What the models' laws derive from draws `[draw, parameter]` of one clip's parameters."""
+def _derived_by_laws(trials: JointProblem, posterior: Posterior) -> dict[str, dict[str, Any]]:
+    """What the models' laws derive from draws of one clip's parameters."""
     if len(trials.problems) != 1:
         return {}
     model = trials.problems[0].model
@@ -175,11 +166,11 @@ def _derived_by_laws(trials: JointProblem, draws: np.ndarray) -> dict[str, dict[
     before = by_name(trials.prior_draws)
     return {
         name: {
-            **summarise(values),
+            **summary_of(posterior, values),
             "unit": unit,
             "identified": _width(values) < IDENTIFIED_SD_Z * _width(before[name][0]),
         }
-        for name, (values, unit) in by_name(draws).items()
+        for name, (values, unit) in by_name(posterior.flat()).items()
     }
 
 
@@ -212,7 +203,7 @@ def make_result(
     for i, parameter in enumerate(trials.parameters):
         if parameter.role in UNSHOWN:
             continue
-        entry: dict[str, Any] = summarise(draws[:, i])
+        entry: dict[str, Any] = summary_of(posterior, draws[:, i])
         entry["unit"] = parameter.unit
         entry["identified"] = bool(spread[i] < IDENTIFIED_SD_Z)
         room = "nuisances" if parameter.role == "nuisance" else "parameters"
@@ -225,9 +216,10 @@ def make_result(
         prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
         logs = np.log(ratios["mass_ratio"] if name == "phi" else values)
         is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
-        derived[name] = {**summarise(values), "unit": "1", "identified": is_identified}
-    derived |= _derived_by_laws(trials, draws)
-    forces = per_mass_entries(trials, draws)
+        entry = summary_of(posterior, values)
+        derived[name] = {**entry, "unit": "1", "identified": is_identified}
+    derived |= _derived_by_laws(trials, posterior)
+    forces = per_mass_entries(trials, posterior)
     derived |= forces
     for name in undetermined_by_mass(trials, forces):
         if name in table["parameters"]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax import __version__
-from galileo_jax.inference.result import summarise
+from galileo_jax.inference.summarise import summarise
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.results.run import Run

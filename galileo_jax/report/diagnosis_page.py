@@ -16,9 +16,9 @@ from galileo_jax.report.chart import Chart
 from galileo_jax.report.comparison_charts import before_after_chart
 from galileo_jax.report.comparison_page import cells, failures, motion
 from galileo_jax.report.diagnosis_charts import is_known, missing_force_chart, rounds_chart
-from galileo_jax.report.fit_text import number
 from galileo_jax.report.html_page import chart_section, document, header, items, legend, table
 from galileo_jax.report.provenance import provenance
+from galileo_jax.results.shown_digits import shown
 from galileo_jax.runtime.atomic_write import write_text
 
 NUM_CANDIDATES = 8
@@ -129,7 +129,7 @@ def _rounds(rounds: Sequence[Round], history: Sequence[Mapping[str, Any]]) -> st
                 f"{row['rmse']:.4f}",
                 f"{row['chi2_per_dof']:.2f}",
                 escape(diagnosis_text.p_text(row["p_value"])),
-                *(number(row[k]["mean"], row[k]["sd"]) for k in frictions),
+                *(shown(row[k]) for k in frictions),
             ]
         )
     head = ["model with", "rmse, m/s", "chi2 per dof", "p", *frictions]

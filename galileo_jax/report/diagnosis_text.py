@@ -12,7 +12,7 @@ from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.report.fit_text import number
+from galileo_jax.results.shown_digits import shown
 
 NO_EFFECTS = "no effects"
 MOST_APART = 2  # that are said one by one
@@ -27,8 +27,7 @@ def effects_text(effects: Sequence[str]) -> str:
 def value_text(entry: Mapping[str, Any]) -> str:
     """A parameter's mean, standard deviation and unit."""
     unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-    sd = entry["sd"]
-    return f"{number(entry['mean'], sd)} +- {number(sd, sd)}{unit}"
+    return f"{shown(entry)} +- {shown(entry, 'sd')}{unit}"
 
 
 def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:

@@ -22,12 +22,13 @@ from galileo_jax.report.fit_charts import (
     profile_chart,
     residual_chart,
 )
-from galileo_jax.report.fit_text import meaning, number
+from galileo_jax.report.fit_text import meaning
 from galileo_jax.report.html_page import chart_section, details, document, header, legend, table
 from galileo_jax.report.posterior_charts import pair_chart, trace_chart
 from galileo_jax.report.provenance import provenance
 from galileo_jax.report.style import object_colour
 from galileo_jax.results.run import Run
+from galileo_jax.results.shown_digits import number, shown
 from galileo_jax.results.shown_parameters import shown_parameters
 from galileo_jax.runtime.atomic_write import write_text
 
@@ -149,8 +150,8 @@ def _headlines(run: Run) -> str:
             continue
         label = escape(meaning(name) or name)
         if entry["identified"]:
-            low, high = (number(entry[key], entry["sd"]) for key in ("q025", "q975"))
-            value, note = number(entry["mean"], entry["sd"]), f"{low} to {high} (95 %)"
+            low, high = (shown(entry, key) for key in ("q025", "q975"))
+            value, note = shown(entry), f"{low} to {high} (95 %)"
         else:
             value, note = "not determined", "see below"
         cards.append(
@@ -218,15 +219,14 @@ def _table(heading: str, entries: Mapping[str, Mapping[str, Any]], note: str = "
         return f"<h2>{escape(heading)}</h2>\n<p>The model of this motion has none to determine.</p>"
     rows = []
     for name, entry in entries.items():
-        sd = entry["sd"]
-        low, high = number(entry["q025"], sd), number(entry["q975"], sd)
+        low, high = shown(entry, "q025"), shown(entry, "q975")
         unit = "" if entry["unit"] == "1" else escape(entry["unit"])
         rows.append(
             [
                 f"<code>{escape(name)}</code>",
                 escape(meaning(name) or ""),
-                f"{number(entry['mean'], sd)} {unit}",
-                number(sd, sd),
+                f"{shown(entry)} {unit}",
+                shown(entry, "sd"),
                 f"{low} to {high}",
                 "yes" if entry["identified"] else "no",
             ]

@@ -224,16 +224,6 @@ def caution(result: dict[str, Any]) -> str | None:
     )
 
 
-def number(value: float | None, sd: float | None) -> str:
-    """A value with as many places as its uncertainty allows (two figures of it)."""
-    if value is None or not math.isfinite(value):
-        return "n/a"
-    if not sd or not math.isfinite(sd):
-        return f"{value:.4g}"
-    places = max(0, 1 - math.floor(math.log10(sd)))
-    return f"{value:.{min(places, 9)}f}"
-
-
 def fit_command(run: Run) -> str:
     """The command that makes this run again, from the clip as it was fitted."""
     result = run.result

@@ -17,8 +17,9 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
-from galileo_jax.report.fit_text import fits, meaning, number
+from galileo_jax.report.fit_text import fits, meaning
 from galileo_jax.report.style import object_colour
+from galileo_jax.results.shown_digits import number, shown
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 
@@ -182,8 +183,8 @@ def _value(entry: Mapping[str, Any]) -> str:
     if not entry["identified"]:
         return '<span class="soft">not determined</span>'
     unit = "" if entry["unit"] == "1" else f" {escape(entry['unit'])}"
-    value, sd = number(entry["mean"], entry["sd"]), entry["sd"]
-    return f"{value} &plusmn; {number(sd, sd)}{unit}" if sd else f"{value}{unit}"
+    value = shown(entry)
+    return f"{value} &plusmn; {shown(entry, 'sd')}{unit}" if entry["sd"] else f"{value}{unit}"
 
 
 def _model(row: ClipRow) -> str:

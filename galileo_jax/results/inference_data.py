@@ -28,9 +28,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.convergence import arviz
-from galileo_jax.inference.fit_posterior import ESS, TOO_FEW
+from galileo_jax.inference.fit_posterior import TOO_FEW
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.posterior import Posterior, Status
+from galileo_jax.inference.posterior import ESS, Posterior, Status
 from galileo_jax.inference.systematic import systematic
 from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m

@@ -77,7 +77,7 @@ def round_of(result: Mapping[str, Any]) -> dict[str, Any]:
     """A round of the loop, from result.json."""
     error, known = result["error"], result["parameters"]
     frictions = {
-        name: {"mean": known[name]["mean"], "sd": known[name]["sd"]}
+        name: {key: known[name][key] for key in ("mean", "sd", "mcse") if key in known[name]}
         for name in ("k1", "k2")
         if name in known
     }

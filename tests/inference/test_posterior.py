@@ -22,17 +22,6 @@ def posterior():
     )
 
 
-def test_summary_of_independent_draws(posterior):
-    row = posterior.summary()["k1"]
-    assert row.mean == pytest.approx(0.1, abs=0.001)
-    assert row.sd == pytest.approx(0.01, rel=0.06)
-    assert row.q025 == pytest.approx(0.1 - 0.0196, abs=0.002)
-    assert row.q975 == pytest.approx(0.1 + 0.0196, abs=0.002)
-    assert row.rhat < 1.01
-    assert row.ess_bulk == pytest.approx(2000, rel=0.15)
-    assert row.ess_tail == pytest.approx(2000, rel=0.2)
-
-
 def test_netcdf_round_trip(posterior, tmp_path):
     path = tmp_path / "posterior.nc"
     posterior.to_netcdf(path)

@@ -14,11 +14,12 @@ from galileo_jax.report import write_report
 from galileo_jax.report.animation import animation
 from galileo_jax.report.fit_charts import failing_interval_of
 from galileo_jax.report.fit_plots import write_fit_plots
-from galileo_jax.report.fit_text import fit_quality, number, undetermined
+from galileo_jax.report.fit_text import fit_quality, undetermined
 from galileo_jax.report.html_page import document
 from galileo_jax.report.provenance import digest
 from galileo_jax.report.video_frames import BUDGET_BYTES, sample_frames
 from galileo_jax.results.run import load_run
+from galileo_jax.results.shown_digits import shown
 from tests.oracle_run import HIT, MISS, PARTS, STILL, make_run
 from tests.reference_ramp import solve
 from tests.report.browser import opened
@@ -130,8 +131,8 @@ def test_the_failing_interval_is_found_and_noise_has_none(run):
 def test_states_the_numbers(run, page):
     for name in ("k1", "k2"):
         entry = run.result["parameters"][name]
-        assert f"<b>{number(entry['mean'], entry['sd'])}</b>" in page
-        assert number(entry["q975"], entry["sd"]) in page
+        assert f"<b>{shown(entry)}</b>" in page
+        assert shown(entry, "q975") in page
     for name in run.result["nuisances"]:
         assert f"<code>{name}</code>" in page
     assert f"{run.result['error']['chi2_per_dof']:.2f}" in page
@@ -227,10 +228,3 @@ def test_an_acceleration_of_any_form_is_said_to_be_there():
     said = fit_quality({"error": {"chi2_per_dof": 1.0}, "discrepancy": found})
     assert "about 0.5 m/s² on object1 and 0.05 m/s² on object2" in said
     assert "acceleration" not in fit_quality({"error": {"chi2_per_dof": 1.0}})
-
-
-def test_numbers_have_the_places_their_uncertainty_allows():
-    assert number(0.151812, 0.00036) == "0.15181"
-    assert number(123.4, 17.0) == "123"
-    assert number(None, 1.0) == "n/a"
-    assert number(0.25, 0.0) == "0.25"

@@ -52,6 +52,8 @@ CROSSED_Z = (-3.0, 1.0)  # one of them next to nothing, the others a lot
 MOVED_Z = (-1.0, -0.5, 0.5, 1.0)  # one parameter of an end, to come to the valleys beside it
 ALONG_Z = np.linspace(-2.0, 2.5, 19)  # of a positive nuisance: where another valley may begin
 LEADS_ON = 1.0  # nats: less is no other valley
+STILL = 1e-5  # standard deviations, and of a noise scale: a fit that moves on by less stands still
+STILL_NATS = STILL**2
 NUM_LOOKS = 3  # round a fit, each from a better one
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
 LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
@@ -102,7 +104,7 @@ class GradientFitter:
     def __init__(self, trials: JointProblem, settings: Settings = Settings()):
         self.trials, self.settings = trials, settings
         is_smooth = trials.problems[0].engine.name == "rigid"
-        self._descent = Descent(Residuals(trials), trials.coarse_steps, is_smooth)
+        self._descent = Descent(Residuals(trials), trials.coarse_steps, is_smooth, not is_smooth)
         self._residuals = self._descent.residuals
         self._count = len(trials.model_parameters)
         self._settled = settings.settled if is_smooth else settings.settled_if_rough
@@ -159,7 +161,7 @@ class GradientFitter:
         on_stage("refining")
         fits = self._in_valleys(ends, free)
         if ends.num_agreeing >= LEAST_AGREEING and self.is_explained(_best_of(fits)):
-            return self._looked_round(fits, seed)
+            return self._at_rest(self._looked_round(fits, seed))
         on_stage("searching on")
         num = self.settings.num_second_starts
         scattered = scattered_starts(self.trials, free, num, seed + 1)
@@ -169,7 +171,7 @@ class GradientFitter:
         if not self.is_explained(best := _best_of(fits)):
             beside = self._ends_round(best, free).without(ends).without(second)
             fits += self._in_valleys(beside, free) if beside.any else []
-        fit = self._looked_round(fits, seed)
+        fit = self._at_rest(self._looked_round(fits, seed))
         if fit.code is Code.CONVERGED and not self.is_explained(fit, NOISE_SCALE_RANGE[1]):
             fit = replace(fit, code=Code.MISFIT)
         return fit
@@ -319,6 +321,27 @@ class GradientFitter:
             if not _evidence(best) - _evidence(known) > LEADS_ON:  # nor if both failed
                 break
         return replace(best, stats={**best.stats, "num_rollouts": self._residuals.num_rollouts})
+
+    def _at_rest(self, fit: GradientFit) -> GradientFit:
+        """The fit and those beside it, each moved on until it stands still.
+
+        Where the search came from shows no longer: what is left of it would be, through the
+        curvature of the misfit, a difference between processors, seeds and versions.
+        """
+        if not self._descent.is_smooth or fit.code is not Code.CONVERGED:
+            return fit
+        fits, count = (fit, *fit.beside), self._count
+        z = np.stack([one.z for one in fits])
+        points = Batch(
+            z[:, :count],
+            np.stack([one.free[:count] for one in fits]),
+            np.exp(NOISE_SD * z[:, count:]),
+        )
+        descent, most = replace(self._descent, is_central=True), self.settings.max_polish_steps
+        found = polish(descent, points, np.arange(len(fits)), STILL_NATS, most, drift=STILL)
+        stats = {**fit.stats, "num_steps": fit.stats["num_steps"] + found.num_steps}
+        still = laplace_fits(self.trials, self._residuals, found, stats)
+        return _with_beside([replace(one, code=Code.CONVERGED) for one in still])
 
     def _ends(self, starts: np.ndarray, free: np.ndarray, num_refined: int) -> Ends:
         """Refines the best of some starts."""

@@ -12,7 +12,7 @@ from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.similarity.noise_scale import fitted_noise_scale
 
 MAX_ROUNDS = 6
-DRIFT = 0.1  # of a noise scale, in a round: more has not settled
+DRIFT = 0.1  # of a noise scale, in a round, while valleys are compared
 SHARE_PROMISED = 0.2  # of what counts as settled: a round ends where a step promises less
 BEHIND = 100.0  # nats: a fit so far behind another, and not catching up, is left where it is
 
@@ -45,6 +45,7 @@ def polish(
     settled: float,
     max_steps: int,
     lowest: float = np.inf,
+    drift: float = DRIFT,
 ) -> Polished:
     """Descends again and again, each time with noise scales that suit the residuals.
 
@@ -58,6 +59,7 @@ def polish(
       settled: nats.
       max_steps: of one round.
       lowest: as in what was returned, of other points polished before.
+      drift: of a noise scale, in a round: more has not settled.
     """
     z, noise = points.z.copy(), points.noise.copy()
     count, size = z.shape
@@ -69,7 +71,7 @@ def polish(
         here = Batch(z, points.free, noise).take(active)
         used = size - np.trace(inverse(normal[active]), axis1=1, axis2=2)
         scales = noise_scales(descent.residuals, here, used)
-        drifts = np.abs(scales / noise[active] - 1).max(axis=1) > DRIFT
+        drifts = np.abs(scales / noise[active] - 1).max(axis=1) > drift
         noise[active] = scales
         price = np.log(noise) @ num_values  # what the noise scales cost
         give_up = GiveUp(owner[active], BEHIND, price[active], BEHIND, lowest)

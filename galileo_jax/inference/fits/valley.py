@@ -1,12 +1,14 @@
 """Coordinates in which a curved valley of the posterior is straight.
 
-    z = mode + R (u + B u^2 + C u^3),  u = V^T w      R R^T the covariance; B, C strictly lower
-                                                    triangular; V orthogonal
+    z = mode + R (u + B u^2 + C u^3),  u = V^T w      R R^T the covariance; B, C strictly
+                                                      lower triangular; V orthogonal
+
 The columns of R are the eigenvectors V of the covariance, each times its standard deviation, least
-determined direction first. Along such a direction the well-determined ones shift by several of their own standard deviations (for
-example if object 2 hardly slides). A normal proposal with any covariance is then almost always
-rejected. B and C describe this shift. Each direction shifts only better-determined ones, so the map
-is invertible and its determinant constant: the densities of w and z differ by a constant factor.
+determined direction first. Along such a direction the well-determined ones shift by several of
+their own standard deviations (for example if object 2 hardly slides). A normal proposal with any
+covariance is then almost always rejected. B and C describe this shift. Each direction shifts only
+better-determined ones, so the map is invertible and its determinant constant: the densities of w
+and z differ by a constant factor.
 
 Random numbers are drawn for w, not for u. An eigenvector has no sign, and those of equal
 eigenvalues (two parameters that do not show) are any basis of their plane; which ones come out

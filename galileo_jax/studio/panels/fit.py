@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
-from galileo_jax.studio.panels.parts import main_button, number, plain_button, remark, title
+from galileo_jax.results.shown_digits import shown
+from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
 from galileo_jax.studio.results import program_of
 
 if TYPE_CHECKING:
@@ -67,8 +68,8 @@ def _parameter(tab: "Tab", one: Mapping[str, Any], values: dict[str, float]) -> 
     with ui.element("div").classes("parameter" + ("" if is_known else " unknown")):
         ui.label(one["name"]).classes("name")
         with ui.element("div").classes("value"):
-            ui.label(f"{number(one['mean'], one['sd'])}{unit}")
-            interval = f"{number(one['q025'], one['sd'])} to {number(one['q975'], one['sd'])}"
+            ui.label(f"{shown(one)}{unit}")
+            interval = f"{shown(one, 'q025')} to {shown(one, 'q975')}"
             ui.label(interval if is_known else "not determined by this clip").classes("small soft")
         if one["kind"] != "parameters":
             ui.label("follows from the others").classes("small soft")

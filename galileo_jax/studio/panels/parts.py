@@ -36,13 +36,6 @@ def next_button(tab: "Tab", stage: str, text: str) -> None:
         plain_button(text, lambda: tab.go(stage), f"to-{stage}")
 
 
-def number(value: float, sd: float | None = None) -> str:
-    """As many digits as are known."""
-    from galileo_jax.report.fit_text import number as digits
-
-    return digits(value, sd) if sd else f"{value:.4g}"
-
-
 def remark(kind: str, sentence: str) -> None:
     """One sentence with its colour."""
     with ui.element("div").classes(f"remark {kind}").props(f'data-remark="{kind}"'):

@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from galileo_jax.results.shown_digits import number, shown
+
 WIDTH, HEIGHT, TOP, BOTTOM = 416, 150, 26, 38
 
 
@@ -42,14 +44,12 @@ def stairs(rounds: Sequence[Mapping[str, Any]]) -> str:
 
 def friction_moves(rounds: Sequence[Mapping[str, Any]]) -> list[str]:
     """How the last round moved k1 and k2, in words."""
-    from galileo_jax.report.fit_text import number
-
     found = []
     for name in ("k1", "k2"):
         if name not in rounds[-1]:
             continue
         now = rounds[-1][name]
-        text = f"{name} {number(now['mean'], now['sd'])} ± {number(now['sd'], now['sd'])}"
+        text = f"{name} {shown(now)} ± {shown(now, 'sd')}"
         if len(rounds) > 1 and name in rounds[-2]:
             before = rounds[-2][name]["mean"]
             arrow = "↑" if now["mean"] > before else "↓"

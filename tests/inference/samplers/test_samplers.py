@@ -65,13 +65,15 @@ def test_moments(name, target):
     known = TARGETS[target]
     posterior = run(name, known, block_steps=100, min_ess=1500)
     assert posterior.is_converged
-    for i, row in enumerate(posterior.summary().values()):
-        sd = np.sqrt(known.covariance[i, i])
-        assert row.rhat < 1.01
-        assert row.ess_bulk >= 1500
-        assert abs(row.mean - known.mean[i]) < MONTE_CARLO_ERRORS * sd / np.sqrt(row.ess_bulk)
+    for i, name_of_one in enumerate(posterior.names):
+        sd, draws = np.sqrt(known.covariance[i, i]), posterior[name_of_one]
+        found = convergence(draws)
+        assert found.rhat < 1.01
+        assert found.ess_bulk >= 1500
+        off = abs(draws.mean() - known.mean[i])
+        assert off < MONTE_CARLO_ERRORS * sd / np.sqrt(found.ess_bulk)
         # Squared deviations mix more slowly than the mean and have up to twice its kurtosis.
-        assert row.sd / sd == pytest.approx(1, abs=MONTE_CARLO_ERRORS * 2 / np.sqrt(2 * 1500))
+        assert draws.std() / sd == pytest.approx(1, abs=MONTE_CARLO_ERRORS * 2 / np.sqrt(2 * 1500))
     correlation = np.corrcoef(posterior.flat(), rowvar=False)
     expected = known.covariance / np.sqrt(
         np.outer(np.diag(known.covariance), np.diag(known.covariance))

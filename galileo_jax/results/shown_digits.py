@@ -1,0 +1,37 @@
+"""Numbers as text with the digits that they bear, and no more.
+
+A digit is shown if it is worth more than the Monte Carlo error of the number, and not beyond the
+second figure of the standard deviation.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+
+def number(value: float | None, sd: float | None, error: float = 0.0) -> str:
+    """A value with as many places as two figures of its uncertainty allow.
+
+    Args:
+      value: None or not finite: "n/a".
+      sd: its uncertainty; 0 or None: four figures are shown.
+      error: what its last digit must be worth at least, in the unit of the value.
+    """
+    if value is None or not math.isfinite(value):
+        return "n/a"
+    if not sd or not math.isfinite(sd):
+        return f"{value:.4g}"
+    places = 1 - math.floor(math.log10(sd))
+    if error > 0:
+        places = min(places, -math.ceil(math.log10(error)))
+    return f"{round(value, min(places, 9)):.{min(max(places, 0), 9)}f}"
+
+
+def shown(entry: Mapping[str, Any], key: str = "mean") -> str:
+    """A number of a parameter's entry in result.json, as text.
+
+    Args:
+      entry: with `sd` and, if it was written since there is one, `mcse`.
+      key: "mean", "sd", "q025" or "q975".
+    """
+    return number(entry[key], entry["sd"], entry.get("mcse", {}).get(key, 0.0))

@@ -1,0 +1,33 @@
+"""Digits are shown where they mean something."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from galileo_jax.results.shown_digits import number, shown
+
+
+def test_numbers_have_the_places_their_uncertainty_allows():
+    assert number(0.151812, 0.00036) == "0.15181"
+    assert number(123.4, 17.0) == "123"
+    assert number(None, 1.0) == "n/a"
+    assert number(0.25, 0.0) == "0.25"
+
+
+def test_a_digit_below_the_monte_carlo_error_is_not_shown():
+    entry = {"mean": 0.151812, "sd": 0.00036, "mcse": {"mean": 1.1e-5, "sd": 0.9e-5}}
+    assert shown(entry) == "0.1518"
+    assert shown(entry, "sd") == "0.00036"
+    assert number(123.4, 17.0, error=2.0) == "120"
+    assert shown({"mean": 0.151812, "sd": 0.00036}) == "0.15181", "a run of an earlier version"
+
+
+@given(st.floats(-1e4, 1e4), st.floats(1e-6, 1e3), st.floats(1e-3, 0.9))
+def test_what_is_shown_is_the_number_to_a_digit_worth_more_than_its_error(value, sd, share):
+    text = number(value, sd, share * sd)
+    places = len(text.partition(".")[2])
+    last_digit = max(10.0**-places, 10.0 ** math.ceil(math.log10(share * sd)))
+    assert last_digit >= share * sd * (1 - 1e-12)
+    assert float(text) == pytest.approx(value, abs=0.5001 * last_digit)
