@@ -40,7 +40,9 @@ SETTLED_SD = 0.02  # what differs by more is printed
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Runs the corpus, or prints the differences between two runs."""
-    parser = argparse.ArgumentParser(description="Runs the frozen corpus, or prints how two runs differ.")
+    parser = argparse.ArgumentParser(
+        description="Runs the frozen corpus, or prints how two runs differ."
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run")
     run.add_argument("out", type=Path)

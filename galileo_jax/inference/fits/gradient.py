@@ -161,7 +161,7 @@ class GradientFitter:
         on_stage("refining")
         fits = self._in_valleys(ends, free)
         if ends.num_agreeing >= LEAST_AGREEING and self.is_explained(_best_of(fits)):
-            return self._at_rest(self._looked_round(fits, seed))
+            return self._looked_round(fits, seed)
         on_stage("searching on")
         num = self.settings.num_second_starts
         scattered = scattered_starts(self.trials, free, num, seed + 1)
@@ -171,7 +171,7 @@ class GradientFitter:
         if not self.is_explained(best := _best_of(fits)):
             beside = self._ends_round(best, free).without(ends).without(second)
             fits += self._in_valleys(beside, free) if beside.any else []
-        fit = self._at_rest(self._looked_round(fits, seed))
+        fit = self._looked_round(fits, seed)
         if fit.code is Code.CONVERGED and not self.is_explained(fit, NOISE_SCALE_RANGE[1]):
             fit = replace(fit, code=Code.MISFIT)
         return fit
@@ -309,7 +309,7 @@ class GradientFitter:
 
     def _looked_round(self, fits: Sequence[GradientFit], seed: int) -> GradientFit:
         """The most evident fit, and what is found round it; with the valleys beside it."""
-        best = _with_beside(fits)
+        best = self._at_rest(fits)
         for _ in range(NUM_LOOKS if self._descent.is_smooth else 0):
             starts = to_go_on_from((best, *best.beside), self._residuals, seed)
             if not len(starts):
@@ -317,17 +317,18 @@ class GradientFitter:
             points = self._batch(starts, best.free[: self._count])
             owner = np.zeros(len(starts), int)
             found = self._polish(points, owner, int(best.stats.get("num_steps", 0)))
-            known, best = best, _with_beside([best, *best.beside, *found.values()])
+            known, best = best, self._at_rest([best, *best.beside, *found.values()])
             if not _evidence(best) - _evidence(known) > LEADS_ON:  # nor if both failed
                 break
         return replace(best, stats={**best.stats, "num_rollouts": self._residuals.num_rollouts})
 
-    def _at_rest(self, fit: GradientFit) -> GradientFit:
-        """The fit and those beside it, each moved on until it stands still.
+    def _at_rest(self, found: Sequence[GradientFit]) -> GradientFit:
+        """The most evident fit and those of other valleys that count beside it, standing still.
 
-        Where the search came from shows no longer: what is left of it would be, through the
-        curvature of the misfit, a difference between processors, seeds and versions.
+        What is left of the way to a fit would be, through the curvature of the misfit, a
+        difference between processors, seeds and versions.
         """
+        fit = _with_beside(found)
         if not self._descent.is_smooth or fit.code is not Code.CONVERGED:
             return fit
         fits, count = (fit, *fit.beside), self._count
