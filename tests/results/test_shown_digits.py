@@ -27,7 +27,7 @@ def test_a_digit_below_the_monte_carlo_error_is_not_shown():
 @given(st.floats(-1e4, 1e4), st.floats(1e-6, 1e3), st.floats(1e-3, 0.9))
 def test_what_is_shown_is_the_number_to_a_digit_worth_more_than_its_error(value, sd, share):
     text = number(value, sd, share * sd)
-    places = len(text.partition(".")[2])
-    last_digit = max(10.0**-places, 10.0 ** math.ceil(math.log10(share * sd)))
-    assert last_digit >= share * sd * (1 - 1e-12)
-    assert float(text) == pytest.approx(value, abs=0.5001 * last_digit)
+    bears = max(math.ceil(math.log10(share * sd)), math.floor(math.log10(sd)) - 1)
+    assert len(text.partition(".")[2]) == max(-bears, 0)
+    assert float(text) == pytest.approx(value, abs=0.5001 * 10.0**bears)
+    assert 10.0**bears >= share * sd * (1 - 1e-12)
