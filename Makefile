@@ -1,11 +1,12 @@
-# make demo | test | test-all | lint | docs | setup | clean. Each does the set-up it needs, once.
+# make demo | test | test-all | test-plain-processor | test-cluster | lint | docs | setup | clean.
+# Each does the set-up it needs, once.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-all lint docs setup clean
+.PHONY: demo test test-all test-plain-processor test-cluster lint docs setup clean
 
 demo: $(READY)
 	$(BIN)/galileo simulate --seed 7 --out demo/clip.mp4
@@ -22,6 +23,18 @@ test: $(READY)
 
 test-all: $(READY)
 	$(PYTEST)
+
+# As a processor without AVX computes it: other roundings must not show.
+PLAIN := XLA_FLAGS=--xla_cpu_max_isa=SSE4_2 XDG_CACHE_HOME=$(CURDIR)/build/plain_processor
+
+test-plain-processor: $(READY)
+	$(PLAIN) $(PYTEST) tests/docs
+	$(PLAIN) $(PYTEST) -m "not slow" tests/commands/test_fit.py tests/commands/test_compare.py \
+	  tests/commands/test_predict.py tests/inference/test_coverage.py
+
+test-cluster: $(READY)
+	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,distributed]'
+	$(BIN)/python -m pytest tests/sweeping/test_real_sweeps.py -k ray
 
 lint: $(READY)
 	$(BIN)/ruff format --check .

@@ -1,8 +1,8 @@
 """What a test needs and this machine may not have.
 
-A browser and the extra `dev` are installed by .ci/run: without them a test is skipped on a
-stranger's machine and fails in CI. ../shared/data cannot be installed: without it a test is
-skipped everywhere.
+A browser and the extras `dev` and `distributed` are installed by .ci/run: without them a test is
+skipped on a stranger's machine and fails in CI. ../shared/data cannot be installed: without it a
+test is skipped everywhere.
 """
 
 import importlib
@@ -37,9 +37,9 @@ def find_shared_data() -> Path:
     return SHARED_DATA
 
 
-def needed_module(name: str) -> ModuleType:
-    """Imports a module of the extra `dev`."""
+def needed_module(name: str, extra: str = "dev") -> ModuleType:
+    """Imports a module of an extra that .ci/run installs."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError:
-        is_missing(f"no {name.partition('.')[0]} here (pip install -e '.[dev]')")
+        is_missing(f"no {name.partition('.')[0]} here (pip install -e '.[{extra}]')")

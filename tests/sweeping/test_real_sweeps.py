@@ -1,7 +1,6 @@
 """Sweeps of real fits: ready configs, kills, Ray with a node that is lost."""
 
 import csv
-import time
 
 import pytest
 
@@ -10,6 +9,7 @@ from galileo_jax.commands import command, sweep
 from galileo_jax.files.package_data import config_path
 from galileo_jax.sweeping.resources import Resources
 from galileo_jax.sweeping.task import Task
+from tests.missing import needed_module
 from tests.precision import in_64_bit
 from tests.sweeping import work_to_do
 from tests.sweeping.killed import kill_and_resume
@@ -81,7 +81,7 @@ def test_killed_ten_times_the_summary_is_the_same(plan, tmp_path):
 @pytest.fixture
 def cluster():
     """A real Ray cluster of two nodes on this machine, each with one core."""
-    pytest.importorskip("ray")
+    needed_module("ray", "distributed")
     from ray.cluster_utils import Cluster  # pyright: ignore[reportMissingImports]
 
     found = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
@@ -131,9 +131,7 @@ def test_ray_equals_local_to_the_last_digit(cluster, tracks, tmp_path):
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_ray_without_an_answer_is_one_line(plan, tmp_path, capsys):
-    pytest.importorskip("ray")
+    needed_module("ray", "distributed")
     words = [str(plan), "--engine", "ray", "--address", "127.0.0.1:1", "--out", str(tmp_path / "o")]
-    began = time.monotonic()
     assert command.run(sweep.main, words) == 2
     assert "--address: no Ray cluster at 127.0.0.1:1" in capsys.readouterr().err
-    assert time.monotonic() - began < 20
