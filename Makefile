@@ -29,6 +29,7 @@ PLAIN := XLA_FLAGS=--xla_cpu_max_isa=SSE4_2 XDG_CACHE_HOME=$(CURDIR)/build/plain
 
 test-plain-processor: $(READY)
 	$(PLAIN) $(PYTEST) tests/docs
+	$(PYTEST) tests/api/test_processors.py
 	$(PLAIN) $(PYTEST) -m "not slow" tests/commands/test_fit.py tests/commands/test_compare.py \
 	  tests/commands/test_predict.py tests/inference/test_coverage.py
 

@@ -57,6 +57,9 @@ def alone():
         return trials, fit(trials)
 
 
+STANDS_STILL_SD = 1e-4  # ten times what the fit asks for
+
+
 def check_truth(experiment, scatter, trials, found):
     """Estimates are as near to the truth as the noise lets them be, and their sd says so."""
     (m1, m2), (k1, k2) = experiment.mass_kg, experiment.friction
@@ -99,6 +102,15 @@ def test_same_seed_same_fit(alone):
     again = fit(trials)
     np.testing.assert_array_equal(again.z, found.z)
     np.testing.assert_array_equal(again.covariance, found.covariance)
+
+
+def test_other_starts_lead_to_the_same_mode(alone):
+    """A fit stands still to far less than its sd: the way to it leaves no trace."""
+    trials, found = alone
+    other = GradientFitter(trials).fit(1)
+    sd = np.sqrt(np.diag(found.covariance))
+    np.testing.assert_allclose(other.z / sd, found.z / sd, atol=STANDS_STILL_SD)
+    assert other.log_evidence == pytest.approx(found.log_evidence, abs=1e-4)
 
 
 def test_two_clips_tell_more_than_one(alone):

@@ -198,3 +198,14 @@ def test_the_way_back_and_of_a_pinned_parameter_there_is_none():
     assert np.all(wider(u)[:, -1] == 7.0)
     np.testing.assert_allclose(wider.inverse(wider(u), np.append(every, False)), u, atol=1e-6)
     assert wider.log_volume == pytest.approx(valley.log_volume)
+
+
+def test_the_map_does_not_depend_on_the_basis_of_what_does_not_show(gentle):
+    """Rounding of the sixteenth digit of a covariance turns eigenvectors, and not the draws."""
+    _, fit, residuals, valley = gentle
+    noise = 1e-15 * np.random.default_rng(8).standard_normal(fit.covariance.shape)
+    noise *= np.sqrt(np.outer(*[np.diag(fit.covariance)] * 2))
+    other = valley_round(replace(fit, covariance=fit.covariance + noise + noise.T), residuals)
+    w = np.random.default_rng(9).standard_normal((50, valley.root.shape[1]))
+    sd = np.sqrt(np.diag(fit.covariance))
+    np.testing.assert_allclose(other(w) / sd, valley(w) / sd, atol=1e-4)
