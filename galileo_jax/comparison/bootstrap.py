@@ -118,7 +118,9 @@ def _errors(
     found = generator.standard_normal((count, problem.observation.position_m.size))
     if problem.observation.noise_known_to:
         found = found * _uneven(problem.observation, label, count, generator)
-    along = generator.standard_normal((count, len(gain2)))
+    # Drawn as values and seen along the modes: these are unit normals, too, and the replicates do
+    # not depend on the modes' signs, which rounding decides.
+    along = generator.standard_normal(found.shape) @ basis.T
     if errors is None:
         along = along * (mode_size * data.gain)
     else:

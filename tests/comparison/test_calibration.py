@@ -17,7 +17,7 @@ from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
-NUM_TRACKS, NUM_REPLICATES = 40, 64
+NUM_TRACKS, NUM_REPLICATES = 40, 200
 CHANCE = 0.01  # of a right comparison failing a test, had other seeds been taken
 MOST_BELOW = stats.binom.isf(CHANCE, NUM_TRACKS, 0.05)  # the seeds are fixed: this is no lottery
 
