@@ -25,7 +25,8 @@ test-all: $(READY)
 	$(PYTEST)
 
 # As a processor without AVX computes it: other roundings must not show.
-PLAIN := XLA_FLAGS=--xla_cpu_max_isa=SSE4_2 XDG_CACHE_HOME=$(CURDIR)/build/plain_processor
+PLAIN := XLA_FLAGS=--xla_cpu_max_isa=SSE4_2 OPENBLAS_CORETYPE=Nehalem \
+  XDG_CACHE_HOME=$(CURDIR)/build/plain_processor
 
 test-plain-processor: $(READY)
 	$(PLAIN) $(PYTEST) tests/docs
