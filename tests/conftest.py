@@ -1,6 +1,8 @@
 """What all tests share: where JAX runs, its cache, and the data beside the checkout."""
 
+import gc
 import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -22,6 +24,26 @@ if folder := cache_folder():
 # No test depends on time, on how fast the machine is, or on what it compiles on the way.
 settings.register_profile("suite", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("suite")
+
+
+MOST_RESIDENT_BYTES = 2 * 2**30  # a process that holds more drops what it has compiled
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_programs_are_not_kept_for_ever():
+    """One process runs thousands of tests; programs of other files are read again from the cache."""
+    yield
+    if "jax" in sys.modules and _resident_bytes() > MOST_RESIDENT_BYTES:
+        sys.modules["jax"].clear_caches()
+        gc.collect()
+
+
+def _resident_bytes() -> int:
+    """Of this process; 0 where the system does not say."""
+    pages = Path("/proc/self/statm")
+    if not pages.is_file():
+        return 0
+    return int(pages.read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 @pytest.fixture
