@@ -31,7 +31,7 @@ MOST_RESIDENT_BYTES = 2 * 2**30  # a process that holds more drops what it has c
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled_programs_are_not_kept_for_ever():
-    """One process runs thousands of tests; programs of other files are read again from the cache."""
+    """One process runs thousands of tests; those of other files are read again."""
     yield
     if "jax" in sys.modules and _resident_bytes() > MOST_RESIDENT_BYTES:
         sys.modules["jax"].clear_caches()
