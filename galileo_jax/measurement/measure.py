@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from galileo_jax.clip.picture_plane import picture_plane
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.measurement.astray import Astray, find_astray, without_astray
@@ -17,6 +18,7 @@ from galileo_jax.measurement.coding_errors import with_coding_errors
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.errors_in_time import with_errors_in_time
 from galileo_jax.measurement.errors_of_clock import with_errors_of_clock
+from galileo_jax.measurement.find_start_speed import on_ramp, start_speed
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_radii import (
     from_first_common_frame,
@@ -103,10 +105,7 @@ def measure(clip: Clip) -> Measurement:
     pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
     observation, cuts = cut(measured.clip, measured.observation)
     remarks.extend(f"{clip.path}: {each}" for each in cuts)
-    if any(each.why == HELD for each in cuts):
-        # Nobody lets it go in what is left.
-        moving = measured.clip.model_copy(update={"starts_moving": True})
-        measured = replace(measured, clip=moving)
+    measured = replace(measured, clip=_moving(measured.clip, observation, cuts, remarks))
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
     observation = without_astray(to_last_cut(observation, cuts), astray)
     if is_level(measured.clip) or clip.scenario == "toss":
@@ -134,6 +133,33 @@ def measure(clip: Clip) -> Measurement:
         doubts=(*([] if doubt is None else [doubt]), *other_doubts),
         remarks=tuple(remarks),
     )
+
+
+def _moving(clip: Clip, observation: Observation, cuts: Sequence[Cut], remarks: list[str]) -> Clip:
+    """The clip with `starts_moving`, where nobody lets the object go in what is left of it.
+
+    On a ramp with a table whoever moves at first was perhaps pushed, which is an effect: it is said
+    and not assumed.
+    """
+    if any(each.why == HELD for each in cuts):
+        return clip.model_copy(update={"starts_moving": True})
+    scenario = SCENARIOS[clip.scenario]
+    if clip.starts_moving is not None or "starts_moving" not in scenario.keys:
+        return clip
+    found = start_speed(on_ramp(observation) if scenario.has_table else observation)
+    if found is None:
+        return clip
+    how_fast = f", at {found.mean_m_s:.3g} +- {found.sd_m_s:.1g} m/s" if clip.is_scale_known else ""
+    what_then = (
+        "declare `starts_moving: true` if it was let go before, or try the effect initial_push"
+        if scenario.has_table
+        else "its speed there is inferred (`starts_moving: false` if it is at rest there)"
+    )
+    name = clip.objects[0].name
+    remarks.append(
+        f"{clip.path}: {name} moves already in the first frame that is used{how_fast}; {what_then}"
+    )
+    return clip if scenario.has_table else clip.model_copy(update={"starts_moving": True})
 
 
 def observed(clip: Clip) -> tuple[Observation, Track | None]:

@@ -23,6 +23,7 @@ from jaxtyping import Float
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.model import Model
+from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.event_loop import recorded, step_by_events
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
@@ -233,10 +234,10 @@ class EnginePendulum(EngineJax):
 
     roll_out = staticmethod(roll_out)
 
-    def __init__(self, model: Model):
+    def __init__(self, model: Model, laws: ActingLaws | None = None):
         """Raises `InputError` for a track in space."""
         if model.scene.surroundings.num_axes != 2:
             raise InputError(
                 "scenario pendulum: a track in the plane (x, y) expected, not in space"
             )
-        super().__init__(model)
+        super().__init__(model, laws)
