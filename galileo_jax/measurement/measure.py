@@ -12,6 +12,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.measurement.astray import Astray, find_astray, without_astray
+from galileo_jax.measurement.average_rows import with_rows_averaged
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.coding_errors import with_coding_errors
@@ -119,6 +120,9 @@ def measure(clip: Clip) -> Measurement:
         remarks.extend(f"{clip.path}: {line}" for line in said)
     elif pixels is None and clip.scenario == "flight":
         observation, said = with_errors_of_clock(observation)
+        remarks.extend(f"{clip.path}: {line}" for line in said)
+    if pixels is None:
+        observation, said = with_rows_averaged(observation)
         remarks.extend(f"{clip.path}: {line}" for line in said)
     other_doubts = (
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
