@@ -128,11 +128,10 @@ class Fit:
             seen = problem.observation
             predicted = problem.simulate(self.problem.of_clip(theta, c))
             white = problem.tracking_errors(predicted).reshape(predicted.shape)
+            fitted = predicted + seen.offset_m(predicted)[..., None]
             for k, name in enumerate(seen.names):
                 is_seen = seen.mask[k]
-                left = np.where(is_seen, seen.position_m[k] - predicted[k], np.nan)
-                if is_seen.any():
-                    left -= np.nanmedian(left, axis=-1, keepdims=True)
+                left = np.where(is_seen, seen.position_m[k] - fitted[k], np.nan)
                 columns: dict[str, Any] = {"clip": problem.name, "object": name}
                 columns["time_s"] = seen.times_s
                 columns |= {f"{axis}_m": left[i] for i, axis in enumerate("xy")}
@@ -317,6 +316,10 @@ def make_fit(
         notes={**notes, **inferred(measurements)},
     )
     result = with_track_doubts(measurements, result)
+    for key in ("frames_used", "frames"):
+        result["error"][key] = sum(getattr(one, key) for one in measurements)
+    if scarce := [one.no_verdict for one in measurements if one.no_verdict]:
+        result["no_verdict"] = "; ".join(scarce)
     friction = result["parameters"].get("k1", {}).get("mean")
     if exact := [text for one in measurements if (text := taken_as_exact(one, friction))]:
         result["taken_as_exact"] = exact

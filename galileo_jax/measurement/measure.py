@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
@@ -37,6 +39,9 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
 
+LEAST_FRAMES, LEAST_SHARE = 8, 0.5
+"""Of a clip, that tell whether a model describes it."""
+
 
 @dataclass(frozen=True)
 class Measurement:
@@ -52,6 +57,8 @@ class Measurement:
       astray: objects whose tracks are not to be believed to their ends.
       doubts: of what is declared and of tracks gone astray, one line each; results repeat them.
       remarks: what was inferred or left out, one line each.
+      frames_used, frames: in how many an object is seen and used, and how many the clip has.
+      frames_of_scene: of these, how many no cut leaves out.
     """
 
     clip: Clip
@@ -63,6 +70,20 @@ class Measurement:
     astray: tuple[Astray, ...] = ()
     doubts: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    frames_used: int = 0
+    frames: int = 0
+    frames_of_scene: int = 0
+
+    @property
+    def no_verdict(self) -> str | None:
+        """Why nothing can be said of whether a model describes the clip; None where it can."""
+        used, least = self.frames_used, max(LEAST_FRAMES, LEAST_SHARE * self.frames_of_scene)
+        if used >= least or not self.frames:
+            return None
+        return (
+            f"{self.clip.path}: no verdict: only {used} of {self.frames} frames are used; at least "
+            f"{LEAST_FRAMES}, and half of those that no cut leaves out, are needed"
+        )
 
     @property
     def name(self) -> str:
@@ -121,6 +142,7 @@ def measure(clip: Clip) -> Measurement:
     elif pixels is None and clip.scenario == "flight":
         observation, said = with_errors_of_clock(observation)
         remarks.extend(f"{clip.path}: {line}" for line in said)
+    frames_used = int(observation.mask.any(axis=0).sum())
     if pixels is None:
         observation, said = with_rows_averaged(observation)
         remarks.extend(f"{clip.path}: {line}" for line in said)
@@ -136,7 +158,18 @@ def measure(clip: Clip) -> Measurement:
         astray=astray,
         doubts=(*([] if doubt is None else [doubt]), *other_doubts),
         remarks=tuple(remarks),
+        frames_used=frames_used,
+        frames=len(measured.whole.times_s),
+        frames_of_scene=_between(measured.whole.times_s, cuts),
     )
+
+
+def _between(times_s: np.ndarray, cuts: Sequence[Cut]) -> int:
+    """How many frames no cut leaves out."""
+    is_there = np.ones(len(times_s), bool)
+    for each in cuts:
+        is_there &= times_s >= each.time_s if each.side == "before" else times_s <= each.time_s
+    return int(is_there.sum())
 
 
 def _moving(clip: Clip, observation: Observation, cuts: Sequence[Cut], remarks: list[str]) -> Clip:

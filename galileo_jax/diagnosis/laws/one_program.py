@@ -190,6 +190,10 @@ class Spare(Effect):
 
     name: ClassVar[str] = "spare"
 
+    def identity(self) -> tuple[Any, ...]:
+        """The class: its attributes reach hooks as parameters."""
+        return (type(self),)
+
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """As many as are wanted."""
         prior = Normal(0.0, 1.0)
