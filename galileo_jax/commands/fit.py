@@ -70,13 +70,13 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
     for name, entry in shown.items():
         unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
         interval = f"[{entry['q025']:.4g}, {entry['q975']:.4g}]{unit}"
-        known = "" if entry["identified"] else "   not determined by this clip"
+        true = f"{truth[name]:.4g}" if name in truth else ""
+        known = f"{entry['mean']:>10.4g}{entry['sd']:>10.2g}   {interval}"
         if f"{name}{SUFFIX}" in result["derived"]:
             known = "   not determined by this clip: only per mass, below"
-        true = f"{truth[name]:.4g}" if name in truth else ""
-        lines.append(
-            f"{name:<18}{true:>10}{entry['mean']:>10.4g}{entry['sd']:>10.2g}   {interval}{known}"
-        )
+        elif not entry["identified"]:
+            known = f"   not determined by this clip: anything in {interval}"
+        lines.append(f"{name:<18}{true:>10}{known}")
     error = result["error"]
     lines.append(
         f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "

@@ -71,7 +71,7 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     if clip.scenario in ("fall", "flight"):
         found = _largest(_accelerations(times, -y))
         return None if found is None else ApparentGravity(found)
-    if not scenario.has_ramp or clip.ramp_angle_deg is None or times.size < MIN_POINTS:
+    if not scenario.has_ramp or not clip.ramp_angle_deg or times.size < MIN_POINTS:
         return None
     angle = math.radians(clip.ramp_angle_deg)
     along = x * math.cos(angle) - y * math.sin(angle)

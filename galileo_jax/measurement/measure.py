@@ -32,6 +32,7 @@ from galileo_jax.measurement.infer_radii import (
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
+from galileo_jax.measurement.path_direction import OtherWay, other_way, turned_back, way_text
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.measurement.turning import with_turning
 from galileo_jax.measurement.wander_size import with_wander
@@ -57,6 +58,7 @@ class Measurement:
       astray: objects whose tracks are not to be believed to their ends.
       doubts: of what is declared and of tracks gone astray, one line each; results repeat them.
       remarks: what was inferred or left out, one line each.
+      way: of object 1, where its path says another than is declared.
       frames_used, frames: in how many an object is seen and used, and how many the clip has.
       frames_of_scene: of these, how many no cut leaves out.
     """
@@ -70,6 +72,7 @@ class Measurement:
     astray: tuple[Astray, ...] = ()
     doubts: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    way: OtherWay | None = None
     frames_used: int = 0
     frames: int = 0
     frames_of_scene: int = 0
@@ -117,11 +120,7 @@ def measure(clip: Clip) -> Measurement:
     if needs_foot(clip):
         clip = _with_foot(clip, remarks)
         found["origin_px"] = {"mean": list(clip.origin_px or ()), "sd": _foot_sd_px(clip)}
-    if needs_slope(clip):
-        measured = _with_slope(clip, remarks)
-    else:
-        whole, pixels = observed(clip)
-        measured = Measurement(clip, whole, whole, pixels)
+    measured = _with_slope(clip, remarks) if needs_slope(clip) else _on_its_way(clip)
     measured = _with_pucks(measured, remarks) if is_level(clip) else measured
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
     pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
@@ -150,18 +149,28 @@ def measure(clip: Clip) -> Measurement:
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
         for one in astray
     )
+    way = [] if measured.way is None else [f"{clip.path}: {way_text(clip, measured.way)}"]
     return replace(
         measured,
         observation=observation,
         inferred={**found, **measured.inferred},
         cuts=cuts,
         astray=astray,
-        doubts=(*([] if doubt is None else [doubt]), *other_doubts),
+        doubts=(*way, *([] if doubt is None else [doubt]), *other_doubts),
         remarks=tuple(remarks),
         frames_used=frames_used,
         frames=len(measured.whole.times_s),
         frames_of_scene=_between(measured.whole.times_s, cuts),
     )
+
+
+def _on_its_way(clip: Clip) -> Measurement:
+    """A measurement whose points are turned, if need be, to where the clip says that they go."""
+    whole, pixels = observed(clip)
+    way = other_way(clip, cut(clip, whole)[0], may_turn=pixels is None)
+    if way is not None and way.is_turned_back:
+        whole = turned_back(clip, whole, way)
+    return Measurement(clip, whole, whole, pixels, way=way)
 
 
 def _between(times_s: np.ndarray, cuts: Sequence[Cut]) -> int:
