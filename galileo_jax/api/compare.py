@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,8 +61,8 @@ class Comparison:
         return self.found.is_adequate
 
     @property
-    def error(self) -> Mapping[str, float]:
-        """`rmse, noise, l1, l2` of velocities, m/s, and `chi2_per_dof`."""
+    def error(self) -> Mapping[str, float | None]:
+        """`rmse, noise, l1, l2` of velocities, m/s, `chi2_per_dof`, `rms_mm` and its share."""
         return self.found.error
 
     @property
@@ -216,6 +216,7 @@ def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
             raise InputError(f"{fit.result['clips'][0]}: {gradient.code}")
     progress.report("comparing with replicates of the fitted model", 0.3)
     found = compare_fit(fit.problem, gradient, seed)
+    found = replace(found, no_verdict=fit.result.get("no_verdict"))
     document: dict[str, Any] = {
         "clips": list(fit.result["clips"]),
         TRACKS: [digest(problem.observation) for problem in fit.problem.problems],

@@ -342,6 +342,8 @@ def diagnose(
             measured, track_s = as_measurements(
                 tracks, pixels_per_metre, lambda clips: _compile_beside(clips, engine)
             )
+        if scarce := [one.no_verdict for one in measured if one.no_verdict]:
+            raise InputError(scarce[0])
         command = command_line(
             "diagnose",
             [one.clip.source for one in measured],

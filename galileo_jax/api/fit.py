@@ -279,7 +279,7 @@ def _fitted(
     notes |= extra | {"motion": options.motion}
     said: list[str | None] = []
     if gradient is not None and options.method != "mh":
-        said = [two_solutions(problem, gradient), uncertain_width(posterior)]
+        said = [two_solutions(problem, gradient, posterior.flat()), uncertain_width(posterior)]
     if options.motion == "planar" and any(item.z_m for clip in clips for item in clip.objects):
         said.append(OFF_THE_PLANE)
     if told := [line for line in said if line is not None]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from galileo_jax.api.motion import Motion, motions_at, replaced
-from galileo_jax.api.track_doubts import taken_as_exact, with_track_doubts
+from galileo_jax.api.track_doubts import taken_as_exact, with_other_angle, with_track_doubts
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
@@ -128,11 +128,10 @@ class Fit:
             seen = problem.observation
             predicted = problem.simulate(self.problem.of_clip(theta, c))
             white = problem.tracking_errors(predicted).reshape(predicted.shape)
+            fitted = predicted + seen.offset_m(predicted)[..., None]
             for k, name in enumerate(seen.names):
                 is_seen = seen.mask[k]
-                left = np.where(is_seen, seen.position_m[k] - predicted[k], np.nan)
-                if is_seen.any():
-                    left -= np.nanmedian(left, axis=-1, keepdims=True)
+                left = np.where(is_seen, seen.position_m[k] - fitted[k], np.nan)
                 columns: dict[str, Any] = {"clip": problem.name, "object": name}
                 columns["time_s"] = seen.times_s
                 columns |= {f"{axis}_m": left[i] for i, axis in enumerate("xy")}
@@ -317,7 +316,18 @@ def make_fit(
         notes={**notes, **inferred(measurements)},
     )
     result = with_track_doubts(measurements, result)
+    if any(one.clip.is_scale_assumed for one in measurements):
+        # Lengths are in units of something in the picture: only decelerations in these are known.
+        for name, entry in result["parameters"].items():
+            is_friction = re.fullmatch(r"k\d+", name) is not None
+            entry["identified"] = entry["identified"] and not is_friction
+    for key in ("frames_used", "frames"):
+        result["error"][key] = sum(getattr(one, key) for one in measurements)
+    if scarce := [one.no_verdict for one in measurements if one.no_verdict]:
+        result["no_verdict"] = "; ".join(scarce)
     friction = result["parameters"].get("k1", {}).get("mean")
+    if others := [text for one in measurements if (text := with_other_angle(one, friction))]:
+        result["warnings"] = [*result.get("warnings", []), *others]
     if exact := [text for one in measurements if (text := taken_as_exact(one, friction))]:
         result["taken_as_exact"] = exact
     return Fit(measurements, problem, posterior, result, z_best, gradient)

@@ -102,10 +102,7 @@ def _motion(problem: Problem, clip: Clip, theta: np.ndarray, best: np.ndarray) -
     white = problem.tracking_errors(predicted).reshape(predicted.shape)
     shown = seen.mask[:, None]
     measured = np.where(shown, seen.position_m, np.nan)
-    offset = np.zeros((len(seen.names), 2, 1))
-    for i, is_seen in enumerate(seen.mask):
-        if is_seen.any():
-            offset[i, :, 0] = np.nanmedian(measured[i] - fitted[i], axis=1)
+    offset = seen.offset_m(fitted)[..., None]
     variance = np.stack([seen.covariance_m2[:, axis, axis] for axis in (0, 1)], axis=1)
     turned = pitch(np.nan_to_num(predicted.transpose(2, 0, 1)), scene.surroundings).T
     scale = clip.pixels_per_metre or NOMINAL_SCALE_PX_PER_M

@@ -80,9 +80,10 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
     if clip.video is None:
         return None
     exact = []
-    if scenario.has_ramp and not clip.ramp_angle_sd_deg:
+    if scenario.has_ramp and scenario.angle_deg is None and not clip.ramp_angle_sd_deg:
         exact.append("ramp_angle_deg")
-    if clip.pixels_per_metre is not None and clip.pixels_per_metre_sd is None:
+    is_told = clip.pixels_per_metre is not None and not clip.is_scale_assumed
+    if is_told and clip.pixels_per_metre_sd is None and "pixels_per_metre" not in measured.inferred:
         exact.append("pixels_per_metre")
     if not exact:
         return None
@@ -99,6 +100,26 @@ def taken_as_exact(measured: Measurement, k1: float | None) -> str | None:
         f"{text}. If {they_were} read off the picture, half a pixel at either end of a line as "
         f"long as object 1's way down the ramp ({way_px:.0f} px) would change k1 by {by}: declare "
         f"{keys} to include that in its interval"
+    )
+
+
+def with_other_angle(measured: Measurement, k1: float | None) -> str | None:
+    """What k1 would be if the path's angle were the board's; None where they are the same.
+
+    The acceleration g (sin a - k1 cos a) is what was seen.
+    """
+    way, clip = measured.way, measured.clip
+    if way is None or k1 is None or not SCENARIOS[clip.scenario].has_ramp:
+        return None
+    used, other = math.radians(way.declared_deg), math.radians(way.path_deg)
+    seen = math.sin(used) - k1 * math.cos(used)
+    friction = math.tan(other) - seen / math.cos(other)
+    if friction < 0:
+        return None
+    name = clip.objects[0].name
+    return (
+        f"{clip.path}: if the board falls by {way.path_deg:.1f} degrees, as {name}'s path does, k1 "
+        f"is {friction:.3f}"
     )
 
 

@@ -21,14 +21,15 @@ INTO_WALL = 0.25
 def check_objects(file: ClipFile, fail: Any) -> None:
     """What takes several values of the yaml to judge."""
     scenario = SCENARIOS[file.scenario]
-    if scenario.has_ramp and "ramp_angle_deg" not in file.model_fields_set:
+    is_given = scenario.angle_deg is not None
+    if scenario.has_ramp and not is_given and "ramp_angle_deg" not in file.model_fields_set:
         fail(
             "ramp_angle_deg",
             f"missing; scenario {file.scenario} needs it, in degrees, or null where it is to be "
             "found from the path",
         )
     is_alone = scenario.num_objects[1] == 1  # several objects may slide beside a ramp
-    if is_alone and not scenario.has_ramp and file.ramp_angle_deg is not None:
+    if is_alone and (is_given or not scenario.has_ramp) and file.ramp_angle_deg is not None:
         fail(
             "ramp_angle_deg",
             f"{file.ramp_angle_deg:g} given; scenario {file.scenario} ({scenario.meaning}) has no "

@@ -10,6 +10,7 @@ from galileo_jax.clip.checks import check_against_source, check_camera, check_fr
 from galileo_jax.clip.declaration import Declaration
 from galileo_jax.clip.fields import short
 from galileo_jax.clip.picture_plane import scale_of_rectangle
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.schema_errors import first_problem, unknown_key
 from galileo_jax.clip.sources import source_of
@@ -181,6 +182,8 @@ def check_clip(
     found = _observed(path, file, read) if read else _filmed(path, file)
     check_camera(file, fail)
     clip = Clip.model_validate({**dict(file), "path": path, **found})
+    if (angle_deg := SCENARIOS[clip.scenario].angle_deg) is not None:
+        clip = clip.model_copy(update={"ramp_angle_deg": angle_deg})
     if clip.rectangle is not None:
         clip = clip.model_copy(update={"pixels_per_metre": scale_of_rectangle(clip)})
     check_against_source(clip, read.observation if read else None, fail)

@@ -98,9 +98,9 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
     in_pixels = clip.track is None or clip.track_units == "px"
     pixel_m = 1 / clip.pixels_per_metre if clip.pixels_per_metre and in_pixels else 0.0
     has_origin = not in_pixels or clip.origin_px is not None
-    is_on_ramp = (
-        SCENARIOS[clip.scenario].has_ramp and has_origin and clip.ramp_angle_deg is not None
-    )
+    scenario = SCENARIOS[clip.scenario]
+    is_on_ramp = scenario.has_ramp and scenario.angle_deg is None and has_origin
+    is_on_ramp &= clip.ramp_angle_deg is not None
     if clip.is_own_track:
         mend, mend_pair = MEND_OWN_CSV, "correct size_m or the csv's columns"
     elif in_pixels:
@@ -114,7 +114,7 @@ def find_misplacement(clip: Clip, centres_m: dict[str, np.ndarray]) -> tuple[str
         if item.size_m is not None and item.name in centres_m
     ]
     if is_on_ramp:
-        has_table = clip.scenario != "incline"
+        has_table = scenario.has_table
         for index, _, outline in placed:
             problem = _against_surfaces(outline, angle, has_table, pixel_m)
             if problem:

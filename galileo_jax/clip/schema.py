@@ -137,7 +137,7 @@ class ClipFile(BaseModel):
     gravity: Gravity = 9.81
     vertical_sd_deg: AngleSd = 0.0
     launch_angle_deg: Annotated[Number, Field(gt=-90, lt=90)] | None = None
-    starts_moving: Annotated[bool, Field(strict=True)] = False
+    starts_moving: Annotated[bool, Field(strict=True)] | None = None
     floor: Floor = None
     liquid_density: LiquidDensity | None = None
     thread_m: Thread | None = None
@@ -179,7 +179,8 @@ class Clip(ClipFile):
         standard deviation); 0 = taken at its word.
       launch_angle_deg: flight: at which a launcher is set, over the horizontal; None = not known,
         or thrown by hand.
-      starts_moving: incline: the object moves already in the first frame that is used.
+      starts_moving: incline, fall: the object moves already in the first frame that is used; None
+        = found from its path.
       floor: fall, flight: its height over the origin, m; true = there is one, at a height to be
         inferred; None or false = none is reached.
       liquid_density: liquid: kg/m^3; None = not known.

@@ -72,23 +72,34 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
         unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
         mean, sd, low, high = (shown(entry, key) for key in ("mean", "sd", "q025", "q975"))
         interval = f"[{low}, {high}]{unit}"
-        known = "" if entry["identified"] else "   not determined by this clip"
+        true = f"{truth[name]:.4g}" if name in truth else ""
+        known = f"{mean:>10}{sd:>10}   {interval}"
         if f"{name}{SUFFIX}" in result["derived"]:
             known = "   not determined by this clip: only per mass, below"
-        true = f"{truth[name]:.4g}" if name in truth else ""
-        lines.append(f"{name:<18}{true:>10}{mean:>10}{sd:>10}   {interval}{known}")
+        elif not entry["identified"]:
+            known = f"   not determined by this clip: anything in {interval}"
+        lines.append(f"{name:<18}{true:>10}{known}")
     error = result["error"]
     lines.append(
         f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
         f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}); {result['status']}"
     )
-    from galileo_jax.report.fit_text import CHI2_HIGH
+    from galileo_jax.report.fit_text import CHI2_BAD, CHI2_HIGH, distance
 
-    if not error["chi2_per_dof"] <= CHI2_HIGH:
+    if near := distance(error):
+        lines.append(f"the fit is {near}")
+    words = shlex.join(result["clips"])
+    if "no_verdict" in result:
+        lines.append(result["no_verdict"])
+    elif not error["chi2_per_dof"] <= CHI2_BAD:
         lines.append(
             "The model does not describe the data: do not trust its parameters. See where it "
-            f"fails: galileo compare {shlex.join(result['clips'])}; find what is missing: "
-            f"galileo diagnose {shlex.join(result['clips'])}"
+            f"fails: galileo compare {words}; find what is missing: galileo diagnose {words}"
+        )
+    elif error["chi2_per_dof"] > CHI2_HIGH:
+        lines.append(
+            "There is more noise than stated, or the model lacks an effect. See which: galileo "
+            f"compare {words}"
         )
     return "\n".join(lines)
 

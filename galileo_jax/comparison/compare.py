@@ -15,6 +15,7 @@ A nuisance parameter that lies many prior standard deviations from its prior mea
 failure, because the residuals no longer show that misfit.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,16 +93,18 @@ class Comparison:
       noise_scale: of each clip, the errors' size over what is stated, as fitted.
       is_noise_misstated: the residuals contradict the stated noise at the most: they look like
         noise of `noise_scale`, and no tracker is so wrong about its own.
+      no_verdict: why too little was seen to tell whether it is adequate; None where enough was.
     """
 
     p_value: float
     where: tuple[Place, ...]
     pulls: tuple[Pull, ...]
-    error: dict[str, float]
+    error: Mapping[str, float | None]
     labels: tuple[np.ndarray, ...]
     white: tuple[np.ndarray, ...]
     noise_scale: tuple[float, ...]
     is_noise_misstated: bool
+    no_verdict: str | None = None
 
     @property
     def is_adequate(self) -> bool:

@@ -13,7 +13,8 @@ from galileo_jax.inference.result import PULLED_Z
 def comparison_document(comparison: Comparison) -> dict[str, Any]:
     """What the comparison says, for JSON: all cells, and the nuisances outside their priors."""
     return {
-        "adequate": comparison.is_adequate,
+        "adequate": comparison.is_adequate if comparison.no_verdict is None else None,
+        "no_verdict": comparison.no_verdict,
         "p_value": comparison.p_value,
         "noise_scale": list(comparison.noise_scale),
         "noise_misstated": comparison.is_noise_misstated,

@@ -111,15 +111,15 @@ def alike_or_matched(
       effects: the last effect of each candidate.
     """
     parameters = fitter.trials.model_parameters
-    at = {p.name: i for i, p in enumerate(parameters)}
-    shape = {n.removeprefix(leader): i for n, i in at.items() if n.startswith(f"{leader}_")}
+    shape = _shape(fitter.trials, leader)
     alike = z.copy()
     rows: list[int] = []
     for row, effect in enumerate(effects):
-        same = [(at[effect + end], i) for end, i in shape.items() if effect + end in at]
-        for own, its in same:
+        own = _shape(fitter.trials, effect)
+        same = [(own[end], i) for end, i in shape.items() if end in own]
+        for mine, its in same:
             value = in_units(parameters[its].prior, best.z[its])
-            alike[row, own] = parameters[own].prior.inverse(value)
+            alike[row, mine] = parameters[mine].prior.inverse(value)
         if same and np.all(np.isfinite(alike[row])):
             rows.append(row)
     if not rows:
@@ -130,6 +130,13 @@ def alike_or_matched(
     starts = z.copy()
     starts[rows] = np.where((costs < others)[:, None], alike[rows], z[rows])
     return starts
+
+
+def _shape(trials: JointProblem, effect: str) -> dict[str, int]:
+    """Where an effect's parameters stand beside its strength, by how their names end."""
+    named = {trials.model_parameters[i].name: int(i) for i in trials.brought_by(effect)}
+    start = f"{effect}_"
+    return {n.removeprefix(effect): i for n, i in named.items() if n.startswith(start)}
 
 
 def best_strengths(

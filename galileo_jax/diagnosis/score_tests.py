@@ -66,8 +66,7 @@ def best_gains(
 
 def strength_of(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:
     """Where an effect's strengths stand (one per clip, or one), and a small one."""
-    names = [p.name for p in trials.model_parameters]
-    where = [i for i, n in enumerate(names) if n == effect or n.startswith(f"{effect}_")]
+    where = trials.brought_by(effect)
     first = trials.model_parameters[where[0]]
     own = [i for i in where if trials.model_parameters[i].prior == first.prior]
     is_signed = in_units(first.prior, -1.0) < first.absent

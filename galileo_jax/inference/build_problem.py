@@ -18,6 +18,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
 LONGER = 1.15  # an effect may run the clock faster: the frame rate's does
+RELEASE_SDS = 6.0  # of the release's prior: no search goes further
 
 
 def noise_of(clip: Clip, scene: Surroundings) -> NoiseModel:
@@ -62,16 +63,22 @@ def make_problem(
                 "whose own laws do the same"
             )
     scene = build_scene(clip, observation)
-    margin = LONGER if effects else 1.0
     model = Model(
         scene,
-        margin * float(observation.times_s[-1]),
+        _duration_s(scene.surroundings, observation, LONGER if effects else 1.0),
         effects,
         LAWS + make_free_quantities(free) + NUISANCES,
         motion=motion,
     )
     noise = noise or noise_of(clip, scene.surroundings)
     return Problem(observation, model, make_engine(engine, model), clip.path.stem, noise)
+
+
+def _duration_s(scene: Surroundings, observation: Observation, margin: float) -> float:
+    """From the earliest release that may be to the last frame: no data lie behind a rollout."""
+    release_s, sd_s = scene.release_s
+    earliest_s = 0.0 if scene.starts_moving else min(0.0, release_s - RELEASE_SDS * sd_s)
+    return margin * (float(observation.times_s[-1]) - earliest_s)
 
 
 def make_joint_problem(

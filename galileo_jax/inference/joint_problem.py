@@ -129,6 +129,17 @@ class JointProblem:
         absent = [known[name] for name in known if name not in effects]
         return ~is_given & ~brought[absent].any(axis=0)
 
+    def brought_by(self, effect: str) -> np.ndarray:
+        """Where the parameters of one of the models' effects stand, its strengths first: indices.
+
+        Raises:
+          ValueError: the models have no effect of that name.
+        """
+        known, brought, _ = self._brought
+        if effect not in known:
+            raise ValueError(f"effects not in the model: {effect}; there: {sorted(known)}")
+        return np.flatnonzero(brought[known[effect]])
+
     @cached_property
     def _brought(self) -> tuple[dict[str, int], np.ndarray, np.ndarray]:
         """What each effect brings.

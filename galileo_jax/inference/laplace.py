@@ -40,10 +40,11 @@ def laplace_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Post
     )
 
 
-def two_solutions(trials: JointProblem, fit: GradientFit) -> str | None:
+def two_solutions(trials: JointProblem, fit: GradientFit, draws: np.ndarray) -> str | None:
     """One line where several valleys share the posterior: what differs most; None where one has it.
 
-    That is counted in standard deviations of the more certain of both.
+    That is counted in standard deviations of the more certain of both; `draws` `[draw, parameter]`
+    are the posterior's.
     """
     if not fit.beside:
         return None
@@ -58,9 +59,12 @@ def two_solutions(trials: JointProblem, fit: GradientFit) -> str | None:
     told = " or ".join(
         f"{value:.3g} ({share:.0%})" for value, share in zip(values, shares(fit), strict=True)
     )
+    low, high = np.quantile(draws[:, i], [0.025, 0.975])
+    inside = sum(low <= value <= high for value in values)
+    contains = "contain them all" if inside == len(every) else f"contain {inside} of them"
     return (
         f"{len(every)} solutions explain the clip about equally well: {trials.names[i]} {told}; "
-        "the intervals contain them all"
+        f"the intervals {contains}"
     )
 
 

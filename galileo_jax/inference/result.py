@@ -3,6 +3,7 @@
 The keys are listed in docs/reference/result_files.md.
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -46,7 +47,7 @@ PULLED_Z = 3.0  # of a nuisance's prior standard deviations; one in four hundred
 
 def velocity_error(
     problems: Sequence[Problem], predicted_m: Sequence[np.ndarray]
-) -> dict[str, float]:
+) -> dict[str, float | None]:
     """How far predicted and measured velocity profiles are apart, m/s.
 
     Args:
@@ -81,10 +82,43 @@ def velocity_error(
     }
 
 
+def distance_error(
+    problems: Sequence[Problem], predicted_m: Sequence[np.ndarray]
+) -> dict[str, float | None]:
+    """How far the points that were followed are from where the fit has them.
+
+    Args:
+      problems: with the observations.
+      predicted_m: of each clip `[object, axis, frame]`, the fitted centres.
+
+    Returns:
+      rms_mm: the root mean square of that distance, of all objects and frames, mm; None where
+      nobody knows how long a metre is. rms_percent_of_way: the same in per cent of the longest
+      way between two places of an object; None where nothing moves.
+    """
+    squares, way_m = [np.zeros(0)], 0.0
+    for problem, predicted in zip(problems, predicted_m, strict=True):
+        seen = problem.observation
+        axes = 2 if seen.is_turning else predicted.shape[1]
+        fitted = predicted + seen.offset_m(predicted)[..., None]
+        for mask, place, own in zip(seen.mask, seen.position_m, fitted, strict=True):
+            if mask.any():
+                place, own = place[:axes, mask], own[:axes, mask]
+                squares.append(np.sum((place - own) ** 2, axis=0))
+                way_m = max(way_m, float(np.linalg.norm(np.ptp(own, axis=1))))
+    every = np.concatenate(squares)
+    rms_m = float(np.sqrt(np.mean(every))) if every.size else math.nan
+    is_known = all(p.model.scene.surroundings.is_scale_known for p in problems)
+    return {
+        "rms_mm": 1e3 * rms_m if is_known and math.isfinite(rms_m) else None,
+        "rms_percent_of_way": 100 * rms_m / way_m if way_m > rms_m else None,
+    }
+
+
 def error_of(
     trials: JointProblem, theta: np.ndarray, num_fitted: float, pull: float = 0.0
-) -> dict[str, float]:
-    """`velocity_error` and chi2 per degree of freedom at parameters `theta` `[parameter]`.
+) -> dict[str, float | None]:
+    """Errors of places and velocities, and chi2 per degree of freedom, at `theta` `[parameter]`.
 
     The same in result.json, compare.json and diagnosis.json: what the model leaves over, in
     units of the noise that the tracker states, which is the same for every model of a track.
@@ -102,6 +136,7 @@ def error_of(
         count += float(GaussianLikelihood.degrees(1.0, problem.data))
         predictions.append(predicted)
     error = velocity_error(trials.problems, predictions)
+    error |= distance_error(trials.problems, predictions)
     error["chi2_per_dof"] = chi2 / max(count - num_fitted, 1.0)
     return error
 
@@ -233,7 +268,8 @@ def make_result(
     elif not table["parameters"].get("pixels_per_metre", {}).get("identified", True):
         # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.
         for name, entry in table["parameters"].items():
-            entry["identified"] = entry["identified"] and not name.startswith("k")
+            is_friction = re.fullmatch(r"k\d+", name) is not None
+            entry["identified"] = entry["identified"] and not is_friction
         unscaled = SCALE_WARNING if has_surface else FREE_SCALE_WARNING
         said = [*notes.get("warnings", []), unscaled]
         notes = notes | {"warnings": list(dict.fromkeys(said))}

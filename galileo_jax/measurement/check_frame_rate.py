@@ -21,6 +21,8 @@ from galileo_jax.observation.observation import Observation
 LEAST_FACTOR = 1.6  # of the frame rate, that is reported; half the friction or rolling gives 1.4
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
 COMMON_FPS = (24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
+PER_METRE = {"ft": 3.2808, "in": 39.370, "cm": 100.0, "mm": 1000.0}
+NEAR_UNIT = 1.06  # what gravity may be off by where a unit was mistaken
 WINDOWS, MIN_POINTS = 5, 5  # of a stretch; points in each, to tell an acceleration
 BEND_M = 0.05  # past the foot on either side, in which an object turns
 LEAST_WAY_M = 0.03  # on the table, to tell how it slows down
@@ -48,12 +50,13 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
     factor = math.sqrt(clip.gravity / found.value)  # of the true rate over the declared one
     if max(factor, 1 / factor) < LEAST_FACTOR or (found.is_least and factor > 1):
         return None
-    wanted = clip.fps * factor
-    likely = _likely(wanted, clip.container_fps, found.is_least)
+    likely = _likely_unit(clip, found) or _likely(
+        clip.fps * factor, clip.container_fps, found.is_least
+    )
     name, more = observation.names[0], "at least " if found.is_least else ""
     doubt = (
         f"{clip.path}: fps: {clip.fps:g}, but from {name}'s path gravity would be {more}"
-        f"{found.value:.2g} m/s^2, not {clip.gravity:g}; likely {likely}"
+        f"{found.value:.2g} m/s^2, not {clip.gravity:g}; {likely}"
     )
     if clip.pixels_per_metre is not None:
         scale = clip.pixels_per_metre * found.value / clip.gravity
@@ -71,7 +74,7 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     if clip.scenario in ("fall", "flight"):
         found = _largest(_accelerations(times, -y))
         return None if found is None else ApparentGravity(found)
-    if not scenario.has_ramp or clip.ramp_angle_deg is None or times.size < MIN_POINTS:
+    if not scenario.has_ramp or not clip.ramp_angle_deg or times.size < MIN_POINTS:
         return None
     angle = math.radians(clip.ramp_angle_deg)
     along = x * math.cos(angle) - y * math.sin(angle)
@@ -85,6 +88,21 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     return ApparentGravity((down + slowing * math.cos(angle)) / math.sin(angle))
 
 
+def _likely_unit(clip: Clip, found: ApparentGravity) -> str | None:
+    """The unit of length of another program's table in which gravity is what the path says."""
+    if clip.track is None or clip.is_own_track or clip.pixels_per_metre or found.is_least:
+        return None
+
+    def distance(unit: str) -> float:
+        return abs(math.log(found.value / (clip.gravity * PER_METRE[unit])))
+
+    unit = min(PER_METRE, key=distance)
+    if distance(unit) > math.log(NEAR_UNIT):
+        return None
+    value = found.value / PER_METRE[unit]
+    return f"likely track_units: {unit}, with which it would be {value:.3g} m/s^2"
+
+
 def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> str:
     """The rate that is meant: the container's or a common one, where one is near."""
 
@@ -94,11 +112,13 @@ def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> st
     # Friction makes the ramp's acceleration, and with it the true rate, smaller than that.
     near = math.log(NEAR * 2 if is_most else NEAR)
     if container_fps and distance(container_fps) < near:
-        return f"fps: {container_fps:.4g}, as the container says"
+        return f"likely fps: {container_fps:.4g}, as the container says"
     best = min(COMMON_FPS, key=distance)
     if is_most:
-        return f"fps: {best:g} or less"
-    return f"fps: {best:g}" if distance(best) < near else f"fps: about {wanted_fps:.2g}"
+        return f"likely fps: {best:g} or less"
+    if distance(best) < near:
+        return f"likely fps: {best:g}"
+    return "no usual rate explains that: check the unit of length, the axes and what was followed"
 
 
 def _accelerations(times_s: np.ndarray, values_m: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
 
     board without a table    from the rest after which it comes down, and from where the hand is
                              off; to a stop, a blow, or the rest after which it is carried away
+    level                    from where it gains no more speed; to a stop or a blow
     fall, flight             to a stop (fall) or a blow, unless a floor is declared
     toss                     to the first impact
     pendulum, spring, liquid from where it is let go, to a blow or a stop
@@ -26,7 +27,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.find_blow import blow_frame, goes_on
 from galileo_jax.measurement.find_bounce import bounce_frame
 from galileo_jax.measurement.find_fold import fold_frame
-from galileo_jax.measurement.find_hand import hand_frame
+from galileo_jax.measurement.find_hand import hand_frame, pushed_frame
 from galileo_jax.measurement.find_held import let_go_frame, standstill_frame
 from galileo_jax.measurement.find_placed import placed_frames
 from galileo_jax.measurement.find_rest import rest_frame
@@ -48,6 +49,8 @@ FOLDS = "turns aside and slides past what it pushes: their centres come closer t
 RETURNS = "comes back to the foot of the ramp, where its edge meets the slope"
 IS_HELD = "is held before that"
 HELD = "is moved by a hand before that: it accelerates differently from later"
+
+PUSHED = "is pushed by a hand before that: it gains speed on a level table"
 
 SWINGS = ("pendulum", "spring", "liquid")
 
@@ -85,7 +88,9 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
         return _of_pucks(clip, observation)
     if SCENARIOS[clip.scenario].has_table:
         return _of_a_ramp(clip, observation)
-    is_let_go = is_board(clip) and not clip.starts_moving
+    laws = SCENARIOS[clip.scenario].laws
+    why = HELD
+    is_let_go = is_board(clip) and not clip.starts_moving and "start_velocity" not in laws
     observation, cuts = _left_to_itself(observation) if is_let_go else (observation, [])
     swings = clip.scenario in SWINGS
     if swings and (first := let_go_frame(observation)) is not None:
@@ -101,20 +106,22 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
         if frame is not None
     ]
     if ends:
-        last, why = min(ends)
-        if why == STOPPED and goes_on(observation, last):
-            why = STRUCK
+        last, end = min(ends)
+        if end == STOPPED and goes_on(observation, last):
+            end = STRUCK
         # Of a video: the hit falls into an exposure, whose frame shows neither.
         last -= SMEARED_FRAMES if clip.video is not None else 0
         observation = _without(observation, slice(last + 1, None))
         cuts = [each for each in cuts if each.side == "before"]
-        cuts.append(Cut(observation.names[0], float(observation.times_s[last]), "after", why))
+        cuts.append(Cut(observation.names[0], float(observation.times_s[last]), "after", end))
     first = hand_frame(observation) if is_let_go else None
+    if is_board(clip) and SCENARIOS[clip.scenario].angle_deg == 0:
+        first, why = pushed_frame(observation), PUSHED
     if first is not None:
         observation = _without(observation, slice(None, first))
         time_s = float(observation.times_s[first])
         cuts = [each for each in cuts if each.side == "after"]
-        cuts.insert(0, Cut(observation.names[0], time_s, "before", HELD))
+        cuts.insert(0, Cut(observation.names[0], time_s, "before", why))
     return observation, tuple(cuts)
 
 

@@ -14,7 +14,8 @@ Medians are blind to a step or two. So when it was is told by two parabolas, one
 before the blow and one from the next on: that frame is taken with which they leave least, or the
 latest that leaves hardly more, for a frame of the blow itself lies on both. As errors may be larger
 in one direction than in another (along the way, where times are not known well), what they leave is
-the determinant of its scatter.
+the determinant of its scatter. A blow that lasts takes further frames: those that do not lie where
+the parabola of the frames before them goes on to.
 """
 
 import numpy as np
@@ -91,7 +92,26 @@ def last_before(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, 
         beside = np.concatenate([_beside(times[side], place[:, side]) for side in sides], axis=1)
         count = beside.shape[1]
         left[last] = count * np.linalg.slogdet(beside @ beside.T / count + floor)[1]
-    return max(last for last, cost in left.items() if cost <= min(left.values()) + AS_WELL)
+    last = max(last for last, cost in left.items() if cost <= min(left.values()) + AS_WELL)
+    for _ in range(SMEARED):
+        if _continues(times_s, place_m, variance, last):
+            break
+        last -= 1
+    return last
+
+
+def _continues(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, last: int) -> bool:
+    """Whether a frame lies where the parabola of those before it goes on to, `CLEAR` sd at most."""
+    own = slice(max(last - PARABOLA_FRAMES, 0), last)
+    since = times_s[own] - times_s[last]
+    if len(since) < FEWEST:
+        return True
+    design = np.vander(since, 3)
+    solution = np.linalg.lstsq(design, place_m[:, own].T, rcond=None)[0]
+    beside = place_m[:, own].T - design @ solution
+    scatter = np.sum(beside**2, axis=0) / max(len(since) - 3, 1)
+    known = np.maximum(scatter, variance[last]) * (1 + np.linalg.inv(design.T @ design)[2, 2])
+    return bool(np.all((place_m[:, last] - solution[2]) ** 2 <= CLEAR**2 * known))
 
 
 def _beside(times_s: np.ndarray, place_m: np.ndarray) -> np.ndarray:

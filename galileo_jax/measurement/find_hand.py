@@ -18,6 +18,7 @@ from galileo_jax.observation.observation import Observation
 HELD, PUSHED, CLEAR = 0.5, 2.0, 4.0
 WAY, EARLY = (0.15, 0.7), 0.2  # shares of the length of the way
 WINDOW_SHARE, FEWEST = 0.05, 6  # of the frames in motion; frames
+PUSHED_WAY = 0.5  # of the way on a level table
 MOST_SPREAD = 0.5  # of a_way within the way: what accelerates so unevenly has no usual way
 
 
@@ -50,6 +51,29 @@ def hand_frame(observation: Observation) -> int | None:
     if not is_held.any():
         return None
     return int(seen[starts[np.flatnonzero(is_held)[-1]] + size])
+
+
+def pushed_frame(observation: Observation) -> int | None:
+    """The first frame after a push on a level table; None where nothing pushes it at first.
+
+    It gains speed, by `CLEAR` standard deviations of its acceleration in a window, within the first
+    half of its way only: what gains speed for longer is pulled by something of the scene.
+    """
+    seen = np.flatnonzero(observation.mask[0])
+    if len(seen) < 4 * FEWEST:
+        return None
+    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
+    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
+    gone, length = _gone(place_m)
+    size = max(FEWEST, round(WINDOW_SHARE * len(seen)))
+    starts = np.arange(len(seen) - size + 1)
+    found = np.array([_acceleration(times_s, gone, int(i), size) for i in starts])
+    step_s = np.median(np.diff(times_s))
+    sd = np.sqrt(720 * np.median(variance) / size) / (size * step_s) ** 2
+    gains = np.flatnonzero(found > CLEAR * sd)
+    if not gains.size or gone[gains[-1] + size - 1] > PUSHED_WAY * length:
+        return None
+    return int(seen[min(gains[-1] + size, len(seen) - 1)])
 
 
 def _gone(place_m: np.ndarray) -> tuple[np.ndarray, float]:

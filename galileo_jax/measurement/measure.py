@@ -7,16 +7,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from galileo_jax.clip.picture_plane import picture_plane
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_files.read import read_track
 from galileo_jax.measurement.astray import Astray, find_astray, without_astray
+from galileo_jax.measurement.average_rows import with_rows_averaged
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.coding_errors import with_coding_errors
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.errors_in_time import with_errors_in_time
 from galileo_jax.measurement.errors_of_clock import with_errors_of_clock
+from galileo_jax.measurement.find_start_speed import on_ramp, start_speed
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_radii import (
     from_first_common_frame,
@@ -27,12 +32,16 @@ from galileo_jax.measurement.infer_radii import (
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
+from galileo_jax.measurement.path_direction import OtherWay, other_way, turned_back, way_text
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.measurement.turning import with_turning
 from galileo_jax.measurement.wander_size import with_wander
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
+
+LEAST_FRAMES, LEAST_SHARE = 8, 0.5
+"""Of a clip, that tell whether a model describes it."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +58,9 @@ class Measurement:
       astray: objects whose tracks are not to be believed to their ends.
       doubts: of what is declared and of tracks gone astray, one line each; results repeat them.
       remarks: what was inferred or left out, one line each.
+      way: of object 1, where its path says another than is declared.
+      frames_used, frames: in how many an object is seen and used, and how many the clip has.
+      frames_of_scene: of these, how many no cut leaves out.
     """
 
     clip: Clip
@@ -60,6 +72,21 @@ class Measurement:
     astray: tuple[Astray, ...] = ()
     doubts: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    way: OtherWay | None = None
+    frames_used: int = 0
+    frames: int = 0
+    frames_of_scene: int = 0
+
+    @property
+    def no_verdict(self) -> str | None:
+        """Why nothing can be said of whether a model describes the clip; None where it can."""
+        used, least = self.frames_used, max(LEAST_FRAMES, LEAST_SHARE * self.frames_of_scene)
+        if used >= least or not self.frames:
+            return None
+        return (
+            f"{self.clip.path}: no verdict: only {used} of {self.frames} frames are used; at least "
+            f"{LEAST_FRAMES}, and half of those that no cut leaves out, are needed"
+        )
 
     @property
     def name(self) -> str:
@@ -93,20 +120,13 @@ def measure(clip: Clip) -> Measurement:
     if needs_foot(clip):
         clip = _with_foot(clip, remarks)
         found["origin_px"] = {"mean": list(clip.origin_px or ()), "sd": _foot_sd_px(clip)}
-    if needs_slope(clip):
-        measured = _with_slope(clip, remarks)
-    else:
-        whole, pixels = observed(clip)
-        measured = Measurement(clip, whole, whole, pixels)
+    measured = _with_slope(clip, remarks) if needs_slope(clip) else _on_its_way(clip)
     measured = _with_pucks(measured, remarks) if is_level(clip) else measured
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
     pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
     observation, cuts = cut(measured.clip, measured.observation)
     remarks.extend(f"{clip.path}: {each}" for each in cuts)
-    if any(each.why == HELD for each in cuts):
-        # Nobody lets it go in what is left.
-        moving = measured.clip.model_copy(update={"starts_moving": True})
-        measured = replace(measured, clip=moving)
+    measured = replace(measured, clip=_moving(measured.clip, observation, cuts, remarks))
     astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
     observation = without_astray(to_last_cut(observation, cuts), astray)
     if is_level(measured.clip) or clip.scenario == "toss":
@@ -121,19 +141,71 @@ def measure(clip: Clip) -> Measurement:
     elif pixels is None and clip.scenario == "flight":
         observation, said = with_errors_of_clock(observation)
         remarks.extend(f"{clip.path}: {line}" for line in said)
+    frames_used = int(observation.mask.any(axis=0).sum())
+    if pixels is None:
+        observation, said = with_rows_averaged(observation)
+        remarks.extend(f"{clip.path}: {line}" for line in said)
     other_doubts = (
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
         for one in astray
     )
+    way = [] if measured.way is None else [f"{clip.path}: {way_text(clip, measured.way)}"]
     return replace(
         measured,
         observation=observation,
         inferred={**found, **measured.inferred},
         cuts=cuts,
         astray=astray,
-        doubts=(*([] if doubt is None else [doubt]), *other_doubts),
+        doubts=(*way, *([] if doubt is None else [doubt]), *other_doubts),
         remarks=tuple(remarks),
+        frames_used=frames_used,
+        frames=len(measured.whole.times_s),
+        frames_of_scene=_between(measured.whole.times_s, cuts),
     )
+
+
+def _on_its_way(clip: Clip) -> Measurement:
+    """A measurement whose points are turned, if need be, to where the clip says that they go."""
+    whole, pixels = observed(clip)
+    way = other_way(clip, cut(clip, whole)[0], may_turn=pixels is None)
+    if way is not None and way.is_turned_back:
+        whole = turned_back(clip, whole, way)
+    return Measurement(clip, whole, whole, pixels, way=way)
+
+
+def _between(times_s: np.ndarray, cuts: Sequence[Cut]) -> int:
+    """How many frames no cut leaves out."""
+    is_there = np.ones(len(times_s), bool)
+    for each in cuts:
+        is_there &= times_s >= each.time_s if each.side == "before" else times_s <= each.time_s
+    return int(is_there.sum())
+
+
+def _moving(clip: Clip, observation: Observation, cuts: Sequence[Cut], remarks: list[str]) -> Clip:
+    """The clip with `starts_moving`, where nobody lets the object go in what is left of it.
+
+    On a ramp with a table whoever moves at first was perhaps pushed, which is an effect: it is said
+    and not assumed.
+    """
+    if any(each.why == HELD for each in cuts):
+        return clip.model_copy(update={"starts_moving": True})
+    scenario = SCENARIOS[clip.scenario]
+    if clip.starts_moving is not None or "starts_moving" not in scenario.keys:
+        return clip
+    found = start_speed(on_ramp(observation) if scenario.has_table else observation)
+    if found is None:
+        return clip
+    how_fast = f", at {found.mean_m_s:.3g} +- {found.sd_m_s:.1g} m/s" if clip.is_scale_known else ""
+    what_then = (
+        "declare `starts_moving: true` if it was let go before, or try the effect initial_push"
+        if scenario.has_table
+        else "its speed there is inferred (`starts_moving: false` if it is at rest there)"
+    )
+    name = clip.objects[0].name
+    remarks.append(
+        f"{clip.path}: {name} moves already in the first frame that is used{how_fast}; {what_then}"
+    )
+    return clip if scenario.has_table else clip.model_copy(update={"starts_moving": True})
 
 
 def observed(clip: Clip) -> tuple[Observation, Track | None]:

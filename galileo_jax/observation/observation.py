@@ -62,6 +62,24 @@ class Observation:
         third = "turning" if self.is_turning else "z"
         return ("x", "y", third)[: self.position_m.shape[1]]
 
+    def offset_m(
+        self, predicted_m: Float[np.ndarray, "*batch object axis frame"]
+    ) -> Float[np.ndarray, "*batch object axis"]:
+        """How far the points followed are from the centres: the median of measured - predicted.
+
+        Args:
+          predicted_m: centres; with fewer axes than were measured, of the first of them.
+
+        Returns:
+          0 of an object that is never seen.
+        """
+        left = self.position_m[:, : predicted_m.shape[-2]] - predicted_m
+        found = np.zeros(left.shape[:-1])
+        for i, seen in enumerate(self.mask):
+            if seen.any():
+                found[..., i, :] = np.median(left[..., i, :, seen], axis=0)
+        return found
+
     @property
     def velocity_m_s(self) -> Float[np.ndarray, "object 2 frame-1"]:
         """The velocity profile `[object, 2, frame - 1]`, m/s (Galileo's comparison space)."""

@@ -63,11 +63,11 @@ def posterior_predictive(run: Run, seed: int) -> PosteriorPredictive:
     errors = problem.tracking_errors(shown).reshape(shown.shape)
     is_measured = np.broadcast_to(observation.mask[:, None], shown.shape)
     drawn = as_measured(problem.model, draws)
-    drawn = drawn + _offset(observation, drawn)[..., None]
+    drawn = drawn + observation.offset_m(drawn)[..., None]
     return PosteriorPredictive(
         observation=observation,
         position_m=drawn,
-        offset_m=_offset(observation, shown),
+        offset_m=observation.offset_m(shown),
         residuals=np.where(is_measured, errors, np.nan),
         phases=tuple(phases_of(labels, frames) for labels in phases(problem, best[0])),
         hits_s=_hits(centre, surroundings),
@@ -78,14 +78,3 @@ def _hits(motions: Motions, surroundings: Surroundings) -> tuple[float | None, .
     """When each object but the last hits the next in the first of the motions."""
     when = [float(hit_s(motions, surroundings, i)[0]) for i in range(len(surroundings.names) - 1)]
     return tuple(None if np.isnan(one) else one for one in when)
-
-
-def _offset(observation: Observation, predicted_m: np.ndarray) -> np.ndarray:
-    """Tracked points minus centres `[..., object, 2, frame]`, median over the frames."""
-    return np.stack(
-        [
-            np.median((observation.position_m[i] - predicted_m[..., i, :, :])[..., seen], axis=-1)
-            for i, seen in enumerate(observation.mask)
-        ],
-        axis=-2,
-    )

@@ -37,7 +37,7 @@ def animation(clip: Clip, problem: Problem, predicted_m: Mapping[str, np.ndarray
     # What flies in space is drawn from the side.
     predicted_m = {name: motion[:, :2] for name, motion in predicted_m.items()}
     models = list(predicted_m)
-    offset = _offset(problem, predicted_m[models[-1]])
+    offset = observation.offset_m(predicted_m[models[-1]])[..., None]
     video = _frames(clip, len(observation.times_s))
     # Over a frame, shapes stand around the tracked point, in a drawing around the centre.
     motions = {name: motion + offset * (video is not None) for name, motion in predicted_m.items()}
@@ -78,17 +78,6 @@ def _frames(clip: Clip, num_frames: int) -> VideoFrames | None:
 
 def _stride(problem: Problem) -> int:
     return -(-len(problem.observation.times_s) // MOST_STEPS)
-
-
-def _offset(problem: Problem, predicted_m: np.ndarray) -> np.ndarray:
-    """The tracked points minus the centres, `[object, 2, 1]`."""
-    observation = problem.observation
-    found = np.zeros((len(observation.names), 2, 1))
-    for i, seen in enumerate(observation.mask):
-        if seen.any():
-            difference = (observation.position_m[i, :2] - predicted_m[i])[:, seen]
-            found[i, :, 0] = np.median(difference, axis=1)
-    return found
 
 
 def _caption(video: VideoFrames | None, problem: Problem) -> str:

@@ -31,7 +31,9 @@ def value_text(entry: Mapping[str, Any]) -> str:
 
 
 def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
-    """Whether the model is adequate, in one sentence."""
+    """Whether the model is adequate, in one sentence; or why nobody can tell."""
+    if comparison.no_verdict is not None:
+        return f"{comparison.no_verdict}."
     equals = p_equals(comparison.p_value)
     model = f"with {effects_text(effects)} " if effects else ""
     if not comparison.is_adequate:

@@ -146,8 +146,26 @@ def _struck(name: str) -> int | None:
     return struck if struck > 1 else None
 
 
+def distance(error: Mapping[str, Any]) -> str:
+    """How near the fit comes to what was seen, and in how many frames; empty where unknown."""
+    rms_mm, percent = error.get("rms_mm"), error.get("rms_percent_of_way")
+    sizes = [] if rms_mm is None else [f"{rms_mm:.2g} mm"]
+    sizes += [] if percent is None else [f"{percent:.2g} % of the way"]
+    frames = f"{error['frames_used']} of {error['frames']} frames" if error.get("frames") else ""
+    said = f"{' or '.join(sizes)} off (root mean square)" if sizes else ""
+    return ", in ".join(filter(None, [said, frames]))
+
+
 def fit_quality(result: dict[str, Any]) -> str:
-    """chi2 per degree of freedom and what it means, in a sentence or two."""
+    """How near the fit comes, and chi2 per degree of freedom, in two sentences or three."""
+    near = distance(result["error"])
+    lead = f"The fit is {near}. " if near else ""
+    if result.get("no_verdict"):
+        return f"{lead}{result['no_verdict']}."
+    return lead + _of_chi2(result)
+
+
+def _of_chi2(result: dict[str, Any]) -> str:
     chi2 = result["error"]["chi2_per_dof"]
     if chi2 is None or not math.isfinite(chi2):
         return "chi2 per degree of freedom cannot be computed."
@@ -198,7 +216,9 @@ def pull_text(pull: Mapping[str, Any]) -> str:
 
 
 def fits(result: dict[str, Any]) -> bool:
-    """Whether chi2 per degree of freedom is one that noise gives."""
+    """Whether chi2 per degree of freedom is one that noise gives, of enough frames to tell."""
+    if result.get("no_verdict"):
+        return False
     chi2 = result["error"]["chi2_per_dof"]
     return chi2 is not None and chi2 <= CHI2_HIGH  # False for NaN
 

@@ -107,11 +107,10 @@ def clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
 
 
 def _fitted_m(folder: Path) -> np.ndarray:
-    """Where a run's model, at the posterior's mean, has the objects: `[object, 2, frame]`, m."""
+    """Where the best fit has the points that were followed: `[object, 2, frame]`, m."""
     run = load_run(folder)
-    mean = run.posterior.flat().mean(axis=0)
-    columns = [run.posterior.names.index(name) for name in run.problem.model.names]
-    return np.asarray(run.problem.simulate(mean[columns]))
+    centres = np.asarray(run.problem.simulate(run.best[: len(run.problem.model.names)]))
+    return centres + run.problem.observation.offset_m(centres)[..., None]
 
 
 def _track_table(

@@ -16,6 +16,7 @@ import numpy as np
 import yaml
 
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
 from galileo_jax.inference.build_problem import make_problem
@@ -75,6 +76,8 @@ def save_run(
 ) -> None:
     """Writes a run; result.json last, so that a folder with it is complete."""
     keys = clip.model_dump(mode="json", include=set(ClipFile.model_fields))
+    if SCENARIOS[clip.scenario].angle_deg is not None:
+        keys["ramp_angle_deg"] = None  # the scenario's own
     for key in ("video", "track"):
         if (file := getattr(clip, key)) is not None:
             keys[key] = str(Path(file).resolve())

@@ -163,7 +163,9 @@ def _with_modes_times(
     left: np.ndarray, difference_m: Batch, noise_scale: float, data: Whitening
 ) -> Values:
     """L^-1 r / s with the modes' parts times `left` `[mode]`."""
-    y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
-    y = y.reshape(*difference_m.shape[:-3], -1)
     basis = data.basis.reshape(len(data.gain), -1)
-    return (y - ((y @ basis.T) * (1 - left)) @ basis) / noise_scale
+    # What a wild proposal makes of a motion may be infinite: it has no density, and is refused.
+    with np.errstate(over="ignore", invalid="ignore"):
+        y = np.einsum("oijt,...ojt->...oit", data.inverse_root, difference_m)
+        y = y.reshape(*difference_m.shape[:-3], -1)
+        return (y - ((y @ basis.T) * (1 - left)) @ basis) / noise_scale

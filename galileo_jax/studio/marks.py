@@ -64,7 +64,8 @@ class Marks:
     @property
     def has_ramp(self) -> bool:
         """Whether the scenario has a slope."""
-        return SCENARIOS[self.scenario].has_ramp
+        scenario = SCENARIOS[self.scenario]
+        return scenario.has_ramp and scenario.angle_deg is None
 
     @property
     def has_scale(self) -> bool:

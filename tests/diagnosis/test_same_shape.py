@@ -27,7 +27,11 @@ class NarrowValley:
             Parameter("magnetic_brake_rate", "1", Uniform(0.0, 1.0), at_zero),
             Parameter("air_drag", "1", unit, at_zero),
         ]
-        self.trials = SimpleNamespace(model_parameters=parameters)
+        self.trials = SimpleNamespace(model_parameters=parameters, brought_by=self.brought_by)
+
+    def brought_by(self, effect: str) -> np.ndarray:
+        of = {"friction_patch": (0, 1), "magnetic_brake": (2, 3, 4), "air_drag": (5,)}
+        return np.array(of[effect])
 
     def search_costs(self, z: np.ndarray, free: np.ndarray) -> np.ndarray:
         assert z.shape == free.shape

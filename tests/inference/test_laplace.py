@@ -44,19 +44,23 @@ def fit_at(z, sd, log_evidence, **more) -> GradientFit:
 def test_two_valleys_share_the_draws_by_their_evidence():
     other = fit_at([0.8, 0.1, 0.0], [0.06, 0.1, 1.0], -np.log(3.0))
     found = fit_at([0.94, 0.5, 5.0], [0.01, 1.0, 1.0], 0.0, beside=(other,))
-    draws = laplace_posterior(Plain(), found, 0)["restitution"].ravel()  # pyright: ignore
+    posterior = laplace_posterior(Plain(), found, 0)  # pyright: ignore
+    draws = posterior["restitution"].ravel()
     is_other = draws < 0.87
     assert is_other.mean() == pytest.approx(0.25, abs=0.04)
     assert draws[is_other].std() > 4 * draws[~is_other].std()
     assert is_other[:400].mean() == pytest.approx(0.25, abs=0.08)  # whichever are taken
-    said = two_solutions(Plain(), found)  # pyright: ignore
-    assert (
-        said is not None and "2 solutions" in said and "restitution 0.94 (75%) or 0.8 (25%)" in said
-    )
+    every = posterior.flat()
+    said = two_solutions(Plain(), found, every)  # pyright: ignore
+    assert said is not None and "2 solutions" in said
+    assert "restitution 0.94 (75%) or 0.8 (25%); the intervals contain them all" in said
+    narrow = every[~is_other]
+    assert "contain 1 of them" in str(two_solutions(Plain(), found, narrow))  # pyright: ignore
 
 
 def test_one_valley_has_all_draws():
     found = fit_at([0.94, 0.5, 5.0], [0.01, 1.0, 1.0], 0.0)
-    draws = laplace_posterior(Plain(), found, 0)["restitution"].ravel()  # pyright: ignore
+    posterior = laplace_posterior(Plain(), found, 0)  # pyright: ignore
+    draws = posterior["restitution"].ravel()
     assert draws.mean() == pytest.approx(0.94, abs=0.001)
-    assert two_solutions(Plain(), found) is None  # pyright: ignore
+    assert two_solutions(Plain(), found, posterior.flat()) is None  # pyright: ignore

@@ -89,3 +89,25 @@ def test_a_measurement_has_it(tmp_path):
     write_observation_csv(tmp_path / "fall.csv", seen)
     (doubt,) = measure(clip).doubts
     assert doubt == frame_rate_doubt(clip, seen) and "likely fps: 60" in doubt
+
+
+@pytest.mark.parametrize(
+    ("per_metre", "unit"), [(3.2808, "ft"), (39.37, "in"), (100.0, "cm"), (1000.0, "mm")]
+)
+def test_a_unit_is_likelier_than_another_rate(per_metre, unit, tmp_path):
+    """Of a table of another program that is declared in metres."""
+    clip, seen = fall(tmp_path)
+    clip = clip.model_copy(update={"is_own_track": False})
+    doubt = frame_rate_doubt(clip, replace(seen, position_m=per_metre * seen.position_m))
+    assert doubt is not None and f"likely track_units: {unit}, with which it would be " in doubt
+    value = float(doubt.split("it would be ")[1].split()[0])
+    assert value == pytest.approx(9.81, rel=0.06)
+    assert "fps: 30" not in doubt.split("; ")[1]
+
+
+def test_nonsense_is_not_likely(tmp_path):
+    """What is 5,000 times too slow was not filmed at another rate."""
+    clip, seen = fall(tmp_path)
+    clip = clip.model_copy(update={"is_own_track": False})
+    doubt = frame_rate_doubt(clip, replace(seen, position_m=2e-4 * seen.position_m))
+    assert doubt is not None and "no usual rate explains that" in doubt and "; likely" not in doubt

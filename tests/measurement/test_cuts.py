@@ -167,3 +167,16 @@ def test_a_held_and_struck_run_is_what_lies_between(tmp_path):
     problem = make_problem(measured.clip, measured.observation)
     assert "start_speed" in problem.model.names
     assert "release_instant" not in problem.model.names
+
+
+@pytest.mark.parametrize("steps", [1, 2])
+def test_the_frames_of_a_blow_go_too(steps):
+    """It falls, is struck for one step or two, and rises: what was struck is not used."""
+    rng = np.random.default_rng(steps)
+    way, sd = np.linspace(-2.4, 2.4, steps + 2)[1:-1], 5e-5
+    speed = np.concatenate([np.full(12, -2.4), way, np.full(26, 2.4)])
+    y = np.concatenate([[0.0], np.cumsum(speed / 250)])
+    place = np.stack([0.8 * np.arange(len(y)) / 250, y]) + sd * rng.standard_normal((2, len(y)))
+    error = np.broadcast_to(sd**2 * np.eye(2)[None, :, :, None], (1, 2, 2, len(y)))
+    times, mask = np.arange(len(y)) / 250, np.ones((1, len(y)), bool)
+    assert blow_frame(Observation(("object1",), times, place[None], error, mask)) == 12

@@ -12,7 +12,9 @@ class Scenario:
     Attributes:
       name: as written in the clip yaml.
       meaning: one phrase for the user.
-      has_ramp: it needs `ramp_angle_deg`, and its objects slide on the ramp or the table.
+      has_ramp: its objects slide on a ramp or the table; it needs `ramp_angle_deg`, unless there is
+        an `angle_deg`.
+      angle_deg: of the surface, where that is no choice.
       has_table: the ramp ends on a table.
       num_objects: (fewest, most) objects; None means no upper limit.
       is_level: objects slide on a level table that is seen from above.
@@ -26,6 +28,7 @@ class Scenario:
     name: str
     meaning: str
     has_ramp: bool
+    angle_deg: float | None = None
     num_objects: tuple[int, int | None] = (1, 1)
     has_table: bool = False
     is_level: bool = False

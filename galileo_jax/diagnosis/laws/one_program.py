@@ -70,8 +70,10 @@ class LawAsFriction(Effect):
         """None: what a rollout is given stands in no model."""
         return ()
 
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """As `Law.friction`."""
+    def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+        """As `Law.friction`; None where nothing slides on a surface."""
+        if not scene.has_surface:
+            return None
 
         def law(state: State, k: Array) -> Array:
             changed = changed_friction(k, _value(theta, scene, state))
@@ -187,6 +189,10 @@ class Spare(Effect):
     count: int
 
     name: ClassVar[str] = "spare"
+
+    def identity(self) -> tuple[Any, ...]:
+        """The class: its attributes reach hooks as parameters."""
+        return (type(self),)
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """As many as are wanted."""

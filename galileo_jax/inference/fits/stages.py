@@ -9,13 +9,14 @@ single shooting, preprint AICES-2009-8, RWTH Aachen, 2009).
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
 from galileo_jax.clip.walls import bounces
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
+from galileo_jax.model.effects.laws.pucks import START
 
 MOVED_SD, MOVED_M = 6.0, 3e-4  # an object farther than both from where it stood has moved
 STANDING_FRAMES = 5  # that say where it stood
@@ -26,8 +27,12 @@ LEAST_FRAMES = 4  # before it moves: from fewer nothing is fitted
 def phases(trials: JointProblem) -> Iterator[JointProblem]:
     """The trials as they were seen before each further object moved, then before each bounce.
 
-    Spans that grow; of bounces off walls the first few of all clips.
+    Spans that grow; of bounces off walls the first few of all clips. Pucks that all move at first
+    are seen until two of them are nearest to each other.
     """
+    meetings = [_meeting(problem) for problem in trials.problems]
+    if all(frame >= LEAST_FRAMES for frame in meetings):
+        yield JointProblem(tuple(map(_until, trials.problems, meetings)))
     for index in range(1, len(trials.problems[0].observation.names)):
         if (short := before_moving(trials, index)) is not None:
             yield short
@@ -39,6 +44,20 @@ def phases(trials: JointProblem) -> Iterator[JointProblem]:
                 for problem, own in zip(trials.problems, frames, strict=True)
             )
         )
+
+
+def _meeting(problem: Problem) -> int:
+    """The frame in which two pucks are nearest to each other, all of which move; 0: none."""
+    seen, scene = problem.observation, problem.model.scene.surroundings
+    moves = [f"{START[0]}{i + 1}" in scene.expected for i in range(len(seen.names))]
+    if not scene.is_level or len(moves) < 2 or not all(moves):
+        return 0
+    nearest = []
+    for i, j in combinations(range(len(moves)), 2):
+        apart = np.linalg.norm(seen.position_m[i, :2] - seen.position_m[j, :2], axis=0)
+        both = seen.mask[i] & seen.mask[j]
+        nearest.append(int(np.argmin(np.where(both, apart, np.inf))))
+    return min(nearest)
 
 
 def _bounces(problem: Problem) -> list[int]:

@@ -245,7 +245,10 @@ class Surroundings:
 
 
 class Effect:
-    """One physical (or measurement) effect; subclasses are stateless.
+    """One physical (or measurement) effect.
+
+    Compiled programs are found by their effects: two are the same if they are of one class and have
+    the same attributes (of the package's own few have any).
 
     `theta` maps parameters' names to arrays `[...]`; numbers of objects are `[..., object]`.
     """
@@ -253,12 +256,19 @@ class Effect:
     name: ClassVar[str]
 
     def __eq__(self, other: object) -> bool:
-        """Effects have no state: two of a class are the same, also to a compiled program."""
-        return type(self) is type(other)
+        """Whether the other does the same, also to a compiled program."""
+        return isinstance(other, Effect) and self.identity() == other.identity()
 
     def __hash__(self) -> int:
         """Of the class."""
         return hash(type(self))
+
+    def identity(self) -> tuple[Any, ...]:
+        """What its hooks depend on besides their arguments: the class, and all attributes.
+
+        An effect whose attributes reach its hooks as parameters only may leave them out.
+        """
+        return type(self), vars(self)
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The unknowns it brings, the strength first; empty where it has no place."""

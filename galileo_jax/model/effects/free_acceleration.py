@@ -73,6 +73,10 @@ class FreeAcceleration(Effect):
 
     name: ClassVar[str] = "free_acceleration"
 
+    def identity(self) -> tuple[Any, ...]:
+        """The class: its attributes reach hooks as parameters."""
+        return (type(self),)
+
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The knots, and the spans, which are given."""
         found = []

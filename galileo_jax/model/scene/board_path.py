@@ -42,22 +42,21 @@ def board_shape(clip: Clip, observation: Observation) -> dict[str, tuple[float, 
         return {}
     u = 2 * way / length - 1
     best: tuple[float, np.ndarray, np.ndarray] | None = None
-    straight = math.inf
     for terms in range(MOST + 1):
         design = _design(u, terms)
         weighted = design / np.sqrt(variance)[:, None]
         solution, *_ = np.linalg.lstsq(weighted, drop / np.sqrt(variance), rcond=None)
         left = drop - design @ solution
+        if terms == 0 and np.abs(left).max() < max(LEAST_BEND_M, LEAST_BEND_SHARE * length):
+            return {}
         # Of the size of what is left: points wobble together.
         cost = 0.5 * len(seen) * math.log(np.mean(left**2 / variance)) + PER_TERM * terms
-        if terms == 0:
-            straight = float(np.abs(left).max())
         if best is None or cost < best[0]:
             spread = np.mean(left**2 / variance) * np.linalg.inv(weighted.T @ weighted)
             best = cost, solution[1:], np.sqrt(np.diagonal(spread))[1:]
     assert best is not None
     _, found, error = best
-    if len(found) < 2 or straight < max(LEAST_BEND_M, LEAST_BEND_SHARE * length):
+    if len(found) < 2:
         return {}
     (lean, *slopes), errors = found * 2 / length, error[1:] * 2 / length
     sds = np.hypot(errors, np.maximum(SLOPE_SD, SLOPE_SD_SHARE * np.abs(slopes)))

@@ -15,7 +15,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.model.effects.air import expected_added_mass, expected_drags
 from galileo_jax.model.effects.effect import FALL_LENGTH, ORIGIN, PENDULUM, SPIN
-from galileo_jax.model.effects.laws.start_velocity import LAUNCH
+from galileo_jax.model.effects.laws.start_velocity import LAUNCH, StartVelocity
 from galileo_jax.model.effects.nuisances.declared_angle import DeclaredAngle
 from galileo_jax.model.effects.nuisances.declared_scale import DeclaredScale
 from galileo_jax.model.effects.nuisances.perspective import Perspective
@@ -48,8 +48,10 @@ def expected(
     times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
     known = clip.is_scale_known
     if SCENARIOS[clip.scenario].has_ramp:
-        if clip.starts_moving:
-            speed = math.hypot(*_start_velocity(times_s, place_m))
+        if clip.starts_moving or StartVelocity.name in SCENARIOS[clip.scenario].laws:
+            assert clip.ramp_angle_deg is not None  # the clip's own validation, or the path's
+            angle, (x, y) = math.radians(clip.ramp_angle_deg), _start_velocity(times_s, place_m)
+            speed = x * math.cos(angle) - y * math.sin(angle)
             declared["start_speed"] = (speed, START_SD_M_S) if known else (0.0, UNKNOWN_M_S)
         is_board = not SCENARIOS[clip.scenario].has_table
         return declared | (board_shape(clip, observation) if is_board else {})

@@ -187,7 +187,7 @@ def laws_of(clip: Clip) -> tuple[str, ...]:
     """The scenario's laws, and those that the clip's keys bring."""
     declared = (
         ("floor", clip.has_floor),
-        (StartVelocity.name, clip.starts_moving),
+        (StartVelocity.name, clip.starts_moving is True),
         (StraightWalls.name, bool(clip.walls)),
     )
     return SCENARIOS[clip.scenario].laws + tuple(name for name, is_there in declared if is_there)

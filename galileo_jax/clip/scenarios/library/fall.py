@@ -7,6 +7,6 @@ register(
         name="fall",
         meaning="one object is dropped",
         has_ramp=False,
-        keys=("floor",),
+        keys=("floor", "starts_moving"),
     )
 )

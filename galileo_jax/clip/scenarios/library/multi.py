@@ -9,5 +9,6 @@ register(
         has_ramp=True,
         has_table=True,
         num_objects=(1, None),
+        keys=("starts_moving",),
     )
 )

@@ -9,5 +9,6 @@ register(
         has_ramp=True,
         has_table=True,
         num_objects=(1, 2),
+        keys=("starts_moving",),
     )
 )

@@ -50,10 +50,10 @@ class StartVelocity(Effect):
         return components[0].__array_namespace__().stack(components, axis=-1)[..., None, :]
 
     def start_speed(self, theta: Theta, scene: Surroundings) -> Array | None:
-        """Along the path."""
+        """Along the path, of object 1."""
         if self.name not in scene.laws or scene.is_thrown:
             return None
-        return theta[PATH[0]][..., None]
+        return scene.only(theta[PATH[0]], 0)
 
     def derived(self, theta: Theta, scene: Surroundings) -> Mapping[str, tuple[Array, str]]:
         """The speed of a throw and its angle over the horizontal; the speed at a launcher."""

@@ -1,0 +1,108 @@
+"""Fewer rows of a long track, with the errors of their means: a fit's time grows with the rows.
+
+Of n rows that follow each other, with p the polynomial through these and n more to either side,
+
+    x(t_mean) = mean of (x - p)(t) + p(t_mean),    which is the linear sum of w_i x_i over 3 n rows
+
+so that a curved path is not flattened, and the covariance is that of sum w_i x_i. Rows that p does
+not describe (a hit, a release) stay as they are, as do those next to a gap.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from galileo_jax.observation.observation import Observation
+
+MOST_ROWS = 500
+FEWEST, MOST_TERMS = 4, 6  # rows, and terms of p: no more than half of its rows and one
+CLEAR = 4.0  # sds by which chi2 may be beyond what is expected
+
+
+def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]]:
+    """The observation with about `MOST_ROWS` rows, and a line that says so; as it is, if fewer."""
+    seen = int(observation.mask.any(axis=0).sum())
+    size = math.ceil(seen / MOST_ROWS)
+    if size < 2:
+        return observation, []
+    weights, kept = _weights(observation, size)
+    if len(kept) == len(observation.times_s):
+        return observation, []
+    mask = observation.mask[:, kept]
+    position = np.where(observation.mask[:, None], observation.position_m, 0.0) @ weights.T
+    covariance = observation.covariance_m2 @ (weights**2).T
+    modes, turned = observation.modes_m, observation.turned_rad
+    averaged = replace(
+        observation,
+        times_s=_mean_times(observation.times_s, kept, size, weights),
+        position_m=np.where(mask[:, None], position, np.nan),
+        covariance_m2=covariance,
+        mask=mask,
+        modes_m=None if modes is None else modes @ weights.T,
+        turned_rad=None if turned is None else turned @ weights.T,
+    )
+    rows = int(mask.any(axis=0).sum())
+    return averaged, [
+        f"{seen} rows are averaged in groups of up to {size}, with the errors of their means: "
+        f"{rows} are fitted"
+    ]
+
+
+def _mean_times(
+    times_s: np.ndarray, kept: np.ndarray, size: int, weights: np.ndarray
+) -> Float[np.ndarray, " row"]:
+    """Of groups the mean, of single rows their own."""
+    is_group = (weights != 0).sum(axis=1) > 1
+    return np.array(
+        [
+            times_s[first : first + size].mean() if group else times_s[first]
+            for first, group in zip(kept, is_group, strict=True)
+        ]
+    )
+
+
+def _weights(
+    observation: Observation, size: int
+) -> tuple[Float[np.ndarray, "row frame"], np.ndarray]:
+    """What each new row takes of each frame, and the first frame of each."""
+    count = len(observation.times_s)
+    found: list[tuple[int, slice, np.ndarray]] = []
+    for first in range(0, count, size):
+        group = slice(first, min(first + size, count))
+        around = slice(max(first - size, 0), min(first + 2 * size, count))
+        own = _of_group(observation, group, around)
+        if own is None:
+            found += [(i, slice(i, i + 1), np.ones(1)) for i in range(group.start, group.stop)]
+        else:
+            found.append((first, around, own))
+    weights = np.zeros((len(found), count))
+    for row, (_, where, own) in enumerate(found):
+        weights[row, where] = own
+    return weights, np.array([first for first, *_ in found])
+
+
+def _of_group(observation: Observation, group: slice, around: slice) -> np.ndarray | None:
+    """The weights of the frames `around` in the mean of `group`; None: they stay as they are."""
+    times, mask = observation.times_s[around], observation.mask[:, around]
+    is_seen = mask.any(axis=1)
+    width = group.stop - group.start
+    terms = min(MOST_TERMS, len(times) // 2 + 1)
+    if width < 2 or len(times) < FEWEST or not (mask.all(axis=1) == is_seen).all():
+        return None
+    since = (times - times.mean()) / (times[-1] - times[0])
+    powers = np.vander(since, terms)
+    fit = np.linalg.pinv(powers)
+    is_own = np.zeros(len(times))
+    is_own[group.start - around.start : group.stop - around.start] = 1 / width
+    weights = is_own + (np.vander([is_own @ since], terms)[0] - is_own @ powers) @ fit
+    if not is_seen.any():
+        return weights
+    place = observation.position_m[is_seen][..., around]
+    left = place - place @ fit.T @ powers.T
+    variance = np.einsum("oaat->oat", observation.covariance_m2[is_seen][..., around])
+    chi2, degrees = np.sum(left**2 / variance), left.shape[0] * left.shape[1]
+    degrees = degrees * (len(times) - terms)
+    is_smooth = chi2 < degrees + CLEAR * math.sqrt(2 * degrees)
+    return weights if is_smooth else None

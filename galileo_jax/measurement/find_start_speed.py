@@ -1,0 +1,94 @@
+"""The speed of what moves already when it is first seen: whoever let it go did so before.
+
+The first half of the way is described in two ways with as many numbers each,
+
+    let go in the clip:    s = s0 + a u^2 / 2 + b u^3 + c u^4,    u = max(t - t_r, 0),    t_r >= 0
+    moving at first:       s = s0 + v0 t + a t^2 / 2 + b t^3 + c t^4,                     v0 > a dt
+
+with t from the first place seen, b and c for what a drag does, and dt the time between two places:
+what was let go less than that before is let go in the first frame. It moves where v0 is larger, and
+the second likelier, by `CLEAR` standard deviations of errors as large as those that it leaves.
+"""
+
+import math
+from dataclasses import replace
+from typing import NamedTuple, cast
+
+import numpy as np
+from scipy.optimize import OptimizeResult, minimize_scalar
+
+from galileo_jax.observation.observation import Observation
+
+EARLY = 0.5  # of the way
+FEWEST, TERMS = 9, 5  # places, and numbers that describe them
+NEAR_FOOT = 0.25  # of the way down a ramp to its table
+CLEAR = 5.0  # standard deviations
+RELEASES = 48  # instants between which the best is looked for
+
+
+class StartSpeed(NamedTuple):
+    """A speed along the way and its standard deviation, m/s."""
+
+    mean_m_s: float
+    sd_m_s: float
+
+
+def start_speed(observation: Observation) -> StartSpeed | None:
+    """How fast object 1 moves where it is first seen; None where it is let go later, or at once."""
+    seen = np.flatnonzero(observation.mask[0])
+    place_m = observation.position_m[0][:, seen]
+    gone = place_m - place_m[:, :1]
+    distance = np.linalg.norm(gone, axis=0)
+    if len(seen) < FEWEST or not distance.max() > 0:
+        return None
+    along = gone[:, int(np.argmax(distance))] / distance.max()
+    way = along @ gone
+    early = slice(0, max(FEWEST, int(np.argmax(way > EARLY * way.max()))))
+    times = (observation.times_s[seen] - observation.times_s[seen[0]])[early]
+    covariance = observation.covariance_m2[0][..., seen[early]]
+    sd = np.sqrt(np.einsum("i,ijt,j->t", along, covariance, along))
+    moving, moves_cost, spread = _least_squares(
+        np.vander(times, TERMS, increasing=True), way[early], sd
+    )
+    size = max(1.0, moves_cost / max(len(times) - TERMS, 1))
+    found = StartSpeed(float(moving[1]), math.sqrt(size * spread[1, 1]))
+    in_a_step = max(2 * float(moving[2]), 0.0) * float(np.median(np.diff(times)))
+    if found.mean_m_s - CLEAR * found.sd_m_s < in_a_step:
+        return None
+    better = _let_go_cost(times, way[early], sd) - moves_cost
+    return found if better > CLEAR**2 * size else None
+
+
+def on_ramp(observation: Observation) -> Observation:
+    """The observation with object 1 on the ramp alone, above where its front meets the table."""
+    mask, x_m = observation.mask.copy(), observation.position_m[0, 0]
+    first = int(np.argmax(mask[0]))
+    mask[0] &= x_m < NEAR_FOOT * min(float(x_m[first]), 0.0)
+    return replace(observation, mask=mask)
+
+
+def _let_go_cost(times_s: np.ndarray, way_m: np.ndarray, sd_m: np.ndarray) -> float:
+    """The least sum of squared errors of a release from rest in the clip."""
+
+    def cost(release_s: float) -> float:
+        after = np.maximum(times_s - release_s, 0.0)
+        design = np.delete(np.vander(after, TERMS, increasing=True), 1, axis=1)
+        return _least_squares(design, way_m, sd_m)[1]
+
+    grid = np.linspace(times_s[0], times_s[-1], RELEASES)
+    costs = [cost(release_s) for release_s in grid]
+    at = int(np.argmin(costs))
+    bounds = float(grid[max(at - 1, 0)]), float(grid[min(at + 1, RELEASES - 1)])
+    between = cast(OptimizeResult, minimize_scalar(cost, bounds=bounds, method="bounded"))
+    return min(costs[at], float(between.fun))
+
+
+def _least_squares(
+    design: np.ndarray, way_m: np.ndarray, sd_m: np.ndarray
+) -> tuple[np.ndarray, float, np.ndarray]:
+    """The solution, the sum of its squared errors in units of their sd, and its covariance."""
+    white = design / sd_m[:, None]
+    inverse = np.linalg.pinv(white)
+    solution = inverse @ (way_m / sd_m)
+    cost = float(np.sum((way_m / sd_m - white @ solution) ** 2))
+    return solution, cost, inverse @ inverse.T

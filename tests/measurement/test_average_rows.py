@@ -1,0 +1,81 @@
+"""Long tracks: means of rows, with the errors of means, where rows are of a smooth path."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from galileo_jax.measurement.average_rows import MOST_ROWS, with_rows_averaged
+from galileo_jax.observation.observation import Observation
+
+SD_M = 5e-4
+
+
+def seen(way_m: np.ndarray, times_s: np.ndarray, seed: int = 0) -> Observation:
+    place = np.stack([way_m, -0.3 * way_m])[None]
+    place = place + SD_M * np.random.default_rng(seed).standard_normal(place.shape)
+    error = np.broadcast_to(SD_M**2 * np.eye(2)[None, :, :, None], (1, 2, 2, len(times_s)))
+    return Observation(("object1",), times_s, place, error, np.ones((1, len(times_s)), bool))
+
+
+def swing(times_s: np.ndarray) -> np.ndarray:
+    return 0.1 * np.sin(2 * np.pi * times_s / 1.5)
+
+
+@pytest.mark.parametrize("count", [1100, 1600, 2000])
+def test_means_are_right_within_their_errors(count):
+    """Also where the path bends: a swing of 10 cm has 90 rows in its period."""
+    times = np.arange(count) / 60
+    averaged, said = with_rows_averaged(seen(swing(times), times))
+    assert len(averaged.times_s) < 1.2 * MOST_ROWS
+    sd = np.sqrt(averaged.covariance_m2[0, 0, 0])
+    assert np.median(sd) < 0.8 * SD_M
+    error = (averaged.position_m[0, 0] - swing(averaged.times_s)) / sd
+    assert np.mean(error**2) == pytest.approx(1.0, abs=0.2)
+    assert f"{count} rows are averaged" in said[0]
+
+
+def test_nothing_is_lost():
+    """What the rows tell of a straight line the means tell as well, within a tenth."""
+    times = np.arange(2000) / 60
+    whole = seen(0.3 * times, times)
+    averaged, _ = with_rows_averaged(whole)
+
+    def slope_sd(one: Observation) -> float:
+        design = np.vander(one.times_s, 2) / np.sqrt(one.covariance_m2[0, 0, 0])[:, None]
+        return float(np.sqrt(np.linalg.inv(design.T @ design)[0, 0]))
+
+    assert slope_sd(averaged) == pytest.approx(slope_sd(whole), rel=0.2)
+    assert slope_sd(averaged) >= 0.99 * slope_sd(whole), "means tell no more than their rows"
+
+
+def test_rows_at_a_blow_and_a_gap_stay_as_they_are():
+    times = np.arange(1600) / 400
+    way = 5 * np.abs(times - 2.0)  # 5 m/s, and back
+    observation = seen(way, times)
+    mask = observation.mask.copy()
+    mask[0, 300:303] = False
+    averaged, _ = with_rows_averaged(replace(observation, mask=mask))
+    near = np.abs(averaged.times_s - 2.0) < 2.5 / 400
+    assert near.sum() == 5
+    assert np.allclose(averaged.covariance_m2[0, 0, 0, near], SD_M**2)
+    kept = averaged.mask[0]
+    sd = np.sqrt(averaged.covariance_m2[0, 0, 0, kept])
+    error = (averaged.position_m[0, 0, kept] - 5 * np.abs(averaged.times_s[kept] - 2.0)) / sd
+    assert np.mean(error**2) == pytest.approx(1.0, abs=0.2)
+    assert not ((averaged.times_s > 299.5 / 400) & (averaged.times_s < 302.5 / 400) & kept).any()
+
+
+def test_shared_errors_are_averaged_alike():
+    times = np.arange(1200) / 60
+    drift = np.zeros((1, 1, 2, 1200))
+    drift[0, 0, 0] = times / times[-1]
+    averaged, _ = with_rows_averaged(replace(seen(swing(times), times), modes_m=drift))
+    assert averaged.modes_m is not None
+    assert averaged.modes_m[0, 0, 0] == pytest.approx(averaged.times_s / times[-1])
+
+
+def test_a_short_track_stays_as_it_is():
+    times = np.arange(MOST_ROWS) / 60
+    observation = seen(swing(times), times)
+    assert with_rows_averaged(observation) == (observation, [])

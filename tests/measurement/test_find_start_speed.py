@@ -1,0 +1,96 @@
+"""Whether an object moves already when it is first seen, and how fast."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.api.fit import fit
+from galileo_jax.clip.load import load_clip
+from galileo_jax.inference.build_problem import make_problem
+from galileo_jax.measurement.find_start_speed import start_speed
+from galileo_jax.measurement.measure import measure
+from galileo_jax.observation.observation import Observation
+
+FPS, NOISE_M, A_M_S2 = 60.0, 5e-4, 2.4
+DOWN = np.array([np.cos(0.4), -np.sin(0.4)])
+
+
+def went(way_m: np.ndarray, seed: int = 0) -> Observation:
+    count = len(way_m)
+    place = way_m * DOWN[:, None]
+    place = place + NOISE_M * np.random.default_rng(seed).standard_normal(place.shape)
+    error = np.broadcast_to(NOISE_M**2 * np.eye(2)[None, :, :, None], (1, 2, 2, count))
+    times = np.arange(count) / FPS
+    return Observation(("object1",), times, place[None], error, np.ones((1, count), bool))
+
+
+def way(release_s: float, drag_per_s: float = 0.0, count: int = 60) -> np.ndarray:
+    """From rest at `release_s`, as seen from t = 0 on; x'' = a - drag x'."""
+    after = np.maximum(np.arange(count) / FPS - release_s, 0.0)
+    if not drag_per_s:
+        return A_M_S2 * after**2 / 2
+    return A_M_S2 / drag_per_s * (after + np.expm1(-drag_per_s * after) / drag_per_s)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("before_s", [0.1, 0.4])
+@pytest.mark.parametrize("drag_per_s", [0.0, 1.0])
+def test_what_was_let_go_before_moves(before_s, drag_per_s, seed):
+    found = start_speed(went(way(-before_s, drag_per_s), seed))
+    at_first = way(0.0, drag_per_s, 60)
+    true = np.interp(before_s, np.arange(60) / FPS, np.gradient(at_first, 1 / FPS))
+    assert found is not None
+    assert abs(found.mean_m_s - true) < 4 * found.sd_m_s < 0.2
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("release_s", [-0.005, 0.0, 0.01, 0.3])
+@pytest.mark.parametrize("drag_per_s", [0.0, 1.0, 4.0])
+def test_what_is_let_go_in_the_clip_does_not(release_s, drag_per_s, seed):
+    assert start_speed(went(way(release_s, drag_per_s, 90), seed)) is None
+
+
+def test_rest_and_too_few_places_tell_nothing():
+    assert start_speed(went(np.zeros(60))) is None
+    assert start_speed(went(way(-0.4, count=6))) is None
+
+
+def write_fall(folder: Path, before_s: float, more: str = "") -> Path:
+    """A fall from rest that began `before_s` before the first row of its table."""
+    times = np.arange(24) / FPS
+    noise = 3e-4 * np.random.default_rng(3).standard_normal((2, len(times)))
+    y = 1.5 - 9.81 * (times + before_s) ** 2 / 2 + noise[1]
+    rows = [f"{t:.6f},{x:.6f},{h:.6f},3e-4" for t, x, h in zip(times, noise[0], y, strict=True)]
+    head = "time_s,object1_x_m,object1_y_m,object1_sd_m"
+    (folder / "fall.csv").write_text("\n".join([head, *rows]) + "\n")
+    path = folder / "fall.yaml"
+    path.write_text(
+        f"track: fall.csv\nscenario: fall\n{more}objects: [{{name: object1, shape: sphere}}]\n"
+    )
+    return path
+
+
+@pytest.mark.parametrize("before_s", [0.0, 1 / 60, 0.05, 0.2])
+def test_gravity_does_not_depend_on_when_the_clip_begins(tmp_path, before_s):
+    clip = load_clip(write_fall(tmp_path, before_s))
+    found = fit(clip, free=["gravity"])
+    gravity = found.parameters["gravity"]
+    assert abs(gravity["mean"] - 9.81) < 4 * gravity["sd"] < 0.3
+    assert found.result["error"]["chi2_per_dof"] < 2
+
+
+def test_it_is_said_and_can_be_declared_otherwise(tmp_path):
+    measured = measure(load_clip(write_fall(tmp_path, 0.1)))
+    assert measured.clip.starts_moving
+    assert any("moves already in the first frame that is used, at " in r for r in measured.remarks)
+    at_rest = measure(load_clip(write_fall(tmp_path, 0.1, "starts_moving: false\n")))
+    assert at_rest.clip.starts_moving is False and not at_rest.remarks
+
+
+def test_no_data_lie_behind_a_rollout(tmp_path):
+    """However early the release may be."""
+    measured = measure(load_clip(write_fall(tmp_path, 0.0)))
+    model = make_problem(measured.clip, measured.observation).model
+    release_s, sd_s = model.scene.surroundings.release_s
+    assert model.duration_s >= measured.observation.times_s[-1] - (release_s - 5 * sd_s)

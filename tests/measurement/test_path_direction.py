@@ -1,0 +1,110 @@
+"""A path that does not go where it is declared to go is said; turned axes are turned back."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import galileo_jax as gx
+from galileo_jax.clip.load import load_clip
+from galileo_jax.measurement.measure import measure
+
+K1, NOISE_M, G = 0.2, 3e-4, 9.81
+
+
+def write(folder: Path, falls_deg: float, scenario: str, acceleration: float) -> Path:
+    """From rest, along a straight line that falls by an angle in the table's axes."""
+    t = np.arange(40) / 40
+    angle = math.radians(falls_deg)
+    place = np.outer([math.cos(angle), -math.sin(angle)], acceleration * t**2 / 2)
+    place += NOISE_M * np.random.default_rng(2).standard_normal(place.shape)
+    rows = [f"{a},{x},{y},{NOISE_M}" for a, x, y in zip(t, *place, strict=True)]
+    head = "time_s,object1_x_m,object1_y_m,object1_sd_m"
+    (folder / "run.csv").write_text("\n".join([head, *rows]) + "\n")
+    path = folder / "run.yaml"
+    path.write_text(
+        f"track: run.csv\nscenario: {scenario}\nobjects: [{{name: object1, shape: box}}]\n"
+    )
+    return path
+
+
+def slide(folder: Path, path_deg: float, true_deg: float = 25.0) -> Path:
+    angle = math.radians(true_deg)
+    acceleration = G * (math.sin(angle) - K1 * math.cos(angle))
+    return write(folder, path_deg, "incline\nramp_angle_deg: 25", acceleration)
+
+
+@pytest.mark.parametrize("path_deg", [0.0, 32.0, -25.0, 180.0])
+def test_turned_axes_are_turned_back_and_both_angles_are_said(tmp_path, path_deg):
+    found = gx.fit(slide(tmp_path, path_deg))
+    assert abs(found.parameters["k1"]["mean"] - K1) < 0.004
+    assert found.result["error"]["chi2_per_dof"] < 1.5
+    (said,) = (line for line in found.warnings if "degrees, but" in line)
+    assert "ramp_angle_deg: 25 is declared; the axes are taken to be turned" in said
+    assert f"by {abs(path_deg):.1f} +- " in said
+
+
+def test_what_k1_is_with_the_other_angle(tmp_path):
+    """The same acceleration on the steeper board: with the path's angle that is another k1."""
+    found = gx.fit(slide(tmp_path, path_deg=32.0, true_deg=25.0))
+    a, b = math.radians(25), math.radians(32)
+    other = math.tan(b) - (math.sin(a) - K1 * math.cos(a)) / math.cos(b)
+    (said,) = (line for line in found.warnings if "if the board falls by 32.0 degrees" in line)
+    assert float(said.rsplit(" ", 1)[1]) == pytest.approx(other, abs=0.003)
+
+
+@pytest.mark.parametrize(("path_deg", "is_said"), [(25.3, False), (26.0, False), (28.0, True)])
+def test_an_angle_that_may_be_misread_is_said_and_not_turned(tmp_path, path_deg, is_said):
+    measured = measure(load_clip(slide(tmp_path, path_deg)))
+    assert (measured.way is not None) == is_said
+    assert measured.way is None or not measured.way.is_turned_back
+    x, y = measured.observation.position_m[0]
+    along = np.polyfit(x, y, 1)[0]
+    assert math.degrees(math.atan(-along)) == pytest.approx(path_deg, abs=0.1)
+    assert any("which is used; check the angle" in line for line in measured.doubts) == is_said
+
+
+def test_a_fall_along_x(tmp_path):
+    found = gx.fit(write(tmp_path, 0.0, "fall", G), free=["gravity"])
+    assert found.parameters["gravity"]["mean"] == pytest.approx(G, abs=0.05)
+    assert any("straight down is what scenario fall says" in line for line in found.warnings)
+
+
+def level(folder: Path, push_s: float = 0.0, noise_y_m: float = NOISE_M) -> Path:
+    """Pushed from rest for a while, if at all; then slower and slower, to a stop."""
+    t = np.arange(160) / 100
+    speed = np.where(t < push_s, 0.9 * t / max(push_s, 1e-9), 0.9 - K1 * G * (t - push_s))
+    x = np.concatenate([[0.0], np.cumsum(np.clip(speed, 0, None))[:-1]]) / 100
+    noise = np.random.default_rng(4).standard_normal((2, 160)) * [[NOISE_M], [noise_y_m]]
+    rows = [f"{a},{b},{c},{NOISE_M}" for a, b, c in zip(t, x + noise[0], noise[1], strict=True)]
+    head = "time_s,object1_x_m,object1_y_m,object1_sd_m"
+    (folder / "run.csv").write_text("\n".join([head, *rows]) + "\n")
+    path = folder / "run.yaml"
+    path.write_text("track: run.csv\nscenario: level\nobjects: [{name: object1, shape: box}]\n")
+    return path
+
+
+@pytest.mark.parametrize("noise_y_m", [NOISE_M, 0.0])
+def test_a_slide_along_a_level_table(tmp_path, noise_y_m):
+    found = gx.fit(level(tmp_path, noise_y_m=noise_y_m))
+    assert abs(found.parameters["k1"]["mean"] - K1) < 0.003
+    assert found.parameters["start_speed"]["mean"] == pytest.approx(0.9, abs=0.02)
+    assert found.parameters["k1"]["identified"]
+    found.save(tmp_path / "out")
+    again = gx.load_run(tmp_path / "out")
+    assert again.parameters["k1"]["mean"] == found.parameters["k1"]["mean"]
+
+
+def test_the_push_is_left_out(tmp_path):
+    measured = measure(load_clip(level(tmp_path, push_s=0.2)))
+    (cut,) = measured.cuts
+    assert cut.side == "before" and "is pushed by a hand" in cut.why
+    assert cut.time_s == pytest.approx(0.2, abs=0.06)
+
+
+def test_a_level_table_has_no_angle(tmp_path):
+    path = level(tmp_path)
+    path.write_text(path.read_text() + "ramp_angle_deg: 2\n")
+    with pytest.raises(gx.InputError, match="ramp_angle_deg: 2 given; scenario level"):
+        load_clip(path)
