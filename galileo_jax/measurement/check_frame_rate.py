@@ -16,12 +16,13 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.observation.observation import Observation
 
 LEAST_FACTOR = 1.6  # of the frame rate, that is reported; half the friction or rolling gives 1.4
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
 COMMON_FPS = (24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
-WINDOWS, MIN_POINTS = 5, 5  # of a stretch; points in each, to tell an acceleration
+MIN_POINTS = 5  # of a stretch, to tell an acceleration
 BEND_M = 0.05  # past the foot on either side, in which an object turns
 LEAST_WAY_M = 0.03  # on the table, to tell how it slows down
 MOVED_M = 0.003  # of the second object: it has been hit
@@ -69,14 +70,14 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     seen = observation.mask[0]
     times, (x, y) = observation.times_s[seen], observation.position_m[0, :2][:, seen]
     if clip.scenario in ("fall", "flight"):
-        found = _largest(_accelerations(times, -y))
+        found = _largest(accelerations(times, -y))
         return None if found is None else ApparentGravity(found)
     if not scenario.has_ramp or clip.ramp_angle_deg is None or times.size < MIN_POINTS:
         return None
     angle = math.radians(clip.ramp_angle_deg)
     along = x * math.cos(angle) - y * math.sin(angle)
     on_ramp = x < -BEND_M if scenario.has_table else np.ones(x.shape, bool)
-    down = _largest(_accelerations(times[on_ramp], along[on_ramp]))
+    down = _largest(accelerations(times[on_ramp], along[on_ramp]))
     if down is None:
         return None
     slowing = _slowing(observation) if scenario.has_table else None
@@ -99,16 +100,6 @@ def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> st
     if is_most:
         return f"fps: {best:g} or less"
     return f"fps: {best:g}" if distance(best) < near else f"fps: about {wanted_fps:.2g}"
-
-
-def _accelerations(times_s: np.ndarray, values_m: np.ndarray) -> np.ndarray:
-    """The accelerations `[window]` of parabolas through overlapping windows; may be none."""
-    size = max(MIN_POINTS, len(times_s) // WINDOWS)
-    found = [
-        2 * np.polyfit(times_s[i : i + size] - times_s[i], values_m[i : i + size], 2)[0]
-        for i in range(0, len(times_s) - size + 1, max(1, size // 2))
-    ]
-    return np.array(found)
 
 
 def _largest(accelerations: np.ndarray) -> float | None:

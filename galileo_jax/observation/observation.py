@@ -7,6 +7,10 @@ from jaxtyping import Bool, Float
 
 NOMINAL_SCALE_PX_PER_M = 500.0
 
+UNMEASURED_SD_M = 10.0
+"""Across the way of a motion of which one coordinate was measured: the error says nothing, and is
+still small enough for the other's to keep its digits in one covariance."""
+
 
 @dataclass(frozen=True)
 class Observation:
