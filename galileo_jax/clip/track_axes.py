@@ -45,7 +45,7 @@ def accelerations(times_s: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def up_from_motion(shows: str, times: np.ndarray, place: np.ndarray) -> str | None:
-    """ "up" or "down": which way the y axis of `place` `[2, row]` points; None: it does not show."""
+    """Which way the y axis of `place` `[2, row]` points, "up" or "down"; None: it does not show."""
     seen = np.isfinite(place).all(axis=0)
     t, (x, y) = times[seen], place[:, seen]
     if shows == "drop":
@@ -165,7 +165,7 @@ def _sign_along(
 def _line_observation(
     file: ClipFile, names: tuple[str, ...], times: np.ndarray, way: np.ndarray, sd_m: np.ndarray
 ) -> Observation:
-    """Ways `[object, row]`, m, along the scenario's line, in the plane; across it nothing is known."""
+    """Ways `[object, row]`, m, along the scenario's line; across it nothing is known."""
     scenario = SCENARIOS[file.scenario]
     angle = math.radians(file.ramp_angle_deg or 0.0) if scenario.line == "slope" else 0.0
     along = np.array([math.cos(angle), -math.sin(angle)])
@@ -269,7 +269,10 @@ def check_falls_down(yaml_path: Path, path: Path, file: ClipFile, observation: O
         return
     if abs(x) > abs(y):
         scatter = float(np.median(np.abs(by_axis[0] - x)))
-        if not _sign(by_axis[0]) or scatter > MOST_SCATTER * abs(x):
+        speeds = np.gradient(observation.position_m[0, 0][seen], times)
+        ends = float(np.median(speeds[-MIN_POINTS:])) * math.copysign(1.0, x)
+        # What slows down along x is braked; what falls ends as fast as it ever was.
+        if scatter > MOST_SCATTER * abs(x) or ends < 0.3 * np.abs(speeds).max():
             return
         side = "+x" if x > 0 else "-x"
         up = "-x" if x > 0 else "x"

@@ -85,7 +85,7 @@ def read_observation_csv(path: Path) -> Observation:
         column = {field: table[title] for field, title in columns[name].items()}
         places = [column[field] for field in ("x_m", "y_m", third)[:axes]]
         position[index] = _positions(path, name, places, lines)
-        _check_speed(path, name, times, position[index, : 2 if is_turning else axes])
+        check_speed(path, name, times, position[index, : 2 if is_turning else axes])
         if is_turning:
             covariance[index] = _with_turning(path, name, column, times, position[index], lines)
             continue
@@ -276,7 +276,7 @@ def _positions(
     return position
 
 
-def _check_speed(path: Path, name: str, times: np.ndarray, position: np.ndarray) -> None:
+def check_speed(path: Path, name: str, times: np.ndarray, position: np.ndarray) -> None:
     """Refuses a track that is much too fast over several tenths of it: lengths in other units."""
     seen = np.flatnonzero(np.isfinite(position[0]))
     step = max(len(seen) // 10, 2)

@@ -27,6 +27,7 @@ from galileo_jax.clip.track_axes import (
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
     MIN_ROWS,
+    check_speed,
     check_times,
     read_observation_csv,
 )
@@ -266,9 +267,10 @@ def _times(yaml_path: Path, path: Path, table: TrackTable, fps: float | None) ->
         return table.times_s
     assert table.frames is not None  # a reader gives one of the two
     if fps is None and table.frame_s is None:
+        has = "has no times" if table.is_counted else "counts frames"
         raise InputError(
-            f"{yaml_path}: fps: missing; {path.name} {'has no times' if table.is_counted else 'counts frames'}"
-            "; write fps: and the camera's true frame rate, such as fps: 30.0"
+            f"{yaml_path}: fps: missing; {path.name} {has}; write fps: and the camera's true "
+            "frame rate, such as fps: 30.0"
         )
     return table.frames * _frame_s(table, fps)
 
@@ -419,6 +421,8 @@ def _observation(
                 f"{path}: {name}: a position of {largest:g} m; correct track_units, "
                 "pixels_per_metre or the origin"
             )
+        if not is_nominal:
+            check_speed(path, name, times, position[index])
         rough = roughness_covariance_m2(path, name, times, position[index])
         covariance[index] = np.maximum(rough, rounding[:, :, None])
         covariance[index][:, :, ~mask[index]] = np.nan

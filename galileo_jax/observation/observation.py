@@ -61,6 +61,16 @@ class Observation:
         return self.noise_known_to > 0
 
     @property
+    def across(self) -> Float[np.ndarray, "object 2 frame"]:
+        """Unit vectors along which nothing was measured; 0 where all axes were, or none."""
+        found = np.zeros_like(self.position_m)
+        covariance = np.where(self.mask[:, None, None], self.covariance_m2, 0.0)
+        trace = np.einsum("oaat->ot", covariance)
+        for one, frame in zip(*np.nonzero(trace >= UNMEASURED_SD_M**2), strict=True):
+            found[one, :, frame] = np.linalg.eigh(covariance[one, :, :, frame])[1][:, -1]
+        return found
+
+    @property
     def axes(self) -> tuple[str, ...]:
         """Names of the axes."""
         third = "turning" if self.is_turning else "z"

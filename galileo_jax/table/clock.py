@@ -44,8 +44,7 @@ def clock_times(path: Path, rows: Rows, title: str, at: int, fps: float | None) 
         match = form.fullmatch(cell)
         if match is None and not is_nothing(cell):
             raise InputError(
-                f"{path}: line {line}: {title}: {cell[:40]!r} is not a time such as {first[:40]!r}, "
-                "which the rows before have"
+                f"{path}: line {line}: {title}: {cell[:40]!r} is not a time such as {first[:40]!r}"
             )
         parsed.append(match)
     try:

@@ -112,7 +112,8 @@ def _fit(lines: list[str], separator: str) -> tuple[float, int]:
     for row in rows:
         cells = [cell for cell in row if cell]
         numbers = [cell for cell in cells if is_number(cell) or is_time(cell) or is_nothing(cell)]
-        good += len(cells) <= usual and len(numbers) >= max(1, len(cells) / 2)
+        least = len(cells) if separator == " " else max(1, len(cells) / 2)  # words have spaces
+        good += len(cells) <= usual and len(numbers) >= least
     # A comma with a space, where it fits, is told by every cell's own decimal comma.
     return round(good / len(rows), 2), 2 if separator == ", " else 1
 

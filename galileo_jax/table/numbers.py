@@ -96,7 +96,7 @@ def decimal_mark(path: Path, rows: Rows, columns: dict[str, int]) -> tuple[str, 
                 marked.setdefault(found, (f"line {line}: {title}", cell))
     if len(marked) == 2 and thousands in (",", "."):
         decimal = "." if thousands == "," else ","
-        where, cell = marked[thousands]
+        _where, cell = marked[thousands]
         if GROUPED.fullmatch(cell):
             return decimal, thousands
     if len(marked) == 2:

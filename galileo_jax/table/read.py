@@ -215,7 +215,7 @@ def _swapped_back(path: Path, heading: Heading, columns: _Columns) -> _Columns:
 
 def _table(path: Path, heading: Heading, columns: _Columns) -> TrackTable:
     lines = [line for line, _ in heading.body]
-    times, frames, unit_s = _clock(path, heading, columns, lines)
+    times, frames, _unit_s = _clock(path, heading, columns, lines)
     names, axes, places, resolution = _places(path, heading, columns)
     unit = _unit(path, heading, columns)
     warnings = list(columns.warnings)

@@ -1,80 +1,33 @@
 """Titles of columns to roles, objects and units: 'VideoAnalysis: X 2 (m)', 'Zeit / s', '位移'.
 
-A program or a language is a few words here and nothing else.
+The words are in `words.yaml`.
 """
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
 
 Role = Literal["time", "frame", "x", "y", "z", "line", "angle", "object", "likelihood", ""]
 """What a column is; "line": a distance along the way; "": anything else."""
 
-WORDS: dict[str, Role] = {
-    **dict.fromkeys(
-        "t time times zeit temps tiempo tempo tijd tid aika czas čas cas idő zaman waktu timp "
-        "время час χρόνος 时间 時間 時刻 时刻 시간 זמן الزمن वक्त timestamp clock seconds secs".split(),
-        "time",
-    ),
-    **dict.fromkeys(
-        "frame frames image img bild bilder bildnummer imagen fotograma quadro picture slice "
-        "framenumber frameno кадр klatka beeld ruta 帧 画面 フレーム 프레임".split(),
-        "frame",
-    ),
-    **dict.fromkeys("x horizontal abscisse abscissa abszisse".split(), "x"),
-    **dict.fromkeys(
-        "y vertical ordonnée ordonnee ordinate height höhe hoehe hauteur altura altezza hoogte "
-        "höjd wysokość výška высота 高度 高さ 높이 h".split(),
-        "y",
-    ),
-    **dict.fromkeys(["z"], "z"),
-    **dict.fromkeys(
-        "s d distance displacement position pos weg strecke abstand ort déplacement deplacement "
-        "distancia desplazamiento posición posicion posizione spostamento distanza afstand plaats "
-        "sträcka droga dráha poloha координата путь перемещение 位移 位置 距离 距離 변위 위치".split(),
-        "line",
-    ),
-    **dict.fromkeys("angle theta θ phi φ winkel angolo angulo ángulo hoek th 角度 угол".split(), "angle"),
-    **dict.fromkeys("particle trajectory tid trackid track_id particleid objectid".split(), "object"),
-    **dict.fromkeys("likelihood confidence".split(), "likelihood"),
-}  # fmt: skip
 
-FILLERS = frozenset(
-    "position positions pos coordinate coordinates coord coords koordinate koordinaten coordonnée "
-    "coordonnee coordenada coordinata координата in of the of centre center centroid mean".split()
-)
-"""Beside an axis these words are part of its title, not an object's name."""
+def _by_word(words_of: dict[Any, str]) -> dict[str, Any]:
+    return {word: meaning for meaning, words in words_of.items() for word in words.split()}
 
-DERIVED = frozenset(
-    "velocity speed geschwindigkeit vitesse velocidad velocità acceleration accel "
-    "beschleunigung accélération error err sd std sigma uncertainty momentum energy force "
-    "vx vy vz ax ay az width radius area".split()
-)
-"""Quantities made from places, which are read from the places again."""
 
-SYMBOLS = frozenset("va")  # 'A X' is the place of A
+_LISTS = yaml.safe_load((Path(__file__).parent / "words.yaml").read_text("utf-8"))
+WORDS: dict[str, Role] = _by_word(_LISTS["roles"])
+FILLERS, DERIVED = (frozenset(_LISTS[key].split()) for key in ("fillers", "derived"))
+SYMBOLS = frozenset("va")
+"""Of quantities made from places; 'A X' is the place of A."""
 
-LENGTHS: dict[str, str] = {
-    **{word: word for word in ("m", "cm", "mm", "km", "in", "ft", "px")},
-    **dict.fromkeys("meter meters metre metres mètre metros 米 м".split(), "m"),
-    **dict.fromkeys("centimeter centimeters centimetre centimetres 厘米 см".split(), "cm"),
-    **dict.fromkeys("millimeter millimeters millimetre millimetres 毫米 мм".split(), "mm"),
-    **dict.fromkeys(("inch", "inches"), "in"),
-    **dict.fromkeys(("foot", "feet"), "ft"),
-    **dict.fromkeys("pix pixel pixels 像素 ピクセル".split(), "px"),
-}
-SECONDS: dict[str, float] = {
-    **dict.fromkeys("s sec secs second seconds sek sekunden 秒 с".split(), 1.0),
-    **dict.fromkeys("ms msec millisecond milliseconds 毫秒 мс".split(), 1e-3),
-    **dict.fromkeys("us µs μs usec microsecond microseconds 微秒 мкс".split(), 1e-6),
-    **dict.fromkeys("ns nanosecond nanoseconds".split(), 1e-9),
-    **dict.fromkeys("min minute minutes".split(), 60.0),
-}
-RADIANS: dict[str, float] = {
-    **dict.fromkeys("rad radian radians".split(), 1.0),
-    **dict.fromkeys("deg degree degrees ° grad".split(), 3.141592653589793 / 180),
-}
+LENGTHS: dict[str, str] = _by_word(_LISTS["lengths"])
+SECONDS: dict[str, float] = _by_word(_LISTS["seconds"])
+RADIANS: dict[str, float] = _by_word(_LISTS["radians"])
 UNITS = frozenset((*LENGTHS, *SECONDS, *RADIANS))
 
 BRACKETS = re.compile(r"[(\[{]\s*(?:in\s+)?([^()\[\]{}]*?)\s*[)\]}]")
