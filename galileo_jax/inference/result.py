@@ -77,9 +77,7 @@ def velocity_error(
         left = np.einsum("oabt,obt->oat", measured, observation.position_m - predicted)
         residual = np.diff(left, axis=-1) / dt
         both = np.broadcast_to(both[:, None], residual.shape)
-        variance = np.einsum(
-            "oabt,obct,oact->oat", measured, observation.covariance_m2, measured
-        )
+        variance = np.einsum("oabt,obct,oact->oat", measured, observation.covariance_m2, measured)
         if observation.is_turning:  # radians are no metres
             residual, variance, both = residual[:, :2], variance[:, :2], both[:, :2]
         residuals.append(residual[both])

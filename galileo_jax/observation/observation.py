@@ -66,8 +66,8 @@ class Observation:
         found = np.zeros_like(self.position_m)
         covariance = np.where(self.mask[:, None, None], self.covariance_m2, 0.0)
         trace = np.einsum("oaat->ot", covariance)
-        for one, frame in zip(*np.nonzero(trace >= UNMEASURED_SD_M**2), strict=True):
-            found[one, :, frame] = np.linalg.eigh(covariance[one, :, :, frame])[1][:, -1]
+        one, frame = np.nonzero(trace >= UNMEASURED_SD_M**2)
+        found[one, :, frame] = np.linalg.eigh(covariance[one, :, :, frame])[1][..., -1]
         return found
 
     @property
