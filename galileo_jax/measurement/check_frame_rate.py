@@ -18,8 +18,13 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.observation.observation import Observation
+from galileo_jax.table.track_table import METRES_PER_UNIT
 
 LEAST_FACTOR = 1.6  # of the frame rate, that is reported; half the friction or rolling gives 1.4
+LEAST_FACTOR_FREE = 1.4  # of what touches nothing: twice or half of gravity
+SURE_SDS = 4.0  # by which gravity must be off
+UNIT_WITHIN = 0.08  # of gravity: nearer another unit of length is the likely mistake
+PIXELS_FROM = 20.0  # times gravity: no unit of length, but pixels
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
 COMMON_FPS = (24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
 MIN_POINTS = 5  # of a stretch, to tell an acceleration
@@ -34,11 +39,13 @@ class ApparentGravity:
 
     Attributes:
       value: the estimate.
+      sd: its standard deviation; 0 where it is not known.
       is_least: whether it can only be more: friction is not known.
     """
 
     value: float
     is_least: bool = False
+    sd: float = 0.0
 
 
 def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
@@ -47,14 +54,20 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
     if found is None or found.value <= 0:
         return None
     factor = math.sqrt(clip.gravity / found.value)  # of the true rate over the declared one
-    if max(factor, 1 / factor) < LEAST_FACTOR or (found.is_least and factor > 1):
+    is_free = SCENARIOS[clip.scenario].up_shows == "bend"
+    least = LEAST_FACTOR_FREE if is_free else LEAST_FACTOR
+    if max(factor, 1 / factor) < least or (found.is_least and factor > 1):
         return None
-    wanted = clip.fps * factor
-    likely = _likely(wanted, clip.container_fps, found.is_least)
+    if abs(found.value - clip.gravity) < SURE_SDS * found.sd:
+        return None
+    likely = _likely(clip.fps * factor, clip.container_fps, found.is_least)
+    if (unit := _likely_unit(clip, found.value)) is not None:
+        likely = f"{unit} (or {likely})"
     name, more = observation.names[0], "at least " if found.is_least else ""
+    error = f" +- {found.sd:.1g}" if found.sd else ""
     doubt = (
         f"{clip.path}: fps: {clip.fps:g}, but from {name}'s path gravity would be {more}"
-        f"{found.value:.2g} m/s^2, not {clip.gravity:g}; likely {likely}"
+        f"{found.value:.3g}{error} m/s^2, not {clip.gravity:g}; likely {likely}"
     )
     if clip.pixels_per_metre is not None:
         scale = clip.pixels_per_metre * found.value / clip.gravity
@@ -70,8 +83,9 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     seen = observation.mask[0]
     times, (x, y) = observation.times_s[seen], observation.position_m[0, :2][:, seen]
     if clip.scenario in ("fall", "flight"):
-        found = _largest(accelerations(times, -y))
-        return None if found is None else ApparentGravity(found)
+        windows = accelerations(times, -y)
+        found = _largest(windows)
+        return None if found is None else ApparentGravity(found, sd=_sd(windows, found))
     if not scenario.has_ramp or clip.ramp_angle_deg is None or times.size < MIN_POINTS:
         return None
     angle = math.radians(clip.ramp_angle_deg)
@@ -84,6 +98,29 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     if slowing is None:
         return ApparentGravity(down / math.sin(angle), is_least=True)
     return ApparentGravity((down + slowing * math.cos(angle)) / math.sin(angle))
+
+
+def _likely_unit(clip: Clip, value: float) -> str | None:
+    """The unit of length in which a track's gravity is the true one; None where there is none."""
+    if clip.track is None or clip.track_units == "px":
+        return None
+    key = "its columns in" if clip.is_own_track else "track_units:"
+    if value > PIXELS_FROM * clip.gravity:
+        return f"{key} px, {value / clip.gravity:.4g} pixels per metre"
+    declared = METRES_PER_UNIT[clip.track_units or "m"]
+    off = {
+        unit: abs(math.log(value * metres / declared / clip.gravity))
+        for unit, metres in METRES_PER_UNIT.items()
+    }
+    best = min(off, key=lambda unit: off[unit])
+    if off[best] > UNIT_WITHIN:
+        return None
+    return f"{key} {best}, {value * METRES_PER_UNIT[best] / declared:.3g} m/s^2"
+
+
+def _sd(windows: np.ndarray, value: float) -> float:
+    """How well the middle of the windows' accelerations is known."""
+    return 1.4826 * float(np.median(np.abs(windows - value))) / math.sqrt(len(windows) / 2)
 
 
 def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> str:

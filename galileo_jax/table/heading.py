@@ -53,11 +53,10 @@ def split_heading(path: Path, rows: Rows) -> Heading:
             f"{path}: no row of numbers; line {rows[0][0]} has {_listed(rows[0][1])}; a time and a "
             "place in columns expected, such as t (s), x (m), y (m)"
         )
+    commented = {line for line, row in rows[:start] if COMMENT.match(row[0])}
     above = [(line, _uncommented(row)) for line, row in rows[:start]]
     body = [(line, row) for line, row in rows[start:] if not COMMENT.match(row[0])]
-    counts = [sum(bool(title_of(cell).role) for cell in row if unit_of(cell) is None or
-                  title_of(cell).role == "time") if not _is_units(row) else 0
-              for _, row in above]  # fmt: skip
+    counts = [_num_titles(row) for _, row in above]
     above, counts = _with_markers(above, counts)
     at = max(range(len(counts)), key=lambda n: (counts[n], n), default=-1)
     if at < 0 or not counts[at]:
@@ -73,8 +72,10 @@ def split_heading(path: Path, rows: Rows) -> Heading:
     if at >= 0 and used[0] >= named:
         _refuse_longer(path, body, used[1], named, titles)
     units = next((row for _, row in above if _is_units(row)), [])
-    names = _names([row for n, (_, row) in enumerate(above[:max(at, 0)]) if not _is_units(row)],
-                   width)  # fmt: skip
+    over = [
+        row for line, row in above[: max(at, 0)] if not _is_units(row) and line not in commented
+    ]
+    names = _names(over, width)
     meanings = []
     for n, text in enumerate(titles[:width]):
         meaning = title_of(text)
@@ -86,6 +87,13 @@ def split_heading(path: Path, rows: Rows) -> Heading:
     return Heading(
         tuple(titles[:width]), tuple(meanings), body, any(m.role for m in meanings), _rate(above)
     )
+
+
+def _num_titles(row: list[str]) -> int:
+    """How many cells are known titles; 0 of a row of units, or of a word and its value."""
+    if _is_units(row) or _has_number(row):
+        return 0
+    return sum(bool(title_of(cell).role) for cell in row)
 
 
 def _is_value(cell: str) -> bool:

@@ -17,12 +17,12 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import UNIX_MS, clock_times
 from galileo_jax.table.grid import read_grid
 from galileo_jax.table.heading import Heading, split_heading
-from galileo_jax.table.numbers import Numbers, parse_columns
+from galileo_jax.table.numbers import Numbers, is_nothing, is_number, parse_columns
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
 from galileo_jax.table.repeated import without_repeats
 from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
-from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS, Title
+from galileo_jax.table.titles import DERIVED, LENGTHS, RADIANS, SECONDS, Title
 from galileo_jax.table.track_table import MIN_LIKELIHOOD, Column, TrackTable
 from galileo_jax.table.tracker_trk import is_trk, read_trk
 
@@ -114,14 +114,10 @@ def _may_be_used(heading: Heading, n: int) -> bool:
     if heading.titles[n] and unit is None and _is_derived(heading.titles[n]):
         return False
     cells = [row[n] for _, row in heading.body[:200] if n < len(row) and row[n]]
-    from galileo_jax.table.numbers import is_nothing, is_number
-
     return bool(cells) and all(is_number(cell) or is_nothing(cell) for cell in cells)
 
 
 def _is_derived(title: str) -> bool:
-    from galileo_jax.table.titles import DERIVED
-
     return any(word in DERIVED for word in title.lower().replace("_", " ").split())
 
 
@@ -140,6 +136,12 @@ def _is_even(numbers: Numbers) -> bool:
         return False
     rounding = 1.01 * (numbers.resolution if math.isfinite(numbers.resolution) else 0.0)
     return bool(np.ptp(steps) <= 2 * max(rounding, EVEN_SHARE * float(np.median(steps))))
+
+
+def _unevenness(numbers: Numbers) -> float:
+    """The range of a rising column's steps, over the usual one."""
+    steps = np.diff(numbers.values[np.isfinite(numbers.values)])
+    return float(np.ptp(steps) / np.median(steps))
 
 
 def _is_count(numbers: Numbers) -> bool:
@@ -198,8 +200,11 @@ def _swapped_back(path: Path, heading: Heading, columns: _Columns) -> _Columns:
     steps = np.diff(columns.numbers[clock[0]].values)
     if not (np.nan_to_num(steps, nan=1.0) < 0).any():
         return columns
-    even = [n for n in places if _is_even(columns.numbers[n])]
-    if len(even) != 1 or len(places) > 3:
+    even = sorted(
+        (n for n in places if _is_even(columns.numbers[n])),
+        key=lambda n: _unevenness(columns.numbers[n]),
+    )
+    if not even or len(places) > 3:
         return columns
     roles = [columns.meanings[n].role for n in sorted(places)]
     rest = sorted(n for n in (*places, clock[0]) if n != even[0])

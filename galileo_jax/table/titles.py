@@ -96,7 +96,8 @@ def _from_tokens(tokens: Sequence[str], unit: str | None) -> Title:
         exact = [n for n, token in enumerate(lower) if token == axis]
         if exact or axis in roles:
             at = exact[0] if exact else roles.index(axis)
-            name = [t for n, t in enumerate(tokens) if n != at and lower[n] not in FILLERS]
+            rest = [n for n in range(len(tokens)) if n != at and lower[n] not in FILLERS]
+            name = [tokens[n] for n in rest if lower[n] not in WORDS]
             return Title(axis, " ".join(name), unit)
     if len(lower) <= 3 or roles[0] == "time":
         for role in ("time", "likelihood", "angle", "frame", "object", "line"):
