@@ -21,7 +21,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
 LEAST_FACTOR = 1.6  # of the frame rate, that is reported; half the friction or rolling gives 1.4
-LEAST_FACTOR_FREE = 1.4  # of what touches nothing: twice or half of gravity
+LEAST_FACTOR_FREE = 1.4  # too few frames of what touches nothing: nothing else falls so fast
 SURE_SDS = 4.0  # by which gravity must be off
 UNIT_WITHIN = 0.08  # of gravity: nearer another unit of length is the likely mistake
 PIXELS_FROM = 20.0  # times gravity: no unit of length, but pixels
@@ -55,14 +55,16 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
         return None
     factor = math.sqrt(clip.gravity / found.value)  # of the true rate over the declared one
     is_free = SCENARIOS[clip.scenario].up_shows == "bend"
-    least = LEAST_FACTOR_FREE if is_free else LEAST_FACTOR
+    least = LEAST_FACTOR_FREE if is_free and factor < 1 else LEAST_FACTOR
     if max(factor, 1 / factor) < least or (found.is_least and factor > 1):
         return None
     if abs(found.value - clip.gravity) < SURE_SDS * found.sd:
         return None
     likely = _likely(clip.fps * factor, clip.container_fps, found.is_least)
     if (unit := _likely_unit(clip, found.value)) is not None:
-        likely = f"{unit} (or {likely})"
+        nearest = min(abs(math.log(fps / clip.fps / factor)) for fps in COMMON_FPS)
+        words, off = unit
+        likely = f"{words} (or {likely})" if off < 2 * nearest else f"{likely} (or {words})"
     name, more = observation.names[0], "at least " if found.is_least else ""
     error = f" +- {found.sd:.1g}" if found.sd else ""
     doubt = (
@@ -100,13 +102,15 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     return ApparentGravity((down + slowing * math.cos(angle)) / math.sin(angle))
 
 
-def _likely_unit(clip: Clip, value: float) -> str | None:
-    """The unit of length in which a track's gravity is the true one; None where there is none."""
+def _likely_unit(clip: Clip, value: float) -> tuple[str, float] | None:
+    """The unit of length in which a track's gravity is the true one, and by which logarithm it is
+    not; infinite of pixels, of which any scale is right. None where there is none.
+    """
     if clip.track is None or clip.track_units == "px":
         return None
     key = "its columns in" if clip.is_own_track else "track_units:"
     if value > PIXELS_FROM * clip.gravity:
-        return f"{key} px, {value / clip.gravity:.4g} pixels per metre"
+        return f"{key} px, {value / clip.gravity:.4g} pixels per metre", math.inf
     declared = METRES_PER_UNIT[clip.track_units or "m"]
     off = {
         unit: abs(math.log(value * metres / declared / clip.gravity))
@@ -115,7 +119,7 @@ def _likely_unit(clip: Clip, value: float) -> str | None:
     best = min(off, key=lambda unit: off[unit])
     if off[best] > UNIT_WITHIN:
         return None
-    return f"{key} {best}, {value * METRES_PER_UNIT[best] / declared:.3g} m/s^2"
+    return f"{key} {best}, {value * METRES_PER_UNIT[best] / declared:.3g} m/s^2", off[best]
 
 
 def _sd(windows: np.ndarray, value: float) -> float:

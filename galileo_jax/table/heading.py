@@ -121,7 +121,8 @@ def _has_number(row: list[str]) -> bool:
 
 
 def _uncommented(row: list[str]) -> list[str]:
-    return [COMMENT.sub("", row[0], count=1), *row[1:]]
+    first = COMMENT.sub("", row[0], count=1)
+    return row[1:] if not first and row[0] else [first, *row[1:]]
 
 
 def _filled(row: list[str]) -> int:

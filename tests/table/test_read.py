@@ -70,7 +70,7 @@ FORMS = {
     "name_above": text("mass_A", "t,x,y"),
     "quoted_lines": "\n".join(f'"{one}"' for one in ["mass A", "t\tx\ty", *lines("\t")]),
     "trailing_separators": text("t,x,y,", body=[f"{one},,," for one in lines()]),
-    "empty_rows": text("", "t,x,y", ",,", body=[*lines()[:5], "", ",,", *lines()[5:]], after=(",,",)),
+    "empty_rows": text("", "t,x,y", ",,", body=[*lines()[:5], "", ",,", *lines()[5:], ",,"]),
     "comments": text("# made by a program", "# t x y", body=lines(" "), after=("# the end",)),
     "numpy_savetxt": text("# t,x,y", body=lines(form=lambda v: f"{v:.18e}")),
     "german": text("Bild; Zeit (in s); Objekt 1 x-Koordinate; Objekt 1 y-Koordinate; Objekt 1 x-"
@@ -269,7 +269,7 @@ def test_a_sheet_of_two_far_cells_is_refused_not_fatal(tmp_path: Path) -> None:
 
 REFUSED = {
     "comma_twice_untold": (
-        text("t,x,y", body=lines(",", ",")[:-1] + ["1,5,6"]),
+        text("t,x,y", body=[*lines(",", ",")[:-1], "1,5,6"]),
         r"cells for 3 titles .*the comma used twice.*write decimal points, or semicolons",
     ),
     "more_cells_than_titles": (
