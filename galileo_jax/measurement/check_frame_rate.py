@@ -103,8 +103,9 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
 
 
 def _likely_unit(clip: Clip, value: float) -> tuple[str, float] | None:
-    """The unit of length in which a track's gravity is the true one, and by which logarithm it is
-    not; infinite of pixels, of which any scale is right. None where there is none.
+    """The unit of length in which a track's gravity is the true one, and how far off it is then.
+
+    The logarithm of the ratio; infinite of pixels, of which any scale is right. None: no unit.
     """
     if clip.track is None or clip.track_units == "px":
         return None
