@@ -407,7 +407,7 @@ def _observation(
 
     A number is rounded where it is printed; no error is smaller than that.
     """
-    mask = np.isfinite(position[:, 0])
+    mask = np.asarray(np.isfinite(position[:, 0]))
     covariance = np.full((len(names), 2, 2, len(times)), np.nan)
     rounding = np.diag([(floor / math.sqrt(12)) ** 2 for floor in floor_m or (0.0, 0.0)])
     for index, name in enumerate(names):

@@ -60,7 +60,7 @@ def test_a_fall_along_x_says_what_to_declare(tmp_path: Path) -> None:
 
 
 def test_a_flight_needs_two_coordinates(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="only one coordinate .* needs x and y; along a line are"):
+    with pytest.raises(InputError, match=r"only one coordinate .* needs x and y; along a line are"):
         observed(tmp_path, {"t (s)": T, "y (m)": FALL}, "scenario: flight")
 
 
