@@ -37,6 +37,9 @@ MIN_ROWS = 4
 """Three differences: the fewest that show whether a speed changes."""
 
 MAX_POSITION_M = 2000.0
+FAR_M, FAR_ALONE = 100.0, 10.0
+"""What is further away, and by so many times further than half of the points, is in other units."""
+
 MAX_SPEED_M_S = 100.0  # nothing that is dropped or thrown is as fast; in millimetres 0.1 m/s is
 MAX_SD_M = UNMEASURED_SD_M
 MAX_SD_RAD = 1.0
@@ -268,7 +271,8 @@ def _positions(
     if (count := int((~empty[0]).sum())) < MIN_ROWS:
         raise InputError(f"{path}: {name}: visible in {count} rows; at least {MIN_ROWS} expected")
     largest = float(np.nanmax(np.abs(position)))
-    if largest > MAX_POSITION_M:
+    usual = float(np.nanmedian(np.abs(position).max(axis=0)))
+    if largest > MAX_POSITION_M or (largest > FAR_M and largest > FAR_ALONE * usual):
         raise InputError(
             f"{path}: {name}: a position of {largest:g} m; metres expected; "
             "are these pixels or millimetres?"

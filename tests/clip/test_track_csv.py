@@ -119,7 +119,7 @@ GOOD = "time_s,object1_x_m,object1_y_m,object1_sd_m\n" + ROWS
     ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5", "line 5: 3 cells; 4 expected"),
     ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5,", "line 5: object1: standard deviation nan"),
     ("0.1000,0.030,0.5,0.001", "0.1000,0.030,0.5,-1", "line 5: object1: standard deviation -1"),
-    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,5000,1", "5000 m; metres expected"),
+    ("0.1000,0.030,0.5,0.001", "0.1000,0.030,500,1", "500 m; metres expected"),
     (ROWS, ROWS[:46], "2 rows; at least 4"),
     (ROWS, ROWS.replace("0.5", ""), "only one of x and y"),
     (GOOD, "", "empty"),
