@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from galileo_jax.api.fit_result import Fit
     from galileo_jax.api.fit_tosses import TossFit, fit_tosses
     from galileo_jax.api.label import label
+    from galileo_jax.api.look import Look, look
     from galileo_jax.api.motion import Motion
     from galileo_jax.api.next_experiment import NextExperiment, next_experiment
     from galileo_jax.api.predict import Prediction, predict
@@ -69,6 +70,7 @@ _PLACES = {
     "galileo_jax.api.motion": ("Motion",),
     "galileo_jax.api.export": ("export",),
     "galileo_jax.api.label": ("label",),
+    "galileo_jax.api.look": ("Look", "look"),
     "galileo_jax.api.run": ("load_run",),
     "galileo_jax.api.simulate": ("Simulated", "simulate"),
     "galileo_jax.api.track": ("Track", "track"),
@@ -100,6 +102,7 @@ __all__ = [
     "HalfNormal",
     "InputError",
     "LogNormal",
+    "Look",
     "Motion",
     "NextExperiment",
     "Normal",
@@ -125,6 +128,7 @@ __all__ = [
     "label",
     "load",
     "load_run",
+    "look",
     "next_experiment",
     "predict",
     "propose",

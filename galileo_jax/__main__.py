@@ -18,6 +18,7 @@ VERBS = (
     ("diagnose", "find the missing effect, add it, watch the error fall"),
     ("track", "track the objects of a clip; check the overlay by eye"),
     ("studio", "the same with the mouse, on a page in your browser"),
+    ("look", "show what is understood of a table or film"),
     ("label", "write points and scale into a clip's yaml"),
     ("simulate", "simulate a clip whose truth is known"),
     ("predict", "predict how a fitted scene goes on after its clip"),

@@ -15,7 +15,7 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
-from galileo_jax.clip.track_files.read import read_track
+from galileo_jax.clip.track_file import read_track
 from galileo_jax.observation.observation import Observation
 
 START_M, APART_M, SD_M = -0.3, 0.3, 1e-4  # on the ramp; between objects; of the track

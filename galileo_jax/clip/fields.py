@@ -10,7 +10,7 @@ from pydantic_core import PydanticCustomError
 
 LengthUnit = Literal["m", "cm", "mm", "km", "in", "ft", "px"]
 YAxis = Literal["up", "down"]
-UpAxis = Literal["y", "z"]
+UpAxis = Literal["y", "z", "x", "-x"]
 Shape = Literal["box", "cylinder", "torus", "sphere"]
 Direction = Literal["right", "left"]
 

@@ -18,7 +18,7 @@ from galileo_jax.clip.load import (
 from galileo_jax.clip.ramp_in_plane import ramp_in_plane
 from galileo_jax.clip.schema import UNCERTAINTY_OF, Clip, ClipFile
 from galileo_jax.clip.sources import source_of
-from galileo_jax.clip.track_files.read import is_track
+from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping, yaml_text
 from galileo_jax.clip.yaml_update import updated_text
 from galileo_jax.runtime.atomic_write import write_text

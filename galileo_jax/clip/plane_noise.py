@@ -33,16 +33,34 @@ def position_noise_m(times_s: np.ndarray, position_m: np.ndarray) -> float:
     Limits: assumes errors independent between frames. Motion that changes within three
     frames for most of the clip counts as noise.
     """
-    t = np.lib.stride_tricks.sliding_window_view(times_s, 4)
-    x = np.lib.stride_tricks.sliding_window_view(position_m, 4)
-    is_whole = np.isfinite(x).all(axis=1)
-    if is_whole.sum() < MIN_NOISE_WINDOWS:
+    t, x = _whole_windows(times_s, position_m)
+    if len(t) < MIN_NOISE_WINDOWS:  # of a track in steps of several rows, no four are consecutive
+        seen = np.isfinite(position_m)
+        t, x = _whole_windows(times_s[seen], position_m[seen])
+    if len(t) < MIN_NOISE_WINDOWS:
         return math.nan
-    t, x = t[is_whole], x[is_whole]
     gaps = t[:, :, None] - t[:, None, :] + np.eye(4)
     weights = 1 / gaps.prod(axis=2)
     draws = (weights * x).sum(axis=1) / np.sqrt((weights**2).sum(axis=1))
     return max(1.4826 * float(np.median(np.abs(draws))), MIN_SD_M)
+
+
+def _whole_windows(times_s: np.ndarray, position_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times and positions `[window, 4]` of four consecutive points that are all visible."""
+    if len(times_s) < 4:
+        return np.empty((0, 4)), np.empty((0, 4))
+    t = np.lib.stride_tricks.sliding_window_view(times_s, 4)
+    x = np.lib.stride_tricks.sliding_window_view(position_m, 4)
+    is_whole = np.isfinite(x).all(axis=1)
+    return t[is_whole], x[is_whole]
+
+
+def too_few_rows(path: Path, name: str) -> InputError:
+    """What to raise where the rows are too few to tell their error."""
+    return InputError(
+        f"{path}: column '{name}_sd_m': missing, and too few consecutive rows "
+        f"({MIN_NOISE_WINDOWS + 3} expected) to estimate it; give the error in metres"
+    )
 
 
 def roughness_covariance_m2(
@@ -55,8 +73,5 @@ def roughness_covariance_m2(
     """
     sd = [position_noise_m(times_s, coordinate) for coordinate in position_m]
     if any(map(math.isnan, sd)):
-        raise InputError(
-            f"{path}: column '{name}_sd_m': missing, and too few consecutive rows "
-            f"({MIN_NOISE_WINDOWS + 3} expected) to estimate it; give the error in metres"
-        )
+        raise too_few_rows(path, name)
     return np.repeat(np.diag(np.square(sd))[:, :, None], len(times_s), axis=2)

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from galileo_jax.clip.track_csv import MAX_POSITION_M, MIN_ROWS, TIME, check_times
-from galileo_jax.clip.track_files.cells import parse_columns, read_cells
 from galileo_jax.observation.poses import Poses
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.grid import read_cells
+from galileo_jax.table.numbers import values_of
 
 PLACE, TURN = ("x_m", "y_m", "z_m"), ("qw", "qx", "qy", "qz")
 UNIT_WITHIN = 0.01  # a quaternion's length; what a table rounds is much nearer
@@ -43,7 +44,7 @@ def read_poses_csv(path: Path, up: str = "z", edge_m: float | None = None) -> Po
             raise InputError(
                 f"{path}: line {line}: {len(row)} cells; {len(header)} expected as in the header"
             )
-    table = parse_columns(path, rows, named)
+    table = values_of(path, rows, named)
     lines = [f"line {line}" for line, _ in rows]
     check_times(path, table[TIME], lines)
     place = np.stack([table[title] for title in PLACE], axis=1)

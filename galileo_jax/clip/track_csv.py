@@ -12,7 +12,7 @@ axes (`object1_sd_m`); where times are uncertain, another one along the velocity
 What is seen from above may have `object1_angle_rad` of every object: how far it has turned,
 counter-clockwise (with `object1_sd_angle_rad`).
 
-A track that a spreadsheet has saved again is read as well (`track_files/cells.py`).
+A track that a spreadsheet has saved again is read as well (`table/`).
 """
 
 import csv
@@ -26,18 +26,22 @@ import numpy as np
 
 from galileo_jax.clip.plane_noise import position_noise_m, roughness_covariance_m2
 from galileo_jax.clip.space_noise import space_covariance_m2, space_noise_m, space_sds_m
-from galileo_jax.clip.track_files.cells import Rows, parse_columns, read_cells
-from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.grid import read_cells
+from galileo_jax.table.numbers import Rows, values_of
 
 TIME = "time_s"
 MIN_ROWS = 4
 """Three differences: the fewest that show whether a speed changes."""
 
-MAX_POSITION_M = 100.0
+MAX_POSITION_M = 2000.0
+FAR_M, FAR_ALONE = 100.0, 10.0
+"""What is further away, and by so many times further than half of the points, is in other units."""
+
 MAX_SPEED_M_S = 100.0  # nothing that is dropped or thrown is as fast; in millimetres 0.1 m/s is
-MAX_SD_M = 1.0
+MAX_SD_M = UNMEASURED_SD_M
 MAX_SD_RAD = 1.0
 MAX_STEP_S = 1.0
 """No motion is seen in frames a second apart; a step of just 1 is a count of frames."""
@@ -70,7 +74,7 @@ def read_observation_csv(path: Path) -> Observation:
         _check_length(path, line, row, header, columns)
     if len(rows) < MIN_ROWS:
         raise InputError(f"{path}: {len(rows)} rows; at least {MIN_ROWS} expected")
-    table = parse_columns(path, rows, {title: at for at, title in enumerate(header)})
+    table = values_of(path, rows, {title: at for at, title in enumerate(header)})
     times = table[TIME]
     lines = [f"line {line}" for line, _ in rows]
     check_times(path, times, lines)
@@ -84,7 +88,7 @@ def read_observation_csv(path: Path) -> Observation:
         column = {field: table[title] for field, title in columns[name].items()}
         places = [column[field] for field in ("x_m", "y_m", third)[:axes]]
         position[index] = _positions(path, name, places, lines)
-        _check_speed(path, name, times, position[index, : 2 if is_turning else axes])
+        check_speed(path, name, times, position[index, : 2 if is_turning else axes])
         if is_turning:
             covariance[index] = _with_turning(path, name, column, times, position[index], lines)
             continue
@@ -267,7 +271,8 @@ def _positions(
     if (count := int((~empty[0]).sum())) < MIN_ROWS:
         raise InputError(f"{path}: {name}: visible in {count} rows; at least {MIN_ROWS} expected")
     largest = float(np.nanmax(np.abs(position)))
-    if largest > MAX_POSITION_M:
+    usual = float(np.nanmedian(np.abs(position).max(axis=0)))
+    if largest > MAX_POSITION_M or (largest > FAR_M and largest > FAR_ALONE * usual):
         raise InputError(
             f"{path}: {name}: a position of {largest:g} m; metres expected; "
             "are these pixels or millimetres?"
@@ -275,7 +280,7 @@ def _positions(
     return position
 
 
-def _check_speed(path: Path, name: str, times: np.ndarray, position: np.ndarray) -> None:
+def check_speed(path: Path, name: str, times: np.ndarray, position: np.ndarray) -> None:
     """Refuses a track that is much too fast over several tenths of it: lengths in other units."""
     seen = np.flatnonzero(np.isfinite(position[0]))
     step = max(len(seen) // 10, 2)

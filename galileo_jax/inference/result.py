@@ -63,10 +63,12 @@ def velocity_error(
         observation = problem.observation
         dt = np.diff(observation.times_s)
         both = observation.mask[:, 1:] & observation.mask[:, :-1]
-        residual = np.diff(observation.position_m - predicted, axis=-1) / dt
+        across = observation.across
+        measured = np.eye(across.shape[1])[:, :, None] - across[:, :, None] * across[:, None]
+        left = np.einsum("oabt,obt->oat", measured, observation.position_m - predicted)
+        residual = np.diff(left, axis=-1) / dt
         both = np.broadcast_to(both[:, None], residual.shape)
-        variance = np.diagonal(observation.covariance_m2, axis1=1, axis2=2)
-        variance = np.moveaxis(variance, -1, 1)
+        variance = np.einsum("oabt,obct,oact->oat", measured, observation.covariance_m2, measured)
         if observation.is_turning:  # radians are no metres
             residual, variance, both = residual[:, :2], variance[:, :2], both[:, :2]
         residuals.append(residual[both])

@@ -16,14 +16,18 @@ import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.observation.observation import Observation
+from galileo_jax.table.track_table import METRES_PER_UNIT
 
 LEAST_FACTOR = 1.6  # of the frame rate, that is reported; half the friction or rolling gives 1.4
+LEAST_FACTOR_FREE = 1.4  # too few frames of what touches nothing: nothing else falls so fast
+SURE_SDS = 4.0  # by which gravity must be off
+UNIT_WITHIN = 0.08  # of gravity: nearer another unit of length is the likely mistake
+PIXELS_FROM = 20.0  # times gravity: no unit of length, but pixels
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
 COMMON_FPS = (24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
-PER_METRE = {"ft": 3.2808, "in": 39.370, "cm": 100.0, "mm": 1000.0}
-NEAR_UNIT = 1.06  # what gravity may be off by where a unit was mistaken
-WINDOWS, MIN_POINTS = 5, 5  # of a stretch; points in each, to tell an acceleration
+MIN_POINTS = 5  # of a stretch, to tell an acceleration
 BEND_M = 0.05  # past the foot on either side, in which an object turns
 LEAST_WAY_M = 0.03  # on the table, to tell how it slows down
 MOVED_M = 0.003  # of the second object: it has been hit
@@ -35,11 +39,13 @@ class ApparentGravity:
 
     Attributes:
       value: the estimate.
+      sd: its standard deviation; 0 where it is not known.
       is_least: whether it can only be more: friction is not known.
     """
 
     value: float
     is_least: bool = False
+    sd: float = 0.0
 
 
 def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
@@ -48,15 +54,22 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
     if found is None or found.value <= 0:
         return None
     factor = math.sqrt(clip.gravity / found.value)  # of the true rate over the declared one
-    if max(factor, 1 / factor) < LEAST_FACTOR or (found.is_least and factor > 1):
+    is_free = SCENARIOS[clip.scenario].up_shows == "bend"
+    least = LEAST_FACTOR_FREE if is_free and factor < 1 else LEAST_FACTOR
+    if max(factor, 1 / factor) < least or (found.is_least and factor > 1):
         return None
-    likely = _likely_unit(clip, found) or _likely(
-        clip.fps * factor, clip.container_fps, found.is_least
-    )
+    if abs(found.value - clip.gravity) < SURE_SDS * found.sd:
+        return None
+    likely = _likely(clip.fps * factor, clip.container_fps, found.is_least)
+    if (unit := _likely_unit(clip, found.value)) is not None:
+        nearest = min(abs(math.log(fps / clip.fps / factor)) for fps in COMMON_FPS)
+        words, off = unit
+        likely = f"likely {words}" if off < 2 * nearest else f"{likely} (or {words})"
     name, more = observation.names[0], "at least " if found.is_least else ""
+    error = f" +- {found.sd:.1g}" if found.sd else ""
     doubt = (
         f"{clip.path}: fps: {clip.fps:g}, but from {name}'s path gravity would be {more}"
-        f"{found.value:.2g} m/s^2, not {clip.gravity:g}; {likely}"
+        f"{found.value:.3g}{error} m/s^2, not {clip.gravity:g}; {likely}"
     )
     if clip.pixels_per_metre is not None:
         scale = clip.pixels_per_metre * found.value / clip.gravity
@@ -72,14 +85,15 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     seen = observation.mask[0]
     times, (x, y) = observation.times_s[seen], observation.position_m[0, :2][:, seen]
     if clip.scenario in ("fall", "flight"):
-        found = _largest(_accelerations(times, -y))
-        return None if found is None else ApparentGravity(found)
+        windows = accelerations(times, -y)
+        found = _largest(windows)
+        return None if found is None else ApparentGravity(found, sd=_sd(windows, found))
     if not scenario.has_ramp or not clip.ramp_angle_deg or times.size < MIN_POINTS:
         return None
     angle = math.radians(clip.ramp_angle_deg)
     along = x * math.cos(angle) - y * math.sin(angle)
     on_ramp = x < -BEND_M if scenario.has_table else np.ones(x.shape, bool)
-    down = _largest(_accelerations(times[on_ramp], along[on_ramp]))
+    down = _largest(accelerations(times[on_ramp], along[on_ramp]))
     if down is None:
         return None
     slowing = _slowing(observation) if scenario.has_table else None
@@ -88,19 +102,30 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     return ApparentGravity((down + slowing * math.cos(angle)) / math.sin(angle))
 
 
-def _likely_unit(clip: Clip, found: ApparentGravity) -> str | None:
-    """The unit of length of another program's table in which gravity is what the path says."""
-    if clip.track is None or clip.is_own_track or clip.pixels_per_metre or found.is_least:
-        return None
+def _likely_unit(clip: Clip, value: float) -> tuple[str, float] | None:
+    """The unit of length in which a track's gravity is the true one, and how far off it is then.
 
-    def distance(unit: str) -> float:
-        return abs(math.log(found.value / (clip.gravity * PER_METRE[unit])))
-
-    unit = min(PER_METRE, key=distance)
-    if distance(unit) > math.log(NEAR_UNIT):
+    The logarithm of the ratio; infinite of pixels, of which any scale is right. None: no unit.
+    """
+    if clip.track is None or clip.track_units == "px":
         return None
-    value = found.value / PER_METRE[unit]
-    return f"likely track_units: {unit}, with which it would be {value:.3g} m/s^2"
+    key = "its columns in" if clip.is_own_track else "track_units:"
+    if value > PIXELS_FROM * clip.gravity:
+        return f"{key} px, {value / clip.gravity:.4g} pixels per metre", math.inf
+    declared = METRES_PER_UNIT[clip.track_units or "m"]
+    off = {
+        unit: abs(math.log(value * metres / declared / clip.gravity))
+        for unit, metres in METRES_PER_UNIT.items()
+    }
+    best = min(off, key=lambda unit: off[unit])
+    if off[best] > UNIT_WITHIN:
+        return None
+    return f"{key} {best}, {value * METRES_PER_UNIT[best] / declared:.3g} m/s^2", off[best]
+
+
+def _sd(windows: np.ndarray, value: float) -> float:
+    """How well the middle of the windows' accelerations is known."""
+    return 1.4826 * float(np.median(np.abs(windows - value))) / math.sqrt(len(windows) / 2)
 
 
 def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> str:
@@ -119,16 +144,6 @@ def _likely(wanted_fps: float, container_fps: float | None, is_most: bool) -> st
     if distance(best) < near:
         return f"likely fps: {best:g}"
     return "no usual rate explains that: check the unit of length, the axes and what was followed"
-
-
-def _accelerations(times_s: np.ndarray, values_m: np.ndarray) -> np.ndarray:
-    """The accelerations `[window]` of parabolas through overlapping windows; may be none."""
-    size = max(MIN_POINTS, len(times_s) // WINDOWS)
-    found = [
-        2 * np.polyfit(times_s[i : i + size] - times_s[i], values_m[i : i + size], 2)[0]
-        for i in range(0, len(times_s) - size + 1, max(1, size // 2))
-    ]
-    return np.array(found)
 
 
 def _largest(accelerations: np.ndarray) -> float | None:

@@ -12,7 +12,7 @@ import numpy as np
 from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
-from galileo_jax.clip.track_files.read import read_track
+from galileo_jax.clip.track_file import read_track
 from galileo_jax.measurement.astray import Astray, find_astray, without_astray
 from galileo_jax.measurement.average_rows import with_rows_averaged
 from galileo_jax.measurement.camera_modes import with_camera_modes
@@ -216,7 +216,8 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
     """
     if clip.video is None:
         assert clip.track is not None  # load_clip requires one of the two
-        return _to_last(clip, read_track(clip.path, clip.track, clip, clip.fps).observation), None
+        read = read_track(clip.path, clip.track, clip, clip.fps)
+        return _as_declared(clip, read.observation), None
     pixels = track_once(clip)
     observation = with_noise_at_rest(observe(clip, pixels))
     observation = with_coding_errors(clip, observation, pixels)
@@ -224,10 +225,11 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
     return with_turning(observation) if clip.turning else observation, pixels
 
 
-def _to_last(clip: Clip, observation: Observation) -> Observation:
-    """Without what is after the last frames that are declared; tracking stops there by itself."""
+def _as_declared(clip: Clip, observation: Observation) -> Observation:
+    """Without what is before the first and after the last frames; tracking begins and ends so."""
     mask = observation.mask.copy()
     for i, item in enumerate(clip.objects):
+        mask[i, : item.first_frame or 0] = False
         if item.last_frame is not None:
             mask[i, item.last_frame + 1 :] = False
     return replace(observation, mask=mask)

@@ -7,6 +7,10 @@ from jaxtyping import Bool, Float
 
 NOMINAL_SCALE_PX_PER_M = 500.0
 
+UNMEASURED_SD_M = 10.0
+"""Across the way of a motion of which one coordinate was measured: the error says nothing, and is
+still small enough for the other's to keep its digits in one covariance."""
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -55,6 +59,16 @@ class Observation:
     def is_tracked_here(self) -> bool:
         """Whether a video was tracked: what others tracked states its errors, and is believed."""
         return self.noise_known_to > 0
+
+    @property
+    def across(self) -> Float[np.ndarray, "object 2 frame"]:
+        """Unit vectors along which nothing was measured; 0 where all axes were, or none."""
+        found = np.zeros_like(self.position_m)
+        covariance = np.where(self.mask[:, None, None], self.covariance_m2, 0.0)
+        trace = np.einsum("oaat->ot", covariance)
+        one, frame = np.nonzero(trace >= UNMEASURED_SD_M**2)
+        found[one, :, frame] = np.linalg.eigh(covariance[one, :, :, frame])[1][..., -1]
+        return found
 
     @property
     def axes(self) -> tuple[str, ...]:

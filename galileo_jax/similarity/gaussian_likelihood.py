@@ -91,7 +91,7 @@ class GaussianLikelihood:
             inverse_root,
             basis.reshape(len(gain), *patterns.shape[1:]),  # of short tracks fewer than patterns
             gain,
-            np.float64(axes * mask.sum()),
+            np.float64(axes * mask.sum() - (observation.across != 0).any(axis=1).sum()),
         )
 
     @staticmethod

@@ -465,19 +465,10 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "export_without_unit": _foreign(
         "a.txt", make.tracker_text(), "", "clip.yaml: track_units: missing", "a.txt", "m | cm"
     ),
-    "table_without_axis": _foreign(
-        "a.csv", make.plain_table(True), "", "clip.yaml: track_y: missing", "up | down"
-    ),
     "logger_pro_with_a_word": _foreign(
         "a.csv", make.logger_pro().replace("0.216667", "later"), "", "a.csv: line 3", "'later'"
     ),
-    "dlc_without_scorer": _foreign(
-        "a.csv", make.dlc_csv().split("\n", 1)[1], "fps: 60.0\n", "a.csv: no row 'scorer'"
-    ),
-    "dlc_without_likelihood": _foreign(
-        "a.csv", make.dlc_csv().replace("likelihood", "p"), "fps: 60.0\n", "no column likelihood"
-    ),
-    "track_of_an_unknown_tool": _foreign("a.csv", "a,b\n1,2\n", "", "a.csv: not a track file"),
+    "track_of_words": _foreign("a.csv", "a,b\nc,d\n", "", "a.csv: no row of numbers"),
 }
 
 BROKEN_CLIPS: tuple[BrokenClip, ...] = tuple(

@@ -1,6 +1,7 @@
 """A scenario: the keys that its clip must declare, its objects' path, and the laws of motion."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from galileo_jax.runtime.registry import Registry
 
@@ -19,6 +20,10 @@ class Scenario:
       num_objects: (fewest, most) objects; None means no upper limit.
       is_level: objects slide on a level table that is seen from above.
       moves_in_plane: the path bends freely; False: it is straight, or a ramp and a table.
+      line: the straight line that the motion is along, for which one coordinate is enough:
+        "down", "slope" or "level"; None: it is along none.
+      up_shows: what of a path tells which way is up: "bend" (it falls), "sag" (it hangs) or
+        "drop" (it ends lower); None: nothing.
       laws: names of the laws of motion that are always there (`effects/laws/`).
       without: effects that have no place, because the laws do the same or the picture cannot
         tell them from these.
@@ -33,6 +38,8 @@ class Scenario:
     has_table: bool = False
     is_level: bool = False
     moves_in_plane: bool = False
+    line: Literal["down", "slope", "level"] | None = None
+    up_shows: Literal["bend", "sag", "drop"] | None = None
     laws: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     keys: tuple[str, ...] = ()

@@ -7,6 +7,8 @@ register(
         name="fall",
         meaning="one object is dropped",
         has_ramp=False,
+        line="down",
+        up_shows="bend",
         keys=("floor", "starts_moving"),
     )
 )

@@ -19,6 +19,7 @@ register(
         name="flight",
         meaning="one object is thrown",
         has_ramp=False,
+        up_shows="bend",
         moves_in_plane=True,
         laws=("start_velocity",),
         without=WITHOUT,

@@ -7,6 +7,8 @@ register(
         name="incline",
         meaning="one object slides down a board, no table",
         has_ramp=True,
+        line="slope",
+        up_shows="drop",
         keys=("starts_moving",),
     )
 )

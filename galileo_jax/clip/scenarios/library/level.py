@@ -11,6 +11,7 @@ register(
         meaning="one object slides along a level table, no ramp",
         has_ramp=True,
         angle_deg=0.0,
+        line="level",
         laws=("start_velocity",),
         without=(
             "initial_push",  # start_velocity

@@ -7,6 +7,7 @@ register(
         name="ramp",
         meaning="object 1 slides down a ramp onto a table",
         has_ramp=True,
+        up_shows="drop",
         has_table=True,
         num_objects=(1, 2),
         keys=("starts_moving",),

@@ -10,6 +10,7 @@ register(
         name="spring",
         meaning="one object hangs on a spring and swings up and down",
         has_ramp=False,
+        line="down",
         laws=("spring", "start_velocity"),
         without=(
             "constant_force",  # the place of rest

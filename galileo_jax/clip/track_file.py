@@ -1,40 +1,51 @@
-"""Converts a track file (our own csv or another program's) to an observation in metres.
+"""A track file (our own csv or any table) to an observation in metres.
 
-If the file does not contain a necessary quantity, the error message names the yaml key and its
-possible values.
+What the file does not say, and the motion does not tell, is asked for: one line names the yaml key
+and its possible values.
 """
 
 import math
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from galileo_jax.clip.fields import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, short
+from galileo_jax.clip.lost_frames import with_lost_frames
 from galileo_jax.clip.plane_noise import roughness_covariance_m2
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
+from galileo_jax.clip.track_axes import (
+    along_line,
+    check_falls_down,
+    in_plane,
+    straightened,
+    swung,
+    up_from_motion,
+)
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
     MIN_ROWS,
+    check_speed,
     check_times,
     read_observation_csv,
 )
-from galileo_jax.clip.track_files.cells import first_cells
-from galileo_jax.clip.track_files.track_table import (
-    METRES_PER_UNIT,
-    Calibration,
-    TrackReader,
-    TrackTable,
-    readers,
-)
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.grid import read_cells
+from galileo_jax.table.pandas_h5 import is_hdf5
+from galileo_jax.table.read import read_table
+from galileo_jax.table.spreadsheet import is_spreadsheet
+from galileo_jax.table.text import content_of
+from galileo_jax.table.track_table import METRES_PER_UNIT, Calibration, TrackTable
+from galileo_jax.table.tracker_trk import is_trk
 
-HEAD_BYTES = 65_536
-TRACK_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".trk", ".trz", ".h5", ".hdf5")
+TRACK_SUFFIXES = (
+    *(".csv", ".txt", ".tsv", ".dat", ".trk", ".trz", ".h5", ".hdf5"),
+    *(".xlsx", ".xls", ".ods"),
+)
 """Files taken for a track when given as CLIP; what is in them decides the rest."""
-
 
 OWN_CSV_SAYS = {
     "track_units": "m",
@@ -88,78 +99,92 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
       InputError: one line naming the file and the place that is wrong, or the key that has to
         be given.
     """
-    head = _head(path)
-    if _is_ours(head):
-        _check_own_keys(yaml_path, path, file)
-        observation = read_observation_csv(path)
-        if file.track_up == "z":
-            observation = _turned_up(yaml_path, path, observation)
-        _check_names(yaml_path, path, file, observation.names)
-        is_level, third = SCENARIOS[file.scenario].is_level, observation.position_m.shape[1] == 3
-        if third and is_level != observation.is_turning:
-            column = "angle_rad" if observation.is_turning else "z_m"
-            raise InputError(
-                f"{path}: column '{column}': means nothing in scenario {file.scenario}; "
-                "leave it out"
-            )
-        return FileTrack(observation, "m", _frame_rate(observation.times_s), is_own=True)
-    table = _reader(path, head).read(path)
-    table, warnings = _in_declared_order(yaml_path, path, file, table)
-    times = _times(yaml_path, path, file, table, fps)
+    is_own = _is_ours(path)
+    found = _own(yaml_path, path, file) if is_own else _foreign(yaml_path, path, file, fps)
+    observation, warnings = straightened(path, file, found.observation)
+    check_falls_down(yaml_path, path, file, observation)
+    return replace(found, observation=observation, warnings=found.warnings + warnings)
+
+
+def _own(yaml_path: Path, path: Path, file: ClipFile) -> FileTrack:
+    """Our own csv, in metres along our axes."""
+    _check_own_keys(yaml_path, path, file)
+    observation = read_observation_csv(path)
+    if file.track_up == "z":
+        observation = _turned_up(yaml_path, path, observation)
+    _check_names(yaml_path, path, file, observation.names)
+    is_level, third = SCENARIOS[file.scenario].is_level, observation.position_m.shape[1] == 3
+    if third and is_level != observation.is_turning:
+        column = "angle_rad" if observation.is_turning else "z_m"
+        raise InputError(
+            f"{path}: column '{column}': means nothing in scenario {file.scenario}; leave it out"
+        )
+    return FileTrack(observation, "m", _frame_rate(observation.times_s), is_own=True)
+
+
+def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> FileTrack:
+    """Any other table, in its own units and axes."""
+    table, warnings = _in_declared_order(yaml_path, path, file, read_table(path, fps))
+    times = _times(yaml_path, path, table, fps)
     if len(times) < MIN_ROWS:
         raise InputError(f"{path}: {len(times)} rows; at least {MIN_ROWS} expected")
     check_times(path, times)
-    unit = "px" if table.unit == "px" else file.track_units or table.unit
-    y_axis = file.track_y or table.y_axis
-    if unit is None or y_axis is None:
-        asked = [
-            *([("track_units", "its unit of length", LENGTH_CHOICES)] if unit is None else []),
-            *([("track_y", "which way its y axis points", "up | down")] if y_axis is None else []),
-        ]
-        keys, what, choices = zip(*asked, strict=True)
-        wanted = ", ".join(f"{key}: {words}" for key, words in zip(keys, choices, strict=True))
-        raise InputError(
-            f"{yaml_path}: {', '.join(keys)}: missing; {path.name} does not state "
-            f"{' and '.join(what)}; write {wanted} (or give it to galileo label)"
-        )
-    if unit == "px":
-        scale, origin = _scale(yaml_path, path, file, table.calibration), _origin(file, table)
-        position = _from_pixels(file, table, scale, origin, y_axis)
-    else:
-        scale, origin = None, None
-        away = np.subtract(table.position, np.array(file.track_origin or (0, 0))[:, None])
-        position = away * METRES_PER_UNIT[unit] * [[1.0], [1.0 if y_axis == "up" else -1.0]]
-    position = position * [[1.0 if file.direction == "right" else -1.0], [1.0]]
-    seen = np.asarray(np.isfinite(position).all(axis=1))
-    first = int(np.flatnonzero(seen.any(axis=0))[0]) if seen.any() else 0
-    observation = _observation(
-        path,
-        tuple(item.name for item in file.objects),
+    unit = _unit(yaml_path, path, file, table)
+    is_px = unit == "px"
+    scale = _scale(yaml_path, path, file, table.calibration) if is_px else None
+    origin = _origin(file, table) if is_px else None
+    metres = 1 / (scale or NOMINAL_SCALE_PX_PER_M) if is_px else METRES_PER_UNIT[unit]
+    first = _first_seen(table.position)
+    times, table = (
         times[first:] - times[first],
-        np.where(seen[:, None], position, np.nan)[:, :, first:],
-        is_nominal=unit == "px" and scale is None,
+        replace(table, position=table.position[..., first:]),
     )
+    times, lost = with_lost_frames(path, times, table.position)
+    floor_m = tuple(0.0 if math.isnan(one) else one * metres for one in table.resolution)
+    names = tuple(item.name for item in file.objects)
+    said: tuple[str, ...] = ()
+    if table.axes == ("angle",):
+        observation = swung(yaml_path, path, file, times, table.position[:, 0])
+    elif len(table.axes) == 1:
+        start = table.position[0, 0, 0] if is_px else 0.0
+        observation, said = along_line(
+            yaml_path, path, file, table.axes[0], times, (table.position[:, 0] - start) * metres,
+            floor_m[0],
+        )  # fmt: skip
+    else:
+        table, turned = in_plane(path, file, table)
+        y_axis, told = _y_axis(yaml_path, path, file, table, times, unit)
+        said = turned + told
+        position = _placed(file, table, metres, origin, y_axis, is_px)
+        observation = _observation(
+            path, names, times, position, floor_m, is_nominal=is_px and scale is None
+        )
     return FileTrack(
         observation,
         unit,
         fps=_frame_rate(times) if table.frames is None else 1 / _frame_s(table, fps),
         pixels_per_metre=scale,
         origin_px=origin,
-        warnings=table.warnings + warnings + _doubts(yaml_path, path, table, fps),
+        warnings=table.warnings + warnings + lost + said + _doubts(yaml_path, path, table, fps),
     )
 
 
-def _head(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            head = file.read(HEAD_BYTES)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    if not head.strip():
-        raise InputError(f"{path}: empty; a track file expected")
-    return head
+OURS = re.compile(r"time_s|\w+_[xy]_m", re.IGNORECASE)
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether it is the csv that `track` writes, or was meant as one, with x and y."""
+    content = content_of(path)
+    if is_hdf5(content) or is_spreadsheet(content) or is_trk(content):
+        return False
+    head = [line for line in content[:65_536].replace(b"\0", b"").splitlines() if line.strip()]
+    if not any(OURS.search(line.decode("ascii", "ignore")) for line in head[:3]):
+        return False
+    titles = [title.lower() for title in read_cells(path)[0][1]]
+    sides = {axis for axis in "xy" for one in titles if one == f"{axis}_m" or
+             one.endswith(f"_{axis}_m")}  # fmt: skip
+    is_meant = any(OURS.fullmatch(title) for title in titles)
+    return is_meant and len(sides) != 1
 
 
 def _turned_up(yaml_path: Path, path: Path, observation: Observation) -> Observation:
@@ -171,22 +196,6 @@ def _turned_up(yaml_path: Path, path: Path, observation: Observation) -> Observa
         observation,
         position_m=np.einsum("ab,obt->oat", turn, observation.position_m),
         covariance_m2=np.einsum("ab,obct,dc->oadt", turn, observation.covariance_m2, turn),
-    )
-
-
-def _is_ours(head: bytes) -> bool:
-    """Whether it is the csv that `track` writes, or was meant as one."""
-    titles = [cell for line in first_cells(head, 1) for cell in line]
-    return any(title == "time_s" or title.endswith(("_x_m", "_y_m")) for title in titles)
-
-
-def _reader(path: Path, head: bytes) -> type[TrackReader]:
-    for reader in readers.values():
-        if reader.claims(head):
-            return reader
-    raise InputError(
-        f"{path}: not a track file that is known: csv with time_s, object1_x_m, object1_y_m; "
-        f"{'; '.join(reader.meaning for reader in readers.values())}"
     )
 
 
@@ -252,17 +261,16 @@ def _plain(name: str) -> str:
     return "".join(name.replace("_", " ").split()).casefold()
 
 
-def _times(
-    yaml_path: Path, path: Path, file: ClipFile, table: TrackTable, fps: float | None
-) -> np.ndarray:
+def _times(yaml_path: Path, path: Path, table: TrackTable, fps: float | None) -> np.ndarray:
     """`[row]`, s."""
     if table.times_s is not None:
         return table.times_s
     assert table.frames is not None  # a reader gives one of the two
     if fps is None and table.frame_s is None:
+        has = "has no times" if table.is_counted else "counts frames"
         raise InputError(
-            f"{yaml_path}: fps: missing; {path.name} counts frames; write fps: and the camera's "
-            "true frame rate, such as fps: 30.0"
+            f"{yaml_path}: fps: missing; {path.name} {has}; write fps: and the camera's true "
+            "frame rate, such as fps: 30.0"
         )
     return table.frames * _frame_s(table, fps)
 
@@ -315,16 +323,59 @@ def _origin(file: ClipFile, table: TrackTable) -> tuple[float, float] | None:
     return table.calibration.origin_px
 
 
-def _from_pixels(
+def _unit(yaml_path: Path, path: Path, file: ClipFile, table: TrackTable) -> str:
+    """The unit of length: what is declared, else what the file says."""
+    if table.axes == ("angle",):
+        return "m"
+    by_scale = "px" if file.pixels_per_metre is not None else None
+    unit = "px" if table.unit == "px" else file.track_units or table.unit or by_scale
+    if unit is None:
+        raise InputError(
+            f"{yaml_path}: track_units: missing; {path.name} does not state its unit of length; "
+            f"write track_units: {LENGTH_CHOICES} (or give it to galileo label)"
+        )
+    return unit
+
+
+def _y_axis(
+    yaml_path: Path, path: Path, file: ClipFile, table: TrackTable, times: np.ndarray, unit: str
+) -> tuple[str, tuple[str, ...]]:
+    """Which way y points: as declared, as the file says, as the motion shows."""
+    if (declared := file.track_y or table.y_axis) is not None:
+        return declared, ()
+    scenario = SCENARIOS[file.scenario]
+    usual = "down" if unit == "px" else "up"
+    if scenario.up_shows is None:
+        return usual, ()
+    found = up_from_motion(scenario.up_shows, times, table.position[0])
+    if found is None:
+        raise InputError(
+            f"{yaml_path}: track_y: missing; {path.name} does not state which way its y axis "
+            "points, and the motion does not show it; write track_y: up | down"
+        )
+    if found == usual:
+        return found, ()
+    return found, (f"{path}: track_y: {found}, as the motion shows; declare it if it is not",)
+
+
+def _first_seen(position: np.ndarray) -> int:
+    seen = np.isfinite(position).all(axis=1).any(axis=0)
+    return int(seen.argmax()) if seen.any() else 0
+
+
+def _placed(
     file: ClipFile,
     table: TrackTable,
-    scale: float | None,
+    metres: float,
     origin: tuple[float, float] | None,
     y_axis: str,
+    is_px: bool,
 ) -> np.ndarray:
-    """`[object, 2, row]`, m, x right, y up; without an origin from where object 1 begins."""
+    """`[object, 2, row]`, m, x along the travel, y up; pixels from object 1 without an origin."""
     position = table.position
-    if origin is None:
+    if not is_px:
+        origin = file.track_origin or (0.0, 0.0)
+    elif origin is None:
         seen = np.flatnonzero(np.isfinite(position[0]).all(axis=0))
         origin = tuple(position[0, :, seen[0]]) if seen.size else (0.0, 0.0)
     x, y = position[:, 0] - origin[0], position[:, 1] - origin[1]
@@ -335,7 +386,8 @@ def _from_pixels(
             y = y * calibration.pixels_per_unit[0] / calibration.pixels_per_unit[1]
         cos, sin = math.cos(calibration.roll_rad), math.sin(calibration.roll_rad)
         x, y = cos * x + sin * y, cos * y - sin * x
-    return np.stack([x, y], axis=1) / (scale or NOMINAL_SCALE_PX_PER_M)
+    found = np.stack([x if file.direction == "right" else -x, y], axis=1) * metres
+    return np.where(np.isfinite(found).all(axis=1)[:, None], found, np.nan)
 
 
 def _frame_rate(times_s: np.ndarray) -> float:
@@ -343,11 +395,21 @@ def _frame_rate(times_s: np.ndarray) -> float:
 
 
 def _observation(
-    path: Path, names: tuple[str, ...], times: np.ndarray, position: np.ndarray, *, is_nominal: bool
+    path: Path,
+    names: tuple[str, ...],
+    times: np.ndarray,
+    position: np.ndarray,
+    floor_m: tuple[float, ...],
+    *,
+    is_nominal: bool,
 ) -> Observation:
-    """Checks that positions can be metres, and takes their error from their roughness."""
-    mask = np.isfinite(position[:, 0])
+    """Checks that positions can be metres, and takes their error from their roughness.
+
+    A number is rounded where it is printed; no error is smaller than that.
+    """
+    mask = np.asarray(np.isfinite(position[:, 0]))
     covariance = np.full((len(names), 2, 2, len(times)), np.nan)
+    rounding = np.diag([(floor / math.sqrt(12)) ** 2 for floor in floor_m or (0.0, 0.0)])
     for index, name in enumerate(names):
         if mask[index].sum() < MIN_ROWS:
             raise InputError(
@@ -359,6 +421,9 @@ def _observation(
                 f"{path}: {name}: a position of {largest:g} m; correct track_units, "
                 "pixels_per_metre or the origin"
             )
-        covariance[index] = roughness_covariance_m2(path, name, times, position[index])
+        if not is_nominal:
+            check_speed(path, name, times, position[index])
+        rough = roughness_covariance_m2(path, name, times, position[index])
+        covariance[index] = np.maximum(rough, rounding[:, :, None])
         covariance[index][:, :, ~mask[index]] = np.nan
     return Observation(names, times, position, covariance, mask)

@@ -15,19 +15,13 @@ import math
 import re
 import zipfile
 from pathlib import Path
-from typing import ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
 
-from galileo_jax.clip.track_files.track_table import (
-    UNIT_WORDS,
-    Calibration,
-    TrackReader,
-    TrackTable,
-    register,
-)
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.titles import LENGTHS
+from galileo_jax.table.track_table import Calibration, TrackTable
 
 OSP = "org.opensourcephysics"
 PANEL = f"{OSP}.cabrillo.tracker.TrackerPanel"
@@ -37,54 +31,46 @@ MAX_ROLL_DEG = 5.0
 """A camera is held level within this; axes turned further were laid along a slope."""
 
 
-@register
-class TrackerTrk(TrackReader):
-    """Tracker's own files."""
-
-    name: ClassVar[str] = "tracker_trk"
-    meaning: ClassVar[str] = "Tracker .trk or .trz"
-
-    @staticmethod
-    def claims(head: bytes) -> bool:
-        """XML, or a zip archive."""
-        start = head.removeprefix(b"\xef\xbb\xbf").lstrip()
-        return start.startswith((b"<?xml", b"<object", b"<!DOCTYPE", b"PK\x03\x04"))
-
-    @staticmethod
-    def read(path: Path) -> TrackTable:
-        """The marks of all point masses, in pixels, with the calibration."""
-        panel = _panel(path)
-        masses = [
-            item
-            for item in panel.findall("property[@name='tracks']/property/object")
-            if item.get("class") == POINT_MASS
-        ]
-        marks = {_text(mass, "name") or f"mass {n + 1}": _marks(path, mass)
-                 for n, mass in enumerate(masses)}  # fmt: skip
-        marks = {name: by_frame for name, by_frame in marks.items() if by_frame}
-        if not marks:
-            raise InputError(f"{path}: no point mass with marks; track an object in Tracker first")
-        frames = np.array(sorted(set().union(*marks.values())))
-        position = np.full((len(marks), 2, len(frames)), np.nan)
-        for index, by_frame in enumerate(marks.values()):
-            at = np.searchsorted(frames, list(by_frame))
-            position[index][:, at] = np.array(list(by_frame.values())).T
-        calibration, warnings = _calibration(path, panel)
-        return TrackTable(
-            names=tuple(marks),
-            position=position,
-            frames=frames,
-            frame_s=_frame_s(path, panel),
-            unit="px",
-            y_axis="down",
-            calibration=calibration,
-            warnings=warnings,
-        )
+def is_trk(content: bytes) -> bool:
+    """Whether a file is XML, or an archive with a tab of Tracker."""
+    start = content[:200].removeprefix(b"\xef\xbb\xbf").lstrip()
+    return start.startswith((b"<?xml", b"<object", b"<!DOCTYPE", b"PK\x03\x04"))
 
 
-def _panel(path: Path) -> ElementTree.Element:
+def read_trk(path: Path, content: bytes) -> TrackTable:
+    """The marks of all point masses, in pixels, with the calibration."""
+    panel = _panel(path, content)
+    masses = [
+        item
+        for item in panel.findall("property[@name='tracks']/property/object")
+        if item.get("class") == POINT_MASS
+    ]
+    marks = {_text(mass, "name") or f"mass {n + 1}": _marks(path, mass)
+             for n, mass in enumerate(masses)}  # fmt: skip
+    marks = {name: by_frame for name, by_frame in marks.items() if by_frame}
+    if not marks:
+        raise InputError(f"{path}: no point mass with marks; track an object in Tracker first")
+    frames = np.array(sorted(set().union(*marks.values())))
+    position = np.full((len(marks), 2, len(frames)), np.nan)
+    for index, by_frame in enumerate(marks.values()):
+        at = np.searchsorted(frames, list(by_frame))
+        position[index][:, at] = np.array(list(by_frame.values())).T
+    calibration, warnings = _calibration(path, panel)
+    return TrackTable(
+        names=tuple(marks),
+        position=position,
+        frames=frames,
+        frame_s=_frame_s(path, panel),
+        unit="px",
+        y_axis="down",
+        calibration=calibration,
+        warnings=warnings,
+    )
+
+
+def _panel(path: Path, content: bytes) -> ElementTree.Element:
     """The root of the XML, of one tab of Tracker."""
-    content = _content(path)
+    content = _unpacked(path, content)
     if len(content) > MAX_BYTES:
         raise InputError(f"{path}: larger than {MAX_BYTES} bytes; a Tracker file expected")
     if b"<!ENTITY" in content:
@@ -100,8 +86,7 @@ def _panel(path: Path) -> ElementTree.Element:
     return root
 
 
-def _content(path: Path) -> bytes:
-    content = path.read_bytes()
+def _unpacked(path: Path, content: bytes) -> bytes:
     if not content.startswith(b"PK"):
         return content
     try:
@@ -145,7 +130,7 @@ def _calibration(
     x, y, angle_deg, *scales = values[0]
     if min(scales) <= 0:
         raise InputError(f"{path}: coords: a scale of {min(scales):g} pixels; above 0 expected")
-    unit = UNIT_WORDS.get((_text(panel, "length_unit") or "").strip().lower())
+    unit = LENGTHS.get((_text(panel, "length_unit") or "").strip().lower())
     turned_deg = (angle_deg + 45) % 90 - 45
     is_level = abs(turned_deg) <= MAX_ROLL_DEG
     warnings = ()

@@ -1,0 +1,108 @@
+"""`look`: what is understood of a table or film, for a person to check."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from galileo_jax.clip.look import Seen, seen_in_table
+from galileo_jax.clip.track_file import is_track
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.read import PLACES, read_table
+from galileo_jax.table.track_table import TrackTable
+
+
+@dataclass(frozen=True)
+class Look:
+    """What was understood of a file.
+
+    Attributes:
+      path: the file.
+      seen: of a table; None of a film.
+      film: of a film, one line; "" of a table.
+      warnings: doubts, one line each.
+    """
+
+    path: Path
+    seen: Seen | None
+    film: str = ""
+    warnings: tuple[str, ...] = ()
+    table: TrackTable | None = None
+
+    @property
+    def yaml(self) -> str:
+        """The clip's yaml that would be written; "" of a film."""
+        return self.seen.yaml if self.seen else ""
+
+    def summary(self) -> str:
+        """Lines to read: columns, time, gaps, what moves, the likely scenario, and a yaml."""
+        if self.seen is None:
+            return f"{self.path.name}: {self.film}"
+        return "\n".join(_lines(self.seen))
+
+    def plot(self, path: str | Path) -> Path:
+        """Writes the places in time as a figure, by the file's suffix (png, svg, pdf)."""
+        if self.seen is None or self.table is None:
+            raise InputError(f"{self.path}: a film has no table to plot; galileo track shows it")
+        from galileo_jax.report.look_figure import write_look_figure
+
+        return write_look_figure(Path(path), self.seen, self.table)
+
+
+def look(file: str | Path, *, fps: float | None = None) -> Look:
+    """What is understood of a table or film; nothing is written.
+
+    Args:
+      file: a table of any program, or a film.
+      fps: frames per second, where the table counts frames.
+
+    Raises:
+      InputError: one line that names file, line and cell, and what was expected.
+    """
+    path = Path(file)
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if path.is_dir() or path.suffix.lower() in (".yaml", ".yml"):
+        raise InputError(f"{path}: a table or a film expected")
+    if is_track(path):
+        table = read_table(path, fps)
+        seen = seen_in_table(path, table, fps)
+        return Look(path, seen, warnings=seen.warnings, table=table)
+    from galileo_jax.video import decode  # and OpenCV, which a table does not need
+
+    info = decode.probe(path, fps)
+    width, height = info.size_px
+    film = f"{info.frame_count} frames of {width} x {height} pixels, {info.fps:.4g} a second"
+    return Look(path, None, film, info.warnings)
+
+
+def _lines(seen: Seen) -> list[str]:
+    rows = [("column", "role", "unit", "last digit")]
+    for one in seen.columns:
+        is_used = one.role not in PLACES or one.role in seen.axes
+        role = f"{one.role} of {one.name}" if one.role and one.name else one.role
+        role = role if role and is_used else "not used"
+        digit = f"{one.resolution:.1g}" if math.isfinite(one.resolution) else ""
+        rows.append((one.title[:40], role, one.unit or "", digit))
+    widths = [max(len(row[n]) for row in rows) for n in range(4)]
+    lines = [f"{seen.path.name}: {seen.num_rows} rows, {len(seen.names)} object(s)"]
+    if seen.columns:
+        lines += ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip()
+                  for row in rows]  # fmt: skip
+    clock = "frames" if seen.is_in_frames else f"s ({1 / seen.step:.4g} a second)"
+    gaps = ", ".join(f"after row {row} ({size:.3g} steps)" for row, size in seen.gaps[:5])
+    more = f" and {len(seen.gaps) - 5} more" if len(seen.gaps) > 5 else ""
+    lines.append(f"time step: {seen.step:.4g} {clock}; gaps: {gaps + more or 'none'}")
+    unit = seen.unit or "(no unit)"
+    moved = (
+        ", ".join(
+            f"{size:.4g} {'rad' if axis == 'angle' else unit} along "
+            f"{'the way' if axis == 'line' else axis}"
+            for axis, size in zip(seen.axes, seen.moved, strict=True)
+            if axis != "angle"
+        )
+        or f"{math.degrees(seen.moved[0]):.3g} degrees"
+    )
+    lines.append(f"moves: {seen.names[0]} by {moved}")
+    lines.append(f"likely scenario: {seen.scenario} ({seen.why})")
+    lines += ["", f"{seen.path.with_suffix('.yaml').name} would be:", ""]
+    return [*lines, *("  " + line for line in seen.yaml.splitlines())]

@@ -1,0 +1,179 @@
+"""What a table shows before anything is declared: its columns, its time, what moves and how."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax.clip.fields import short
+from galileo_jax.clip.track_axes import accelerations
+from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
+
+STRAIGHT = 0.03
+"""Of a path's length: what stays within this of a line is straight."""
+
+LEVEL_DEG = 2.0
+SWINGS = 3
+"""Turns back of a motion that swings."""
+
+GAP = 1.5
+"""Of the usual step."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What was understood of a table.
+
+    Attributes:
+      path: the file.
+      columns: role, unit and resolution of each.
+      names: of the objects.
+      num_rows: of the table.
+      step: the usual time between rows, s, or in frames where it has no times.
+      is_in_frames: the file counts frames; `fps` makes them seconds.
+      gaps: (row, how many steps long) of the longer ones, from 0.
+      unit: of length; None where the file does not say.
+      axes: that were measured.
+      moved: how far object 1 moves along each axis, in the file's unit.
+      scenario: the likeliest kind of motion.
+      why: what speaks for it, one phrase.
+      yaml: that would be written beside the file.
+      warnings: doubts, one line each.
+    """
+
+    path: Path
+    columns: tuple[Column, ...]
+    names: tuple[str, ...]
+    num_rows: int
+    step: float
+    is_in_frames: bool
+    gaps: tuple[tuple[int, float], ...]
+    unit: str | None
+    axes: tuple[str, ...]
+    moved: tuple[float, ...]
+    scenario: str
+    why: str
+    yaml: str
+    warnings: tuple[str, ...] = ()
+
+
+def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Seen:
+    """What a table shows; `fps` makes its frames seconds."""
+    clock = table.frames if table.times_s is None else table.times_s
+    assert clock is not None  # a table has one of the two
+    is_in_frames = table.times_s is None
+    steps = np.diff(clock)
+    step = float(np.median(steps)) if steps.size else math.nan
+    gaps = tuple((int(n), float(steps[n] / step)) for n in np.flatnonzero(steps > GAP * step))
+    place = table.position[0]
+    shown = np.isfinite(place).all(axis=0)
+    moved = tuple(float(np.ptp(one[shown])) if shown.any() else 0.0 for one in place)
+    frame_s = (1 / fps if fps else table.frame_s) if is_in_frames else 1.0
+    seconds = clock[shown] * (frame_s or math.nan)
+    per_unit = METRES_PER_UNIT.get(table.unit or "", math.nan)
+    scenario, why = _likely(table, seconds, place[:, shown], per_unit)
+    return Seen(
+        path,
+        table.columns,
+        table.names,
+        table.position.shape[-1],
+        step,
+        is_in_frames,
+        gaps,
+        table.unit,
+        table.axes,
+        moved,
+        scenario,
+        why,
+        _yaml(path, table, scenario, place[:, shown], fps),
+        table.warnings,
+    )
+
+
+def _likely(
+    table: TrackTable, seconds: np.ndarray, place: np.ndarray, metres_per_unit: float
+) -> tuple[str, str]:
+    """The likeliest scenario of object 1's path, and why."""
+    if len(table.names) > 1:
+        return "from_above", f"{len(table.names)} objects; a ramp, if one slides down into others"
+    if place.shape[1] < 2:
+        return "fall", "too few rows to tell"
+    if table.axes == ("angle",):
+        return "pendulum", "an angle in time"
+    turns = _turns(place[int(np.argmax(np.ptp(place, axis=1)))])
+    if len(place) == 1:
+        if turns >= SWINGS:
+            return "spring", f"one coordinate, which turns back {turns} times"
+        size = _acceleration(seconds, place[0]) * metres_per_unit
+        if math.isfinite(size) and 7 < abs(size) < 12:
+            return "fall", f"one coordinate, {short(round(abs(size), 2))} m/s^2"
+        told = f", {abs(size):.3g} m/s^2" if math.isfinite(size) else ""
+        return "incline", f"one coordinate{told}"
+    x, y = place[:2]
+    straight, degrees = _straight(x, y)
+    if turns >= SWINGS:
+        kind = "spring" if straight else "pendulum"
+        return kind, f"turns back {turns} times"
+    if not straight:
+        return "flight", "a path that bends"
+    if degrees > 90 - LEVEL_DEG:
+        return "fall", "a straight way up or down"
+    return "incline", f"a straight way at {degrees:.2f} degrees"
+
+
+def _turns(values: np.ndarray) -> int:
+    """How often a coordinate turns back, by more than a tenth of its range."""
+    least = 0.1 * float(np.ptp(values))
+    turns, extreme, direction = 0, values[0], 0
+    for value in values:
+        if direction == 0 and abs(value - extreme) > least:
+            direction, extreme = (1 if value > extreme else -1), value
+        elif direction and (value - extreme) * direction > 0:
+            extreme = value
+        elif direction and (extreme - value) * direction > least:
+            turns, direction, extreme = turns + 1, -direction, value
+    return turns
+
+
+def _straight(x: np.ndarray, y: np.ndarray) -> tuple[bool, float]:
+    """(whether a path is straight, its angle against the horizontal, degrees)."""
+    centred = np.stack([x - x.mean(), y - y.mean()])
+    axes, _, _ = np.linalg.svd(centred, full_matrices=False)
+    along = axes[:, 0]
+    across = np.ptp(axes[:, 1] @ centred)
+    return across <= STRAIGHT * np.ptp(along @ centred), math.degrees(
+        math.atan2(abs(along[1]), abs(along[0]))
+    )
+
+
+def _acceleration(seconds: np.ndarray, values: np.ndarray) -> float:
+    if not np.isfinite(seconds).all():
+        return math.nan
+    found = accelerations(seconds, values)
+    return float(np.median(found)) if found.size else math.nan
+
+
+def _yaml(
+    path: Path, table: TrackTable, scenario: str, place: np.ndarray, fps: float | None
+) -> str:
+    """The clip's yaml; what nobody can know but the user is a comment."""
+    lines = [f"track: {path.name}", f"scenario: {scenario}"]
+    if table.times_s is None:
+        lines.append(f"fps: {fps:g}" if fps else "# fps: of the camera, frames per second")
+    if table.unit is None:
+        lines.append("# track_units: m | cm | mm | km | in | ft | px; the file does not say")
+    if table.unit == "px":
+        lines.append("# pixels_per_metre: where it is known")
+    if scenario == "incline":
+        degrees = _straight(*place[:2])[1] if len(place) > 1 else 0.0
+        seen = f"; the path lies at {degrees:.1f}" if degrees > LEVEL_DEG else ""
+        lines.append(f"# ramp_angle_deg: measured, in degrees{seen}")
+    shape = {"fall": "sphere", "flight": "sphere", "from_above": "cylinder"}.get(scenario, "box")
+    lines.append("objects:")
+    for name in table.names:
+        plain = "".join(c if c.isalnum() and c.isascii() else "_" for c in name).strip("_")
+        plain = plain if plain[:1].isalpha() else f"object{table.names.index(name) + 1}"
+        track_name = f", track_name: '{name}'" if len(table.names) > 1 else ""
+        lines.append(f"  - {{name: {plain}, shape: {shape}{track_name}}}")
+    return "\n".join(lines) + "\n"

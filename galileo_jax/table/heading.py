@@ -1,0 +1,195 @@
+"""What stands above the numbers: titles, units in a row of their own, names of objects.
+
+mass_A            or   #multi:                 or   Pointages    or   scorer,DLC,DLC
+t,x,y                  ,mass A,,mass B,             t;x;y             bodyparts,block,block
+0.0,1.2E-2,-3.0E-3     t,x,y,x,y                    (s);(m);(m)       coords,x,y
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.clock import is_time
+from galileo_jax.table.grid import COMMENT
+from galileo_jax.table.numbers import Rows, is_nothing, is_number
+from galileo_jax.table.titles import Title, title_of, unit_of
+
+MULTI = "multi:"
+RATES = ("frequency", "fps", "frame rate", "framerate", "sampling rate")
+MARKERS = "marker_names"
+"""Motion capture: three columns for each of the names that follow."""
+
+
+@dataclass(frozen=True)
+class Heading:
+    """The part above the numbers, and the numbers.
+
+    Attributes:
+      titles: one for each column, as the file has it; "" where it has none.
+      meanings: the titles taken apart, with units and names from other rows.
+      body: the rows of numbers.
+      is_titled: whether a title was understood.
+      frame_s: between two rows, s, where the heading tells it.
+    """
+
+    titles: tuple[str, ...]
+    meanings: tuple[Title, ...]
+    body: Rows
+    is_titled: bool
+    frame_s: float | None = None
+
+
+def split_heading(path: Path, rows: Rows) -> Heading:
+    """Parts the titles from the numbers.
+
+    Raises:
+      InputError: there are no numbers, or a row has more cells than titles.
+    """
+    width = max(len(row) for _, row in rows)
+    words = _word_columns(rows, width)
+    start = next((n for n, (_, row) in enumerate(rows) if _is_body(row, words)), None)
+    if start is None:
+        raise InputError(
+            f"{path}: no row of numbers; line {rows[0][0]} has {_listed(rows[0][1])}; a time and a "
+            "place in columns expected, such as t (s), x (m), y (m)"
+        )
+    commented = {line for line, row in rows[:start] if COMMENT.match(row[0])}
+    above = [(line, _uncommented(row)) for line, row in rows[:start]]
+    body = [(line, row) for line, row in rows[start:] if not COMMENT.match(row[0])]
+    counts = [_num_titles(row) for _, row in above]
+    above, counts = _with_markers(above, counts)
+    at = max(range(len(counts)), key=lambda n: (counts[n], n), default=-1)
+    if at < 0 or not counts[at]:
+        # Titles in words that are not known are the last row that fills the columns.
+        at = max((n for n, (_, row) in enumerate(above) if _filled(row) >= min(width, 2)
+                  and not _is_units(row)), default=-1)  # fmt: skip
+    cut = next((n for n in range(at + 1, len(above)) if at >= 0 and _has_number(above[n][1])), None)
+    if cut is not None:  # a bad cell in the first row of numbers
+        above, body = above[:cut], [*rows[cut:start], *body]
+    titles = (above[at][1] if at >= 0 else []) + [""] * width
+    used = _last_used(body, words)
+    named = max((n + 1 for n, title in enumerate(titles) if title), default=0)
+    if at >= 0 and used[0] >= named:
+        _refuse_longer(path, body, used[1], named, titles)
+    units = next((row for _, row in above if _is_units(row)), [])
+    over = [
+        row for line, row in above[: max(at, 0)] if not _is_units(row) and line not in commented
+    ]
+    names = _names(over, width)
+    meanings = []
+    for n, text in enumerate(titles[:width]):
+        meaning = title_of(text)
+        if meaning.unit is None and n < len(units) and units[n]:
+            meaning = replace(meaning, unit=unit_of(units[n]))
+        if not meaning.name and n < len(names) and meaning.role not in ("time", "frame"):
+            meaning = replace(meaning, name=names[n])
+        meanings.append(meaning)
+    return Heading(
+        tuple(titles[:width]), tuple(meanings), body, any(m.role for m in meanings), _rate(above)
+    )
+
+
+def _num_titles(row: list[str]) -> int:
+    """How many cells are known titles; 0 of a row of units, or of a word and its value."""
+    if _is_units(row) or _has_number(row):
+        return 0
+    return sum(bool(title_of(cell).role) for cell in row)
+
+
+def _is_value(cell: str) -> bool:
+    return is_number(cell) or is_time(cell)
+
+
+def _word_columns(rows: Rows, width: int) -> set[int]:
+    """Columns of words: labels that most rows have."""
+    later = [row for _, row in rows[len(rows) // 2 :]][:2000]
+    found = set()
+    for n in range(width):
+        cells = [row[n] for row in later if n < len(row) and not is_nothing(row[n])]
+        if cells and sum(map(_is_value, cells)) < len(cells) / 2:
+            found.add(n)
+    return found
+
+
+def _is_body(row: list[str], words: set[int]) -> bool:
+    cells = [cell for n, cell in enumerate(row) if n not in words and cell]
+    return any(map(_is_value, cells)) and all(_is_value(c) or is_nothing(c) for c in cells)
+
+
+def _has_number(row: list[str]) -> bool:
+    return any(_is_value(cell) for cell in row)
+
+
+def _uncommented(row: list[str]) -> list[str]:
+    first = COMMENT.sub("", row[0], count=1)
+    return row[1:] if not first and row[0] else [first, *row[1:]]
+
+
+def _filled(row: list[str]) -> int:
+    return sum(map(bool, row))
+
+
+def _is_units(row: list[str]) -> bool:
+    cells = [cell for cell in row if cell.strip("()[] -")]
+    known = [unit_of(cell) is not None for cell in cells]
+    return bool(known) and sum(known) > len(known) / 2 and "t" not in [c.lower() for c in cells]
+
+
+def _with_markers(above: Rows, counts: list[int]) -> tuple[Rows, list[int]]:
+    """With titles for the three columns of each marker, where only the markers are named."""
+    for line, row in above:
+        if row[0].lower() == MARKERS and not any(counts):
+            titles = [f"{name} {axis}" for name in row[1:] if name for axis in "XYZ"]
+            return [*above, (line, titles)], [*counts, len(titles)]
+    return above, counts
+
+
+def _last_used(body: Rows, words: set[int]) -> tuple[int, int]:
+    """(last column that has a cell, line where it has)."""
+    best = (-1, 0)
+    for line, row in body:
+        last = max((n for n, cell in enumerate(row) if cell and n not in words), default=-1)
+        best = max(best, (last, -line))
+    return best[0], -best[1]
+
+
+def _refuse_longer(path: Path, body: Rows, line: int, named: int, titles: list[str]) -> None:
+    row = next(row for number, row in body if number == line)
+    hint = "give every column a title"
+    if all(cell.lstrip("+-").isdigit() for cell in row if cell):
+        hint = (
+            "is the comma used twice, in numbers and between them? write decimal points, or "
+            "semicolons between the cells"
+        )
+    raise InputError(
+        f"{path}: line {line}: {len(row)} cells for {named} titles ({_listed(titles)}); {hint}"
+    )
+
+
+def _listed(cells: list[str]) -> str:
+    shown = [repr(cell[:20]) for cell in cells if cell]
+    return ", ".join(shown[:6]) + (", ..." if len(shown) > 6 else "")
+
+
+def _names(rows: list[list[str]], width: int) -> list[str]:
+    """The object's name over each column: a name stands over its first column, or over each."""
+    filled = []
+    for row in rows:
+        if not any(row) or row[0].lower().lstrip("#") == MULTI or _has_number(row):
+            continue
+        names, last = [], ""
+        for n in range(width):
+            last = row[n] if n < len(row) and row[n] else last
+            names.append(last.replace("_", " "))
+        filled.append(names)
+    varied = [names for names in filled if len(set(names[1:])) > 1]
+    chosen = varied or filled[-1:]
+    return [" ".join(dict.fromkeys(parts)) for parts in zip(*chosen, strict=True)]
+
+
+def _rate(above: Rows) -> float | None:
+    for _, row in above:
+        if len(row) > 1 and row[0].lower().strip(":= ") in RATES and is_number(row[1]):
+            rate = float(row[1].replace(",", "."))
+            return 1 / rate if rate > 0 else None
+    return None

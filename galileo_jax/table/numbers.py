@@ -1,0 +1,157 @@
+"""Cells to numbers: decimal points and commas, thousands marks, exponents, what stands for nothing.
+
+A number printed with so many digits is known to half of the last one: its rounding error has the
+standard deviation `unit in the last place / sqrt(12)`.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from galileo_jax.runtime.errors import InputError
+
+Rows = list[tuple[int, list[str]]]
+"""Each row's line number in the file, and its cells."""
+
+NOTHING = frozenset(
+    ("", "nan", "na", "n/a", "#n/a", "#nv", "#value!", "#wert!", "null", "none", "-", "--", "---")
+)
+"""What programs write where there is no number, lower case."""
+
+PLAIN = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE)
+COMMA = re.compile(r"[-+]?(\d+,\d+|,\d+)(e[-+]?\d+)?", re.IGNORECASE)
+GROUPED = re.compile(r"[-+]?\d{1,3}(?:([,.' ])\d{3})(?:\1\d{3})*(?:([.,])\d*)?")
+"""1,234.5 and 1.234,5: digits in groups of three."""
+
+SPACES = dict.fromkeys(map(ord, "\u00a0\u2009\u202f"), " ") | {ord("\u2212"): "-"}
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """A column of numbers.
+
+    Attributes:
+      values: `[row]`, NaN where there is none.
+      resolution: unit in the last place as printed, median over the rows; NaN where there is no
+        number but 0.
+    """
+
+    values: np.ndarray
+    resolution: float
+
+
+def plain(cell: str) -> str:
+    """A cell without typographic spaces and minus signs."""
+    return cell.translate(SPACES).strip().strip("'")
+
+
+def is_nothing(cell: str) -> bool:
+    """Whether a cell stands for no number."""
+    return plain(cell).lower() in NOTHING
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number, with whatever decimal and thousands marks."""
+    text = plain(cell)
+    return bool(
+        text and (PLAIN.fullmatch(text) or COMMA.fullmatch(text) or _grouped(text) is not None)
+    )
+
+
+def _grouped(text: str) -> tuple[str, str | None] | None:
+    """(thousands mark, decimal mark) of a number in groups of three that can be nothing else."""
+    match = GROUPED.fullmatch(text)
+    if match is None or match[1] == match[2]:
+        return None
+    is_certain = match[2] is not None or text.count(match[1]) > 1 or match[1] in "' "
+    return (match[1], match[2]) if is_certain else None
+
+
+def decimal_mark(path: Path, rows: Rows, columns: dict[str, int]) -> tuple[str, str | None]:
+    """The decimal mark of all the columns, and the thousands mark, if there is one.
+
+    Raises:
+      InputError: some numbers have a comma and others a point, so that 1,234 may be one or a
+        thousand; names the lines and columns.
+    """
+    marked: dict[str, tuple[str, str]] = {}  # the first number with each decimal mark
+    thousands: str | None = None
+    for line, row in rows:
+        for title, at in columns.items():
+            cell = row[at] if at < len(row) else ""
+            if cell.isdigit() or ("." in marked and "," not in cell and PLAIN.fullmatch(cell)):
+                continue
+            cell = plain(cell)
+            if (grouped := _grouped(cell)) is not None:
+                thousands, found = grouped
+                found = found or {",": ".", ".": ","}.get(thousands)
+            elif PLAIN.fullmatch(cell):
+                found = "." if "." in cell else None
+            else:
+                found = "," if COMMA.fullmatch(cell) else None
+            if found is not None:
+                marked.setdefault(found, (f"line {line}: {title}", cell))
+    if len(marked) == 2 and thousands in (",", "."):
+        decimal = "." if thousands == "," else ","
+        _where, cell = marked[thousands]
+        if GROUPED.fullmatch(cell):
+            return decimal, thousands
+    if len(marked) == 2:
+        (first, one), (second, other) = marked["."], marked[","]
+        raise InputError(
+            f"{path}: {second}: {other[:40]!r}, but {first}: {one[:40]!r}; "
+            "the same decimal mark, point or comma, in the whole file expected"
+        )
+    return ("," if "," in marked else "."), thousands
+
+
+def parse_columns(path: Path, rows: Rows, columns: dict[str, int]) -> dict[str, Numbers]:
+    """The numbers of each of the columns, by title.
+
+    Raises:
+      InputError: a cell is no number, or decimal marks differ; names line, column and cell.
+    """
+    decimal, thousands = decimal_mark(path, rows, columns)
+    return {title: _column(path, rows, title, at, decimal, thousands)
+            for title, at in columns.items()}  # fmt: skip
+
+
+def values_of(path: Path, rows: Rows, columns: dict[str, int]) -> dict[str, np.ndarray]:
+    """The values of `parse_columns` alone, `[row]` for each title."""
+    return {title: one.values for title, one in parse_columns(path, rows, columns).items()}
+
+
+def _column(
+    path: Path, rows: Rows, title: str, at: int, decimal: str, thousands: str | None
+) -> Numbers:
+    values, places = np.full(len(rows), np.nan), []
+    for index, (line, row) in enumerate(rows):
+        cell = row[at] if at < len(row) else ""
+        if not PLAIN.fullmatch(cell):
+            if is_nothing(cell):
+                continue
+            cell = plain(cell)
+            if thousands is not None:
+                cell = cell.replace(thousands, "")
+            if decimal == ",":
+                cell = cell.replace(",", ".")
+        value = float(cell) if PLAIN.fullmatch(cell) else math.inf
+        if not math.isfinite(value):
+            raise InputError(
+                f"{path}: line {line}: {title}: {row[at][:40]!r} is not a number; a number such as "
+                "0.125 expected; leave the cell empty where nothing was seen"
+            )
+        values[index] = value
+        if value:
+            places.append(_last_place(cell))
+    return Numbers(values, float(np.median(places)) if places else math.nan)
+
+
+def _last_place(text: str) -> float:
+    """The unit in the last place of a printed number: 1.20E-2 is known to 1e-4."""
+    mantissa, _, exponent = text.lower().partition("e")
+    digits = len(mantissa.partition(".")[2])
+    return 10.0 ** min((int(exponent) if exponent else 0) - digits, 300)

@@ -1,0 +1,102 @@
+"""Bytes of a text file to text: the encoding in which its words are words.
+
+A few letters of a title do not tell an encoding by their statistics (charset-normalizer takes
+'time µs' in Latin-1 for 'time ”s', and six of twelve short titles wrong); words that name times,
+places and units do. Digits and separators are the same in all of them.
+"""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from galileo_jax.runtime.errors import InputError
+
+MAX_BYTES = 64_000_000
+"""About a million rows of six numbers."""
+
+MARKS = (
+    (b"\xef\xbb\xbf", "utf-8-sig"),
+    (b"\xff\xfe\x00\x00", "utf-32"),
+    (b"\x00\x00\xfe\xff", "utf-32"),
+    (b"\xff\xfe", "utf-16"),
+    (b"\xfe\xff", "utf-16"),
+)
+ENCODINGS = (
+    *("cp1252", "gb18030", "shift_jis", "big5", "euc_kr", "euc_jp"),
+    *("cp1251", "cp1250", "cp1253", "cp1254", "mac_roman", "koi8_r", "cp437"),
+)
+HEAD_BYTES = 4096
+"""Titles are at the top."""
+
+
+def content_of(path: Path) -> bytes:
+    """The bytes of a file.
+
+    Raises:
+      InputError: it cannot be read, is empty, or is larger than `MAX_BYTES`.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    if len(content) > MAX_BYTES:
+        raise InputError(
+            f"{path}: larger than {MAX_BYTES // 1_000_000} MB; a table of one motion expected"
+        )
+    if not content.strip(b" \t\r\n\0"):
+        raise InputError(f"{path}: empty; a row of titles and numbers expected")
+    return content
+
+
+def decoded(path: Path, content: bytes, count_words: Callable[[str], int]) -> str:
+    """The text of a file.
+
+    Args:
+      path: named in errors.
+      content: all of it.
+      count_words: how many words of a text are known; the more, the better its encoding.
+
+    Raises:
+      InputError: it is no text.
+    """
+    for mark, encoding in MARKS:
+        if content.startswith(mark):
+            return content.decode(encoding, errors="replace")
+    if b"\0" in content:
+        return _without_mark(path, content)
+    try:
+        return _text(path, content.decode("utf-8"))
+    except UnicodeDecodeError:
+        pass
+    head = content[:HEAD_BYTES].rpartition(b"\n")[0] or content[:HEAD_BYTES]
+    best, most = ENCODINGS[0], (-1, 0.0)
+    for encoding in ENCODINGS:
+        try:
+            text = head.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        beyond = [letter for letter in text if letter > "\x7f"]
+        share = sum(map(str.isalpha, beyond)) / len(beyond) if beyond else 0.0
+        if (found := (count_words(text), share)) > most:
+            best, most = encoding, found
+    return _text(path, content.decode(best, errors="replace"))
+
+
+def _without_mark(path: Path, content: bytes) -> str:
+    """UTF-16 without its mark: every second byte of digits is 0."""
+    even, odd = content[0:HEAD_BYTES:2], content[1:HEAD_BYTES:2]
+    for encoding, nulls, other in (("utf-16-le", odd, even), ("utf-16-be", even, odd)):
+        if nulls.count(0) > 0.8 * len(nulls) and other.count(0) < 0.1 * len(other):
+            return content.decode(encoding, errors="replace")
+    raise InputError(f"{path}: not a text: a byte 0 at {content.index(0)}; a table expected")
+
+
+def _text(path: Path, text: str) -> str:
+    """The text, unless it is full of what no table has."""
+    strange = re.findall(r"[\x01-\x08\x0e-\x1a\x1c-\x1f\x7f]", text[:HEAD_BYTES])
+    if len(strange) > 0.02 * len(text[:HEAD_BYTES]):
+        raise InputError(f"{path}: not a text, full of control characters; a table expected")
+    return text

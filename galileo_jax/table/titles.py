@@ -1,0 +1,109 @@
+"""Titles of columns to roles, objects and units: 'VideoAnalysis: X 2 (m)', 'Zeit / s', '位移'.
+
+The words are in `words.yaml`.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+
+Role = Literal["time", "frame", "x", "y", "z", "line", "angle", "object", "likelihood", ""]
+"""What a column is; "line": a distance along the way; "": anything else."""
+
+
+def _by_word(words_of: dict[Any, str]) -> dict[str, Any]:
+    return {word: meaning for meaning, words in words_of.items() for word in words.split()}
+
+
+_LISTS = yaml.safe_load((Path(__file__).parent / "words.yaml").read_text("utf-8"))
+WORDS: dict[str, Role] = _by_word(_LISTS["roles"])
+FILLERS, DERIVED = (frozenset(_LISTS[key].split()) for key in ("fillers", "derived"))
+SYMBOLS = frozenset("va")
+"""Of quantities made from places; 'A X' is the place of A."""
+
+LENGTHS: dict[str, str] = _by_word(_LISTS["lengths"])
+SECONDS: dict[str, float] = _by_word(_LISTS["seconds"])
+RADIANS: dict[str, float] = _by_word(_LISTS["radians"])
+UNITS = frozenset((*LENGTHS, *SECONDS, *RADIANS))
+
+BRACKETS = re.compile(r"[(\[{]\s*(?:in\s+)?([^()\[\]{}]*?)\s*[)\]}]")
+NUMBERED = re.compile(r"([xyz])[_ ]?(\d+|[A-Za-z])", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Title:
+    """A column's title, taken apart.
+
+    Attributes:
+      role: what the column is.
+      name: of the object, "" where the title has none.
+      unit: as written, lower case; None where none is.
+    """
+
+    role: Role
+    name: str = ""
+    unit: str | None = None
+
+
+def count_words(text: str) -> int:
+    """How many words of a text are known: of the right encoding the most are."""
+    words = re.split(r"[\s,;|()\[\]{}/\"']+", text.lower())
+    return sum(word in WORDS or word in UNITS for word in words)
+
+
+def unit_of(text: str) -> str | None:
+    """A unit alone, in brackets or not; None: it is none."""
+    word = text.strip().strip("()[]{}").strip().lower()
+    return word if word in UNITS else None
+
+
+def title_of(text: str) -> Title:
+    """Takes a title apart; 'X Velocity (m/s)' is no place and has no role."""
+    text = text.strip().lstrip("#%").strip()
+    found = BRACKETS.findall(text)
+    unit = next((one.lower() for one in found if one.lower() in UNITS), None)
+    foreign = [one for one in found if one.lower() not in UNITS]
+    words = BRACKETS.sub(lambda m: " " if m[1].lower() in UNITS else f" {m[1]} ", text)
+    if ":" in words:  # the data set stands before a colon
+        words = words.rsplit(":", 1)[1] or words
+    head, slash, tail = words.rpartition("/")
+    head, comma, tail = (head, slash, tail) if slash else words.rpartition(",")
+    if (slash or comma) and unit is None and tail.strip().lower() in UNITS and head.strip():
+        words, unit = head, tail.strip().lower()
+    if "/" in words or "^" in words or any("/" in one for one in foreign):
+        return Title("", unit=unit)
+    tokens = [one for one in re.split(r"[\s_\-.]+", words) if one]
+    return _from_tokens(tokens, unit)
+
+
+def _from_tokens(tokens: Sequence[str], unit: str | None) -> Title:
+    lower = [token.lower() for token in tokens]
+    joined = "".join(lower).rstrip("#").replace("number", "").replace("index", "")
+    if WORDS.get(joined) in ("frame", "object", "time"):
+        return Title(WORDS[joined], unit=unit)
+    if len(tokens) == 1 and (match := NUMBERED.fullmatch(tokens[0])):
+        return Title(WORDS[match[1].lower()], match[2], unit)
+    if DERIVED & set(lower) or SYMBOLS & set(tokens):
+        return Title("", unit=unit)
+    if unit is None and len(lower) > 1 and lower[-1] in UNITS and lower[-1] not in WORDS:
+        tokens, lower, unit = tokens[:-1], lower[:-1], lower[-1]
+    roles = [WORDS.get(token, "") for token in lower]
+    for axis in ("x", "y", "z"):
+        exact = [n for n, token in enumerate(lower) if token == axis]
+        if exact or axis in roles:
+            at = exact[0] if exact else roles.index(axis)
+            rest = [n for n in range(len(tokens)) if n != at and lower[n] not in FILLERS]
+            name = [tokens[n] for n in rest if lower[n] not in WORDS]
+            return Title(axis, " ".join(name), unit)
+    if len(lower) <= 3 or roles[0] == "time":
+        for role in ("time", "likelihood", "angle", "frame", "object", "line"):
+            if role in roles:
+                rest = [t for t, r in zip(tokens, roles, strict=True)
+                    if r != role and t.lower() not in FILLERS]  # fmt: skip
+                is_named = role in ("angle", "likelihood", "line")
+                return Title(role, " ".join(rest) if is_named else "", unit)
+    return Title("", unit=unit)

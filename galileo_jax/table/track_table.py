@@ -1,0 +1,93 @@
+"""What a file says of a motion, before its units and axes are settled."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+METRES_PER_UNIT: dict[str, float] = {
+    "m": 1.0,
+    "cm": 0.01,
+    "mm": 0.001,
+    "km": 1000.0,
+    "in": 0.0254,
+    "ft": 0.3048,
+}
+"""Units of length by the words with which files and `track_units` name them."""
+
+MIN_LIKELIHOOD = 0.6
+"""DeepLabCut's own `pcutoff`: points less likely count as not seen."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What a tool knows of its picture.
+
+    Attributes:
+      pixels_per_unit: along (x, y).
+      unit: of length; None where the file does not name it.
+      origin_px: x right, y down.
+      roll_rad: how its level x axis is turned against the picture's, counterclockwise.
+    """
+
+    pixels_per_unit: tuple[float, float]
+    unit: str | None
+    origin_px: tuple[float, float]
+    roll_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column, as it was understood.
+
+    Attributes:
+      title: as the file has it; "column 3" where it has none.
+      role: "time", "frame", "x", ...; "" where it is not used.
+      name: of the object.
+      unit: as the file has it; None where it has none.
+      resolution: unit in the last place that is printed, in the column's unit; NaN where it is
+        not used.
+    """
+
+    title: str
+    role: str
+    name: str = ""
+    unit: str | None = None
+    resolution: float = math.nan
+
+
+@dataclass(frozen=True)
+class TrackTable:
+    """A motion in a table.
+
+    Attributes:
+      names: of the objects, as the file calls them.
+      position: `[object, axis, row]` in `unit`, x right; NaN where an object was not seen.
+      axes: what was measured, of "x", "y", "z", "line" (along the way) and "angle" (rad).
+      times_s: `[row]`, s; None where the file counts `frames`.
+      frames: `[row]`, whole numbers; None where it gives times.
+      is_counted: the file has neither times nor frames: each row is a frame.
+      frame_s: between two frames, s; None where the file does not tell.
+      unit: a key of `METRES_PER_UNIT`, or "px"; None where the file does not tell.
+      resolution: `[axis]`, unit in the last place of positions as printed, in `unit`; empty where
+        nothing was rounded.
+      y_axis: "up" or "down"; None where the file does not tell.
+      calibration: of a file in pixels; None where it has none.
+      columns: of a table, all that it has, in their order.
+      warnings: doubts, one line each.
+    """
+
+    names: tuple[str, ...]
+    position: np.ndarray
+    axes: tuple[str, ...] = ("x", "y")
+    times_s: np.ndarray | None = None
+    frames: np.ndarray | None = None
+    is_counted: bool = False
+    frame_s: float | None = None
+    unit: str | None = None
+    resolution: tuple[float, ...] = ()
+    y_axis: Literal["up", "down"] | None = None
+    calibration: Calibration | None = None
+    columns: tuple[Column, ...] = ()
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,56 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from galileo_jax.__main__ import main
+from galileo_jax.api.look import look
+from galileo_jax.clip.schema import ClipFile
+from galileo_jax.runtime.errors import InputError
+
+T = np.arange(30) / 25
+
+
+def write(path: Path, titles: str, *columns: np.ndarray) -> Path:
+    rows = "\n".join(";".join(f"{v:.4f}" for v in row) for row in zip(*columns, strict=True))
+    path.write_text(f"{titles}\n{rows}\n")
+    return path
+
+
+@pytest.mark.parametrize("titles, columns, scenario", [
+    ("t (s);y (m)", (T, 2 - 4.905 * T**2), "fall"),
+    ("t (s);s (m)", (T, 0.4 * T**2), "incline"),
+    ("t (s);x (m);y (m)", (T, 2 * T, 3 * T - 4.905 * T**2), "flight"),
+    ("t (s);x (mm)", (T, np.sin(20 * T)), "spring"),
+    ("t (s);x (m);y (m)", (T, np.sin(14 * T), 0.5 * np.sin(14 * T) ** 2), "pendulum"),
+])  # fmt: skip
+def test_the_likely_scenario(titles, columns, scenario, tmp_path: Path) -> None:
+    found = look(write(tmp_path / "a.csv", titles, *columns))
+    assert found.seen is not None and found.seen.scenario == scenario
+    said = yaml.safe_load(found.yaml)
+    assert said["scenario"] == scenario and said["track"] == "a.csv"
+    assert set(said) <= set(ClipFile.model_fields)
+
+
+def test_summary_names_columns_gaps_and_what_is_not_known(tmp_path: Path, capsys) -> None:
+    kept = np.delete(np.arange(30), [10, 11])
+    path = write(tmp_path / "a.csv", "frame;x;v (m/s)", kept, kept**2.0, 2.0 * kept)
+    assert main(["look", str(path), "--plot", str(tmp_path / "a.png")]) in (None, 0)
+    out = capsys.readouterr().out
+    for words in (
+        "28 rows",
+        "v (m/s)  not used",
+        "after row 9 (3 steps)",
+        "# fps",
+        "# track_units",
+    ):
+        assert words in out
+    assert (tmp_path / "a.png").stat().st_size > 0
+
+
+def test_what_is_no_file_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no such file"):
+        look(tmp_path / "none.csv")
+    with pytest.raises(InputError, match="a table or a film expected"):
+        look(tmp_path)

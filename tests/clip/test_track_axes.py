@@ -1,0 +1,85 @@
+"""One coordinate is enough along a line; axes that lie otherwise are found by the motion."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.clip.load import load_clip
+from galileo_jax.measurement.measure import measure
+from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
+from galileo_jax.runtime.errors import InputError
+
+T = np.arange(40) / 60
+NOISE = np.random.default_rng(5).normal(0, 3e-4, (2, 40))
+FALL = 1.5 - 4.905 * T**2 + NOISE[0]
+WAY = 0.8 * T**2 + NOISE[1]
+
+
+def observed(folder: Path, columns: dict[str, np.ndarray], keys: str) -> Observation:
+    table = np.stack(list(columns.values())).T
+    rows = "\n".join(",".join(f"{v:.6f}" for v in row) for row in table)
+    (folder / "a.csv").write_text(",".join(columns) + "\n" + rows + "\n")
+    (folder / "a.yaml").write_text(
+        f"track: a.csv\n{keys}\nobjects: [{{name: object1, shape: box}}]\n"
+    )
+    return measure(load_clip(folder / "a.yaml")).observation
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_fall_by_its_height_or_depth(sign: int, tmp_path: Path) -> None:
+    found = observed(tmp_path, {"t (s)": T, "s (m)": sign * FALL}, "scenario: fall")
+    np.testing.assert_allclose(found.position_m[0, 1], FALL, atol=1e-6)
+    sd = np.sqrt(np.einsum("aat->at", found.covariance_m2[0]))
+    assert sd[0, 0] == UNMEASURED_SD_M and sd[1, 0] < 1e-3
+    np.testing.assert_array_equal(np.abs(found.across[0, 0]), 1.0)
+
+
+@pytest.mark.parametrize("columns", [
+    {"t (s)": T, "x (m)": WAY},
+    {"t (s)": T, "x (m)": -WAY},
+    {"t (s)": T, "x (m)": WAY, "y (m)": NOISE[0]},
+    {"t (s)": T, "x (m)": NOISE[0], "y (m)": WAY},
+    {"time_s": T, "object1_x_m": WAY, "object1_y_m": 0 * T},
+], ids=["way", "way_back", "level_with_errors", "upright", "own_csv"])  # fmt: skip
+def test_the_way_down_a_slope(columns: dict[str, np.ndarray], tmp_path: Path) -> None:
+    found = observed(tmp_path, columns, "scenario: incline\nramp_angle_deg: 10")
+    angle = np.radians(10)
+    along = np.array([np.cos(angle), -np.sin(angle)])
+    np.testing.assert_allclose(along @ found.position_m[0], WAY, atol=2e-5)
+    sd = np.sqrt(np.einsum("a,b,abt->t", along, along, found.covariance_m2[0]))
+    assert 1e-4 < sd[0] < 6e-4  # 3e-4 was put in
+
+
+def test_a_fall_along_x_says_what_to_declare(tmp_path: Path) -> None:
+    columns = {"t (s)": T, "x (m)": -FALL, "y (m)": NOISE[1]}
+    with pytest.raises(InputError, match=r"falls along \+x, .* write track_up: -x"):
+        observed(tmp_path, columns, "scenario: fall\ntrack_y: up")
+    found = observed(tmp_path, columns, "scenario: fall\ntrack_up: -x")
+    np.testing.assert_allclose(found.position_m[0, 1], FALL, atol=1e-6)
+
+
+def test_a_flight_needs_two_coordinates(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"only one coordinate .* needs x and y; along a line are"):
+        observed(tmp_path, {"t (s)": T, "y (m)": FALL}, "scenario: flight")
+
+
+def test_first_frame_is_honoured(tmp_path: Path) -> None:
+    rows = "\n".join(f"{t:.4f},{x:.6f},{y:.6f}" for t, x, y in zip(T, T, FALL, strict=True))
+    (tmp_path / "a.csv").write_text("t (s),x (m),y (m)\n" + rows + "\n")
+    (tmp_path / "a.yaml").write_text(
+        "track: a.csv\nscenario: flight\n"
+        "objects: [{name: object1, shape: box, first_frame: 4, last_frame: 20}]\n"
+    )
+    mask = measure(load_clip(tmp_path / "a.yaml")).observation.mask[0]
+    np.testing.assert_array_equal(np.flatnonzero(mask), np.arange(4, 21))
+
+
+def test_lost_frames_are_named_and_their_time_put_back(tmp_path: Path) -> None:
+    kept = np.delete(np.arange(40), [8, 15, 16, 27])
+    columns = {"t (s)": T[: len(kept)], "x (m)": NOISE[1][kept], "y (m)": FALL[kept]}
+    found = observed(tmp_path, columns, "scenario: fall")
+    np.testing.assert_allclose(found.times_s, T[kept], atol=1e-4)
+    assert "missing after rows 7, 13 (2), 23" in load_clip(tmp_path / "a.yaml").warnings[0]
+    whole = observed(tmp_path, {"t (s)": T, "x (m)": NOISE[1], "y (m)": FALL}, "scenario: fall")
+    np.testing.assert_allclose(whole.times_s, T, atol=1e-6)

@@ -1,0 +1,310 @@
+"""One throw, written as many programs and people write it, is read as the same numbers."""
+
+import io
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.read import read_table
+from galileo_jax.table.track_table import TrackTable
+
+ROWS = 21
+STEP_S = 0.04
+DIGITS = 4
+
+
+def truth() -> np.ndarray:
+    """`[3, row]`: t, x, y of a throw, rounded as it is printed."""
+    t = STEP_S * np.arange(ROWS)
+    return np.round(np.stack([t, 2.0123 * t, 3.7 * t - 4.905 * t**2]), DIGITS)
+
+
+def lines(
+    separator: str = ",",
+    decimal: str = ".",
+    form: Callable[[float], str] = lambda v: f"{v:.{DIGITS}f}",
+    columns: tuple[int, ...] = (0, 1, 2),
+) -> list[str]:
+    rows = truth()[list(columns)].T
+    return [separator.join(form(v).replace(".", decimal) for v in row) for row in rows]
+
+
+def text(*heading: str, body: list[str] | None = None, after: tuple[str, ...] = ()) -> str:
+    return "\n".join([*heading, *(lines() if body is None else body), *after]) + "\n"
+
+
+def read(folder: Path, content: str | bytes, suffix: str = "csv", fps: float | None = None):
+    path = folder / f"a.{suffix}"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_table(path, fps)
+
+
+def check(table: TrackTable, index: int = 0) -> None:
+    t, x, y = truth()
+    assert table.times_s is not None
+    np.testing.assert_allclose(table.times_s - table.times_s[0], t, atol=1e-9)
+    np.testing.assert_allclose(table.position[index], [x, y], atol=1e-12)
+
+
+def clocked(form: Callable[[int], str]) -> list[str]:
+    """Rows whose time is written by the row's number."""
+    return [f"{form(n)};{x};{y}" for n, (_, x, y) in enumerate(truth().T)]
+
+
+SEMI = lines(";", ",")
+FORMS = {
+    "plain": text("t,x,y"),
+    "no_titles": text(),
+    "tabs": text("t\tx\ty", body=lines("\t")),
+    "semicolons_and_commas": text("t;x;y", body=SEMI),
+    "spaces": text("t x y", body=lines("  ")),
+    "comma_twice": text("t, x, y", body=lines(", ", ",")),
+    "bars": text("t|x|y", body=lines("|")),
+    "units_in_their_row": text("t;x;y", "(s);(m);(m)", body=SEMI),
+    "units_without_brackets": text("t;x;y", "s;m;m", body=SEMI),
+    "avimeca": text("Pointages Aviméca", "t\tx\ty", "(s)\t(m)\t(m)", body=lines("\t", ",")),
+    "name_above": text("mass_A", "t,x,y"),
+    "quoted_lines": "\n".join(f'"{one}"' for one in ["mass A", "t\tx\ty", *lines("\t")]),
+    "trailing_separators": text("t,x,y,", body=[f"{one},,," for one in lines()]),
+    "empty_rows": text("", "t,x,y", ",,", body=[*lines()[:5], "", ",,", *lines()[5:], ",,"]),
+    "comments": text("# made by a program", "# t x y", body=lines(" "), after=("# the end",)),
+    "numpy_savetxt": text("# t,x,y", body=lines(form=lambda v: f"{v:.18e}")),
+    "german": text("Bild; Zeit (in s); Objekt 1 x-Koordinate; Objekt 1 y-Koordinate; Objekt 1 x-"
+                   "Geschwindigkeit", body=[f"{n}; {one}; 2,0" for n, one in enumerate(
+                       lines("; ", ","))]),
+    "slashes": text("t / s,x / m,y / m"),
+    "velocities_beside": text("t,x,y,v_x,v_y", body=[f"{one},1,2" for one in lines()]),
+    "y_before_x": text("y,x,t", body=lines(columns=(2, 1, 0))),
+    "titles_in_no_known_words": text("aikapiste,sivu,ylös"),
+    "titles_swapped": text("X, Y, t"),
+    "milliseconds": text("t (ms),x,y", body=[f"{40 * n},{x},{y}"
+                                             for n, (_, x, y) in enumerate(truth().T)]),
+    "microseconds": text("t (us),x,y", body=[f"{40000 * n},{x},{y}"
+                                             for n, (_, x, y) in enumerate(truth().T)]),
+    "unix_ms": text("timestamp;x;y", body=clocked(lambda n: str(1715672462033 + 40 * n))),
+    "iso": text("time;x;y", body=clocked(lambda n: f"2024-05-14T09:31:0{n * 40 // 1000}."
+                                         f"{n * 40 % 1000:03d}Z")),
+    "minutes": text("time;x;y", body=clocked(lambda n: f"12:0{n * 40 // 1000}."
+                                             f"{n * 40 % 1000:03d}")),
+    "hundredths": text("time;x;y", body=clocked(
+        lambda n: f"0:00:{58 + (80 + 4 * n) // 100:02d}:{(80 + 4 * n) % 100:02d}")),
+    "frames_of_a_second": text("time;x;y", body=clocked(
+        lambda n: f"0:00:{1 + (20 + n) // 25:02d}:{(20 + n) % 25:02d}")),
+    "a_time_twice": text("t,x,y", body=[lines()[0], *lines()]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("content", FORMS.values(), ids=FORMS)
+def test_every_form_is_the_same_throw(content: str, tmp_path: Path) -> None:
+    check(read(tmp_path, content))
+
+
+ENCODINGS = {
+    "utf-8-sig": "t,x,y",
+    "utf-16": "t,x,y",
+    "utf-16-le": "t,x,y",
+    "utf-32": "t,x,y",
+    "gbk": "时间,水平 x,高度 y",
+    "latin-1": "Pointages Aviméca\nt,x,y",
+    "cp1251": "время,x,y",
+    "shift_jis": "時間,x,y",
+    "euc_kr": "시간,x,y",
+}
+
+
+@pytest.mark.parametrize("encoding, heading", ENCODINGS.items(), ids=ENCODINGS)
+def test_every_encoding(encoding: str, heading: str, tmp_path: Path) -> None:
+    table = read(tmp_path, text(heading).encode(encoding))
+    check(table)
+    titles = [one.title for one in table.columns]
+    assert titles == heading.split("\n")[-1].split(",")
+
+
+def test_a_unit_in_an_old_encoding_is_a_unit(tmp_path: Path) -> None:
+    """Statistics of letters take it for another one."""
+    body = [f"{40000 * n},{x},{y}" for n, (_, x, y) in enumerate(truth().T)]
+    check(read(tmp_path, text("t (µs),x,y", body=body).encode("latin-1")))
+
+
+def test_units_of_length_and_resolution(tmp_path: Path) -> None:
+    table = read(tmp_path, text("t (s),x (cm),y (cm)"))
+    assert (table.unit, table.resolution) == ("cm", (1e-4, 1e-4))
+    in_figures = read(tmp_path, text("t,x,y", body=lines(form=lambda v: f"{v:.2E}")))
+    assert in_figures.resolution[1] == pytest.approx(1e-3)  # three figures of less than 1 m
+
+
+def test_thousands_marks(tmp_path: Path) -> None:
+    body = [f"{n};{1000.5 + n:,.1f};{2000 + 3 * n:,.1f}" for n in range(12)]
+    expected = [[1000.5 + n for n in range(12)], [2000.0 + 3 * n for n in range(12)]]
+    np.testing.assert_array_equal(
+        read(tmp_path, text("frame;x;y", body=body)).position[0], expected
+    )
+    german = [one.replace(",", "_").replace(".", ",").replace("_", ".") for one in body]
+    np.testing.assert_array_equal(
+        read(tmp_path, text("frame;x;y", body=german)).position[0], expected
+    )
+
+
+def test_nothing_is_written_in_many_ways(tmp_path: Path) -> None:
+    words = ["", "nan", "NaN", "-", "NA", "#N/A", "null"]
+    body = lines()
+    for n, word in enumerate(words):
+        body[2 * n] = f"{truth()[0, 2 * n]},{word},{word}"
+    table = read(tmp_path, text("t,x,y", body=body))
+    assert np.isnan(table.position[0, 0, : 2 * len(words) : 2]).all()
+    assert np.isfinite(table.position[0]).all(axis=0).sum() == ROWS - len(words)
+
+
+def test_a_row_for_each_particle(tmp_path: Path) -> None:
+    rows = [",y,x,mass,frame,particle"]
+    for n, (_, x, y) in enumerate(truth().T):
+        for particle in (7, 0):
+            if (n, particle) != (3, 7):
+                rows.append(f"{len(rows) - 1},{y},{x + particle},4126.1,{n},{particle}")
+    table = read(tmp_path, "\n".join(rows))
+    assert table.names == ("0", "7")
+    np.testing.assert_array_equal(table.frames, np.arange(ROWS))
+    np.testing.assert_allclose(table.position[0], truth()[1:])
+    assert np.isnan(table.position[1, :, 3]).all()
+    np.testing.assert_allclose(np.delete(table.position[1, 0], 3), np.delete(truth()[1] + 7, 3))
+
+
+def test_several_objects_by_names_in_the_titles_or_above(tmp_path: Path) -> None:
+    body = [f"{t},{x},{y},{x + 1},{y}" for t, x, y in truth().T]
+    for heading in (
+        ("t,x1,y1,x2,y2",),
+        ("Time (s),X A (m),Y A (m),X B (m),Y B (m)",),
+        ("t,ball_x,ball_y,box_x,box_y",),
+        ("#multi:", ",mass A,,mass B,", "t,x,y,x,y"),
+    ):
+        table = read(tmp_path, text(*heading, body=body))
+        assert len(table.names) == 2
+        check(table)
+        np.testing.assert_allclose(table.position[1, 0], truth()[1] + 1)
+
+
+def test_motion_capture_names_its_markers_alone(tmp_path: Path) -> None:
+    heading = ["NO_OF_FRAMES\t21", "FREQUENCY\t25", "MARKER_NAMES\tA\tB"]
+    body = [f"{x}\t0\t{y}\t{x + 1}\t0\t{y}" for _, x, y in truth().T]
+    table = read(tmp_path, "\n".join([*heading, *body]), "tsv")
+    assert (table.names, table.axes, table.is_counted) == (("A", "B"), ("x", "y", "z"), True)
+    assert table.frame_s == pytest.approx(STEP_S)
+
+
+def test_no_times_count_the_rows(tmp_path: Path) -> None:
+    table = read(tmp_path, text("x,y", body=lines(columns=(1, 2))))
+    assert table.is_counted
+    np.testing.assert_allclose(table.position[0], truth()[1:])
+
+
+@pytest.mark.parametrize("title", ["y (m)", "s / m", "Weg", "высота", "位移", "?"])
+def test_one_coordinate(title: str, tmp_path: Path) -> None:
+    table = read(tmp_path, text(f"t;{title}", body=lines(";", columns=(0, 2))))
+    assert len(table.axes) == 1
+    np.testing.assert_allclose(table.position[0, 0], truth()[2])
+
+
+def test_two_places_at_one_time_are_their_mean_and_said(tmp_path: Path) -> None:
+    t, x, y = truth()[:, 4]
+    body = [*lines()[:5], f"{t},{x + 0.02},{y}", *lines()[5:]]
+    table = read(tmp_path, text("t,x,y", body=body))
+    assert table.position[0, 0, 4] == pytest.approx(x + 0.01)
+    assert table.position.shape[-1] == ROWS
+    assert "line 6: 1 times stand in several rows, 1 of them with other places" in table.warnings[0]
+
+
+def spreadsheet(rows: list[list[str]]) -> bytes:
+    """A minimal xlsx, by its parts."""
+    cells = "".join(
+        f'<row r="{n}">' + "".join(f'<c r="{chr(65 + k)}{n}"><v>{v}</v></c>'
+                                   for k, v in enumerate(row)) + "</row>"
+        for n, row in enumerate(rows, 1)
+    )  # fmt: skip
+    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    package = "http://schemas.openxmlformats.org/package/2006"
+    parts = {
+        "[Content_Types].xml": f'<Types xmlns="{package}/content-types"><Default Extension="xml" '
+        'ContentType="application/xml"/></Types>',
+        "_rels/.rels": f'<Relationships xmlns="{package}/relationships"><Relationship Id="r1" '
+        f'Type="{office}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
+        "xl/workbook.xml": f'<workbook xmlns="{main}" xmlns:r="{office}"><sheets><sheet name="a" '
+        'sheetId="1" r:id="r1"/></sheets></workbook>',
+        "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{package}/relationships">'
+        f'<Relationship Id="r1" Type="{office}/worksheet" Target="worksheets/sheet1.xml"/>'
+        "</Relationships>",
+        "xl/worksheets/sheet1.xml": f'<worksheet xmlns="{main}"><sheetData>{cells}</sheetData>'
+        "</worksheet>",
+    }
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, part in parts.items():
+            archive.writestr(name, f'<?xml version="1.0" encoding="UTF-8"?>{part}')
+    return out.getvalue()
+
+
+def test_a_spreadsheet(tmp_path: Path) -> None:
+    check(read(tmp_path, spreadsheet([one.split(",") for one in lines()]), "xlsx"))
+
+
+def test_a_sheet_of_two_far_cells_is_refused_not_fatal(tmp_path: Path) -> None:
+    """A range of 17,000 million cells, at which calamine ends its process."""
+    with zipfile.ZipFile(io.BytesIO(spreadsheet([["1"]]))) as archive:
+        parts = {name: archive.read(name) for name in archive.namelist()}
+    parts["xl/worksheets/sheet1.xml"] = parts["xl/worksheets/sheet1.xml"].replace(
+        b"</sheetData>",
+        b'<row r="1048576"><c r="XFD1048576"><v>1</v></c></row></sheetData>',
+    )
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, part in parts.items():
+            archive.writestr(name, part)
+    with pytest.raises(InputError, match=r"a\.xlsx: not a whole spreadsheet, or far too large"):
+        read(tmp_path, out.getvalue(), "xlsx")
+
+
+REFUSED = {
+    "comma_twice_untold": (
+        text("t,x,y", body=[*lines(",", ",")[:-1], "1,5,6"]),
+        r"cells for 3 titles .*the comma used twice.*write decimal points, or semicolons",
+    ),
+    "more_cells_than_titles": (
+        text("t,x", body=lines()),
+        r"line 2: 3 cells for 2 titles \('t', 'x'\); give every column a title",
+    ),
+    "a_word": (text("t,x,y").replace("0.0805", "about"), r"line 3: x: 'about' is not a number"),
+    "both_marks": (
+        text("t;x;y", body=[*lines(";"), "0,84;1,5;2,5"]),
+        r"the same decimal mark, point or comma, in the whole file",
+    ),
+    "two_units": (text("t (s),x (m),y (mm)"), "different units: m, mm"),
+    "an_angle_without_unit": (
+        text("t,angle", body=lines(columns=(0, 1))),
+        r"an angle without its unit; write \(deg\) or \(rad\)",
+    ),
+    "x_twice": (text("t,x,x"), "x is given twice"),
+    "many_columns_of_nothing_known": (
+        text(body=[f"{one},1,2,3" for one in lines()]),
+        "which columns are places is not told by no titles",
+    ),
+    "words_only": ("a,b\nc,d\n", "no row of numbers; line 1 has 'a', 'b'"),
+    "frames_or_hundredths": (
+        text("time;x;y", body=clocked(lambda n: f"0:00:01:{n:02d}")),
+        "whether its last field counts frames or hundredths",
+    ),
+    "another_clock": (
+        text("time;x;y", body=[*clocked(lambda n: f"12:00.{n:03d}"), "later;1;2"]),
+        "'later' is not a time such as '12:00.000'",
+    ),
+}
+
+
+@pytest.mark.parametrize("content, words", REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_read_is_one_line(content: str, words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        read(tmp_path, content)
+    assert "a.csv: " in str(caught.value) and "\n" not in str(caught.value)
