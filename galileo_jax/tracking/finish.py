@@ -50,6 +50,7 @@ def finished(
     pieces: Sequence[Piece],
     shares: Sequence[float],
     coding: Coding,
+    clock: np.ndarray,
 ) -> list[Finished]:
     """The pieces' tracks from their fits of every frame (None: not found).
 
@@ -58,17 +59,18 @@ def finished(
       pieces: with the points to follow, each in its piece's first frame.
       shares: per piece, the open share of a frame's time.
       coding: of the frames.
+      clock: `[frame]`, when each was taken, in usual steps.
     """
     seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
     # A coder sees what is shown, before anything else is put right.
-    mended = without_coding_shift(seen, coding)
+    mended = without_coding_shift(seen, coding, clock)
     seen = [
-        _at_mid_exposure(one.poses, noise, share, piece)
+        _at_mid_exposure(one.poses, noise, share, piece, clock)
         for one, (_, noise), piece, share in zip(mended, seen, pieces, shares, strict=True)
     ]
-    excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
+    excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen], clock)
     return [
-        _anchored(poses, noise, one.shifts_px, found, piece, excess)
+        _anchored(poses, noise, one.shifts_px, found, piece, excess, clock)
         for (poses, noise), one, found, piece in zip(seen, mended, fits, pieces, strict=True)
     ]
 
@@ -104,12 +106,16 @@ def _seen(fits: list[Refined | None], corrected: Sequence[int]) -> tuple[np.ndar
 
 
 def _at_mid_exposure(
-    poses: np.ndarray, noise: np.ndarray, exposure_share: float, piece: Piece
+    poses: np.ndarray,
+    noise: np.ndarray,
+    exposure_share: float,
+    piece: Piece,
+    clock: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The poses without what blows within an exposure shift them, and the noise with the rest."""
     jumps = np.zeros((len(poses), 2))
     for index in np.flatnonzero(np.isfinite(poses[:, 0])):
-        jumps[index] = piece.velocities(poses, int(index)).jump[:2]
+        jumps[index] = piece.velocities(poses, int(index), clock).jump[:2]
     shift = blow_shift(jumps, exposure_share)
     unknown = BLOW_KNOWN_TO**2 * (shift**2).sum(axis=1)
     corrected = poses - np.pad(shift, ((0, 0), (0, 1)))
@@ -123,6 +129,7 @@ def _anchored(
     fits: list[Refined | None],
     piece: Piece,
     excess: np.ndarray,
+    clock: np.ndarray,
 ) -> Finished:
     """The followed point's places: rigid with the poses, `point_px` where the object began.
 
@@ -134,7 +141,7 @@ def _anchored(
     moves = is_in_motion(poses[frames, :2], noise[frames])
     grown = moves * excess * speed_scale2(poses[frames, :2])[:, None]
     covariance[frames] += np.einsum("fi,ij->fij", grown, np.eye(2))
-    scale2 = motion_scale2(poses[:, :2], covariance)
+    scale2 = motion_scale2(poses[:, :2], covariance, clock)
     scale2 = scale2 * after_blow_scale2(poses[frames, :2], noise[frames])
     scale2 = scale2 * slow_scale2(poses[frames, :2], noise[frames])
     scale = np.sqrt(np.where(moves, scale2, 1.0))
