@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.tracking.exposure import LEARNT_FRAMES, Exposure
-from galileo_jax.tracking.finish import finished, joined
+from galileo_jax.tracking.finish import Finished, finished, joined
 from galileo_jax.tracking.follower import Follower
 from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pieces import Piece, Start, follow_on, keep_apart
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
+from galileo_jax.tracking.second_opinion import needs_silhouette, with_silhouette
+from galileo_jax.tracking.silhouette import paths_of
 from galileo_jax.tracking.template import Template, grey, median_template
 from galileo_jax.tracking.track import Track
 
@@ -102,6 +104,7 @@ def track_video(
         joined([one for (of, _), one in zip(flat, done, strict=True) if of == k], count)
         for k in range(len(starts))
     ]
+    objects = _with_silhouettes(objects, starts, open_frames, clock[:count])
     return Track(
         names=tuple(start.name for start in starts),
         times_s=times_s[:count],
@@ -113,6 +116,24 @@ def track_video(
         is_visible=np.stack([np.isfinite(item.angle_rad) for item in objects]),
         frame_size_px=size_px,
     )
+
+
+def _with_silhouettes(
+    objects: Sequence[Finished],
+    starts: Sequence[Start],
+    open_frames: Callable[[], Iterable[np.ndarray]],
+    clock: np.ndarray,
+) -> list[Finished]:
+    """The objects, those that their texture loses by their silhouettes."""
+    each = list(zip(objects, starts, strict=True))
+    doubtful = [needs_silhouette(one, start) for one, start in each]
+    if not any(doubtful):
+        return list(objects)
+    paths = paths_of(open_frames, clock)
+    return [
+        with_silhouette(one, start, paths, clock) if is_doubtful else one
+        for (one, start), is_doubtful in zip(each, doubtful, strict=True)
+    ]
 
 
 class _Kept:

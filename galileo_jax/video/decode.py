@@ -27,7 +27,7 @@ SQUARE = 1e-3
 """Pixels whose sides differ by less are taken as square."""
 KINDS = "?IPBSipb"
 """FFmpeg's kinds of pictures by number."""
-FIELDS = "bwdif=mode=send_field"
+FIELDS = "bwdif=mode=send_field:parity={}"
 """FFmpeg's filter that makes of each interlaced picture two, one for each of its fields."""
 
 
@@ -68,7 +68,7 @@ def frames(path: Path) -> Iterator[np.ndarray]:
     path = Path(path)
     scan = _scan(path)
     used = _used(scan)
-    for is_used, frame in zip(used, _stream(path, scan.is_interlaced), strict=False):
+    for is_used, frame in zip(used, _stream(path, scan.first_field), strict=False):
         if is_used:
             yield _picture(frame, "bgr24", scan)
 
@@ -129,7 +129,8 @@ class _Scan:
     Attributes:
       size_px: (width, height) as shown.
       pixel_aspect: width of a pixel by its height.
-      is_interlaced: pictures are fields.
+      first_field: pictures are fields, of which each frame's first is the upper ("tff") or lower
+        one ("bff"); None: they are whole.
       stamps_s: `[picture]`; NaN where missing.
       is_even: the container knows no times, only a rate.
       tick_s: what they are rounded to.
@@ -143,7 +144,7 @@ class _Scan:
 
     size_px: tuple[int, int]
     pixel_aspect: float
-    is_interlaced: bool
+    first_field: str | None
     stamps_s: np.ndarray
     is_even: bool
     tick_s: float
@@ -153,6 +154,11 @@ class _Scan:
     rate: float
     missing: int
     warnings: tuple[str, ...]
+
+    @property
+    def is_interlaced(self) -> bool:
+        """Whether pictures are fields."""
+        return self.first_field is not None
 
 
 def _is_square(aspect: float) -> bool:
@@ -184,11 +190,18 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
         yield container, stream
 
 
-def _stream(path: Path, as_fields: bool) -> Iterator[Any]:
+def _stream(path: Path, first_field: str | None) -> Iterator[Any]:
     """The film's frames in the order in which they are shown; damaged parts are passed over."""
     with _opened(path) as (container, stream):
-        decoded = _decoded(container, stream)
-        yield from _filtered(decoded, stream, FIELDS) if as_fields else decoded
+        yield from _shown(container, stream, first_field)
+
+
+def _shown(container: Any, stream: Any, first_field: str | None) -> Iterator[Any]:
+    """The frames, or the fields that they are woven from."""
+    decoded = _decoded(container, stream)
+    if first_field is None:
+        return decoded
+    return _filtered(decoded, stream, FIELDS.format(first_field))
 
 
 def _decoded(container: Any, stream: Any) -> Iterator[Any]:
@@ -248,40 +261,39 @@ def _scan(path: Path) -> _Scan:
 @functools.lru_cache(64)
 def _scanned(path: Path, _whole: Path, *_stamp: int) -> _Scan:
     """Once for each content: who draws marks has the clip checked at every step."""
-    scan = _passed(path, _is_interlaced(path))
+    scan = _passed(path, _first_field(path))
     if len(scan.kinds) == 0:
         raise InputError(f"{path}: cannot be decoded: without frames, or damaged; a video expected")
     return scan
 
 
-def _is_interlaced(path: Path) -> bool:
-    """Whether the pictures are woven from two fields that were taken one after the other.
+def _first_field(path: Path) -> str | None:
+    """Which field comes first of pictures that are woven from two; None: they are whole.
 
-    A file that says so may still hold whole pictures: FFmpeg's `idet` looks at edges that move.
+    A file that says that they are woven may still hold whole pictures, and many are wrong about
+    which field is first: FFmpeg's `idet` looks at edges that move.
     """
     with _opened(path) as (container, stream):
-        decoded = _decoded(container, stream)
-        first = next(decoded, None)
+        first = next(_decoded(container, stream), None)
         if first is None or not first.interlaced_frame:
-            return False
+            return None
     with _opened(path) as (container, stream):
         judged = [
             frame.metadata.get("lavfi.idet.multiple.current_frame")
             for frame in _filtered(_decoded(container, stream), stream, "idet")
         ]
-    return judged.count("tff") + judged.count("bff") >= judged.count("progressive")
+    found = max(("tff", "bff"), key=judged.count)
+    return found if judged.count(found) >= judged.count("progressive") else None
 
 
-def _passed(path: Path, is_interlaced: bool) -> _Scan:
+def _passed(path: Path, first_field: str | None) -> _Scan:
     stamps_s, kinds, change, contrast = [], [], [], []
     size_px, tick_s, before = (0, 0), 0.0, None
     with _opened(path) as (container, stream):
         aspect = float(stream.sample_aspect_ratio or 1)
         rate = float(stream.average_rate or 0)
         is_even = container.format.name == "avi"  # whose stamps are the order of coding
-        decoded = _decoded(container, stream)
-        shown = _filtered(decoded, stream, FIELDS) if is_interlaced else decoded
-        for frame in shown:
+        for frame in _shown(container, stream, first_field):
             if before is None:
                 size_px = _shown_size(frame, aspect)
             grey = frame.to_ndarray(format="gray")
@@ -293,9 +305,9 @@ def _passed(path: Path, is_interlaced: bool) -> _Scan:
             tick_s, before = float(frame.time_base or 0), grey
         missing = _num_missing(container, stream, np.array(stamps_s))
     stamps = np.sort(stamps_s) if is_even else np.array(stamps_s)
-    warnings = _said(size_px, aspect, is_interlaced)
+    warnings = _said(size_px, aspect, first_field is not None)
     return _Scan(
-        size_px, aspect, is_interlaced, stamps, is_even, tick_s, "".join(kinds), np.array(change),
+        size_px, aspect, first_field, stamps, is_even, tick_s, "".join(kinds), np.array(change),
         np.array(contrast), rate, missing, warnings,
     )  # fmt: skip
 

@@ -1,0 +1,149 @@
+"""Where the texture of an object loses it: the path of its silhouette instead."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from galileo_jax.tracking.finish import Finished
+from galileo_jax.tracking.noise import motion_variance
+from galileo_jax.tracking.pieces import Start
+from galileo_jax.tracking.silhouette import MOST_MISSED, Path
+
+LOST_SHARE = 0.05
+"""Of the frames in which an object is looked for: if it is missed in more, its silhouette is."""
+TURNED_RAD = 0.5
+"""What is round and turns by more may be followed by its marks instead of its middle."""
+LEAST_FRAMES, LEAST_SHARE = 3, 0.1
+"""A silhouette has to show so many frames more, and this share of those that are known."""
+SAME_FRAMES, SAME_PX, SAME_SIZE = 5, 0.5, 0.05
+"""The middles of texture and silhouette are a fixed distance apart if over so many frames they
+agree to this, in pixels or by the object's size."""
+INSIDE, BESIDE = 0.5, 2.0
+"""A silhouette is the object's if its middle is within this share of its size of where the texture
+is, or if it begins within so many sizes of where that was last seen."""
+OUTLINE_AREA = (0.3, 6.0)
+"""A silhouette's area by that of the declared outline: a smear makes it larger."""
+EDGE_PX = 0.03
+"""Standard deviation that sampling a sharp edge with pixels gives the middle of a silhouette."""
+ARM = 0.25
+"""Pixels that come and go at the rim are about this share of the size from the middle."""
+
+
+def needs_silhouette(found: Finished, start: Start) -> bool:
+    """Whether an object is lost for a while, or may be followed by its marks."""
+    if start.corrections:
+        return False  # somebody has looked at it
+    seen = np.isfinite(found.angle_rad)
+    wanted = np.array([start.uses(index) for index in range(len(seen))])
+    is_lost = (wanted & ~seen).sum() > LOST_SHARE * wanted.sum()
+    return bool(is_lost or _turns(found, start))
+
+
+def with_silhouette(
+    found: Finished, start: Start, paths: Sequence[Path], clock: Float[np.ndarray, " frame"]
+) -> Finished:
+    """The object's track, where its silhouette shows more than its texture from that.
+
+    Where it is known how far the two are apart, both are used, and the point stays the followed
+    one; otherwise the silhouette's middle is followed alone.
+
+    Args:
+      found: by texture.
+      start: of the object.
+      paths: of all silhouettes.
+      clock: when each frame was taken, in usual steps.
+    """
+    seen = np.isfinite(found.angle_rad)
+    own = [path for path in paths if _is_own(path, found.position_px, seen, start)]
+    if not own:
+        return found
+    path = max(own, key=lambda one: _way_px(one.places_px))
+    place = np.full_like(found.position_px, np.nan)
+    place[path.frames] = path.places_px
+    place[[not start.uses(index) for index in range(len(place))]] = np.nan
+    shown = np.isfinite(place[:, 0])
+    covariance = _covariance(path, place, clock)
+    both = shown & seen
+    apart = found.position_px[both] - place[both]
+    middle = np.median(apart, axis=0) if both.any() else np.zeros(2)
+    size = float(np.median([part.size_px for part in path.parts]))
+    scatter = np.median(np.abs(apart - middle)) if both.any() else np.inf
+    is_fixed = both.sum() >= SAME_FRAMES and scatter < max(SAME_PX, SAME_SIZE * size)
+    more = (shown & ~seen).sum()
+    is_more = more >= max(LEAST_FRAMES, LEAST_SHARE * seen.sum())
+    if not is_more and not (_turns(found, start) and _is_smoother(found, place, both, clock)):
+        return found
+    if not is_fixed and _way_px(place[shown]) < _way_px(found.position_px[seen]):
+        return found
+    kept = seen & ~shown & is_fixed
+    return _joined(found, kept, place + (middle if is_fixed else 0.0), covariance)
+
+
+def _joined(
+    found: Finished,
+    kept: Bool[np.ndarray, " frame"],
+    place: Float[np.ndarray, "frame 2"],
+    covariance: Float[np.ndarray, "2 2"],
+) -> Finished:
+    shown = np.isfinite(place[:, 0])
+    nothing = np.where((kept | shown)[:, None, None], 0.0, np.nan)
+    stated = np.where(shown[:, None, None], covariance, found.covariance_px2)
+    return Finished(
+        position_px=np.where(kept[:, None], found.position_px, place),
+        covariance_px2=np.where((kept | shown)[:, None, None], stated, np.nan),
+        common_px2=np.broadcast_to(nothing, found.common_px2.shape).copy(),
+        shifts_px=np.broadcast_to(nothing, found.shifts_px.shape).copy(),
+        angle_rad=np.where(kept | shown, 0.0, np.nan),
+    )
+
+
+def _is_own(
+    path: Path, position_px: np.ndarray, seen: Bool[np.ndarray, " frame"], start: Start
+) -> bool:
+    """Whether a path of silhouettes is the object's: it moves, and meets the texture's path."""
+    place, frames = path.places_px, np.array(path.frames)
+    size = float(np.median([part.size_px for part in path.parts]))
+    if _way_px(place) < size or len(frames) < SAME_FRAMES or not seen.any():
+        return False
+    if start.outline.size_px is not None:
+        low, high = np.array(OUTLINE_AREA) * np.prod(start.outline.size_px)
+        if not low < size**2 < high:
+            return False
+    both = seen[frames]
+    if both.any():
+        off = np.hypot(*(place[both] - position_px[frames[both]]).T)
+        return bool(np.median(off) < INSIDE * size)
+    last = int(np.flatnonzero(seen)[-1])
+    is_next = 0 < frames[0] - last <= MOST_MISSED
+    return bool(is_next and np.hypot(*(place[0] - position_px[last])) < BESIDE * size)
+
+
+def _way_px(place: Float[np.ndarray, "frame 2"]) -> float:
+    return float(np.hypot(*np.ptp(place, axis=0)))
+
+
+def _turns(found: Finished, start: Start) -> bool:
+    seen = np.isfinite(found.angle_rad)
+    return start.outline.is_round and bool(np.ptp(found.angle_rad[seen]) > TURNED_RAD)
+
+
+def _is_smoother(
+    found: Finished, place: np.ndarray, both: Bool[np.ndarray, " frame"], clock: np.ndarray
+) -> bool:
+    """Whether the silhouette's path scatters less about a smooth one than the texture's."""
+    none = np.zeros((len(place), 2, 2))
+    paths = [
+        (np.where(both[:, None], each, np.nan), none) for each in (place, found.position_px)
+    ]
+    silhouette, texture = (float(motion_variance([one], clock).sum()) for one in paths)
+    return silhouette < texture
+
+
+def _covariance(path: Path, place: np.ndarray, clock: np.ndarray) -> Float[np.ndarray, "2 2"]:
+    """Of a silhouette's middle: its scatter, and how much of it comes and goes."""
+    stated = np.broadcast_to(EDGE_PX**2 * np.eye(2), (len(place), 2, 2))
+    area = np.array([part.area_px2 for part in path.parts])
+    change = np.diff(area, n=2) / (np.sqrt(6) * np.median(area))
+    rim = ARM * np.sqrt(np.median(area)) * 1.4826 * np.median(np.abs(change))
+    return np.diag(EDGE_PX**2 + rim**2 + motion_variance([(place, stated)], clock))
