@@ -77,7 +77,8 @@ def with_silhouette(
     if not is_fixed and _way_px(place[shown]) < _way_px(found.position_px[seen]):
         return found
     kept = seen & ~shown & is_fixed
-    return _joined(found, kept, place + (middle if is_fixed else 0.0), covariance)
+    slow_px = _slow_px(path)
+    return _joined(found, kept, place + (middle if is_fixed else 0.0), covariance, slow_px)
 
 
 def _joined(
@@ -85,15 +86,18 @@ def _joined(
     kept: Bool[np.ndarray, " frame"],
     place: Float[np.ndarray, "frame 2"],
     covariance: Float[np.ndarray, "2 2"],
+    slow_px: float,
 ) -> Finished:
     shown = np.isfinite(place[:, 0])
     nothing = np.where((kept | shown)[:, None, None], 0.0, np.nan)
+    shifts_px = np.broadcast_to(nothing, found.shifts_px.shape).copy()
+    shifts_px[shown, :2] = slow_px * np.eye(2)
     stated = np.where(shown[:, None, None], covariance, found.covariance_px2)
     return Finished(
         position_px=np.where(kept[:, None], found.position_px, place),
         covariance_px2=np.where((kept | shown)[:, None, None], stated, np.nan),
         common_px2=np.broadcast_to(nothing, found.common_px2.shape).copy(),
-        shifts_px=np.broadcast_to(nothing, found.shifts_px.shape).copy(),
+        shifts_px=shifts_px,
         angle_rad=np.where(kept | shown, 0.0, np.nan),
     )
 
@@ -141,9 +145,22 @@ def _is_smoother(
 
 
 def _covariance(path: Path, place: np.ndarray, clock: np.ndarray) -> Float[np.ndarray, "2 2"]:
-    """Of a silhouette's middle: its scatter, and how much of it comes and goes."""
+    """Of a silhouette's middle from frame to frame: its scatter."""
     stated = np.broadcast_to(EDGE_PX**2 * np.eye(2), (len(place), 2, 2))
+    return np.diag(EDGE_PX**2 + motion_variance([(place, stated)], clock))
+
+
+def _slow_px(path: Path) -> float:
+    """Standard deviation per axis of errors that follow each other, px.
+
+    What is behind an object lets pixels at its rim come and go as it passes. So its area changes
+    otherwise than with its distance (a parabola in time) and its smear (its speed).
+    """
     area = np.array([part.area_px2 for part in path.parts])
-    change = np.diff(area, n=2) / (np.sqrt(6) * np.median(area))
-    rim = ARM * np.sqrt(np.median(area)) * 1.4826 * np.median(np.abs(change))
-    return np.diag(EDGE_PX**2 + rim**2 + motion_variance([(place, stated)], clock))
+    since = np.linspace(-1, 1, len(area))
+    speed = np.hypot(*np.gradient(path.places_px, path.clock, axis=0).T)
+    design = np.column_stack([np.ones_like(since), since, since**2, speed])
+    left = area - design @ np.linalg.lstsq(design, area)[0]
+    # Not of the frame in which it is thrown back, whose smear is folded.
+    spread = 1.4826 * np.median(np.abs(left)) * np.sqrt(len(area) / (len(area) - 4))
+    return float(ARM * spread / np.sqrt(np.median(area)))

@@ -88,6 +88,11 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
     film = clock_of(_stamps(path, scan, fps_declared), scan.tick_s)
     fields = 2 if scan.is_interlaced else 1
     warnings = [f"{path}: {line}" for line in (*scan.warnings, *_left_out(scan))]
+    if scan.missing:
+        count = len(scan.kinds)
+        warnings.append(
+            f"{path}: {count} of {count + scan.missing} announced frames can be decoded"
+        )
     rate = scan.rate if abs(scan.rate * fields / film.rate - 1) < 1e-3 else film.rate / fields
     clock, fps = film, rate
     if fps_declared:

@@ -92,9 +92,10 @@ def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture
     if is_repeat.sum() < max(LEAST_REPEATS, REPEATED_SHARE * is_moving.sum()):
         return np.zeros(count, bool)
     fresh = np.flatnonzero(is_moving & ~is_repeat)
-    period = np.diff(fresh)
-    if len(period) and period[0] > 1 and (period % period.min() == 0).all():
-        is_repeat = np.arange(count) % period.min() != fresh[0] % period.min()
+    apart = np.diff(fresh)
+    period = int(apart.min()) if len(apart) else 1
+    if period > 1 and (apart % period == 0).all():
+        is_repeat = np.arange(count) % period != fresh[0] % period
         is_repeat[0] = False
     return is_repeat
 
