@@ -248,10 +248,7 @@ def blow_shift(jumps: np.ndarray, exposure_share: float) -> np.ndarray:
     """
     if not exposure_share:
         return np.zeros_like(jumps)
-    padded = np.pad(jumps, ((STEADY_FRAMES // 2,) * 2, (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, STEADY_FRAMES, axis=0)
-    steady = np.median(windows, axis=-1)
-    blow = np.pad(jumps - steady, ((1, 1), (0, 0)))
+    blow = np.pad(sudden(jumps), ((1, 1), (0, 0)))
     own = np.linalg.norm(blow[1:-1], axis=1)
     direction = blow[1:-1] / np.maximum(own, 1e-12)[:, None]
     sides = [(beside * direction).sum(axis=1) for beside in (blow[:-2], blow[2:])]
@@ -261,3 +258,10 @@ def blow_shift(jumps: np.ndarray, exposure_share: float) -> np.ndarray:
     open_after = np.maximum(exposure_share / 2 - instant, 0)
     shift = whole * open_after**2 / (2 * exposure_share)
     return shift[:, None] * direction
+
+
+def sudden(jumps: np.ndarray) -> np.ndarray:
+    """`[frame, 2]`: what changes of the velocity exceed the steady acceleration around them by."""
+    padded = np.pad(jumps, ((STEADY_FRAMES // 2,) * 2, (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, STEADY_FRAMES, axis=0)
+    return jumps - np.median(windows, axis=-1)

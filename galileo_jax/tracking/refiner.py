@@ -37,7 +37,7 @@ def velocities_at(poses: np.ndarray, frame: int, clock: np.ndarray) -> Velocitie
     if len(later):
         after = (poses[later[0]] - poses[frame]) / (clock[later[0]] - clock[frame])
     if before is None:
-        before = after if after is not None else np.zeros(3)
+        before = after if after is not None else np.zeros_like(poses[frame])
     return Velocities(before, before if after is None else after)
 
 

@@ -6,8 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from galileo_jax.tracking.finish import Finished
-from galileo_jax.tracking.noise import motion_variance
+from galileo_jax.tracking.noise import motion_variance, sudden
 from galileo_jax.tracking.pieces import Start
+from galileo_jax.tracking.refiner import velocities_at
 from galileo_jax.tracking.silhouette import MOST_MISSED, Path
 
 LOST_SHARE = 0.05
@@ -26,6 +27,8 @@ OUTLINE_AREA = (0.3, 6.0)
 """A silhouette's area by that of the declared outline: a smear makes it larger."""
 EDGE_PX = 0.03
 """Standard deviation that sampling a sharp edge with pixels gives the middle of a silhouette."""
+USUAL_SHARE = 0.5
+"""Of a frame's time for which the shutter may be open."""
 ARM = 0.25
 """Pixels that come and go at the rim are about this share of the size from the middle."""
 
@@ -63,7 +66,7 @@ def with_silhouette(
     place[path.frames] = path.places_px
     place[[not start.uses(index) for index in range(len(place))]] = np.nan
     shown = np.isfinite(place[:, 0])
-    covariance = _covariance(path, place, clock)
+    covariance = _covariance(place, clock)
     both = shown & seen
     apart = found.position_px[both] - place[both]
     middle = np.median(apart, axis=0) if both.any() else np.zeros(2)
@@ -85,7 +88,7 @@ def _joined(
     found: Finished,
     kept: Bool[np.ndarray, " frame"],
     place: Float[np.ndarray, "frame 2"],
-    covariance: Float[np.ndarray, "2 2"],
+    covariance: Float[np.ndarray, "frame 2 2"],
     slow_px: float,
 ) -> Finished:
     shown = np.isfinite(place[:, 0])
@@ -144,10 +147,19 @@ def _is_smoother(
     return silhouette < texture
 
 
-def _covariance(path: Path, place: np.ndarray, clock: np.ndarray) -> Float[np.ndarray, "2 2"]:
-    """Of a silhouette's middle from frame to frame: its scatter."""
+def _covariance(place: np.ndarray, clock: np.ndarray) -> Float[np.ndarray, "frame 2 2"]:
+    """Of a silhouette's middle from frame to frame: its scatter, and blows within an exposure.
+
+    A picture shows the mean place during the exposure e. A change dv of the velocity within it
+    shifts that by dv e / 8 at most.
+    """
     stated = np.broadcast_to(EDGE_PX**2 * np.eye(2), (len(place), 2, 2))
-    return np.diag(EDGE_PX**2 + motion_variance([(place, stated)], clock))
+    jumps = np.zeros((len(place), 2))
+    for index in np.flatnonzero(np.isfinite(place[:, 0])):
+        jumps[index] = velocities_at(place, int(index), clock).jump
+    unknown = np.sum((USUAL_SHARE / 8 * sudden(jumps)) ** 2, axis=1)
+    scatter = np.diag(motion_variance([(place, stated)], clock))
+    return stated + scatter + unknown[:, None, None] * np.eye(2)
 
 
 def _slow_px(path: Path) -> float:
