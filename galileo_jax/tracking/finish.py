@@ -1,5 +1,6 @@
 """Converts fitted poses to a track: visibility, the followed point's position and uncertainty."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -34,6 +35,14 @@ SAME_PLACE_PX = 1.0
 """What comes back this close to where it was last seen had only been covered."""
 
 
+LONG_GAP, PATH_FRAMES = 4.0, 8
+"""After so many usual steps out of sight the path of so many frames before has to lead to where an
+object is seen again."""
+LEAST_WAY_PX, OFF_WAY = 10.0, 0.5
+"""If it would have gone so far meanwhile, it may be off by this share of that: less than what is
+thrown back."""
+
+
 @dataclass(frozen=True)
 class Finished:
     """One object's part of a track; fields as in `Track`, without the object's axis."""
@@ -51,6 +60,7 @@ def finished(
     shares: Sequence[float],
     coding: Coding,
     clock: np.ndarray,
+    is_alone: bool = True,
 ) -> list[Finished]:
     """The pieces' tracks from their fits of every frame (None: not found).
 
@@ -60,8 +70,12 @@ def finished(
       shares: per piece, the open share of a frame's time.
       coding: of the frames.
       clock: `[frame]`, when each was taken, in usual steps.
+      is_alone: there is one object, which no other one can hit while it is hidden.
     """
-    seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
+    seen = [
+        _seen(found, piece.corrected, clock if is_alone else None)
+        for found, piece in zip(fits, pieces, strict=True)
+    ]
     # A coder sees what is shown, before anything else is put right.
     mended = without_coding_shift(seen, coding, clock)
     seen = [
@@ -93,7 +107,9 @@ def joined(pieces: Sequence[Finished], count: int) -> Finished:
     return whole
 
 
-def _seen(fits: list[Refined | None], corrected: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def _seen(
+    fits: list[Refined | None], corrected: Sequence[int], clock: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Poses `[frame, 3]` and their image noise `[frame, 2, 2]`; NaN: not visible."""
     poses = np.full((len(fits), 3), np.nan)
     noise = np.full((len(fits), 2, 2), np.nan)
@@ -101,6 +117,10 @@ def _seen(fits: list[Refined | None], corrected: Sequence[int]) -> tuple[np.ndar
         if fit is not None and _is_visible(fit):
             poses[index], noise[index] = fit.pose, fit.covariance
     is_doubtful = ~_without_glimpses(poses, corrected)
+    if clock is not None:
+        is_doubtful[_led_to(np.where(is_doubtful[:, None], np.nan, poses), corrected, clock) :] = (
+            True
+        )
     poses[is_doubtful], noise[is_doubtful] = np.nan, np.nan
     return poses, noise
 
@@ -190,6 +210,30 @@ def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray
             result[begin:end] = True
             last_end = end
     return result
+
+
+def _led_to(poses: np.ndarray, corrected: Sequence[int], clock: np.ndarray) -> int:
+    """The first frame after a gap to which the path before it does not lead; or how many there are.
+
+    Something has happened to the object while it was out of sight, or it is another one: what
+    follows is another motion. What would hardly have moved, or has been seen by somebody, counts.
+    """
+    known = np.flatnonzero(np.isfinite(poses[:, 0]))
+    for last, back in itertools.pairwise(known):
+        own = known[(known <= last) & (known > last - PATH_FRAMES)]
+        gap = clock[back] - clock[last]
+        if gap < LONG_GAP or len(own) < PATH_FRAMES // 2 or any(at > last for at in corrected):
+            continue
+        since = clock[own] - clock[back]
+        ends, speeds = zip(
+            *(np.polyfit(since, poses[own, :2], degree)[[-1, -2]] for degree in (1, 2)),
+            strict=True,
+        )
+        way = gap * float(np.hypot(*speeds[0]))
+        off = min(float(np.hypot(*(poses[back, :2] - end))) for end in ends)
+        if way > LEAST_WAY_PX and off > OFF_WAY * way:
+            return int(back)
+    return len(poses)
 
 
 def _is_visible(fit: Refined) -> bool:

@@ -161,9 +161,7 @@ def motion_variance(
     return excess
 
 
-def motion_scale2(
-    place: np.ndarray, covariance: np.ndarray, clock: np.ndarray
-) -> np.ndarray:
+def motion_scale2(place: np.ndarray, covariance: np.ndarray, clock: np.ndarray) -> np.ndarray:
     """`[2]`: by how much one object's variance in motion differs from what is stated, per axis.
 
     The excess is pooled over all objects, and image noise is overstated where a picture is smeared;

@@ -49,7 +49,8 @@ def with_silhouette(
     """The object's track, where its silhouette shows more than its texture from that.
 
     Where it is known how far the two are apart, both are used, and the point stays the followed
-    one; otherwise the silhouette's middle is followed alone.
+    one, but for what is round, whose middle it becomes; otherwise the silhouette's middle is
+    followed alone.
 
     Args:
       found: by texture.
@@ -79,9 +80,14 @@ def with_silhouette(
         return found
     if not is_fixed and _way_px(place[shown]) < _way_px(found.position_px[seen]):
         return found
-    kept = seen & ~shown & is_fixed
-    slow_px = _slow_px(path)
-    return _joined(found, kept, place + (middle if is_fixed else 0.0), covariance, slow_px)
+    kept = _in_long_runs(seen & ~shown) & is_fixed
+    texture, silhouette = found.position_px, place
+    if start.outline.is_round or not is_fixed:
+        texture = texture - middle
+    else:
+        silhouette = silhouette + middle
+    together = np.where(kept[:, None], texture, silhouette)
+    return _joined(found, kept, together, covariance, _slow_px(path))
 
 
 def _joined(
@@ -91,18 +97,28 @@ def _joined(
     covariance: Float[np.ndarray, "frame 2 2"],
     slow_px: float,
 ) -> Finished:
-    shown = np.isfinite(place[:, 0])
-    nothing = np.where((kept | shown)[:, None, None], 0.0, np.nan)
-    shifts_px = np.broadcast_to(nothing, found.shifts_px.shape).copy()
-    shifts_px[shown, :2] = slow_px * np.eye(2)
-    stated = np.where(shown[:, None, None], covariance, found.covariance_px2)
+    """The track of places of which those that are `kept` are by texture."""
+    used = np.isfinite(place[:, 0])
+    nothing = np.where(used, 0.0, np.nan)
+    shifts_px = np.tile(nothing[:, None, None], (1, *found.shifts_px.shape[1:]))
+    shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
     return Finished(
-        position_px=np.where(kept[:, None], found.position_px, place),
-        covariance_px2=np.where((kept | shown)[:, None, None], stated, np.nan),
-        common_px2=np.broadcast_to(nothing, found.common_px2.shape).copy(),
+        position_px=place,
+        covariance_px2=np.where(kept[:, None, None], found.covariance_px2, covariance)
+        + nothing[:, None, None],
+        common_px2=np.tile(nothing[:, None, None], (1, 2, 2)),
         shifts_px=shifts_px,
-        angle_rad=np.where(kept | shown, 0.0, np.nan),
+        angle_rad=nothing,
     )
+
+
+def _in_long_runs(chosen: Bool[np.ndarray, " frame"]) -> Bool[np.ndarray, " frame"]:
+    """Those of the chosen frames that follow each other for a while."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    result = np.zeros_like(chosen)
+    for begin, end in edges.reshape(-1, 2):
+        result[begin:end] = end - begin >= SAME_FRAMES
+    return result
 
 
 def _is_own(
@@ -140,9 +156,7 @@ def _is_smoother(
 ) -> bool:
     """Whether the silhouette's path scatters less about a smooth one than the texture's."""
     none = np.zeros((len(place), 2, 2))
-    paths = [
-        (np.where(both[:, None], each, np.nan), none) for each in (place, found.position_px)
-    ]
+    paths = [(np.where(both[:, None], each, np.nan), none) for each in (place, found.position_px)]
     silhouette, texture = (float(motion_variance([one], clock).sum()) for one in paths)
     return silhouette < texture
 

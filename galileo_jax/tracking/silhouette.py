@@ -94,10 +94,10 @@ class Path:
         ratio = part.area_px2 / last.area_px2
         if not 1 / SAME_AREA < ratio < SAME_AREA:
             return np.inf
-        step = np.zeros(2)
-        if len(self.parts) > 1:
-            step = (last.centre_px - self.parts[-2].centre_px) / (self.clock[-1] - self.clock[-2])
-        way = float(np.hypot(*step)) * (now - self.clock[-1])
+        # The frame in which it is thrown back shows neither the speed before nor the one after.
+        moved = np.hypot(*np.diff(self.places_px[-LEADS_FRAMES:], axis=0).T)
+        speeds = moved / np.diff(self.clock[-LEADS_FRAMES:])
+        way = float(speeds.max(initial=0.0)) * (now - self.clock[-1])
         off = float(np.hypot(*(part.centre_px - self.expected(now))))
         back = float(np.hypot(*(part.centre_px - last.centre_px)))
         if len(self.parts) == 1:  # nobody knows how fast it is
@@ -170,6 +170,6 @@ def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
     for (left, top, wide, high, area), centre in zip(stats[1:], centres[1:], strict=True):
         is_cut = left == 0 or top == 0 or left + wide == width or top + high == height
         if not is_cut and LEAST_AREA_PX2 <= area <= MOST_SHARE * mask.size:
-            low = np.array([left, top])
-            found.append(Part(centre, float(area), low, low + [wide - 1, high - 1]))
+            low, high_px = np.array([left, top]), np.array([left + wide - 1, top + high - 1])
+            found.append(Part(centre, float(area), low, high_px))
     return sorted(found, key=lambda part: -part.area_px2)[:MOST_PARTS]

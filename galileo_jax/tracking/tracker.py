@@ -99,12 +99,14 @@ def track_video(
         advance(None)
 
     coding = coding or Coding(np.zeros(count, bool))
-    done = finished(fits, [piece for _, piece in flat], shares, coding, clock[:count])
+    done = finished(
+        fits, [piece for _, piece in flat], shares, coding, clock[:count], len(starts) == 1
+    )
     objects = [
         joined([one for (of, _), one in zip(flat, done, strict=True) if of == k], count)
         for k in range(len(starts))
     ]
-    objects = _with_silhouettes(objects, starts, open_frames, clock[:count])
+    objects = _with_silhouettes(objects, starts, open_frames, clock)
     return Track(
         names=tuple(start.name for start in starts),
         times_s=times_s[:count],

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import av
+import av.error
+import av.filter
 import cv2
 import numpy as np
 
@@ -188,7 +190,7 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
             f"{path}: cannot be decoded: not a video, without frames, or cut off before its index"
         ) from error
     with container:
-        stream = container.streams.best("video")
+        stream: Any = container.streams.best("video")
         if stream is None:
             raise InputError(f"{path}: cannot be decoded: without frames; a video expected")
         stream.thread_type = "AUTO"
@@ -302,8 +304,7 @@ def _passed(path: Path, first_field: str | None) -> _Scan:
             if before is None:
                 size_px = _shown_size(frame, aspect)
             grey = frame.to_ndarray(format="gray")
-            is_alike = before is not None and before.shape == grey.shape
-            change.append(_change(before, grey) if is_alike else np.inf)
+            change.append(np.inf if before is None else _change(before, grey))
             contrast.append(float(grey.std()))
             stamps_s.append(np.nan if frame.pts is None else float(frame.pts * frame.time_base))
             kinds.append(KINDS[int(frame.pict_type)].upper())
@@ -319,6 +320,8 @@ def _passed(path: Path, first_field: str | None) -> _Scan:
 
 def _change(before: np.ndarray, grey: np.ndarray) -> float:
     """By how much two pictures differ in the block of pixels in which they differ most."""
+    if before.shape != grey.shape:
+        return np.inf
     size = tuple(max(1, side // BLOCK_PX) for side in grey.shape[::-1])
     differs = cv2.resize(cv2.absdiff(grey, before), size, interpolation=cv2.INTER_AREA)
     return float(differs.max())

@@ -67,10 +67,10 @@ def at_declared_rate(clock: Clock, fps: float) -> tuple[Clock, float]:
     rate = min(rates, key=lambda one: abs(np.log(fps / one)))
     if not clock.is_even and abs(fps / rate - 1) < AS_DECLARED:
         return clock, rate
-    if clock.is_even:
-        number = np.rint(clock.times_s * clock.rate)
-        return Clock(number / (clock.rate * fps / rate), clock.rate * fps / rate, True), rate
-    return Clock(clock.times_s * rate / fps, clock.rate * fps / rate, False), rate
+    declared = fps * (clock.rate / rate)
+    number = clock.times_s * clock.rate
+    number = np.rint(number) if clock.is_even else number
+    return Clock(number / declared, declared, clock.is_even), rate
 
 
 def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture"]:

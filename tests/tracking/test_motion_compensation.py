@@ -32,7 +32,10 @@ def mended_places(paths, coding, angle_rad=STILL):
         (np.column_stack([place, np.broadcast_to(angle_rad, len(place))]), noise)
         for place, noise in paths
     ]
-    return [found.poses[:, :2] for found in without_coding_shift(poses, coding, np.arange(float(len(poses[0][0]))))]
+    return [
+        found.poses[:, :2]
+        for found in without_coding_shift(poses, coding, np.arange(float(len(poses[0][0]))))
+    ]
 
 
 def coded(frames=FRAMES, whole=12):
@@ -51,7 +54,9 @@ def test_amplitudes_of_a_coder_are_found(amplitudes):
     rng = np.random.default_rng(1)
     found = [
         coding_shift_amplitudes_px(
-            [seen(path, np.array(amplitudes), coded(), rng) for path in both], coded(), CLOCK,
+            [seen(path, np.array(amplitudes), coded(), rng) for path in both],
+            coded(),
+            CLOCK,
         )
         for both in [(ACCELERATED, 1.1 * ACCELERATED)] * 20
     ]
