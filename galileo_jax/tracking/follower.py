@@ -315,6 +315,8 @@ class Follower:
             return False
         target = self.template.sharp(FINE_PX)
         then, now = (target.values_at(one, fit.pose) for one in (self.first_picture, picture))
+        if not (np.ptp(then) and np.ptp(now)):
+            return False  # nothing is seen there
         return float(np.corrcoef(then, now)[0, 1]) > fit.correlation
 
     def _expected(self) -> np.ndarray:

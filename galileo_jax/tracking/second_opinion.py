@@ -134,12 +134,15 @@ def _is_own(
         if not low < size**2 < high:
             return False
     both = seen[frames]
-    if both.any():
+    if both.sum() >= SAME_FRAMES:
+        own = np.array([part.size_px for part in path.parts])[both]
         off = np.hypot(*(place[both] - position_px[frames[both]]).T)
-        return bool(np.median(off) < INSIDE * size)
-    last = int(np.flatnonzero(seen)[-1])
-    is_next = 0 < frames[0] - last <= MOST_MISSED
-    return bool(is_next and np.hypot(*(place[0] - position_px[last])) < BESIDE * size)
+        return bool(np.median(off / own) < INSIDE)
+    known = np.flatnonzero(seen)
+    nearest = int(known[np.argmin(np.abs(known - frames[0]))])
+    off = np.hypot(*(place[0] - position_px[nearest]))
+    is_next = abs(frames[0] - nearest) <= MOST_MISSED
+    return bool(is_next and off < BESIDE * path.parts[0].size_px)
 
 
 def _way_px(place: Float[np.ndarray, "frame 2"]) -> float:

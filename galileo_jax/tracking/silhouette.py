@@ -156,12 +156,11 @@ def _scene(open_frames: Callable[[], Iterable[np.ndarray]], count: int) -> np.nd
 
 def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
     """What differs from the scene, largest first, without what the picture's edge cuts."""
-    differs = picture.astype(np.float32) - scene
+    differs = cv2.GaussianBlur(picture.astype(np.float32) - scene, (0, 0), SMOOTH_PX)
     some = differs[::4, ::4]
     middle = float(np.median(some))
     noise = 1.4826 * float(np.median(np.abs(some - middle)))
-    size = cv2.GaussianBlur(np.abs(differs - middle), (0, 0), SMOOTH_PX)
-    mask = (size > max(NOISE_SDS * noise, LEAST_GREY)).astype(np.uint8)
+    mask = (np.abs(differs - middle) > max(NOISE_SDS * noise, LEAST_GREY)).astype(np.uint8)
     if mask.mean() > MOST_FOREGROUND:
         return []
     _, _, stats, centres = cv2.connectedComponentsWithStats(mask)

@@ -162,7 +162,10 @@ class _Kept:
         """For every frame what is there of every object; decodes again where it was too much."""
         if self._parts is not None:
             for index in range(count):
-                yield [parts.get(index) for parts in self._parts]
+                pictures = [parts.get(index) for parts in self._parts]
+                yield pictures
+                for picture in filter(None, pictures):
+                    picture.forget()
             return
         for frame in itertools.islice(open_frames(), count):
             yield [Picture(grey(frame))] * self._num_objects

@@ -305,7 +305,7 @@ def _passed(path: Path, first_field: str | None) -> _Scan:
                 size_px = _shown_size(frame, aspect)
             grey = frame.to_ndarray(format="gray")
             change.append(np.inf if before is None else _change(before, grey))
-            contrast.append(float(grey.std()))
+            contrast.append(float(cv2.meanStdDev(grey)[1][0, 0]))
             stamps_s.append(np.nan if frame.pts is None else float(frame.pts * frame.time_base))
             kinds.append(KINDS[int(frame.pict_type)].upper())
             tick_s, before = float(frame.time_base or 0), grey
@@ -353,7 +353,9 @@ def _num_missing(container: Any, stream: Any, stamps_s: np.ndarray) -> int:
     if len(known) < 2 or np.ptp(known) == 0:
         return int(by_number) if np.isfinite(by_number) else 0
     step_s = float(np.median(np.diff(known)))
-    if stream.duration:
+    if container.format.name == "avi":  # whose duration is made up where it breaks off
+        end_s = known[0] + stream.frames / float(stream.average_rate)
+    elif stream.duration:
         end_s = float(((stream.start_time or 0) + stream.duration) * stream.time_base)
     elif container.duration and len(container.streams) == 1:
         end_s = ((container.start_time or 0) + container.duration) / av.time_base
