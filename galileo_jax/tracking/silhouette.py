@@ -28,7 +28,7 @@ LEAST_AREA_PX2, MOST_SHARE, MOST_PARTS = 12, 0.2, 20
 """Parts that are smaller, or larger than this share of the picture, are no objects."""
 MOST_FOREGROUND = 0.3
 """If more of a picture differs the camera moves."""
-SAME_AREA = 1.8
+SAME_AREA = 1.5
 """From a frame to the next an object's silhouette grows or shrinks by less."""
 OFF_SIZE, OFF_STEP = 0.6, 0.35
 """How far a part may be from where a path leads, by its size and by the way it goes."""

@@ -126,16 +126,13 @@ def _with_silhouettes(
     open_frames: Callable[[], Iterable[np.ndarray]],
     clock: np.ndarray,
 ) -> list[Finished]:
-    """The objects, those that their texture loses by their silhouettes."""
-    each = list(zip(objects, starts, strict=True))
-    doubtful = [needs_silhouette(one, start) for one, start in each]
-    if not any(doubtful):
+    """The objects, a lone one that its texture loses by its silhouette.
+
+    Those of two objects that touch are one, whose middle is neither's.
+    """
+    if len(objects) > 1 or not needs_silhouette(objects[0], starts[0]):
         return list(objects)
-    paths = paths_of(open_frames, clock)
-    return [
-        with_silhouette(one, start, paths, clock) if is_doubtful else one
-        for (one, start), is_doubtful in zip(each, doubtful, strict=True)
-    ]
+    return [with_silhouette(objects[0], starts[0], paths_of(open_frames, clock), clock)]
 
 
 class _Kept:

@@ -211,7 +211,8 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
     be unknown. On others it is where the motion begins: from rest the distance grows as
     (t - release)^2, so that its root is a straight line which meets zero at the release.
     """
-    frame_s = float(np.median(np.diff(observation.times_s)))
+    steps_s = np.diff(observation.times_s)
+    frame_s = float(np.median(steps_s)) if steps_s.size else 1.0 / clip.fps
     declared = clip.objects[0].first_frame
     if StartVelocity.name in laws_of(clip) or SCENARIOS[clip.scenario].is_level:
         return float(observation.times_s[np.argmax(observation.mask[0])]), frame_s
