@@ -113,7 +113,7 @@ def errors(path: Path) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
         found.append(coding_shift_amplitudes_px(*given))
         return found[-1]
 
-    def none(paths: Sequence[Any], _: Any) -> np.ndarray:
+    def none(paths: Sequence[Any], *_: Any) -> np.ndarray:
         return np.zeros((len(paths), 2, len(STEPS_PER_PX)))
 
     both = []

@@ -208,6 +208,7 @@ def _filmed(path: Path, file: ClipFile) -> dict[str, Any]:
         "video": video,
         "frame_count": info.frame_count,
         "frame_size_px": info.size_px,
+        "frame_times_s": info.times_s,
         "container_fps": info.container_fps or None,
         "warnings": info.warnings,
     }

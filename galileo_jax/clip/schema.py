@@ -194,6 +194,7 @@ class Clip(ClipFile):
       is_own_track: the track is our own csv, in metres along our axes.
       frame_count: frames that decode, or rows of the csv track.
       frame_size_px: (width, height); None for a csv track.
+      frame_times_s: when each frame of a video was taken, the first at 0; empty for a csv track.
       container_fps: what the video's container says, right or wrong; None where it says nothing.
       warnings: doubts found while loading, one line each; commands print them.
     """
@@ -204,6 +205,7 @@ class Clip(ClipFile):
     is_own_track: bool = False
     frame_count: int
     frame_size_px: tuple[int, int] | None = None
+    frame_times_s: tuple[float, ...] = ()
     container_fps: float | None = None
     warnings: tuple[str, ...] = ()
 

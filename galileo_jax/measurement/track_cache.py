@@ -22,7 +22,7 @@ from galileo_jax.tracking.track import Track
 
 FOLDER = "tracks"
 ROOMS = ("clip", "tracking", "video")  # whose code decides what a track is
-LIBRARIES = ("numpy", "opencv-python-headless", "scipy")
+LIBRARIES = ("av", "numpy", "opencv-python-headless", "scipy")
 # Of the yaml: what is declared about the picture and the objects in it.
 KEYS = {
     *("scenario", "fps", "ramp_angle_deg", "direction"),

@@ -60,7 +60,8 @@ def track_clip(clip: Clip) -> Track:
     coding = Coding(decode.predicted_from_before(video))
     if view is not None:
         coding = replace(coding, to_coded=view.to_picture, from_coded=view.from_picture)
-    found = track_video(open_frames, starts, clip.fps, coding=coding, advance=advance)
+    times_s = np.array(clip.frame_times_s)
+    found = track_video(open_frames, starts, times_s, coding=coding, advance=advance)
     return found if view is None else view.track(found, clip)
 
 

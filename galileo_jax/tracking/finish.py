@@ -1,5 +1,6 @@
 """Converts fitted poses to a track: visibility, the followed point's position and uncertainty."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -34,6 +35,14 @@ SAME_PLACE_PX = 1.0
 """What comes back this close to where it was last seen had only been covered."""
 
 
+LONG_GAP, PATH_FRAMES = 4.0, 8
+"""After so many usual steps out of sight the path of so many frames before has to lead to where an
+object is seen again."""
+LEAST_WAY_PX, OFF_WAY = 10.0, 0.5
+"""If it would have gone so far meanwhile, it may be off by this share of that: less than what is
+thrown back."""
+
+
 @dataclass(frozen=True)
 class Finished:
     """One object's part of a track; fields as in `Track`, without the object's axis."""
@@ -50,6 +59,8 @@ def finished(
     pieces: Sequence[Piece],
     shares: Sequence[float],
     coding: Coding,
+    clock: np.ndarray,
+    is_alone: bool = True,
 ) -> list[Finished]:
     """The pieces' tracks from their fits of every frame (None: not found).
 
@@ -58,17 +69,22 @@ def finished(
       pieces: with the points to follow, each in its piece's first frame.
       shares: per piece, the open share of a frame's time.
       coding: of the frames.
+      clock: `[frame]`, when each was taken, in usual steps.
+      is_alone: there is one object, which no other one can hit while it is hidden.
     """
-    seen = [_seen(found, piece.corrected) for found, piece in zip(fits, pieces, strict=True)]
-    # A coder sees what is shown, before anything else is put right.
-    mended = without_coding_shift(seen, coding)
     seen = [
-        _at_mid_exposure(one.poses, noise, share, piece)
+        _seen(found, piece.corrected, clock if is_alone else None)
+        for found, piece in zip(fits, pieces, strict=True)
+    ]
+    # A coder sees what is shown, before anything else is put right.
+    mended = without_coding_shift(seen, coding, clock)
+    seen = [
+        _at_mid_exposure(one.poses, noise, share, piece, clock)
         for one, (_, noise), piece, share in zip(mended, seen, pieces, shares, strict=True)
     ]
-    excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen])
+    excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen], clock)
     return [
-        _anchored(poses, noise, one.shifts_px, found, piece, excess)
+        _anchored(poses, noise, one.shifts_px, found, piece, excess, clock)
         for (poses, noise), one, found, piece in zip(seen, mended, fits, pieces, strict=True)
     ]
 
@@ -91,7 +107,9 @@ def joined(pieces: Sequence[Finished], count: int) -> Finished:
     return whole
 
 
-def _seen(fits: list[Refined | None], corrected: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def _seen(
+    fits: list[Refined | None], corrected: Sequence[int], clock: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
     """Poses `[frame, 3]` and their image noise `[frame, 2, 2]`; NaN: not visible."""
     poses = np.full((len(fits), 3), np.nan)
     noise = np.full((len(fits), 2, 2), np.nan)
@@ -99,17 +117,25 @@ def _seen(fits: list[Refined | None], corrected: Sequence[int]) -> tuple[np.ndar
         if fit is not None and _is_visible(fit):
             poses[index], noise[index] = fit.pose, fit.covariance
     is_doubtful = ~_without_glimpses(poses, corrected)
+    if clock is not None:
+        is_doubtful[_led_to(np.where(is_doubtful[:, None], np.nan, poses), corrected, clock) :] = (
+            True
+        )
     poses[is_doubtful], noise[is_doubtful] = np.nan, np.nan
     return poses, noise
 
 
 def _at_mid_exposure(
-    poses: np.ndarray, noise: np.ndarray, exposure_share: float, piece: Piece
+    poses: np.ndarray,
+    noise: np.ndarray,
+    exposure_share: float,
+    piece: Piece,
+    clock: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The poses without what blows within an exposure shift them, and the noise with the rest."""
     jumps = np.zeros((len(poses), 2))
     for index in np.flatnonzero(np.isfinite(poses[:, 0])):
-        jumps[index] = piece.velocities(poses, int(index)).jump[:2]
+        jumps[index] = piece.velocities(poses, int(index), clock).jump[:2]
     shift = blow_shift(jumps, exposure_share)
     unknown = BLOW_KNOWN_TO**2 * (shift**2).sum(axis=1)
     corrected = poses - np.pad(shift, ((0, 0), (0, 1)))
@@ -123,6 +149,7 @@ def _anchored(
     fits: list[Refined | None],
     piece: Piece,
     excess: np.ndarray,
+    clock: np.ndarray,
 ) -> Finished:
     """The followed point's places: rigid with the poses, `point_px` where the object began.
 
@@ -134,7 +161,7 @@ def _anchored(
     moves = is_in_motion(poses[frames, :2], noise[frames])
     grown = moves * excess * speed_scale2(poses[frames, :2])[:, None]
     covariance[frames] += np.einsum("fi,ij->fij", grown, np.eye(2))
-    scale2 = motion_scale2(poses[:, :2], covariance)
+    scale2 = motion_scale2(poses[:, :2], covariance, clock)
     scale2 = scale2 * after_blow_scale2(poses[frames, :2], noise[frames])
     scale2 = scale2 * slow_scale2(poses[frames, :2], noise[frames])
     scale = np.sqrt(np.where(moves, scale2, 1.0))
@@ -183,6 +210,30 @@ def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray
             result[begin:end] = True
             last_end = end
     return result
+
+
+def _led_to(poses: np.ndarray, corrected: Sequence[int], clock: np.ndarray) -> int:
+    """The first frame after a gap to which the path before it does not lead; or how many there are.
+
+    Something has happened to the object while it was out of sight, or it is another one: what
+    follows is another motion. What would hardly have moved, or has been seen by somebody, counts.
+    """
+    known = np.flatnonzero(np.isfinite(poses[:, 0]))
+    for last, back in itertools.pairwise(known):
+        own = known[(known <= last) & (known > last - PATH_FRAMES)]
+        gap = clock[back] - clock[last]
+        if gap < LONG_GAP or len(own) < PATH_FRAMES // 2 or any(at > last for at in corrected):
+            continue
+        since = clock[own] - clock[back]
+        ends, speeds = zip(
+            *(np.polyfit(since, poses[own, :2], degree)[[-1, -2]] for degree in (1, 2)),
+            strict=True,
+        )
+        way = gap * float(np.hypot(*speeds[0]))
+        off = min(float(np.hypot(*(poses[back, :2] - end))) for end in ends)
+        if way > LEAST_WAY_PX and off > OFF_WAY * way:
+            return int(back)
+    return len(poses)
 
 
 def _is_visible(fit: Refined) -> bool:

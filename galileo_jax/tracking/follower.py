@@ -70,7 +70,7 @@ class Follower:
       template: from the first frame at first, hand and noise included.
       pose: the last one found.
       first_picture: the frame in which it began: the scene without it, elsewhere.
-      velocity: change of the pose per frame, extrapolated to the last one.
+      velocity: change of the pose per usual step, extrapolated to the last one.
       poses: pose of every frame so far, NaN where not found.
       patches: sharp aligned patches, thinned evenly to at most `MAX_PATCHES`.
     """
@@ -86,6 +86,7 @@ class Follower:
     correlation: float = 1.0
     frames_missed: int = 0
     frames_held: int = 0
+    since: float = 0.0  # the last frame that showed where it is, in usual steps
     stride: int = 1
     frames_sharp: int = 0
     frames_before: int = 0  # that somebody has put it right in
@@ -121,14 +122,22 @@ class Follower:
             if name != "num_poses":
                 setattr(self, name, value)
         self.taken = taken
-        self.step(before, picture)
+        self.step(before, picture, self._step)
         self.taken = ()
 
-    def step(self, before: Picture | None, picture: Picture) -> None:
-        """Finds the object in the next frame; `before` is the frame preceding it."""
+    def step(self, before: Picture | None, picture: Picture, step: float = 1.0) -> None:
+        """Finds the object in the next frame.
+
+        Args:
+          before: the frame preceding it.
+          picture: the frame.
+          step: the time between them, in usual steps.
+        """
         self._last = {name: getattr(self, name) for name in CHANGING} | {
             "num_poses": len(self.poses), "patches": [*self.patches],
         }  # fmt: skip
+        self._step = step
+        self.since += step
         if self.frames_missed > LONG_GONE_FRAMES and self.frames_missed % LOOK_EVERY:
             fit = None
         else:
@@ -154,10 +163,11 @@ class Follower:
                 self._see_how_it_began(fit.pose)
             self.velocity, self.mean_velocity = (
                 self._velocity_at(fit.pose),
-                (fit.pose - self.pose) / self._frames_since,
+                (fit.pose - self.pose) / self.since,
             )
         self.correlation = fit.correlation
         self.frames_missed = self.frames_held = 0
+        self.since = 0.0
         self.pose = fit.pose
         self.poses.append(fit.pose)
         if self.is_alone or (len(self.poses) > KNOWN_FROM and is_smooth):
@@ -186,13 +196,9 @@ class Follower:
         self.pose, self.correlation = fit.pose, fit.correlation
         self.velocity = self.mean_velocity = np.zeros(3)
         self.frames_missed = self.frames_held = 0
+        self.since = 0.0
         self.frames_before = len(self.poses)
         return True
-
-    @property
-    def _frames_since(self) -> int:
-        """Frames from the last one that showed where the object is to the next."""
-        return self.frames_missed + self.frames_held + 1
 
     def _is_held(self, fit: Fit) -> bool:
         """Whether the object is shown where it was though it moved: first frame of a stop, too."""
@@ -203,7 +209,7 @@ class Follower:
     def _went_on(self, fit: Fit) -> bool:
         """Whether the object is where a steady motion takes it."""
         off = fit.pose - self._expected()
-        path = self._frames_since * self.velocity
+        path = self.since * self.velocity
         return bool(np.hypot(*off[:2]) < AS_BEFORE * np.hypot(*path[:2]))
 
     def _near(self, before: Picture | None, picture: Picture) -> Fit | None:
@@ -212,7 +218,7 @@ class Follower:
         if before is not None and not self.frames_missed:
             if (fit := self._as_expected(picture)) is not None:
                 return fit
-            reach = int(np.ceil(2 * self._frames_since * np.hypot(*self.velocity[:2]))) + 16
+            reach = int(np.ceil(2 * self.since * np.hypot(*self.velocity[:2]))) + 16
             features = follow(before.grey, picture.grey, self.pose, self.template.region, reach)
             if (motion := rigid_motion(*features)) is not None:
                 angle, shift = motion
@@ -245,7 +251,7 @@ class Follower:
         if self.is_alone or most < MIN_SPEED_PX:
             return None
         blows = after_blow(
-            picture, self.template, self.pose, self.velocity, self._frames_since,
+            picture, self.template, self.pose, self.velocity, self.since,
             tuple(filter(None, self.exposure.trials)), most,
         )  # fmt: skip
         return self._best_of(picture, blows, FOUND_AGAIN) if blows else None
@@ -309,11 +315,13 @@ class Follower:
             return False
         target = self.template.sharp(FINE_PX)
         then, now = (target.values_at(one, fit.pose) for one in (self.first_picture, picture))
+        if not (np.ptp(then) and np.ptp(now)):
+            return False  # nothing is seen there
         return float(np.corrcoef(then, now)[0, 1]) > fit.correlation
 
     def _expected(self) -> np.ndarray:
         """Where the object should be if it goes on, for a few frames of hiding."""
-        return self.pose + min(self._frames_since, MAX_COAST_FRAMES) * self.velocity
+        return self.pose + min(self.since, MAX_COAST_FRAMES) * self.velocity
 
     def _leap_px(self) -> float:
         """How far from the expected place the object can be; any distance while it is new."""
@@ -321,7 +329,7 @@ class Follower:
             return np.inf
         speed = float(np.hypot(*self.velocity[:2]))
         most = max(1.5 * speed, self.template.radius, HIT_GAIN * self.fastest_px)
-        return most * min(self._frames_since, MAX_LEAP_FRAMES)
+        return most * min(self.since, MAX_LEAP_FRAMES)
 
     def _velocity_at(self, pose: np.ndarray) -> np.ndarray:
         """The velocity at `pose`: the mean one since the last frame plus half its change.
@@ -329,13 +337,13 @@ class Follower:
         Without the second term a steadily accelerated object seems slower than it is, and
         the exposure longer. Where the speed changes by more than a half, it was a blow.
         """
-        mean = (pose - self.pose) / self._frames_since
+        mean = (pose - self.pose) / self.since
         change = mean - self.mean_velocity
         return mean if self._is_blow(pose) else mean + change / 2
 
     def _is_blow(self, pose: np.ndarray) -> bool:
         """Whether it can be at `pose` only if its speed changed by a half, or more."""
-        mean = (pose - self.pose) / self._frames_since
+        mean = (pose - self.pose) / self.since
         change = mean - self.mean_velocity
         return bool(np.hypot(*change[:2]) > 0.5 * np.hypot(*mean[:2]))
 
@@ -359,7 +367,7 @@ class Follower:
 
 CHANGING = (
     "template", "pose", "velocity", "mean_velocity", "correlation", "frames_missed",
-    "frames_held", "stride", "frames_sharp", "_off_course_px",
+    "frames_held", "since", "stride", "frames_sharp", "_off_course_px",
 )  # fmt: skip
 """What a step changes of a follower, besides its lists."""
 

@@ -100,6 +100,7 @@ class Mended(NamedTuple):
 def without_coding_shift(
     paths: Sequence[tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame 2 2"]]],
     coding: Coding,
+    clock: Float[np.ndarray, " frame"],
 ) -> list[Mended]:
     """The poses of all objects without what motion compensation shifts them.
 
@@ -107,9 +108,10 @@ def without_coding_shift(
       paths: per object the poses as the frames show them (x and y in px, angle in rad) and
         `covariance` of image noise, px^2; NaN where not visible.
       coding: of as many frames or more.
+      clock: when each frame was taken, in usual steps.
     """
     shown = [(coding.to_coded(poses[:, :2]), covariance) for poses, covariance in paths]
-    amplitudes_px = coding_shift_amplitudes_px(shown, coding.is_predicted)
+    amplitudes_px = coding_shift_amplitudes_px(shown, coding.is_predicted, clock)
     found = []
     for (poses, _), (coded, covariance), own_px in zip(paths, shown, amplitudes_px, strict=True):
         step = _displacement(coded)
@@ -141,6 +143,7 @@ def _along_axes(
 def coding_shift_amplitudes_px(
     paths: Sequence[tuple[Float[np.ndarray, "frame 2"], Float[np.ndarray, "frame 2 2"]]],
     is_predicted: Bool[np.ndarray, " frame"],
+    clock: Float[np.ndarray, " frame"],
 ) -> Float[np.ndarray, "object 2 step"]:
     """The amplitudes a_k, px, of each object along each axis, for each of `STEPS_PER_PX`.
 
@@ -149,13 +152,14 @@ def coding_shift_amplitudes_px(
     Args:
       paths: per object `place`, px, and `covariance` of image noise, px^2; NaN where not visible.
       is_predicted: which frames are predicted from the frame before them.
+      clock: when each frame was taken, in usual steps.
     """
     found = np.zeros((len(paths), 2, len(STEPS_PER_PX)))
     pieces = [
         (index, axis, piece)
         for index, (place, covariance) in enumerate(paths)
         for axis in range(2)
-        for piece in _smooth_pieces(place, covariance, is_predicted, axis)
+        for piece in _smooth_pieces(place, covariance, is_predicted, clock, axis)
     ]
     if len(pieces) < MIN_PIECES:
         return found
@@ -198,16 +202,18 @@ def _smooth_pieces(
     place: Float[np.ndarray, "frame 2"],
     covariance: Float[np.ndarray, "frame 2 2"],
     is_predicted: Bool[np.ndarray, " frame"],
+    clock: Float[np.ndarray, " frame"],
     axis: int,
 ) -> list[_Smooth]:
     """Pieces of an object's motion along an axis, one after the other, that tell amplitudes."""
-    off_path, step = _off_parabola(), _displacement(place)
+    step = _displacement(place)
     pattern = _patterns(step, is_predicted[: len(step)])[:, axis]
     slope = _slopes(step, is_predicted[: len(step)])[:, axis]
     return [
         _Smooth(off_path @ place[own, axis], off_path @ pattern[own], slope[own])
         for own in _pieces(_moves(place, covariance)[:, axis])
         if _alike(step[own, axis]) < MOST_ALIKE
+        for off_path in [_off_parabola(clock[own])]
     ]
 
 
@@ -304,7 +310,8 @@ def _alike(step: Float[np.ndarray, " frame"]) -> float:
     return float(np.abs(np.mean(np.exp(2j * np.pi * STEPS_PER_PX[0] * step))))
 
 
-def _off_parabola() -> Float[np.ndarray, "frame frame"]:
+def _off_parabola(clock: Float[np.ndarray, " frame"]) -> Float[np.ndarray, "frame frame"]:
     """Projects a piece onto what no parabola describes."""
-    basis, _ = np.linalg.qr(np.vander(np.linspace(-1, 1, PIECE_FRAMES), DEGREE + 1))
+    since = 2 * (clock - clock[0]) / (clock[-1] - clock[0]) - 1
+    basis, _ = np.linalg.qr(np.vander(since, DEGREE + 1))
     return np.eye(PIECE_FRAMES) - basis @ basis.T

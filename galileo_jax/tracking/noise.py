@@ -8,8 +8,8 @@ MOVED_SDS = 4.0
 """A step of more standard deviations than these is a motion, not noise."""
 MIN_WINDOWS = 8
 """Fewer third differences do not tell a variance."""
-THIRD_DIFFERENCE = np.array([1.0, 9.0, 9.0, 1.0])
-"""Weights of four frames' variances in the variance of their third difference."""
+THIRD_FRAMES = 4
+"""Frames of a third difference."""
 CHI2_MEDIAN = 0.4549
 """Median of chi^2 with one degree of freedom."""
 CUT_SDS, CUT_VARIANCE = 3.0, 0.9733
@@ -129,7 +129,9 @@ def speed_scale2(place: np.ndarray) -> np.ndarray:
     return 1.0 + (np.nan_to_num(step) / FAST_PX) ** 2
 
 
-def motion_variance(paths: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def motion_variance(
+    paths: Sequence[tuple[np.ndarray, np.ndarray]], clock: np.ndarray
+) -> np.ndarray:
     """`[2]`, px^2: variance per image axis beyond the stated noise while moving along it, slowly.
 
     A coder predicts what moves from the frame before, shifted by half or quarter pixels, and
@@ -144,11 +146,13 @@ def motion_variance(paths: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarra
     Args:
       paths: per object `place` `[frame, 2]` and `covariance` `[frame, 2, 2]` of image noise;
         NaN where not visible.
+      clock: `[frame]`, when each frame was taken, in usual steps.
     """
     excess = np.zeros(2)
     for axis in range(2):
         differences = [
-            _third_differences(p[:, axis], c[:, axis, axis], speed_scale2(p)) for p, c in paths
+            _third_differences(p[:, axis], c[:, axis, axis], clock, speed_scale2(p))
+            for p, c in paths
         ]
         square, stated, scale2 = np.concatenate(differences, axis=1)
         if len(square) >= MIN_WINDOWS:
@@ -157,7 +161,7 @@ def motion_variance(paths: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarra
     return excess
 
 
-def motion_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+def motion_scale2(place: np.ndarray, covariance: np.ndarray, clock: np.ndarray) -> np.ndarray:
     """`[2]`: by how much one object's variance in motion differs from what is stated, per axis.
 
     The excess is pooled over all objects, and image noise is overstated where a picture is smeared;
@@ -167,10 +171,11 @@ def motion_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
     Args:
       place: `[frame, 2]`, px; NaN where not visible.
       covariance: `[frame, 2, 2]`, px^2, stated, with the excess in motion.
+      clock: `[frame]`, when each frame was taken, in usual steps.
     """
     scale2 = np.ones(2)
     for axis in range(2):
-        square, stated, _ = _third_differences(place[:, axis], covariance[:, axis, axis])
+        square, stated, _ = _third_differences(place[:, axis], covariance[:, axis, axis], clock)
         if len(square) >= MIN_WINDOWS:
             ratio = square / stated
             own = _excess(ratio, np.full_like(ratio, 1e-12))  # of nothing stated: all there is
@@ -180,21 +185,30 @@ def motion_scale2(place: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 
 def _third_differences(
-    place: np.ndarray, variance: np.ndarray, excess: np.ndarray | None = None
+    place: np.ndarray, variance: np.ndarray, clock: np.ndarray, excess: np.ndarray | None = None
 ) -> np.ndarray:
     """`[3, window]`: squared third differences of `[frame]` while moving, and their variances.
 
+    Of unevenly spaced frames the divided difference, 3! sum_i x_i / prod_(j != i) (t_i - t_j),
+    which removes parabolas all the same.
+
     Args:
       place: px.
+      clock: when each frame was taken, in usual steps.
       variance: px^2, stated; the second row has what it makes of the third differences.
       excess: of another error, or None; the third row has the same of it.
     """
-    if len(place) < len(THIRD_DIFFERENCE):
+    if len(place) < THIRD_FRAMES:
         return np.empty((3, 0))
-    moves = np.lib.stride_tricks.sliding_window_view(has_moved(place, variance), 3).all(axis=1)
+    windows = np.lib.stride_tricks.sliding_window_view
+    moves = windows(has_moved(place, variance), THIRD_FRAMES - 1).all(axis=1)
+    at = windows(clock, THIRD_FRAMES)
+    apart = at[:, :, None] - at[:, None, :] + np.eye(THIRD_FRAMES)
+    share = 6 / apart.prod(axis=2)
     both = np.stack([variance, np.zeros_like(variance) if excess is None else excess])
-    expected = np.lib.stride_tricks.sliding_window_view(both, 4, axis=1) @ THIRD_DIFFERENCE
-    return np.stack([np.diff(place, n=3) ** 2, *expected])[:, moves]
+    expected = np.sum(windows(both, THIRD_FRAMES, axis=1) * share**2, axis=-1)
+    third = np.sum(windows(place, THIRD_FRAMES) * share, axis=-1)
+    return np.stack([third**2, *expected])[:, moves]
 
 
 def _excess(square: np.ndarray, stated: np.ndarray) -> float:
@@ -232,10 +246,7 @@ def blow_shift(jumps: np.ndarray, exposure_share: float) -> np.ndarray:
     """
     if not exposure_share:
         return np.zeros_like(jumps)
-    padded = np.pad(jumps, ((STEADY_FRAMES // 2,) * 2, (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, STEADY_FRAMES, axis=0)
-    steady = np.median(windows, axis=-1)
-    blow = np.pad(jumps - steady, ((1, 1), (0, 0)))
+    blow = np.pad(sudden(jumps), ((1, 1), (0, 0)))
     own = np.linalg.norm(blow[1:-1], axis=1)
     direction = blow[1:-1] / np.maximum(own, 1e-12)[:, None]
     sides = [(beside * direction).sum(axis=1) for beside in (blow[:-2], blow[2:])]
@@ -245,3 +256,10 @@ def blow_shift(jumps: np.ndarray, exposure_share: float) -> np.ndarray:
     open_after = np.maximum(exposure_share / 2 - instant, 0)
     shift = whole * open_after**2 / (2 * exposure_share)
     return shift[:, None] * direction
+
+
+def sudden(jumps: np.ndarray) -> np.ndarray:
+    """`[frame, 2]`: what changes of the velocity exceed the steady acceleration around them by."""
+    padded = np.pad(jumps, ((STEADY_FRAMES // 2,) * 2, (0, 0)), mode="edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, STEADY_FRAMES, axis=0)
+    return jumps - np.median(windows, axis=-1)

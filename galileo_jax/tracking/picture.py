@@ -53,6 +53,11 @@ class Picture:
         x, y = self._corner_px
         return Picture(cut.copy(), (left + x, top + y), self.size_px)
 
+    def forget(self) -> None:
+        """Frees what was smoothed and smeared, which takes many times the picture's own memory."""
+        self._windows.clear()
+        self._smeared.clear()
+
     def window(self, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
         """The pixels from `low` to `high` (x, y), both within, float32; None: not all are seen."""
         (left, top), (right, bottom) = low - self._corner_px, high - self._corner_px

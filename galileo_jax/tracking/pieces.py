@@ -70,12 +70,13 @@ class Piece:
             found[self.first_frame : self.first_frame + len(own)] = own
         return found
 
-    def velocities(self, poses: np.ndarray, frame: int) -> Velocities:
+    def velocities(self, poses: np.ndarray, frame: int, clock: np.ndarray) -> Velocities:
         """Around a frame; it is not known how the object came to where somebody put it right."""
         ends = [at for at in self.corrected if at > frame]
         begins = [at for at in self.corrected if at <= frame]
         first = max(begins, default=0)
-        return velocities_at(poses[first : min(ends, default=len(poses))], frame - first)
+        end = min(ends, default=len(poses))
+        return velocities_at(poses[first:end], frame - first, clock[first:end])
 
 
 def follow_on(
@@ -86,6 +87,7 @@ def follow_on(
     picture: Picture,
     exposure: Exposure,
     beside: Sequence[Follower] = (),
+    step: float = 1.0,
 ) -> None:
     """One frame further; `pieces` grows where a new one begins.
 
@@ -97,6 +99,7 @@ def follow_on(
       picture: the frame.
       exposure: of the video, shared by all objects.
       beside: the other objects, which may hit it.
+      step: time since the frame before, in usual steps.
     """
     if not pieces:
         pieces.append(_begun(start, picture, exposure))
@@ -111,7 +114,7 @@ def follow_on(
     own = pieces[-1]
     own.follower.is_alone = not beside
     own.follower.fastest_px = max((one.speed_px for one in beside), default=0.0)
-    own.follower.step(before if index > own.first_frame else None, picture)
+    own.follower.step(before if index > own.first_frame else None, picture, step)
 
 
 def keep_apart(

@@ -13,7 +13,7 @@ from galileo_jax.tracking.template import Template
 
 @dataclass(frozen=True)
 class Velocities:
-    """Changes of the pose per frame around one frame, `[3]` each: into it and out of it."""
+    """Changes of the pose per usual step around one frame, `[3]` each: into it and out of it."""
 
     before: np.ndarray
     after: np.ndarray
@@ -24,17 +24,20 @@ class Velocities:
         return self.after - self.before
 
 
-def velocities_at(poses: np.ndarray, frame: int) -> Velocities:
-    """The velocities around a frame of `poses` `[frame, 3]`; gaps are bridged."""
+def velocities_at(poses: np.ndarray, frame: int, clock: np.ndarray) -> Velocities:
+    """The velocities around a frame of `poses` `[frame, 3]`; gaps are bridged.
+
+    `clock` `[frame]` is when each frame was taken, in usual steps.
+    """
     known = np.flatnonzero(np.isfinite(poses[:, 0]))
     earlier, later = known[known < frame], known[known > frame]
     before = after = None
     if len(earlier):
-        before = (poses[frame] - poses[earlier[-1]]) / (frame - earlier[-1])
+        before = (poses[frame] - poses[earlier[-1]]) / (clock[frame] - clock[earlier[-1]])
     if len(later):
-        after = (poses[later[0]] - poses[frame]) / (later[0] - frame)
+        after = (poses[later[0]] - poses[frame]) / (clock[later[0]] - clock[frame])
     if before is None:
-        before = after if after is not None else np.zeros(3)
+        before = after if after is not None else np.zeros_like(poses[frame])
     return Velocities(before, before if after is None else after)
 
 

@@ -112,7 +112,7 @@ def after_blow(
     template: Template,
     pose: np.ndarray,
     velocity: np.ndarray,
-    frames: int,
+    frames: float,
     shares: tuple[float, ...],
     most_px: float,
 ) -> list[Guess]:
@@ -131,7 +131,7 @@ def after_blow(
       template: the object's.
       pose: where it was last seen.
       velocity: its change per frame there.
-      frames: since then.
+      frames: usual steps since then.
       shares: of a frame's time that the shutter may be open.
       most_px: no blow makes it faster, per frame.
     """

@@ -14,7 +14,7 @@ class Track:
 
     Attributes:
       names: the objects' names, in the clip's order.
-      times_s: `[frame]`, seconds since the first frame (frame / fps).
+      times_s: `[frame]`, seconds since the first frame.
       position_px: `[object, frame, 2]`, x right and y down. The point followed is the one
         the clip declares (`point_px`), or the object's centre when it declares none;
         NaN where not visible.

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.tracking.exposure import LEARNT_FRAMES, Exposure
-from galileo_jax.tracking.finish import finished, joined
+from galileo_jax.tracking.finish import Finished, finished, joined
 from galileo_jax.tracking.follower import Follower
 from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pieces import Piece, Start, follow_on, keep_apart
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
+from galileo_jax.tracking.second_opinion import needs_silhouette, with_silhouette
+from galileo_jax.tracking.silhouette import paths_of
 from galileo_jax.tracking.template import Template, grey, median_template
 from galileo_jax.tracking.track import Track
 
@@ -36,7 +38,7 @@ class Seen:
 def track_video(
     open_frames: Callable[[], Iterable[np.ndarray]],
     starts: Sequence[Start],
-    fps: float,
+    times_s: np.ndarray,
     *,
     coding: Coding | None = None,
     advance: Callable[[Seen | None], None] = lambda _: None,
@@ -56,11 +58,12 @@ def track_video(
       open_frames: gives the frames from the beginning, `[height, width, 3]` uint8, BGR (or
         grey); called again if the video is long.
       starts: at least one.
-      fps: frames per second.
+      times_s: `[frame]`, increasing, when each was taken.
       coding: how the frames were coded. None: each for itself.
       advance: called after every frame of both passes (a progress bar), of the first one with
         what it has found.
     """
+    clock = in_steps(times_s)
     exposure, kept = Exposure(), _Kept(len(starts))
     pieces: list[list[Piece]] = [[] for _ in starts]
     before: Picture | None = None
@@ -70,7 +73,8 @@ def track_video(
         used = [k for k, start in enumerate(starts) if start.uses(index)]
         for k in used:
             beside = [own[-1].follower for i, own in enumerate(pieces) if own and i != k]
-            follow_on(pieces[k], starts[k], index, before, picture, exposure, beside)
+            step = clock[index] - clock[index - 1] if index else 1.0
+            follow_on(pieces[k], starts[k], index, before, picture, exposure, beside, step)
         keep_apart([pieces[k][-1] for k in used], index, before, picture)
         for k in used:
             kept.add(k, index, picture, pieces[k][-1].follower)
@@ -81,7 +85,7 @@ def track_video(
     flat = [(k, piece) for k, own in enumerate(pieces) for piece in own]
     coarse = [piece.poses(count) for _, piece in flat]
     templates = [_final_template(piece.follower) for _, piece in flat]
-    shares = _learnt(kept, open_frames, [k for k, _ in flat], coarse, templates, exposure)
+    shares = _learnt(kept, open_frames, [k for k, _ in flat], coarse, templates, exposure, clock)
     fits: list[list[Refined | None]] = [[] for _ in flat]
     for index, pictures in enumerate(kept.pictures(open_frames, count)):
         each = zip(flat, coarse, templates, shares, fits, strict=True)
@@ -90,19 +94,22 @@ def track_video(
             if picture is None or not np.isfinite(poses[index, 0]):
                 found.append(None)
                 continue
-            velocities = piece.velocities(poses, index)
+            velocities = piece.velocities(poses, index, clock)
             found.append(refine_pose(picture, template, poses[index], velocities, share))
         advance(None)
 
     coding = coding or Coding(np.zeros(count, bool))
-    done = finished(fits, [piece for _, piece in flat], shares, coding)
+    done = finished(
+        fits, [piece for _, piece in flat], shares, coding, clock[:count], len(starts) == 1
+    )
     objects = [
         joined([one for (of, _), one in zip(flat, done, strict=True) if of == k], count)
         for k in range(len(starts))
     ]
+    objects = _with_silhouettes(objects, starts, open_frames, clock)
     return Track(
         names=tuple(start.name for start in starts),
-        times_s=np.arange(count) / fps,
+        times_s=times_s[:count],
         position_px=np.stack([item.position_px for item in objects]),
         covariance_px2=np.stack([item.covariance_px2 for item in objects]),
         common_px2=np.stack([item.common_px2 for item in objects]),
@@ -111,6 +118,21 @@ def track_video(
         is_visible=np.stack([np.isfinite(item.angle_rad) for item in objects]),
         frame_size_px=size_px,
     )
+
+
+def _with_silhouettes(
+    objects: Sequence[Finished],
+    starts: Sequence[Start],
+    open_frames: Callable[[], Iterable[np.ndarray]],
+    clock: np.ndarray,
+) -> list[Finished]:
+    """The objects, a lone one that its texture loses by its silhouette.
+
+    Those of two objects that touch are one, whose middle is neither's.
+    """
+    if len(objects) > 1 or not needs_silhouette(objects[0], starts[0]):
+        return list(objects)
+    return [with_silhouette(objects[0], starts[0], paths_of(open_frames, clock), clock)]
 
 
 class _Kept:
@@ -137,7 +159,10 @@ class _Kept:
         """For every frame what is there of every object; decodes again where it was too much."""
         if self._parts is not None:
             for index in range(count):
-                yield [parts.get(index) for parts in self._parts]
+                pictures = [parts.get(index) for parts in self._parts]
+                yield pictures
+                for picture in filter(None, pictures):
+                    picture.forget()
             return
         for frame in itertools.islice(open_frames(), count):
             yield [Picture(grey(frame))] * self._num_objects
@@ -156,6 +181,7 @@ def _learnt(
     poses: Sequence[np.ndarray],
     templates: Sequence[Template],
     exposure: Exposure,
+    clock: np.ndarray,
 ) -> list[float]:
     """The open share of a frame's time for each piece, where the first pass has not learned it.
 
@@ -169,6 +195,7 @@ def _learnt(
       poses: of each piece, `[frame, 3]`.
       templates: of each piece, final.
       exposure: what the first pass has learned.
+      clock: `[frame]`, when each was taken, in usual steps.
     """
     blurred = [k for k, template in enumerate(templates) if not template.is_sharp]
     is_learnt = exposure.frames >= LEARNT_FRAMES
@@ -181,10 +208,18 @@ def _learnt(
             picture = pictures[objects[k]]
             if picture is None or not np.isfinite(path[index, 0]) or (k not in own and is_learnt):
                 continue
-            told = velocities_at(path, index)
+            told = velocities_at(path, index, clock)
             into = own.get(k, exposure)
             into.add(picture, as_sharp[k], path[index], (told.before + told.after) / 2)
     return [own.get(k, exposure).share for k in range(len(objects))]
+
+
+def in_steps(times_s: np.ndarray) -> np.ndarray:
+    """`[frame]`: when each frame was taken, in units of the usual step from one to the next."""
+    steps = np.diff(times_s)
+    usual = float(np.median(steps)) if len(steps) else 1.0
+    # Rounding of times is no unevenness.
+    return np.concatenate([[0.0], np.cumsum(np.round(steps / usual, 6))])
 
 
 def _place(pieces: list[Piece], index: int) -> tuple[float, float] | None:

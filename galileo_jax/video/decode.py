@@ -1,132 +1,180 @@
-"""Decoding a video as a stream: one frame in memory at a time."""
+"""Films as streams of upright pictures with square pixels, each with the time it was taken."""
 
 import functools
+import itertools
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import av
+import av.error
+import av.filter
 import cv2
 import numpy as np
 
 from galileo_jax.runtime.errors import InputError
-
-# OpenCV's and FFmpeg's own lines on stderr would bury ours; the variables bring them back.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # read when the first video is opened
-if "OPENCV_LOG_LEVEL" not in os.environ:
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+from galileo_jax.video.stamps import at_declared_rate, clock_of, is_blank, listed, repeats
 
 MIN_FRAMES = 4
-"""With fewer frames there is no change of speed to see; also tells a picture from a video."""
-
-MAX_TIMESTAMP_ERROR = 0.25
-"""Largest distance of a timestamp from an even grid, in frames. One lost frame gives 0.5 or
-more; a container that rounds to 1 ms or to 1/600 s gives at most 0.2 at 240 fps."""
-
+"""With fewer pictures there is no change of speed to see; also tells a picture from a film."""
 MAX_MISSING_SHARE = 0.02
-"""Frames announced but not decodable that are only warned of: containers miscount by one or two."""
-
-
-UNKNOWN_KINDS = (0, ord("?"))
-"""What OpenCV gives for the kind of a frame where the file does not say."""
+"""Pictures announced but not decodable that are only warned of: containers miscount by one or
+two."""
+BLOCK_PX = 8
+"""Pictures are compared by the mean difference of blocks, which noise hardly changes."""
+SQUARE = 1e-3
+"""Pixels whose sides differ by less are taken as square."""
+KINDS = "?IPBSipb"
+"""FFmpeg's kinds of pictures by number."""
+FIELDS = "bwdif=mode=send_field:parity={}"
+"""FFmpeg's filter that makes of each interlaced picture two, one for each of its fields."""
 
 
 @dataclass(frozen=True)
 class VideoInfo:
-    """What decoding a whole video showed.
+    """What decoding a whole film showed.
 
     Attributes:
-      frame_count: frames that decode (not what the header says).
-      size_px: (width, height).
-      fps: the declared frame rate, or the container's where none was declared.
-      container_fps: what the container says; 0 if it says nothing.
+      size_px: (width, height), of square pixels, upright.
+      fps: the declared rate, or the film's where none was declared.
+      container_fps: the film's own.
+      times_s: when each picture that is looked at was taken, from the first on.
       warnings: doubts, one line each.
     """
 
-    frame_count: int
     size_px: tuple[int, int]
     fps: float
     container_fps: float
+    times_s: tuple[float, ...]
     warnings: tuple[str, ...] = ()
+
+    @property
+    def frame_count(self) -> int:
+        """Pictures that are looked at."""
+        return len(self.times_s)
 
 
 def frames(path: Path) -> Iterator[np.ndarray]:
-    """Yields the frames of a video one by one, `[height, width, 3]` uint8, BGR.
+    """Yields the pictures that are looked at one by one, `[height, width, 3]` uint8, BGR.
+
+    As players show them: upright, with square pixels, without what an edit list hides; an
+    interlaced picture is two, one for each of its fields. Pictures that repeat the one before,
+    and black or faded ones at the beginning and the end, are left out.
 
     Raises `InputError` for a missing or undecodable file. A file that breaks off ends the
     iteration; `probe` is what tells it from a whole one.
-
-    Limits: OpenCV scales frames whose size changes midway to the first frame's size.
     """
-    with _opened(path) as capture:
-        while True:
-            is_read, frame = capture.read()
-            if not is_read:
-                return
-            yield frame
+    path = Path(path)
+    scan = _scan(path)
+    used = _used(scan)
+    for is_used, frame in zip(used, _stream(path, scan.first_field), strict=False):
+        if is_used:
+            yield _picture(frame, "bgr24", scan)
 
 
 def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
-    """Decodes the whole video once and says what it is.
+    """Decodes the whole film once and says what it is.
 
-    Keeps one frame and eight bytes per frame (its timestamp). A declared frame rate that
-    contradicts the container's is only warned of: high-speed clips often say 29.97.
+    Keeps one picture and some bytes per picture. A declared rate that contradicts the container's
+    is only warned of: high-speed films often say 29.97.
 
-    Raises `InputError` if the file is missing, empty, no video, a picture, or cut off; or if
-    its frames are unevenly spaced, because then frame number / fps is not the time.
+    Raises `InputError` if the file is missing, empty, no film, a picture, or cut off; or if its
+    pictures' times are missing, twice the same, or go back.
     """
+    path = Path(path)
     scan = _scan(path)
-    announced, container_fps, size_px = scan.announced, scan.container_fps, scan.size_px
-    count = len(scan.times_ms)
-    if count == 0:
-        raise InputError(f"{path}: not one frame can be decoded; a video expected")
-    if count < MIN_FRAMES:
-        raise InputError(
-            f"{path}: only {count} frame(s); a video of at least {MIN_FRAMES} frames expected"
-        )
-
-    warnings = []
-    missing = int(announced) - count
-    if missing > max(2, MAX_MISSING_SHARE * announced):
-        raise InputError(
-            f"{path}: cut off or damaged: only {count} of {int(announced)} frames can be decoded; "
-            "copy it again, or re-encode what is there"
-        )
-    if missing > 0:
-        warnings.append(f"{path}: {count} of {int(announced)} announced frames can be decoded")
-    _check_even_spacing(path, np.array(scan.times_ms))
-
-    fps = fps_declared or container_fps
-    if fps <= 0:
-        raise InputError(f"{path}: the container states no frame rate; declare fps")
-    if container_fps > 0 and abs(fps / container_fps - 1) > 0.01:
+    _check_whole(path, scan)
+    film = clock_of(_stamps(path, scan, fps_declared), scan.tick_s)
+    fields = 2 if scan.is_interlaced else 1
+    warnings = [f"{path}: {line}" for line in (*scan.warnings, *_left_out(scan))]
+    if scan.missing:
+        count = len(scan.kinds)
         warnings.append(
-            f"{path}: fps: {fps:g} declared, the container says {container_fps:.4g}; "
-            f"{fps:g} is used"
+            f"{path}: {count} of {count + scan.missing} announced frames can be decoded"
         )
-    return VideoInfo(count, size_px, fps, container_fps, tuple(warnings))
+    rate = scan.rate if abs(scan.rate * fields / film.rate - 1) < 1e-3 else film.rate / fields
+    clock, fps = film, rate
+    if fps_declared:
+        clock, compared = at_declared_rate(film, fps_declared * fields)
+        fps = fps_declared
+        if abs(fps * fields / compared - 1) > 0.01:
+            warnings.append(
+                f"{path}: fps: {fps:g} declared, the container says {compared / fields:.4g}; "
+                f"{fps:g} is used"
+            )
+    times_s = clock.times_s[_used(scan)]
+    return VideoInfo(scan.size_px, fps, rate, tuple((times_s - times_s[0]).tolist()), (*warnings,))
 
 
 def predicted_from_before(path: Path) -> np.ndarray:
-    """`[frame]`, bool: whether a frame was coded as what changes since the frame before it.
+    """`[picture]`, bool: whether a picture was coded as what changes since the one before it.
 
-    Not so are whole frames (I), frames that are predicted from both sides (B), and those that
-    follow them. Where a file does not say, frames count as predicted.
+    Not so are whole pictures (I), those that are predicted from both sides (B), those that follow
+    them, and all of a film whose pixels are not those that were coded. Where a file does not say,
+    pictures count as predicted.
 
     Raises `InputError` as `frames`.
     """
-    kinds = np.array(
-        [chr(kind) if kind not in UNKNOWN_KINDS else "P" for kind in _scan(path).kinds]
-    )
+    scan = _scan(Path(path))
+    kinds = np.array(list(scan.kinds.replace("?", "P")))
     is_predicted = kinds == "P"
     is_predicted[1:] &= kinds[:-1] != "B"
-    return is_predicted
+    used = _used(scan)
+    # What comes after a picture that is left out is not predicted from the one before that.
+    is_predicted[1:] &= used[:-1]
+    is_recoded = scan.is_interlaced or not _is_square(scan.pixel_aspect)
+    return is_predicted[used] & (not is_recoded)
+
+
+@dataclass(frozen=True)
+class _Scan:
+    """What one pass through a film shows.
+
+    Attributes:
+      size_px: (width, height) as shown.
+      pixel_aspect: width of a pixel by its height.
+      first_field: pictures are fields, of which each frame's first is the upper ("tff") or lower
+        one ("bff"); None: they are whole.
+      stamps_s: `[picture]`; NaN where missing.
+      is_even: the container knows no times, only a rate.
+      tick_s: what they are rounded to.
+      kinds: a letter for each picture.
+      change: `[picture]`, grey levels, see `repeats`.
+      contrast: `[picture]`, grey levels.
+      rate: pictures per second that the container states; 0: none.
+      missing: pictures that it announces and that are not there.
+      warnings: doubts.
+    """
+
+    size_px: tuple[int, int]
+    pixel_aspect: float
+    first_field: str | None
+    stamps_s: np.ndarray
+    is_even: bool
+    tick_s: float
+    kinds: str
+    change: np.ndarray
+    contrast: np.ndarray
+    rate: float
+    missing: int
+    warnings: tuple[str, ...]
+
+    @property
+    def is_interlaced(self) -> bool:
+        """Whether pictures are fields."""
+        return self.first_field is not None
+
+
+def _is_square(aspect: float) -> bool:
+    return abs(aspect - 1) < SQUARE
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
-    path = Path(path)
+def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
+    """The container and its video stream."""
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if not path.is_file():
@@ -135,27 +183,80 @@ def _opened(path: Path) -> Iterator[cv2.VideoCapture]:
         raise InputError(f"{path}: cannot be read (permissions)")
     if path.stat().st_size == 0:
         raise InputError(f"{path}: empty file (0 bytes); a video expected")
-    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     try:
-        if not capture.isOpened():
-            raise InputError(
-                f"{path}: cannot be decoded: not a video, without frames, or cut off before "
-                "its index"
-            )
-        yield capture
-    finally:
-        capture.release()
+        container = av.open(str(path))
+    except av.error.FFmpegError as error:
+        raise InputError(
+            f"{path}: cannot be decoded: not a video, without frames, or cut off before its index"
+        ) from error
+    with container:
+        stream: Any = container.streams.best("video")
+        if stream is None:
+            raise InputError(f"{path}: cannot be decoded: without frames; a video expected")
+        stream.thread_type = "AUTO"
+        yield container, stream
 
 
-@dataclass(frozen=True)
-class _Scan:
-    """Frames announced, the container's rate, the frames' size, times (ms) and kinds."""
+def _stream(path: Path, first_field: str | None) -> Iterator[Any]:
+    """The film's frames in the order in which they are shown; damaged parts are passed over."""
+    with _opened(path) as (container, stream):
+        yield from _shown(container, stream, first_field)
 
-    announced: float
-    container_fps: float
-    size_px: tuple[int, int]
-    times_ms: tuple[float, ...]
-    kinds: tuple[int, ...]  # the letter's code
+
+def _shown(container: Any, stream: Any, first_field: str | None) -> Iterator[Any]:
+    """The frames, or the fields that they are woven from."""
+    decoded = _decoded(container, stream)
+    if first_field is None:
+        return decoded
+    return _filtered(decoded, stream, FIELDS.format(first_field))
+
+
+def _decoded(container: Any, stream: Any) -> Iterator[Any]:
+    packets = container.demux(stream)
+    while True:
+        try:
+            packet = next(packets)
+        except (StopIteration, av.error.FFmpegError):
+            return
+        try:
+            yield from packet.decode()
+        except av.error.FFmpegError:  # of this packet; what follows may be whole
+            continue
+
+
+def _filtered(decoded: Iterator[Any], stream: Any, *filters: str) -> Iterator[Any]:
+    """The frames as a chain of FFmpeg's filters makes them."""
+    graph = av.filter.Graph()
+    nodes = [graph.add_buffer(template=stream)]
+    nodes += [graph.add(*each.split("=", 1)) for each in filters]
+    graph.link_nodes(*nodes, graph.add("buffersink")).configure()
+    for frame in itertools.chain(decoded, (None,)):  # None: that was all
+        graph.vpush(frame)
+        while True:
+            try:
+                yield graph.vpull()
+            except (av.error.BlockingIOError, av.error.EOFError):
+                break
+
+
+def _picture(frame: Any, format_: str, scan: _Scan) -> np.ndarray:
+    """A frame as it is shown: upright, with square pixels."""
+    picture = _upright(frame.to_ndarray(format=format_), frame.rotation)
+    if picture.shape[1::-1] != scan.size_px:
+        picture = cv2.resize(picture, scan.size_px, interpolation=cv2.INTER_LANCZOS4)
+    return picture
+
+
+def _upright(picture: np.ndarray, rotation_deg: int) -> np.ndarray:
+    return np.ascontiguousarray(np.rot90(picture, round(rotation_deg / 90) % 4))
+
+
+def _shown_size(frame: Any, aspect: float) -> tuple[int, int]:
+    """(width, height) of a frame with square pixels, none of which is smaller than before."""
+    width, height = frame.width, frame.height
+    if not _is_square(aspect):
+        width, height = (round(width * max(aspect, 1)), round(height * max(1 / aspect, 1)))
+    return (height, width) if round(frame.rotation / 90) % 2 else (width, height)
 
 
 def _scan(path: Path) -> _Scan:
@@ -167,36 +268,168 @@ def _scan(path: Path) -> _Scan:
 @functools.lru_cache(64)
 def _scanned(path: Path, _whole: Path, *_stamp: int) -> _Scan:
     """Once for each content: who draws marks has the clip checked at every step."""
-    times_ms: list[float] = []
-    kinds: list[int] = []
-    with _opened(path) as capture:
-        announced = capture.get(cv2.CAP_PROP_FRAME_COUNT)
-        container_fps = max(capture.get(cv2.CAP_PROP_FPS), 0.0)
-        size_px = (0, 0)
-        while capture.grab():
-            if not times_ms:
-                is_decoded, frame = capture.retrieve()
-                if not is_decoded:
-                    break
-                size_px = (frame.shape[1], frame.shape[0])
-            times_ms.append(capture.get(cv2.CAP_PROP_POS_MSEC))
-            kinds.append(int(capture.get(cv2.CAP_PROP_FRAME_TYPE)))
-    return _Scan(announced, container_fps, size_px, tuple(times_ms), tuple(kinds))
+    scan = _passed(path, _first_field(path))
+    if len(scan.kinds) == 0:
+        raise InputError(f"{path}: cannot be decoded: without frames, or damaged; a video expected")
+    return scan
 
 
-def _check_even_spacing(path: Path, times_ms: np.ndarray) -> None:
-    """Compares the timestamps with the straight line through them."""
-    index = np.arange(len(times_ms))
-    interval_ms, start_ms = np.polyfit(index, times_ms, 1)
-    if interval_ms <= 0:
-        return  # no timestamps in this format: nothing to check
-    error = np.abs(times_ms - (start_ms + interval_ms * index)) / interval_ms
-    if error.max() <= MAX_TIMESTAMP_ERROR:
-        return
-    intervals = np.diff(times_ms)
-    worst = int(np.argmax(np.abs(intervals - np.median(intervals))))
-    raise InputError(
-        f"{path}: variable frame rate: frames are {intervals.min():.4g} to "
-        f"{intervals.max():.4g} ms apart (worst after frame {worst}), so frame number / fps is "
-        "not the time; record at a constant rate, or cut to an evenly spaced part"
-    )
+def _first_field(path: Path) -> str | None:
+    """Which field comes first of pictures that are woven from two; None: they are whole.
+
+    A file that says that they are woven may still hold whole pictures, and many are wrong about
+    which field is first: FFmpeg's `idet` looks at edges that move.
+    """
+    with _opened(path) as (container, stream):
+        first = next(_decoded(container, stream), None)
+        if first is None or not first.interlaced_frame:
+            return None
+    with _opened(path) as (container, stream):
+        judged = [
+            frame.metadata.get("lavfi.idet.multiple.current_frame")
+            for frame in _filtered(_decoded(container, stream), stream, "idet")
+        ]
+    found = max(("tff", "bff"), key=judged.count)
+    return found if judged.count(found) >= judged.count("progressive") else None
+
+
+def _passed(path: Path, first_field: str | None) -> _Scan:
+    stamps_s, kinds, change, contrast = [], [], [], []
+    size_px, tick_s, before = (0, 0), 0.0, None
+    with _opened(path) as (container, stream):
+        aspect = float(stream.sample_aspect_ratio or 1)
+        rate = float(stream.average_rate or 0)
+        is_even = container.format.name == "avi"  # whose stamps are the order of coding
+        for frame in _shown(container, stream, first_field):
+            if before is None:
+                size_px = _shown_size(frame, aspect)
+            grey = frame.to_ndarray(format="gray")
+            change.append(np.inf if before is None else _change(before, grey))
+            contrast.append(float(cv2.meanStdDev(grey)[1][0, 0]))
+            stamps_s.append(np.nan if frame.pts is None else float(frame.pts * frame.time_base))
+            kinds.append(KINDS[int(frame.pict_type)].upper())
+            tick_s, before = float(frame.time_base or 0), grey
+        missing = _num_missing(container, stream, np.array(stamps_s))
+    stamps = np.sort(stamps_s) if is_even else np.array(stamps_s)
+    warnings = _said(size_px, aspect, first_field is not None)
+    return _Scan(
+        size_px, aspect, first_field, stamps, is_even, tick_s, "".join(kinds), np.array(change),
+        np.array(contrast), rate, missing, warnings,
+    )  # fmt: skip
+
+
+def _change(before: np.ndarray, grey: np.ndarray) -> float:
+    """By how much two pictures differ in the block of pixels in which they differ most."""
+    if before.shape != grey.shape:
+        return np.inf
+    size = tuple(max(1, side // BLOCK_PX) for side in grey.shape[::-1])
+    differs = cv2.resize(cv2.absdiff(grey, before), size, interpolation=cv2.INTER_AREA)
+    return float(differs.max())
+
+
+def _said(size_px: tuple[int, int], aspect: float, is_interlaced: bool) -> tuple[str, ...]:
+    said = []
+    if not _is_square(aspect):
+        said.append(
+            f"pixels are {aspect:.4g} times as wide as high; pictures are taken as "
+            f"{size_px[0]} x {size_px[1]} square ones, as players show them"
+        )
+    if is_interlaced:
+        said.append(
+            "interlaced: each picture is taken as two, one for each of its fields, with their own "
+            "times; frame numbers count fields"
+        )
+    return tuple(said)
+
+
+def _num_missing(container: Any, stream: Any, stamps_s: np.ndarray) -> int:
+    """Pictures that the container announces, in number and in time, beyond those there are.
+
+    An edit list, or a last picture that is shown for long, differs in one of the two only.
+    """
+    count = len(stamps_s)
+    by_number = stream.frames - count if stream.frames else np.inf
+    known = np.sort(stamps_s[np.isfinite(stamps_s)])
+    if len(known) < 2 or np.ptp(known) == 0:
+        return int(by_number) if np.isfinite(by_number) else 0
+    step_s = float(np.median(np.diff(known)))
+    if container.format.name == "avi":  # whose duration is made up where it breaks off
+        end_s = known[0] + stream.frames / float(stream.average_rate)
+    elif stream.duration:
+        end_s = float(((stream.start_time or 0) + stream.duration) * stream.time_base)
+    elif container.duration and len(container.streams) == 1:
+        end_s = ((container.start_time or 0) + container.duration) / av.time_base
+    else:
+        return 0
+    by_time = (end_s - known[-1]) / step_s - 1
+    return max(0, round(min(by_number, by_time)))
+
+
+def _check_whole(path: Path, scan: _Scan) -> None:
+    count = len(scan.kinds)
+    if count < MIN_FRAMES:
+        raise InputError(
+            f"{path}: only {count} frame(s); a video of at least {MIN_FRAMES} frames expected"
+        )
+    announced = count + scan.missing
+    if scan.missing > max(2, MAX_MISSING_SHARE * announced):
+        raise InputError(
+            f"{path}: cut off or damaged: only {count} of {announced} frames can be decoded; "
+            "copy it again, or re-encode what is there"
+        )
+    left = int(_used(scan).sum())
+    if left < MIN_FRAMES:
+        raise InputError(
+            f"{path}: only {left} of {count} frames are neither blank nor repeat the one before; "
+            f"at least {MIN_FRAMES} expected"
+        )
+
+
+def _used(scan: _Scan) -> np.ndarray:
+    """`[picture]`: which are looked at."""
+    return ~(is_blank(scan.contrast) | repeats(scan.change))
+
+
+def _left_out(scan: _Scan) -> Iterator[str]:
+    """What is said of pictures that are not looked at."""
+    blank = is_blank(scan.contrast)
+    repeated = repeats(scan.change) & ~blank
+    counted = "; frame numbers count the others"
+    if blank.any():
+        numbers, word = np.flatnonzero(blank), "is" if blank.sum() == 1 else "are"
+        yield f"picture {listed(numbers)} {word} black, blank or faded and left out{counted}"
+    if repeated.any():
+        numbers, total = np.flatnonzero(repeated), len(repeated)
+        kept = total - len(numbers)
+        often = f", each is there {round(total / kept)} times" if total % kept == 0 else ""
+        yield (
+            f"{len(numbers)} of {total} pictures repeat the one before{often} "
+            f"({listed(numbers)}): left out{counted}"
+        )
+
+
+def _stamps(path: Path, scan: _Scan, fps_declared: float | None) -> np.ndarray:
+    """The time stamps, increasing, s.
+
+    Raises `InputError` where they are missing, twice the same, or go back; but for the last one,
+    which some programs do not write, and where the container knows none.
+    """
+    stamps_s, count = scan.stamps_s.copy(), len(scan.stamps_s)
+    is_there = np.isfinite(stamps_s)
+    if not is_there.any() or (scan.is_even and not (np.diff(stamps_s) > 0).all()):
+        rate = scan.rate or fps_declared
+        if not rate:
+            raise InputError(f"{path}: the container states no frame rate; declare fps")
+        return np.arange(count) / rate
+    steps = np.diff(stamps_s[:-1])
+    if not stamps_s[-1] > stamps_s[-2] and (steps > 0).all():
+        stamps_s[-1] = stamps_s[-2] + np.median(steps)
+    wrong = 1 + np.flatnonzero(~(np.diff(stamps_s) > 0))
+    if len(wrong) or not np.isfinite(stamps_s[0]):
+        numbers = np.flatnonzero(~is_there)
+        what = "have no time stamp" if len(numbers) else "are not later than the one before"
+        raise InputError(
+            f"{path}: time stamps: pictures {listed(numbers if len(numbers) else wrong)} {what}; "
+            f"write the film anew at a constant rate: ffmpeg -i {path.name} -vf fps=RATE new.mp4"
+        )
+    return stamps_s

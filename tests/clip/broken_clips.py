@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from tests.clip import track_file_makers as make
-from tests.video.make_video import SIZE_PX, with_index_first, with_uneven_frames, write_video
+from tests.video.make_video import SIZE_PX, with_index_first, write_video
 
 GOOD_YAML = """\
 video: clip.mp4
@@ -444,7 +444,6 @@ _CASES: dict[str, tuple[Callable[[Path], Path], tuple[str, ...]]] = {
     "cut_off_before_the_index": _video(lambda mp4: mp4[: len(mp4) // 2], "cannot be decoded"),
     "cut_off_in_the_middle": _video(_cut(0.6), "cut off", "of 24 frames"),
     "cut_off_avi": (_cut_avi, ("clip.avi", "cut off", "of 24 frames")),
-    "variable_frame_rate": _video(with_uneven_frames, "variable frame rate", "16.67 to 50 ms"),
     # csv tracks
     "track_without_time": _track("time_s", "times", "times", "did you mean time_s?"),
     "track_without_y": _track("object1_y_m", "object2_y_m", "'object1_y_m'", "missing"),

@@ -121,13 +121,25 @@ def test_scatter_beyond_the_stated_noise_is_found_along_the_motion_only():
     rng = np.random.default_rng(5)
     time = np.arange(200.0)
     smooth = np.stack([1.0 * time + 0.01 * time**2, 0 * time], axis=1)
-    assert motion_variance([noisy(smooth, 0, rng)]) == pytest.approx(0, abs=1e-9)
+    assert motion_variance([noisy(smooth, 0, rng)], time) == pytest.approx(0, abs=1e-9)
     shaken, stated = noisy(smooth, (0.05, 1e-5), rng)
-    x, y = np.sqrt(motion_variance([(shaken, stated)]))
+    x, y = np.sqrt(motion_variance([(shaken, stated)], time))
     assert x == pytest.approx(0.05, rel=0.2)
     assert y < 1e-4
-    x, _ = motion_variance([(shaken, stated + 0.05**2 * np.eye(2))])
+    x, _ = motion_variance([(shaken, stated + 0.05**2 * np.eye(2))], time)
     assert x < 0.03**2
+
+
+def test_uneven_times_are_no_scatter():
+    rng = np.random.default_rng(5)
+    time = np.cumsum(rng.choice([1.0, 1.4, 0.8, 3.0], 200))
+    smooth = np.stack([2.0 * time + 0.01 * time**2, 0 * time], axis=1)
+    assert motion_variance([noisy(smooth, 0, rng)], time) == pytest.approx(0, abs=1e-9)
+    shaken, stated = noisy(smooth, (0.05, 1e-5), rng)
+    x, _ = np.sqrt(motion_variance([(shaken, stated)], time))
+    assert x == pytest.approx(0.05, rel=0.2)
+    taken_as_even, _ = np.sqrt(motion_variance([(shaken, stated)], np.arange(200.0)))
+    assert taken_as_even > 1.0
 
 
 def test_what_scatters_more_the_faster_it_is_scatters_as_much_as_it_does_when_slow():
@@ -137,7 +149,7 @@ def test_what_scatters_more_the_faster_it_is_scatters_as_much_as_it_does_when_sl
     grown = np.sqrt(speed_scale2(fast))
     assert grown[-1] == pytest.approx(np.sqrt(1 + (89.7 / FAST_PX) ** 2))
     scatter = np.stack([0.02 * grown, 1e-5 * grown], axis=1)
-    found = [motion_variance([noisy(fast, scatter, rng)])[0] for _ in range(10)]
+    found = [motion_variance([noisy(fast, scatter, rng)], time)[0] for _ in range(10)]
     assert np.sqrt(np.mean(found)) == pytest.approx(0.02, rel=0.05)
     hidden = np.where(time[:, None] == 7, np.nan, fast)
     assert (speed_scale2(hidden)[7:9] == 1).all()
@@ -162,10 +174,10 @@ def test_an_object_that_scatters_otherwise_than_is_stated_says_so():
     stated = np.tile(0.02**2 * np.eye(2), (400, 1, 1))
     for own in (0.01, 0.02, 0.03):
         shaken = path + own * rng.standard_normal(path.shape)
-        x, y = motion_scale2(shaken, stated)
+        x, y = motion_scale2(shaken, stated, time)
         assert x == pytest.approx((own / 0.02) ** 2, rel=0.3)
         assert y == 1.0  # nothing moves there
-    few, _ = motion_scale2(shaken[:8], stated[:8])
+    few, _ = motion_scale2(shaken[:8], stated[:8], time[:8])
     assert few == 1.0
 
 
@@ -173,7 +185,7 @@ def test_blows_are_not_taken_for_scatter():
     rng = np.random.default_rng(7)
     time = np.arange(40.0)
     bent = np.stack([6 * np.abs(time - 9.7) + 4 * np.abs(time - 21.3), 0 * time], axis=1)
-    x, _ = np.sqrt(motion_variance([noisy(bent, (0.02, 1e-5), rng)]))
+    x, _ = np.sqrt(motion_variance([noisy(bent, (0.02, 1e-5), rng)], time))
     assert x == pytest.approx(0.02, rel=0.5)
 
 

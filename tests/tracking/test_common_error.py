@@ -30,8 +30,8 @@ class Whole(Piece):
     def __init__(self) -> None:
         super().__init__(0, (50.0, 40.0), cast(Any, None))
 
-    def velocities(self, poses: np.ndarray, frame: int) -> Any:
-        return velocities_at(poses, frame)
+    def velocities(self, poses: np.ndarray, frame: int, clock: np.ndarray) -> Any:
+        return velocities_at(poses, frame, clock)
 
 
 def followed(steps_px: np.ndarray) -> Finished:
@@ -41,7 +41,8 @@ def followed(steps_px: np.ndarray) -> Finished:
         Refined(np.array([at, 40.0, 0.0]), FIRST_PX2 if i == 0 else NOISE_PX2, 0.99, 0.0, 0.0)
         for i, at in enumerate(x)
     ]
-    (found,) = finished([list(fits)], [Whole()], [SHUTTER], Coding(np.zeros(len(x), bool)))
+    coding, clock = Coding(np.zeros(len(x), bool)), np.arange(float(len(x)))
+    (found,) = finished([list(fits)], [Whole()], [SHUTTER], coding, clock)
     return found
 
 

@@ -31,7 +31,9 @@ def tracked(frames, start, *clicks, last=None, advance=lambda _: None):
     outline = Outline(BOX.size_px)
     later = tuple(Start("a", point, outline, frame) for frame, point in clicks)
     begin = Start("a", (start[0], start[1]), outline, 0, last, later)
-    return track_video(lambda: iter(frames), [begin], 30.0, advance=advance)
+    return track_video(
+        lambda: iter(frames), [begin], np.arange(len(frames)) / 30.0, advance=advance
+    )
 
 
 def test_what_was_lost_is_followed_on_from_a_click_on_it():

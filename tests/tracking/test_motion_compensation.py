@@ -32,7 +32,10 @@ def mended_places(paths, coding, angle_rad=STILL):
         (np.column_stack([place, np.broadcast_to(angle_rad, len(place))]), noise)
         for place, noise in paths
     ]
-    return [found.poses[:, :2] for found in without_coding_shift(poses, coding)]
+    return [
+        found.poses[:, :2]
+        for found in without_coding_shift(poses, coding, np.arange(float(len(poses[0][0]))))
+    ]
 
 
 def coded(frames=FRAMES, whole=12):
@@ -40,6 +43,7 @@ def coded(frames=FRAMES, whole=12):
 
 
 CODING = Coding(coded())
+CLOCK = np.arange(float(FRAMES))
 
 
 @pytest.mark.parametrize(
@@ -50,7 +54,9 @@ def test_amplitudes_of_a_coder_are_found(amplitudes):
     rng = np.random.default_rng(1)
     found = [
         coding_shift_amplitudes_px(
-            [seen(path, np.array(amplitudes), coded(), rng) for path in both], coded()
+            [seen(path, np.array(amplitudes), coded(), rng) for path in both],
+            coded(),
+            CLOCK,
         )
         for both in [(ACCELERATED, 1.1 * ACCELERATED)] * 20
     ]
@@ -65,7 +71,7 @@ def test_objects_have_amplitudes_of_their_own():
     found = []
     for _ in range(20):
         paths = [seen(ACCELERATED, own, coded(), rng) for own in each]
-        found.append(coding_shift_amplitudes_px(paths, coded())[..., 1].mean(axis=1))
+        found.append(coding_shift_amplitudes_px(paths, coded(), CLOCK)[..., 1].mean(axis=1))
     one, other = np.mean(found, axis=0)  # each drawn a little to what both have
     assert -0.026 < one < -0.019
     assert -0.036 < other < -0.029
@@ -75,7 +81,7 @@ def test_of_an_object_that_hardly_moves_the_video_tells_the_amplitudes():
     rng = np.random.default_rng(8)
     moving = seen(ACCELERATED, np.array([0.0, -0.03, 0.0]), coded(), rng)
     resting = (np.tile([30.0, 40.0], (FRAMES, 1)), moving[1])
-    alone, beside = coding_shift_amplitudes_px([moving, resting], coded())
+    alone, beside = coding_shift_amplitudes_px([moving, resting], coded(), CLOCK)
     np.testing.assert_array_equal(beside[0], beside[1])
     assert abs(beside[0, 1] - alone[0, 1]) < 0.01
 
@@ -107,13 +113,13 @@ def test_what_stays_uncertain_is_a_share_of_what_is_taken_off():
     rng = np.random.default_rng(9)
     place, noise = seen(ACCELERATED, np.array([0.0, -0.03, 0.0]), coded(), rng)
     poses = np.column_stack([place, np.zeros(FRAMES)])
-    (found,) = without_coding_shift([(poses, noise)], CODING)
+    (found,) = without_coding_shift([(poses, noise)], CODING, CLOCK)
     assert found.shifts_px.shape == (FRAMES, 2 * len(STEPS_PER_PX), 2)
     sizes = np.abs(found.shifts_px).max(axis=(0, 2)).reshape(-1, 2)
     assert sizes.max() <= VARIES_PX
     assert (sizes[1] > 0.9 * VARIES_PX).all(), "half pixels, along either axis"
     assert not found.shifts_px[::12].any(), "whole frames show what is there"
-    (plain,) = without_coding_shift([(poses, noise)], Coding(np.zeros(FRAMES, bool)))
+    (plain,) = without_coding_shift([(poses, noise)], Coding(np.zeros(FRAMES, bool)), CLOCK)
     assert not plain.shifts_px.any()
 
 

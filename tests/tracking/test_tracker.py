@@ -20,7 +20,7 @@ def tracked(frames, *poses, box=BOX, first_frame=0):
         Start(f"object{k + 1}", (pose[0], pose[1]), Outline(box.size_px), first_frame)
         for k, pose in enumerate(poses)
     ]
-    return track_video(lambda: iter(frames), starts, FPS)
+    return track_video(lambda: iter(frames), starts, np.arange(len(frames)) / FPS)
 
 
 def errors(track, path, k=0):
@@ -141,7 +141,7 @@ def test_plain_disc_is_followed_without_a_turn():
         path.append((*place, 0.0))
     path = np.array(path)
     start = Start("ball", (path[0, 0], path[0, 1]), Outline(None))
-    track = track_video(lambda: iter(frames), [start], FPS)
+    track = track_video(lambda: iter(frames), [start], np.arange(len(frames)) / FPS)
     assert track.is_visible.all()
     assert np.abs(errors(track, path)).max() < 0.1
     assert np.abs(track.angle_rad).max() < 1e-5

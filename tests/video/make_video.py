@@ -1,12 +1,68 @@
 """Small videos for the tests, and the ways in which a video can be broken."""
 
 import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
+import av
 import cv2
 import numpy as np
 
 SIZE_PX = (320, 180)
+
+
+def write_film(
+    path: Path,
+    pictures: Iterable[np.ndarray],
+    *,
+    codec: str = "libx264",
+    pix_fmt: str = "yuv420p",
+    fps: int = 30,
+    ticks: Sequence[int] | None = None,
+    tick_s: Fraction = Fraction(1, 90_000),
+    options: Mapping[str, str] | None = None,
+    set_up: Callable[[Any], None] = lambda _: None,
+    hidden: int = 0,
+) -> Path:
+    """A film of BGR pictures of any kind; by default H.264.
+
+    Args:
+      path: the suffix says the container.
+      pictures: `[height, width, 3]` uint8.
+      codec: FFmpeg's name.
+      pix_fmt: of the coded pictures.
+      fps: pictures per second.
+      ticks: when each is shown, in units of `tick_s`; None: evenly.
+      tick_s: the clock's.
+      options: the codec's.
+      set_up: is given the stream before the first picture.
+      hidden: pictures at the beginning that an edit list hides.
+    """
+    with av.open(str(path), "w", options={"avoid_negative_ts": "disabled"}) as container:
+        stream: Any = container.add_stream(codec, rate=fps, options=dict(options or {}))
+        if ticks is not None:
+            stream.codec_context.time_base = tick_s
+
+        def mux(packets: Iterable[Any]) -> None:
+            for packet in packets:
+                if hidden:
+                    early = int(hidden / (fps * packet.time_base))
+                    packet.pts, packet.dts = packet.pts - early, packet.dts - early
+                container.mux(packet)
+
+        for index, picture in enumerate(pictures):
+            if index == 0:
+                stream.height, stream.width = picture.shape[:2]
+                stream.pix_fmt = pix_fmt
+                set_up(stream)
+            frame = av.VideoFrame.from_ndarray(picture, format="bgr24").reformat(format=pix_fmt)
+            if ticks is not None:
+                frame.pts, frame.time_base = int(ticks[index]), tick_s
+            mux(stream.encode(frame))
+        mux(stream.encode(None))
+    return path
 
 
 def write_video(path: Path, frame_count: int = 24, fps: float = 30.0) -> Path:

@@ -211,12 +211,13 @@ def _release(clip: Clip, observation: Observation, angle: float) -> tuple[float,
     be unknown. On others it is where the motion begins: from rest the distance grows as
     (t - release)^2, so that its root is a straight line which meets zero at the release.
     """
-    frame_s = 1.0 / clip.fps
+    steps_s = np.diff(observation.times_s)
+    frame_s = float(np.median(steps_s)) if steps_s.size else 1.0 / clip.fps
     declared = clip.objects[0].first_frame
     if StartVelocity.name in laws_of(clip) or SCENARIOS[clip.scenario].is_level:
         return float(observation.times_s[np.argmax(observation.mask[0])]), frame_s
     if clip.scenario == "ramp" and declared is not None:
-        return declared * frame_s, frame_s / 3
+        return float(observation.times_s[declared]), frame_s / 3
     seen = np.flatnonzero(observation.mask[0])
     times, place = observation.times_s[seen], observation.position_m[0][:, seen]
     gone = (place[0] - place[0, 0]) * math.cos(angle) - (place[1] - place[1, 0]) * math.sin(angle)

@@ -1,0 +1,195 @@
+"""Where the texture of an object loses it: the path of its silhouette instead."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from galileo_jax.tracking.finish import Finished
+from galileo_jax.tracking.noise import motion_variance, sudden
+from galileo_jax.tracking.pieces import Start
+from galileo_jax.tracking.refiner import velocities_at
+from galileo_jax.tracking.silhouette import MOST_MISSED, Path
+
+LOST_SHARE = 0.05
+"""Of the frames in which an object is looked for: if it is missed in more, its silhouette is."""
+TURNED_RAD = 0.5
+"""What is round and turns by more may be followed by its marks instead of its middle."""
+LEAST_FRAMES, LEAST_SHARE = 3, 0.1
+"""A silhouette has to show so many frames more, and this share of those that are known."""
+SAME_FRAMES, SAME_PX, SAME_SIZE = 5, 0.5, 0.05
+"""The middles of texture and silhouette are a fixed distance apart if over so many frames they
+agree to this, in pixels or by the object's size."""
+INSIDE, BESIDE = 0.5, 2.0
+"""A silhouette is the object's if its middle is within this share of its size of where the texture
+is, or if it begins within so many sizes of where that was last seen."""
+OUTLINE_AREA = (0.3, 6.0)
+"""A silhouette's area by that of the declared outline: a smear makes it larger."""
+EDGE_PX = 0.03
+"""Standard deviation that sampling a sharp edge with pixels gives the middle of a silhouette."""
+USUAL_SHARE = 0.5
+"""Of a frame's time for which the shutter may be open."""
+ARM = 0.25
+"""Pixels that come and go at the rim are about this share of the size from the middle."""
+
+
+def needs_silhouette(found: Finished, start: Start) -> bool:
+    """Whether an object is lost for a while, or may be followed by its marks."""
+    if start.corrections:
+        return False  # somebody has looked at it
+    seen = np.isfinite(found.angle_rad)
+    wanted = np.array([start.uses(index) for index in range(len(seen))])
+    is_lost = (wanted & ~seen).sum() > LOST_SHARE * wanted.sum()
+    return bool(is_lost or _turns(found, start))
+
+
+def with_silhouette(
+    found: Finished, start: Start, paths: Sequence[Path], clock: Float[np.ndarray, " frame"]
+) -> Finished:
+    """The object's track, where its silhouette shows more than its texture from that.
+
+    Where it is known how far the two are apart, both are used, and the point stays the followed
+    one, but for what is round, whose middle it becomes; otherwise the silhouette's middle is
+    followed alone.
+
+    Args:
+      found: by texture.
+      start: of the object.
+      paths: of all silhouettes.
+      clock: when each frame was taken, in usual steps.
+    """
+    seen = np.isfinite(found.angle_rad)
+    own = [path for path in paths if _is_own(path, found.position_px, seen, start)]
+    if not own:
+        return found
+    path = max(own, key=lambda one: _way_px(one.places_px))
+    place = np.full_like(found.position_px, np.nan)
+    place[path.frames] = path.places_px
+    place[[not start.uses(index) for index in range(len(place))]] = np.nan
+    shown = np.isfinite(place[:, 0])
+    covariance = _covariance(place, clock)
+    both = shown & seen
+    apart = found.position_px[both] - place[both]
+    middle = np.median(apart, axis=0) if both.any() else np.zeros(2)
+    size = float(np.median([part.size_px for part in path.parts]))
+    scatter = np.median(np.abs(apart - middle)) if both.any() else np.inf
+    is_fixed = both.sum() >= SAME_FRAMES and scatter < max(SAME_PX, SAME_SIZE * size)
+    more = (shown & ~seen).sum()
+    is_more = more >= max(LEAST_FRAMES, LEAST_SHARE * seen.sum())
+    if not is_more and not (_turns(found, start) and _is_smoother(found, place, both, clock)):
+        return found
+    if not is_fixed and _way_px(place[shown]) < _way_px(found.position_px[seen]):
+        return found
+    kept = _in_long_runs(seen & ~shown) & is_fixed
+    texture, silhouette = found.position_px, place
+    if start.outline.is_round or not is_fixed:
+        texture = texture - middle
+    else:
+        silhouette = silhouette + middle
+    together = np.where(kept[:, None], texture, silhouette)
+    return _joined(found, kept, together, covariance, _slow_px(path))
+
+
+def _joined(
+    found: Finished,
+    kept: Bool[np.ndarray, " frame"],
+    place: Float[np.ndarray, "frame 2"],
+    covariance: Float[np.ndarray, "frame 2 2"],
+    slow_px: float,
+) -> Finished:
+    """The track of places of which those that are `kept` are by texture."""
+    used = np.isfinite(place[:, 0])
+    nothing = np.where(used, 0.0, np.nan)
+    shifts_px = np.tile(nothing[:, None, None], (1, *found.shifts_px.shape[1:]))
+    shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
+    return Finished(
+        position_px=place,
+        covariance_px2=np.where(kept[:, None, None], found.covariance_px2, covariance)
+        + nothing[:, None, None],
+        common_px2=np.tile(nothing[:, None, None], (1, 2, 2)),
+        shifts_px=shifts_px,
+        angle_rad=nothing,
+    )
+
+
+def _in_long_runs(chosen: Bool[np.ndarray, " frame"]) -> Bool[np.ndarray, " frame"]:
+    """Those of the chosen frames that follow each other for a while."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
+    result = np.zeros_like(chosen)
+    for begin, end in edges.reshape(-1, 2):
+        result[begin:end] = end - begin >= SAME_FRAMES
+    return result
+
+
+def _is_own(
+    path: Path, position_px: np.ndarray, seen: Bool[np.ndarray, " frame"], start: Start
+) -> bool:
+    """Whether a path of silhouettes is the object's: it moves, and meets the texture's path."""
+    place, frames = path.places_px, np.array(path.frames)
+    size = float(np.median([part.size_px for part in path.parts]))
+    if _way_px(place) < size or len(frames) < SAME_FRAMES or not seen.any():
+        return False
+    if start.outline.size_px is not None:
+        low, high = np.array(OUTLINE_AREA) * np.prod(start.outline.size_px)
+        if not low < size**2 < high:
+            return False
+    both = seen[frames]
+    if both.sum() >= SAME_FRAMES:
+        own = np.array([part.size_px for part in path.parts])[both]
+        off = np.hypot(*(place[both] - position_px[frames[both]]).T)
+        return bool(np.median(off / own) < INSIDE)
+    known = np.flatnonzero(seen)
+    nearest = int(known[np.argmin(np.abs(known - frames[0]))])
+    off = np.hypot(*(place[0] - position_px[nearest]))
+    is_next = abs(frames[0] - nearest) <= MOST_MISSED
+    return bool(is_next and off < BESIDE * path.parts[0].size_px)
+
+
+def _way_px(place: Float[np.ndarray, "frame 2"]) -> float:
+    return float(np.hypot(*np.ptp(place, axis=0)))
+
+
+def _turns(found: Finished, start: Start) -> bool:
+    seen = np.isfinite(found.angle_rad)
+    return start.outline.is_round and bool(np.ptp(found.angle_rad[seen]) > TURNED_RAD)
+
+
+def _is_smoother(
+    found: Finished, place: np.ndarray, both: Bool[np.ndarray, " frame"], clock: np.ndarray
+) -> bool:
+    """Whether the silhouette's path scatters less about a smooth one than the texture's."""
+    none = np.zeros((len(place), 2, 2))
+    paths = [(np.where(both[:, None], each, np.nan), none) for each in (place, found.position_px)]
+    silhouette, texture = (float(motion_variance([one], clock).sum()) for one in paths)
+    return silhouette < texture
+
+
+def _covariance(place: np.ndarray, clock: np.ndarray) -> Float[np.ndarray, "frame 2 2"]:
+    """Of a silhouette's middle from frame to frame: its scatter, and blows within an exposure.
+
+    A picture shows the mean place during the exposure e. A change dv of the velocity within it
+    shifts that by dv e / 8 at most.
+    """
+    stated = np.broadcast_to(EDGE_PX**2 * np.eye(2), (len(place), 2, 2))
+    jumps = np.zeros((len(place), 2))
+    for index in np.flatnonzero(np.isfinite(place[:, 0])):
+        jumps[index] = velocities_at(place, int(index), clock).jump
+    unknown = np.sum((USUAL_SHARE / 8 * sudden(jumps)) ** 2, axis=1)
+    scatter = np.diag(motion_variance([(place, stated)], clock))
+    return stated + scatter + unknown[:, None, None] * np.eye(2)
+
+
+def _slow_px(path: Path) -> float:
+    """Standard deviation per axis of errors that follow each other, px.
+
+    What is behind an object lets pixels at its rim come and go as it passes. So its area changes
+    otherwise than with its distance (a parabola in time) and its smear (its speed).
+    """
+    area = np.array([part.area_px2 for part in path.parts])
+    since = np.linspace(-1, 1, len(area))
+    speed = np.hypot(*np.gradient(path.places_px, path.clock, axis=0).T)
+    design = np.column_stack([np.ones_like(since), since, since**2, speed])
+    left = area - design @ np.linalg.lstsq(design, area)[0]
+    # Not of the frame in which it is thrown back, whose smear is folded.
+    spread = 1.4826 * np.median(np.abs(left)) * np.sqrt(len(area) / (len(area) - 4))
+    return float(ARM * spread / np.sqrt(np.median(area)))

@@ -1,0 +1,174 @@
+"""A second opinion on where an object is: what differs from the scene without it.
+
+A camera that stands still shows the same scene all the time but for what moves in it:
+
+    scene = median over the film          silhouette = |picture - scene| > noise
+
+Connected parts of it are linked from frame to frame to paths. Their centres do not need texture,
+are not carried along by marks that turn, and are the mean place of what is smeared; but nothing is
+known of a turn, and what touches another moving thing is one part with it.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+from jaxtyping import Float
+
+from galileo_jax.tracking.template import grey
+
+SCENE_FRAMES = 15
+"""So many frames, evenly over the film, show the scene: an object that is elsewhere in most of
+them is not in it."""
+NOISE_SDS, LEAST_GREY = 6.0, 10.0
+"""What differs by less than so many standard deviations, or grey levels, is noise."""
+SMOOTH_PX = 1.0
+LEAST_AREA_PX2, MOST_SHARE, MOST_PARTS = 12, 0.2, 20
+"""Parts that are smaller, or larger than this share of the picture, are no objects."""
+MOST_FOREGROUND = 0.3
+"""If more of a picture differs the camera moves."""
+SAME_AREA = 1.5
+"""From a frame to the next an object's silhouette grows or shrinks by less."""
+OFF_SIZE, OFF_STEP = 0.6, 0.35
+"""How far a part may be from where a path leads, by its size and by the way it goes."""
+MOST_MISSED = 4.0
+"""Usual steps for which a path may be hidden."""
+TURN_BACK = 1.3
+"""What comes off a wall is at most so many of its steps away from where it was."""
+TERMS = 3
+"""Of the parabola that leads on: place, velocity, acceleration."""
+LEADS_FRAMES = 4
+"""From so many frames."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One connected part of a silhouette.
+
+    Attributes:
+      centre_px: `[2]`.
+      area_px2: pixels.
+      low_px: `[2]`, upper left corner of the box around it.
+      high_px: `[2]`, lower right one.
+    """
+
+    centre_px: np.ndarray
+    area_px2: float
+    low_px: np.ndarray
+    high_px: np.ndarray
+
+    @property
+    def size_px(self) -> float:
+        """The side of a square as large."""
+        return float(np.sqrt(self.area_px2))
+
+    def holds(self, place: np.ndarray) -> bool:
+        """Whether a place is within the box around it."""
+        return bool((place >= self.low_px).all() and (place <= self.high_px).all())
+
+
+@dataclass
+class Path:
+    """A part followed from frame to frame; `clock` in usual steps."""
+
+    frames: list[int] = field(default_factory=list)
+    clock: list[float] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
+
+    @property
+    def places_px(self) -> Float[np.ndarray, "frame 2"]:
+        """Where it was."""
+        return np.stack([part.centre_px for part in self.parts])
+
+    def expected(self, now: float) -> np.ndarray:
+        """Where it should be at a time: by a parabola, at first by a line."""
+        last = np.array(self.clock[-LEADS_FRAMES:])
+        terms = min(TERMS, len(last))
+        design = np.vander(last - now, terms, increasing=True)
+        return np.linalg.lstsq(design, self.places_px[-LEADS_FRAMES:])[0][0]
+
+    def misses(self, part: Part, now: float) -> float:
+        """How far a part is from where it should be, by how far it may be; inf: another thing."""
+        last = self.parts[-1]
+        ratio = part.area_px2 / last.area_px2
+        if not 1 / SAME_AREA < ratio < SAME_AREA:
+            return np.inf
+        # The frame in which it is thrown back shows neither the speed before nor the one after.
+        moved = np.hypot(*np.diff(self.places_px[-LEADS_FRAMES:], axis=0).T)
+        speeds = moved / np.diff(self.clock[-LEADS_FRAMES:])
+        way = float(speeds.max(initial=0.0)) * (now - self.clock[-1])
+        off = float(np.hypot(*(part.centre_px - self.expected(now))))
+        back = float(np.hypot(*(part.centre_px - last.centre_px)))
+        if len(self.parts) == 1:  # nobody knows how fast it is
+            return back / (2 * last.size_px)
+        near = off / (OFF_SIZE * last.size_px + OFF_STEP * way)
+        # What is thrown back is nearer to where it was than its way.
+        return min(near, 0.5 + 0.5 * back / (TURN_BACK * way + OFF_SIZE * last.size_px))
+
+
+def paths_of(
+    open_frames: Callable[[], Iterable[np.ndarray]], clock: Float[np.ndarray, " frame"]
+) -> list[Path]:
+    """The paths of all that moves before a scene that stands still; none if the camera moves.
+
+    Args:
+      open_frames: gives the frames from the beginning; called twice.
+      clock: when each frame was taken, in usual steps.
+    """
+    scene = _scene(open_frames, len(clock))
+    done: list[Path] = []
+    going: list[Path] = []
+    for index, frame in enumerate(open_frames()):
+        parts = _parts(grey(frame), scene)
+        now = float(clock[index])
+        done += [path for path in going if now - path.clock[-1] > MOST_MISSED]
+        going = [path for path in going if now - path.clock[-1] <= MOST_MISSED]
+        pairs = [
+            (path.misses(part, now), i, j)
+            for i, path in enumerate(going)
+            for j, part in enumerate(parts)
+        ]
+        left, free = set(range(len(parts))), set(range(len(going)))
+        for off, i, j in sorted(pairs):
+            if off < 1 and i in free and j in left:
+                free.remove(i)
+                left.remove(j)
+                _append(going[i], index, now, parts[j])
+        for j in left:
+            going.append(Path([index], [now], [parts[j]]))
+    return done + going
+
+
+def _append(path: Path, index: int, now: float, part: Part) -> None:
+    path.frames.append(index)
+    path.clock.append(now)
+    path.parts.append(part)
+
+
+def _scene(open_frames: Callable[[], Iterable[np.ndarray]], count: int) -> np.ndarray:
+    """The median of some frames, `[height, width]` float32."""
+    chosen = set(np.linspace(0, count - 1, min(count, SCENE_FRAMES)).astype(int).tolist())
+    kept = [grey(frame) for index, frame in enumerate(open_frames()) if index in chosen]
+    rows = [np.median([one[row] for one in kept], axis=0) for row in range(len(kept[0]))]
+    return np.array(rows, np.float32)
+
+
+def _parts(picture: np.ndarray, scene: np.ndarray) -> list[Part]:
+    """What differs from the scene, largest first, without what the picture's edge cuts."""
+    differs = cv2.GaussianBlur(picture.astype(np.float32) - scene, (0, 0), SMOOTH_PX)
+    some = differs[::4, ::4]
+    middle = float(np.median(some))
+    noise = 1.4826 * float(np.median(np.abs(some - middle)))
+    mask = (np.abs(differs - middle) > max(NOISE_SDS * noise, LEAST_GREY)).astype(np.uint8)
+    if mask.mean() > MOST_FOREGROUND:
+        return []
+    _, _, stats, centres = cv2.connectedComponentsWithStats(mask)
+    height, width = mask.shape
+    found = []
+    for (left, top, wide, high, area), centre in zip(stats[1:], centres[1:], strict=True):
+        is_cut = left == 0 or top == 0 or left + wide == width or top + high == height
+        if not is_cut and LEAST_AREA_PX2 <= area <= MOST_SHARE * mask.size:
+            low, high_px = np.array([left, top]), np.array([left + wide - 1, top + high - 1])
+            found.append(Part(centre, float(area), low, high_px))
+    return sorted(found, key=lambda part: -part.area_px2)[:MOST_PARTS]

@@ -1,0 +1,118 @@
+"""When each picture of a film was taken, and which pictures are not looked at."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+REPEATED, NEAR_FRAMES = 0.2, 5
+"""A picture repeats the one before if it differs from it by less than this share of what pictures
+differ by shortly before and shortly after it; a motion that begins or ends changes on one side."""
+LEAST_REPEATS, REPEATED_SHARE = 3, 1 / 8
+"""So many, and this share of the pictures in which something moves: fewer are chance, such as the
+turn of a swing. 24 pictures a second stored as 30 repeat one in five."""
+LEAST_CHANGE_GREY = 4.0
+"""Of a block of pixels; less is noise."""
+FADED = 0.5
+"""Of the usual contrast: paler pictures at the beginning and the end belong to a fade."""
+AS_DECLARED = 0.02
+"""A declared rate that is so near the film's confirms the film's own times."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When pictures were taken.
+
+    Attributes:
+      times_s: `[picture]`, the first is 0.
+      rate: pictures per second; of a film with lost pictures that of the others.
+      is_even: whether all pictures lie on an even grid, a whole number of steps apart.
+    """
+
+    times_s: Float[np.ndarray, " picture"]
+    rate: float
+    is_even: bool
+
+
+def clock_of(stamps_s: Float[np.ndarray, " picture"], tick_s: float) -> Clock:
+    """The clock that a film's time stamps show.
+
+    Stamps that are an even grid but for their rounding are taken as that grid, in which pictures
+    may be missing; others as they are.
+
+    Args:
+      stamps_s: finite, increasing, at least two.
+      tick_s: what they are rounded to.
+    """
+    steps = np.diff(stamps_s)
+    number = np.concatenate([[0.0], np.cumsum(np.maximum(np.rint(steps / np.median(steps)), 1))])
+    step_s, start_s = np.polyfit(number, stamps_s, 1)
+    if np.abs(stamps_s - (start_s + step_s * number)).max() <= tick_s:
+        return Clock(number * step_s, 1 / step_s, True)
+    return Clock(stamps_s - stamps_s[0], (len(stamps_s) - 1) / np.ptp(stamps_s), False)
+
+
+def at_declared_rate(clock: Clock, fps: float) -> tuple[Clock, float]:
+    """The clock at a declared rate, and the film's rate that this was compared with.
+
+    A film of 240 pictures a second that is stored as 30 runs eight times faster. Where pictures
+    are unevenly spaced a declared rate near the film's only confirms it.
+
+    Args:
+      clock: the film's.
+      fps: pictures per second.
+    """
+    steps = np.diff(clock.times_s)
+    rates = (clock.rate, len(steps) / float(np.sum(steps)), 1 / float(np.median(steps)))
+    rate = min(rates, key=lambda one: abs(np.log(fps / one)))
+    if not clock.is_even and abs(fps / rate - 1) < AS_DECLARED:
+        return clock, rate
+    declared = fps * (clock.rate / rate)
+    number = clock.times_s * clock.rate
+    number = np.rint(number) if clock.is_even else number
+    return Clock(number / declared, declared, clock.is_even), rate
+
+
+def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture"]:
+    """Which pictures show once more what the one before shows, though things move.
+
+    Where every second, third, ... picture alone is new, that holds for the whole film.
+
+    Args:
+      change: grey levels by which a picture differs from the one before, where most; the first's
+        is not looked at.
+    """
+    count, is_repeat = len(change), np.zeros(len(change), bool)
+    least = np.zeros(count)
+    for index in range(1, count - 1):
+        before = change[max(1, index - NEAR_FRAMES) : index].max(initial=0.0)
+        least[index] = min(before, change[index + 1 : index + 1 + NEAR_FRAMES].max())
+    is_moving = least > LEAST_CHANGE_GREY
+    is_repeat = is_moving & (change < REPEATED * least)
+    if is_repeat.sum() < max(LEAST_REPEATS, REPEATED_SHARE * is_moving.sum()):
+        return np.zeros(count, bool)
+    fresh = np.flatnonzero(is_moving & ~is_repeat)
+    apart = np.diff(fresh)
+    period = int(apart.min()) if len(apart) else 1
+    if period > 1 and (apart % period == 0).all():
+        is_repeat = np.arange(count) % period != fresh[0] % period
+        is_repeat[0] = False
+    return is_repeat
+
+
+def is_blank(contrast: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture"]:
+    """Which pictures at the beginning and the end are black, blank or faded.
+
+    Args:
+      contrast: standard deviation of each picture's grey levels.
+    """
+    is_full = np.flatnonzero(contrast >= FADED * np.median(contrast))
+    index = np.arange(len(contrast))
+    return (index < is_full[0]) | (index > is_full[-1])
+
+
+def listed(numbers: np.ndarray, most: int = 8) -> str:
+    """Numbers of pictures for a line: `3`, `3 to 9`, `1, 2, 4, ...`."""
+    if len(numbers) > 2 and len(numbers) == np.ptp(numbers) + 1:
+        return f"{numbers[0]} to {numbers[-1]}"
+    return ", ".join(str(one) for one in numbers[:most]) + (", ..." if len(numbers) > most else "")

@@ -1,0 +1,128 @@
+"""Objects that their texture does not show well: plain, smeared, turning, thrown back."""
+
+import numpy as np
+import pytest
+
+from galileo_jax.tracking.finish import finished
+from galileo_jax.tracking.motion_compensation import Coding
+from galileo_jax.tracking.pieces import Start
+from galileo_jax.tracking.refiner import Refined
+from galileo_jax.tracking.silhouette import paths_of
+from galileo_jax.tracking.template import Outline
+from galileo_jax.tracking.tracker import track_video
+from tests.tracking.test_common_error import Whole
+
+pytestmark = pytest.mark.video
+
+SIZE_PX = (160, 320)
+RADIUS_PX = 9.0
+SPREAD_PX = 0.5
+"""Of the silhouettes' middles: noise of two grey levels and 8 bits make less."""
+
+
+def picture(
+    places: np.ndarray, turn: float = 0.0, camera: float = 0.0, contrast: float = 15, seed: int = 0
+) -> np.ndarray:
+    """A dark disc with a light mark off its middle, smeared over `places` `[sub-frame, 2]`."""
+    rng = np.random.default_rng(seed)
+    x, y = np.meshgrid(np.arange(SIZE_PX[0]), np.arange(SIZE_PX[1]))
+    ground = 170 + contrast * np.sin((x + camera) / 17) * np.cos(y / 23)
+    total = np.zeros(x.shape)
+    for at in places:
+        inside = np.clip(RADIUS_PX + 0.5 - np.hypot(x - at[0], y - at[1]), 0, 1)
+        mark = at + 5 * np.array([np.cos(turn), np.sin(turn)])
+        light = np.clip(3.5 - np.hypot(x - mark[0], y - mark[1]), 0, 1)
+        disc = 60 + 150 * light * (turn != 0)
+        total += ground + inside * (disc - ground)
+    grey = total / len(places) + rng.normal(0, 2.0, x.shape)
+    return np.clip(np.round(grey), 0, 255).astype(np.uint8)
+
+
+def film(path: np.ndarray, share: float = 0.0, turns: np.ndarray | None = None) -> list[np.ndarray]:
+    """Pictures along `path` `[frame, 2]`, smeared by the open share of each frame's time."""
+    velocity = np.gradient(path, axis=0)
+    instants = np.linspace(-share / 2, share / 2, 9 if share else 1)
+    turns = np.zeros(len(path)) if turns is None else turns
+    return [
+        picture(at + instants[:, None] * v, turn, seed=i)
+        for i, (at, v, turn) in enumerate(zip(path, velocity, turns, strict=True))
+    ]
+
+
+def tracked(frames: list[np.ndarray], point: np.ndarray):
+    outline = Outline((2 * RADIUS_PX, 2 * RADIUS_PX), is_round=True)
+    start = Start("ball", (float(point[0]), float(point[1])), outline)
+    return track_video(lambda: iter(frames), [start], np.arange(len(frames)) / 30.0)
+
+
+def bouncing(frames: int = 15) -> np.ndarray:
+    """Falls by 40 to 60 px a frame and is thrown back in the middle of a step."""
+    time = np.arange(frames, dtype=float)
+    down = 20 + 42 * time + 2 * time**2
+    hit = 5.5
+    floor, speed = 20 + 42 * hit + 2 * hit**2, 0.8 * (42 + 4 * hit)
+    up = floor - speed * (time - hit) + 2 * (time - hit) ** 2
+    return np.stack([30 + 4 * time, np.where(time < hit, down, up)], axis=1)
+
+
+def test_a_fast_smeared_ball_that_bounces_is_followed():
+    path = bouncing()
+    track = tracked(film(path, share=0.5), path[0])
+    assert track.is_visible[0].sum() >= 13
+    off = np.hypot(*(track.position_px[0] - path).T)[track.is_visible[0]]
+    assert np.median(off) < SPREAD_PX
+    # In the frames about the bounce the velocity is not that of any moment.
+    sd = np.sqrt(np.einsum("fii->f", track.covariance_px2[0]))
+    assert sd[5:7].max() > 3 * np.nanmedian(sd)
+
+
+@pytest.mark.parametrize("click", [(0.0, 0.0), (1.0, 0.0), (0.0, -1.0), (2.0, 2.0)])
+def test_one_pixel_beside_the_middle_does_not_decide(click):
+    time = np.arange(30.0)
+    fall = np.stack([np.full(30, 80.0), 30 + 0.35 * np.maximum(time - 5, 0) ** 2], axis=1)
+    track = tracked(film(fall), fall[0] + click)
+    assert track.is_visible[0].sum() >= 29
+    seen = track.position_px[0][track.is_visible[0]]
+    gone = seen - seen[0] - (fall[track.is_visible[0]] - fall[0])
+    assert np.abs(gone).max() < SPREAD_PX
+    half_acceleration = np.polyfit(time[6:], track.position_px[0, 6:, 1], 2)[0]
+    assert half_acceleration == pytest.approx(0.35, rel=0.005)
+
+
+def test_the_middle_of_what_turns_is_followed_not_its_mark():
+    time = np.arange(50.0)
+    x = 20 + 0.04 * time**2
+    rolling = np.stack([x, np.full(50, 150.0)], axis=1)
+    track = tracked(film(rolling, turns=0.01 + (x - 20) / RADIUS_PX), rolling[0])
+    seen = track.is_visible[0]
+    assert seen.sum() >= 48
+    off = track.position_px[0] - rolling
+    assert np.abs(off[seen] - np.median(off[seen], axis=0)).max() < 2 * SPREAD_PX
+
+
+def test_a_moving_camera_has_no_silhouettes():
+    places = [np.array([[30.0 + 4 * i, 60.0]]) for i in range(20)]
+    frames = [picture(at, camera=9.0 * i, contrast=70, seed=i) for i, at in enumerate(places)]
+    paths = paths_of(lambda: iter(frames), np.arange(20.0))
+    assert all(len(path.frames) < 5 for path in paths)
+
+
+def fits_along(place: np.ndarray) -> list[Refined | None]:
+    return [
+        None if np.isnan(at[0]) else Refined(np.array([*at, 0.0]), 1e-4 * np.eye(2), 0.99, 0.0, 0.0)
+        for at in place
+    ]
+
+
+@pytest.mark.parametrize("is_thrown_back", [False, True])
+def test_after_a_gap_counts_what_the_path_before_leads_to(is_thrown_back):
+    time = np.arange(60.0)
+    place = np.stack([10 + 3 * time, 200 - 4 * time + 0.1 * time**2], axis=1)
+    if is_thrown_back:
+        place[40:, 0] = place[32, 0] - 3 * (time[40:] - 32)
+    place[25:40] = np.nan
+    (found,) = finished([fits_along(place)], [Whole()], [0.0], Coding(np.zeros(60, bool)), time)
+    seen = np.isfinite(found.angle_rad)
+    assert seen[:25].all()
+    assert seen[40:].all() != is_thrown_back
+    assert seen[40:].any() != is_thrown_back

@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+
+from galileo_jax.video.stamps import at_declared_rate, clock_of, is_blank, listed, repeats
+
+
+@pytest.mark.parametrize("fps", [15.1515, 29.97, 240.0])
+@pytest.mark.parametrize("tick_s", [1 / 1000, 1 / 600])
+def test_rounded_stamps_are_an_even_grid(fps: float, tick_s: float) -> None:
+    exact_s = np.arange(300) / fps
+    clock = clock_of(3.0 + np.round(exact_s / tick_s) * tick_s, tick_s)
+    assert clock.is_even
+    assert clock.rate == pytest.approx(fps, rel=1e-4)
+    np.testing.assert_allclose(clock.times_s, exact_s, atol=tick_s / 5)
+
+
+@pytest.mark.parametrize("lost", [[1], [30, 31, 150], [298]])
+def test_lost_pictures_leave_gaps_in_the_grid(lost: list[int]) -> None:
+    number = np.delete(np.arange(300), lost)
+    clock, _ = at_declared_rate(clock_of(number / 60, 1 / 15360), 60.0)
+    np.testing.assert_allclose(clock.times_s, number / 60, atol=1e-12)
+
+
+def test_a_phones_stamps_are_taken_as_they_are() -> None:
+    steps = np.random.default_rng(0).uniform(0.030, 0.040, 100)
+    stamps_s = np.concatenate([[0.0], np.cumsum(steps)])
+    clock = clock_of(0.2 + stamps_s, 1 / 90_000)
+    assert not clock.is_even
+    for declared in (clock.rate, 1.01 * clock.rate):  # confirms it
+        np.testing.assert_allclose(at_declared_rate(clock, declared)[0].times_s, stamps_s)
+    slow, rate = at_declared_rate(clock, 8 * clock.rate)
+    assert rate == pytest.approx(clock.rate, rel=0.02)
+    np.testing.assert_allclose(slow.times_s, stamps_s / 8, rtol=0.02)
+
+
+def test_a_declared_rate_rescales_the_clock() -> None:
+    clock, rate = at_declared_rate(clock_of(np.arange(50) * 1001 / 30_000, 1e-5), 240.0)
+    assert rate == pytest.approx(29.97, rel=1e-4)
+    np.testing.assert_allclose(clock.times_s, np.arange(50) / 240, atol=1e-9)
+
+
+def changes(*numbers: float) -> np.ndarray:
+    return np.array([np.inf, *numbers])
+
+
+def test_repeats_of_pictures() -> None:
+    threes = changes(*[0.5] * 8, *[90, 1.5, 1] * 6, 0.5, 0.5)
+    assert np.flatnonzero(~repeats(threes)).tolist() == [0, 3, 6, *range(9, 27, 3), 27]
+    # 24 pictures a second as 30: one in five repeats.
+    fifths = changes(*[60, 65, 1, 70, 70] * 4)
+    assert np.flatnonzero(repeats(fifths)).tolist() == [3, 8, 13, 18]
+    # A slow beginning, a turn of a swing, a rest: nothing repeats.
+    assert not repeats(changes(*np.linspace(0.1, 90, 40))).any()
+    assert not repeats(changes(*np.abs(np.linspace(-80, 80, 41)))).any()
+    assert not repeats(changes(*[80.0] * 10, *[0.5] * 30, *[80.0] * 10)).any()
+    assert not repeats(changes(*[2.0, 0.1] * 20)).any()  # noise
+
+
+def test_pale_ends() -> None:
+    contrast = np.array([0, 3, 9, 10, 2, *[10.0] * 5, 4, 1])
+    assert np.flatnonzero(is_blank(contrast)).tolist() == [0, 1, 10, 11]
+
+
+def test_numbers_in_a_line() -> None:
+    assert listed(np.array([3])) == "3"
+    assert listed(np.arange(3, 10)) == "3 to 9"
+    assert listed(np.array([1, 2, 4])) == "1, 2, 4"
+    assert listed(np.arange(0, 40, 2)) == "0, 2, 4, 6, 8, 10, 12, 14, ..."
