@@ -61,7 +61,7 @@ class Comparison:
         return self.found.is_adequate
 
     @property
-    def error(self) -> Mapping[str, float | None]:
+    def error(self) -> Mapping[str, float]:
         """`rmse, noise, l1, l2` of velocities, m/s, `chi2_per_dof`, `rms_mm` and its share."""
         return self.found.error
 

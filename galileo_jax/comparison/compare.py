@@ -99,7 +99,7 @@ class Comparison:
     p_value: float
     where: tuple[Place, ...]
     pulls: tuple[Pull, ...]
-    error: Mapping[str, float | None]
+    error: Mapping[str, float]
     labels: tuple[np.ndarray, ...]
     white: tuple[np.ndarray, ...]
     noise_scale: tuple[float, ...]

@@ -47,7 +47,7 @@ PULLED_Z = 3.0  # of a nuisance's prior standard deviations; one in four hundred
 
 def velocity_error(
     problems: Sequence[Problem], predicted_m: Sequence[np.ndarray]
-) -> dict[str, float | None]:
+) -> dict[str, float]:
     """How far predicted and measured velocity profiles are apart, m/s.
 
     Args:
@@ -86,7 +86,7 @@ def velocity_error(
 
 def distance_error(
     problems: Sequence[Problem], predicted_m: Sequence[np.ndarray]
-) -> dict[str, float | None]:
+) -> dict[str, float]:
     """How far the points that were followed are from where the fit has them.
 
     Args:
@@ -94,9 +94,9 @@ def distance_error(
       predicted_m: of each clip `[object, axis, frame]`, the fitted centres.
 
     Returns:
-      rms_mm: the root mean square of that distance, of all objects and frames, mm; None where
+      rms_mm: the root mean square of that distance, of all objects and frames, mm; NaN where
       nobody knows how long a metre is. rms_percent_of_way: the same in per cent of the longest
-      way between two places of an object; None where nothing moves.
+      way between two places of an object; NaN where nothing moves.
     """
     squares, way_m = [np.zeros(0)], 0.0
     for problem, predicted in zip(problems, predicted_m, strict=True):
@@ -112,14 +112,14 @@ def distance_error(
     rms_m = float(np.sqrt(np.mean(every))) if every.size else math.nan
     is_known = all(p.model.scene.surroundings.is_scale_known for p in problems)
     return {
-        "rms_mm": 1e3 * rms_m if is_known and math.isfinite(rms_m) else None,
-        "rms_percent_of_way": 100 * rms_m / way_m if way_m > rms_m else None,
+        "rms_mm": 1e3 * rms_m if is_known else math.nan,
+        "rms_percent_of_way": 100 * rms_m / way_m if way_m > rms_m else math.nan,
     }
 
 
 def error_of(
     trials: JointProblem, theta: np.ndarray, num_fitted: float, pull: float = 0.0
-) -> dict[str, float | None]:
+) -> dict[str, float]:
     """Errors of places and velocities, and chi2 per degree of freedom, at `theta` `[parameter]`.
 
     The same in result.json, compare.json and diagnosis.json: what the model leaves over, in

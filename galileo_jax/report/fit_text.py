@@ -148,9 +148,9 @@ def _struck(name: str) -> int | None:
 
 def distance(error: Mapping[str, Any]) -> str:
     """How near the fit comes to what was seen, and in how many frames; empty where unknown."""
-    rms_mm, percent = error.get("rms_mm"), error.get("rms_percent_of_way")
-    sizes = [] if rms_mm is None else [f"{rms_mm:.2g} mm"]
-    sizes += [] if percent is None else [f"{percent:.2g} % of the way"]
+    units = {"rms_mm": "mm", "rms_percent_of_way": "% of the way"}
+    known = {unit: error.get(key) for key, unit in units.items()}  # None in a file, NaN before
+    sizes = [f"{size:.2g} {unit}" for unit, size in known.items() if size and size == size]
     frames = f"{error['frames_used']} of {error['frames']} frames" if error.get("frames") else ""
     said = f"{' or '.join(sizes)} off (root mean square)" if sizes else ""
     return ", in ".join(filter(None, [said, frames]))

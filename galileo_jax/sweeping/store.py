@@ -25,6 +25,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.astray import Astray
 from galileo_jax.measurement.cuts import Cut
 from galileo_jax.measurement.measure import Measurement
+from galileo_jax.measurement.path_direction import OtherWay
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import replacing, write_json
 from galileo_jax.runtime.errors import InputError
@@ -33,6 +34,7 @@ from galileo_jax.sweeping.work import PAGE, CellResult, MeasuredClip
 
 RESULT, FAILURE = "result.json", "failure.json"
 ARRAYS = ("times_s", "position_m", "covariance_m2", "mask")
+COUNTS = ("frames_used", "frames", "frames_of_scene")  # of a measurement
 FLAGS = ("is_squared", "is_turning")
 
 
@@ -134,10 +136,12 @@ class Store:
             wander_m=notes.get("wander_m"),
             noise_known_to=notes.get("noise_known_to", 0.0),
         )
-        said = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
+        own: dict[str, Any] = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
+        own |= {key: notes.get(key, 0) for key in COUNTS}
+        own["way"] = OtherWay(**notes["way"]) if notes.get("way") else None
         astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
         cuts = tuple(Cut(**entry) for entry in notes.get("cuts", []))
-        measured = Measurement(clip, seen, seen, None, notes["inferred"], cuts, astray, **said)
+        measured = Measurement(clip, seen, seen, None, notes["inferred"], cuts, astray, **own)
         return MeasuredClip(measured, picture or None)
 
     def save_clip(self, key: str, measured: MeasuredClip) -> None:
@@ -147,6 +151,8 @@ class Store:
         notes = {name: getattr(one, name) for name in ("inferred", "doubts", "remarks")}
         notes["cuts"] = [vars(entry) for entry in one.cuts]
         notes["astray"] = [vars(entry) for entry in one.astray]
+        notes |= {name: getattr(one, name) for name in COUNTS}
+        notes["way"] = one.way and vars(one.way)
         notes |= {name: getattr(seen, name) for name in FLAGS}
         notes |= {"num_errors": seen.num_errors, "wander_m": seen.wander_m}
         notes |= {"noise_known_to": seen.noise_known_to}

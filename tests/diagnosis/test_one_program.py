@@ -59,7 +59,9 @@ def test_a_formula_as_numbers_does_what_its_class_does(structure):
     state = State(path, speed, np.array(0.31), path < 0)
     if structure.nature == "friction":
         k = np.array([0.3, 0.2])
-        found = LawAsFriction().friction(theta, scene)(state, k)
+        friction = LawAsFriction().friction(theta, scene)
+        assert friction is not None
+        found = friction(state, k)
         expected = law.friction(own, scene)(state, k)
     else:
         found = LawAsForce().force(theta, scene)(state)

@@ -339,9 +339,9 @@ class GradientFitter:
             np.exp(NOISE_SD * z[:, count:]),
         )
         descent, most = replace(self._descent, is_central=True), self.settings.max_polish_steps
-        found = polish(descent, points, np.arange(len(fits)), STILL_NATS, most, drift=STILL)
-        stats = {**fit.stats, "num_steps": fit.stats["num_steps"] + found.num_steps}
-        still = laplace_fits(self.trials, self._residuals, found, stats)
+        modes = polish(descent, points, np.arange(len(fits)), STILL_NATS, most, drift=STILL)
+        stats = {**fit.stats, "num_steps": fit.stats["num_steps"] + modes.num_steps}
+        still = laplace_fits(self.trials, self._residuals, modes, stats)
         return _with_beside([replace(one, code=Code.CONVERGED) for one in still])
 
     def _ends(self, starts: np.ndarray, free: np.ndarray, num_refined: int) -> Ends:
