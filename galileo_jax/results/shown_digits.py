@@ -1,7 +1,8 @@
 """Numbers as text with the digits that they bear, and no more.
 
-A digit is shown if it is worth more than the Monte Carlo error of the number, and not beyond the
-second figure of the standard deviation.
+A digit is shown if it is worth more than the Monte Carlo error, and not beyond the second figure of
+the standard deviation. Mean, standard deviation and interval end at the same place: that of the
+least certain, an end of the interval.
 """
 
 import math
@@ -28,10 +29,10 @@ def number(value: float | None, sd: float | None, error: float = 0.0) -> str:
 
 
 def shown(entry: Mapping[str, Any], key: str = "mean") -> str:
-    """A number of a parameter's entry in result.json, as text.
+    """A number of a parameter's entry in result.json, as text; all four to the same place.
 
     Args:
       entry: with `sd` and, if it was written since there is one, `mcse`.
       key: "mean", "sd", "q025" or "q975".
     """
-    return number(entry[key], entry["sd"], entry.get("mcse", {}).get(key, 0.0))
+    return number(entry[key], entry["sd"], max(entry.get("mcse", {"": 0.0}).values()))

@@ -19,7 +19,7 @@ def test_numbers_have_the_places_their_uncertainty_allows():
 def test_a_digit_below_the_monte_carlo_error_is_not_shown():
     entry = {"mean": 0.151812, "sd": 0.00036, "mcse": {"mean": 1.1e-5, "sd": 0.9e-5}}
     assert shown(entry) == "0.1518"
-    assert shown(entry, "sd") == "0.00036"
+    assert shown(entry, "sd") == "0.0004", "to the same place as the mean"
     assert number(123.4, 17.0, error=2.0) == "120"
     assert shown({"mean": 0.151812, "sd": 0.00036}) == "0.15181", "a run of an earlier version"
 
