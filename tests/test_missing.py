@@ -76,9 +76,10 @@ def test_no_property_has_a_deadline():
 
 def test_every_skip_for_what_is_missing_goes_through_the_helper():
     """But for ray, which is in no set-up: it is 240 MB, for one engine of the sweeps."""
-    assert lines_with(
-        re.compile(r"pytest\.(skip|importorskip)\("), "missing.py", "test_missing.py"
-    ) == {("sweeping/test_real_sweeps.py", 'pytest.importorskip("ray")')}
+    assert (
+        lines_with(re.compile(r"pytest\.(skip|importorskip)\("), "missing.py", "test_missing.py")
+        == set()
+    )
 
 
 def lines_with(pattern: re.Pattern, *but_in: str) -> set[tuple[str, str]]:

@@ -387,8 +387,7 @@ def _placed(
         cos, sin = math.cos(calibration.roll_rad), math.sin(calibration.roll_rad)
         x, y = cos * x + sin * y, cos * y - sin * x
     found = np.stack([x if file.direction == "right" else -x, y], axis=1) * metres
-    found[~np.isfinite(found).all(axis=1)] = np.nan
-    return found
+    return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, np.nan)
 
 
 def _frame_rate(times_s: np.ndarray) -> float:

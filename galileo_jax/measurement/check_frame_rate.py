@@ -110,8 +110,8 @@ def _likely_unit(clip: Clip, value: float) -> tuple[str, float] | None:
     if clip.track is None or clip.track_units == "px":
         return None
     key = "its columns in" if clip.is_own_track else "track_units:"
-    if value > PIXELS_FROM * clip.gravity:
-        return f"{key} px, {value / clip.gravity:.4g} pixels per metre", math.inf
+    pixels = f"{key} px with {value / clip.gravity:.4g} pixels per metre"
+    are_pixels = value > PIXELS_FROM * clip.gravity
     declared = METRES_PER_UNIT[clip.track_units or "m"]
     off = {
         unit: abs(math.log(value * metres / declared / clip.gravity))
@@ -119,8 +119,10 @@ def _likely_unit(clip: Clip, value: float) -> tuple[str, float] | None:
     }
     best = min(off, key=lambda unit: off[unit])
     if off[best] > UNIT_WITHIN:
-        return None
-    return f"{key} {best}, {value * METRES_PER_UNIT[best] / declared:.3g} m/s^2", off[best]
+        return (pixels, math.inf) if are_pixels else None
+    would_be = value * METRES_PER_UNIT[best] / declared
+    words = f"{key} {best}, with which it would be {would_be:.3g} m/s^2"
+    return f"{words}, or {pixels}" if are_pixels else words, off[best]
 
 
 def _sd(windows: np.ndarray, value: float) -> float:

@@ -86,7 +86,9 @@ def test_fit_compare_predict_are_the_commands(video, folder, capfd):
     galileo("predict", folder / "run", "--seconds", 0.5)
     told = json.loads((folder / "run" / "prediction.json").read_text())
     for name, entry in told["objects"].items():
-        assert ahead.objects[name]["end_x_m"] == pytest.approx(entry["end_x_m"], rel=1e-9)
+        assert ahead.objects[name]["end_x_m"]["mean"] == pytest.approx(
+            entry["end_x_m"]["mean"], rel=1e-9
+        )
 
     loaded = gx.load_run(folder / "run")
     assert loaded.parameters == json.loads(json.dumps(fit.parameters))

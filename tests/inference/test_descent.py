@@ -46,7 +46,9 @@ def batch(*z, free: np.ndarray | bool = True):
 
 
 def descend(points, enough=1e-9, max_steps=200, give_up=None):
-    return Descent(Banana(), np.ones(3), is_smooth=True)(points, enough, max_steps, give_up)  # pyright: ignore
+    return Descent(Banana(), np.ones(3), is_smooth=True, is_central=False)(
+        points, enough, max_steps, give_up
+    )  # pyright: ignore
 
 
 def expected_minimum():
@@ -82,7 +84,7 @@ def test_slopes_are_taken_only_where_a_step_has_got_somewhere(monkeypatch):
         return slopes(points, *rest)
 
     monkeypatch.setattr(residuals, "slopes", watched)
-    descent = Descent(residuals, np.ones(3), is_smooth=True)  # pyright: ignore
+    descent = Descent(residuals, np.ones(3), is_smooth=True, is_central=False)  # pyright: ignore
     count = FEW + 1  # fewer are not looked at beforehand
     found = descent(batch(*[[-1.2, 1.0, 0.0]] * count), 1e-9, 200)
     assert all(np.diff(costs) < 0) and len(costs) < found.num_steps

@@ -76,10 +76,12 @@ def test_at_a_corner_of_the_misfit_it_is_as_wide_as_the_posterior(posterior):
 
 
 def test_a_bent_valley_is_followed(posterior):
-    found, _ = posterior(BENT, BENT.best((0.3, 0.1)))
+    """In the mean of ten seeds: one of them is off by up to a seventh."""
+    fit = BENT.best((0.3, 0.1))
+    draws = [posterior(BENT, fit, seed)[0].draws[0] for seed in range(10)]
     mean, sd = on_a_grid(BENT)
-    np.testing.assert_allclose(found.draws[0].std(axis=0), sd, rtol=0.1)
-    np.testing.assert_allclose(found.draws[0].mean(axis=0), mean, atol=0.15 * sd.min())
+    np.testing.assert_allclose(np.std(draws, axis=1).mean(axis=0), sd, rtol=0.07)
+    np.testing.assert_allclose(np.mean(draws, axis=(0, 1)), mean, atol=0.1 * sd.min())
 
 
 def test_valleys_have_their_shares(posterior):

@@ -193,8 +193,9 @@ def test_a_crescent_is_followed_along_its_ridge(monkeypatch):
     mean = weights @ found.z[:, 0]
     assert np.sqrt(weights @ (found.z[:, 0] - mean) ** 2) == pytest.approx(0.298, rel=0.08)
     monkeypatch.setattr(weighed_module, "bent_direction", lambda valley: None)
-    blind = [weighed([fit], CRESCENT, seed, num=512, most=512).log_evidence for seed in range(3)]
-    assert np.abs(np.array(blind) - exact).max() > 1.0, "a map of two powers does not follow it"
+    blind = [weighed([fit], CRESCENT, seed, num=512, most=512).log_evidence for seed in range(12)]
+    off = np.median(np.array(blind) - exact)  # of the followed ones it is a thousandth
+    assert off < -0.05, "a map of two powers does not follow it to its ends"
 
 
 def test_the_density_along_a_ridge_is_that_of_its_draws():

@@ -43,13 +43,13 @@ def damaged(draw: st.DrawFn) -> bytes:
     return content.decode().encode(encoding, "replace")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(content=damaged())
 def test_damaged_tables(content: bytes, tmp_path_factory) -> None:
     reads_or_says(tmp_path_factory.getbasetemp() / "damaged.csv", content)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(content=st.one_of(st.binary(max_size=300), st.text(max_size=300).map(str.encode)))
 def test_anything(content: bytes, tmp_path_factory) -> None:
     reads_or_says(tmp_path_factory.getbasetemp() / "anything.txt", content)

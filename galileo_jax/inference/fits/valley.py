@@ -141,8 +141,8 @@ def valley_round(fit: GradientFit, residuals: Residuals) -> Valley:
     root, axes = np.zeros((len(fit.z), directions)), np.eye(directions)
     quadratic, cubic = np.zeros((directions, directions)), np.zeros((directions, directions))
     variance, vectors = np.linalg.eigh(fit.covariance[np.ix_(own, own)])
-    largest = np.abs(vectors).argmax(axis=0)
-    vectors *= np.sign(vectors[largest, np.arange(size)])  # a ridge is followed by the sign, too
+    for vector in vectors.T:  # a ridge is followed by the sign, too
+        vector *= np.sign(vector[np.abs(vector).argmax()])
     axes[:size, :size] = vectors[:, ::-1]
     root[own, :size] = axes[:size, :size] * np.sqrt(np.maximum(variance, LEAST_VARIANCE))[::-1]
     # Noise scales, behind the others, hardly depend on these.

@@ -10,6 +10,7 @@ from scipy import stats
 
 import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
+from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.model.effects import make_effects
@@ -34,7 +35,8 @@ def precision():
 def problem_of(folder: Path, scenario: str, size: str = "[0.02]", mass: str = "null"):
     """A clip of the scenario; where its track goes is not looked at."""
     path = folder / "clip.csv"
-    place = [f"{t},{0.7 * math.sin(t)},{-0.7 * math.cos(t)},0.001" for t in TIMES - 0.3]
+    up = -0.7 if SCENARIOS[scenario].up_shows == "sag" else 0.7
+    place = [f"{t},{0.7 * math.sin(t)},{up * math.cos(t)},0.001" for t in TIMES - 0.3]
     path.write_text("\n".join(["time_s,object1_x_m,object1_y_m,object1_sd_m", *place]) + "\n")
     path.with_suffix(".yaml").write_text(
         f"track: clip.csv\nscenario: {scenario}\n"
