@@ -5,6 +5,7 @@ only the driver writes. A task whose worker or node is lost is carried out again
 Ray; its outcome comes once, because the driver waits for it by name.
 """
 
+import logging
 import os
 import socket
 from collections.abc import Iterable, Iterator
@@ -41,7 +42,7 @@ class EngineRay:
         self._ray, self.each = ray, each
         try:
             _knock(address)
-            ray.init(address=address or "local", log_to_driver=False, logging_level="ERROR")
+            ray.init(address=address or "local", log_to_driver=False, logging_level=logging.ERROR)
         except (OSError, ValueError, RuntimeError) as error:
             raise InputError(f"--address: no Ray cluster at {address} ({error})") from error
         self._attempt = ray.remote(attempt_as_worker).options(

@@ -1,5 +1,7 @@
 """Levenberg-Marquardt over batches of rollouts."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -46,9 +48,9 @@ def batch(*z, free: np.ndarray | bool = True):
 
 
 def descend(points, enough=1e-9, max_steps=200, give_up=None):
-    return Descent(Banana(), np.ones(3), is_smooth=True, is_central=False)(
-        points, enough, max_steps, give_up
-    )  # pyright: ignore
+    banana: Any = Banana()
+    descent = Descent(banana, np.ones(3), is_smooth=True, is_central=False)
+    return descent(points, enough, max_steps, give_up)
 
 
 def expected_minimum():
