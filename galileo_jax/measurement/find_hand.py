@@ -36,7 +36,7 @@ def hand_frame(observation: Observation) -> int | None:
     if began == 0 or len(seen) - began < 4 * size:
         return None  # it moves when it is first seen: whoever let it go is not in the clip
     starts = np.arange(began, len(seen) - size)
-    found = np.array([_acceleration(times_s, gone, int(i), size) for i in starts])
+    found, sd = _accelerations(times_s, gone, variance, starts, size)
     middle = gone[starts + size // 2] / length
     on_way = (middle > WAY[0]) & (middle < WAY[1])
     if on_way.sum() < size:
@@ -44,8 +44,6 @@ def hand_frame(observation: Observation) -> int | None:
     low, usual, high = np.quantile(found[on_way], [0.25, 0.5, 0.75])
     if usual <= 0 or high - low > MOST_SPREAD * usual:
         return None
-    step_s = np.median(np.diff(times_s))
-    sd = np.sqrt(720 * np.median(variance) / size) / (size * step_s) ** 2
     is_held = (found < HELD * usual) | (found > PUSHED * usual)
     is_held &= (np.abs(found - usual) > CLEAR * sd) & (middle < EARLY)
     if not is_held.any():
@@ -67,13 +65,20 @@ def pushed_frame(observation: Observation) -> int | None:
     gone, length = _gone(place_m)
     size = max(FEWEST, round(WINDOW_SHARE * len(seen)))
     starts = np.arange(len(seen) - size + 1)
-    found = np.array([_acceleration(times_s, gone, int(i), size) for i in starts])
-    step_s = np.median(np.diff(times_s))
-    sd = np.sqrt(720 * np.median(variance) / size) / (size * step_s) ** 2
+    found, sd = _accelerations(times_s, gone, variance, starts, size)
     gains = np.flatnonzero(found > CLEAR * sd)
     if not gains.size or gone[gains[-1] + size - 1] > PUSHED_WAY * length:
         return None
     return int(seen[min(gains[-1] + size, len(seen) - 1)])
+
+
+def _accelerations(
+    times_s: np.ndarray, gone: np.ndarray, variance: np.ndarray, starts: np.ndarray, size: int
+) -> tuple[np.ndarray, float]:
+    """The acceleration in each window of `size` frames, `[window]`, and its standard deviation."""
+    found = np.array([_acceleration(times_s, gone, int(i), size) for i in starts])
+    step_s = np.median(np.diff(times_s))
+    return found, float(np.sqrt(720 * np.median(variance) / size) / (size * step_s) ** 2)
 
 
 def _gone(place_m: np.ndarray) -> tuple[np.ndarray, float]:

@@ -82,7 +82,7 @@ def repeats(change: Float[np.ndarray, " picture"]) -> Bool[np.ndarray, " picture
       change: grey levels by which a picture differs from the one before, where most; the first's
         is not looked at.
     """
-    count, is_repeat = len(change), np.zeros(len(change), bool)
+    count = len(change)
     least = np.zeros(count)
     for index in range(1, count - 1):
         before = change[max(1, index - NEAR_FRAMES) : index].max(initial=0.0)
