@@ -18,8 +18,10 @@ demo: $(READY)
 # (Linux gives it 65,530) and dies.
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile
 
+# Most of the time of a quick test goes into compiling what runs for an instant. The slow ones, and
+# those below, run programs as users do.
 test: $(READY)
-	$(PYTEST) -m "not slow"
+	JAX_DISABLE_MOST_OPTIMIZATIONS=1 $(PYTEST) -m "not slow"
 
 test-all: $(READY)
 	$(PYTEST)

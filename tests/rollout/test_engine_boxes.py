@@ -168,6 +168,7 @@ def test_smooth_in_the_parameters_with_the_right_slopes():
         assert line.deriv()(0.0) / 5e-4 == pytest.approx(float(slope), rel=SLOPE_RTOL)
 
 
+@pytest.mark.slow
 def test_finer_steps_change_little():
     coarse = of_boxes(cubes(-0.03))
     theta = theta_of(coarse, MASS_KG, FRICTION)

@@ -352,7 +352,12 @@ def test_effects_agree_with_the_fine_solver(name: str) -> None:
 @pytest.mark.usefixtures("x64")
 @pytest.mark.parametrize(
     ("seed", "has_walls", "is_oval"),
-    [(0, False, False), (5, False, False), (2, True, False), (2, True, True)],
+    [
+        (0, False, False),
+        (5, False, False),
+        pytest.param(2, True, False, marks=pytest.mark.slow),  # the next has all that this has
+        (2, True, True),
+    ],
 )
 def test_slopes_agree_with_differences(seed: int, has_walls: bool, is_oval: bool) -> None:
     one = draw_level(np.random.default_rng(seed), {}, has_walls)
