@@ -178,12 +178,17 @@ def test_chains_that_have_not_converged_set_off_anew(tmp_path):
 
 @pytest.mark.slow
 def test_chains_converge_in_it(gentle):
-    """In straight coordinates five of six seeds did not within 33,700 rollouts."""
+    """In straight coordinates five of six seeds did not within 33,700 rollouts.
+
+    One in five has a chain that strays into a tail of k2 and sets off anew after FIRST_STEPS: that
+    is 9,600 rollouts, and a second run takes about half as many.
+    """
     trials, fit, _, _ = gentle
-    for seed in range(3):
-        posterior = metropolis_posterior(trials, fit, seed)
-        assert posterior.is_converged
-        assert posterior.stats["num_evaluations"] < 16_000
+    runs = [metropolis_posterior(trials, fit, seed) for seed in range(8)]
+    assert all(run.is_converged for run in runs)
+    counts = [run.stats["num_evaluations"] for run in runs]
+    assert np.median(counts) < 10_000
+    assert max(counts) < 2 * 9_600
 
 
 def test_the_way_back_and_of_a_pinned_parameter_there_is_none():
