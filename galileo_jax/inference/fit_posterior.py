@@ -18,7 +18,7 @@ from galileo_jax.inference.fits.weighed import weighed
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import ESS, Posterior, Status
-from galileo_jax.inference.systematic import systematic
+from galileo_jax.inference.resampled import resampled
 
 # At once, and in all until they are worth `ENOUGH` draws: a mean is then good to .03 sd.
 NUM_AT_ONCE, MOST, ENOUGH = 512, 8192, 1200.0
@@ -49,7 +49,7 @@ def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterio
         normal = laplace_posterior(trials, fit, seed)
         return replace(normal, stats=stats, provenance={**normal.provenance, ESS: found.ess})
     generator = np.random.default_rng([seed, 31])
-    which = generator.permutation(systematic(found.log_weights, NUM_DRAWS, generator))
+    which = resampled(found.log_weights, NUM_DRAWS, generator)
     return Posterior(
         names=trials.names,
         draws=trials.theta(found.z[which], fit.free)[None],

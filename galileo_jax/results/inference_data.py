@@ -31,7 +31,7 @@ from galileo_jax.inference.convergence import arviz
 from galileo_jax.inference.fit_posterior import TOO_FEW
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import ESS, Posterior, Status
-from galileo_jax.inference.systematic import systematic
+from galileo_jax.inference.resampled import resampled
 from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.conditional import conditional_log_density, noise_draws, noise_sd_m
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -200,7 +200,7 @@ def _drawn_again(
         predicted = jnp.asarray(_positions(trials, theta, clip))
         weights += np.asarray(_log_densities(predicted, scale, problem.data))
     smoothed, pareto_k = arviz().psislw(weights)
-    which = systematic(np.asarray(smoothed), min(len(theta), NUM_LIKELIHOOD_DRAWS), rng)
+    which = resampled(np.asarray(smoothed), min(len(theta), NUM_LIKELIHOOD_DRAWS), rng)
     return theta[which], float(pareto_k)
 
 

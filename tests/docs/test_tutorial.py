@@ -50,9 +50,9 @@ class TestDifferences:
     def test_a_small_number_of_another_size_is_told(self):
         assert differences("error 0.0078 m/s", "error 0.0208 m/s")
 
-    def test_what_is_not_determined_may_differ_more(self):
-        assert not differences("m1 0.43 not determined", "m1 0.40 not determined")
-        assert differences("m1 0.43 not determined", "m1 0.63 not determined")
+    def test_two_last_digits_are_told(self):
+        assert differences("k1  0.1481", "k1  0.1483")
+        assert differences("m1 anything in [0.1, 0.8] kg", "m1 anything in [0.1, 0.6] kg")
 
     def test_another_sign_is_told(self):
         assert differences("phi -0.0161", "phi 0.0161")
