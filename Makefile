@@ -18,10 +18,8 @@ demo: $(READY)
 # (Linux gives it 65,530) and dies.
 PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile
 
-# Most of the time of a quick test goes into compiling what runs for an instant. The slow ones, and
-# those below, run programs as users do.
 test: $(READY)
-	JAX_DISABLE_MOST_OPTIMIZATIONS=1 $(PYTEST) -m "not slow"
+	$(PYTEST) -m "not slow"
 
 test-all: $(READY)
 	$(PYTEST)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 BLOCK = re.compile(r"^```console\n\$ (?P<command>.*)\n(?P<printed>(?:.*\n)*?)```$", re.MULTILINE)
 NUMBER = re.compile(r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-# No digit is shown below the Monte Carlo error, and processors differ by a third of that at most
+# No digit is shown below the Monte Carlo error, and processors differ by less
 # (docs/explanation/posterior.md): enough to round one last digit otherwise, not two. The tutorial
 # is the same to the letter under SSE4_2 and AVX2.
 LAST_DIGITS = 1
