@@ -20,7 +20,6 @@ from galileo_jax.clip.track_axes import (
     along_line,
     check_falls_down,
     in_plane,
-    straightened,
     swung,
     up_from_motion,
 )
@@ -101,9 +100,8 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
     """
     is_own = _is_ours(path)
     found = _own(yaml_path, path, file) if is_own else _foreign(yaml_path, path, file, fps)
-    observation, warnings = straightened(path, file, found.observation)
-    check_falls_down(yaml_path, path, file, observation)
-    return replace(found, observation=observation, warnings=found.warnings + warnings)
+    check_falls_down(yaml_path, path, file, found.observation)
+    return found
 
 
 def _own(yaml_path: Path, path: Path, file: ClipFile) -> FileTrack:
@@ -147,7 +145,7 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         observation = swung(yaml_path, path, file, times, table.position[:, 0])
     elif len(table.axes) == 1:
         start = table.position[0, 0, 0] if is_px else 0.0
-        observation, said = along_line(
+        observation = along_line(
             yaml_path, path, file, table.axes[0], times, (table.position[:, 0] - start) * metres,
             floor_m[0],
         )  # fmt: skip
