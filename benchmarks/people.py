@@ -136,7 +136,7 @@ def _run(call: list[str], package: Path) -> tuple[int, str, float]:
     before = os.times()
     try:
         done = subprocess.run(
-            call, capture_output=True, text=True, timeout=4 * TOO_LONG_S, check=False,
+            call, capture_output=True, text=True, timeout=4 * TOO_LONG_S, check=False, cwd=package,
             env={**os.environ, "PYTHONPATH": str(package)},
         )  # fmt: skip
         code, said = done.returncode, f"{done.stdout}\n{done.stderr}"
