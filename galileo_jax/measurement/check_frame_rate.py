@@ -126,7 +126,9 @@ def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | No
     return found if gain > f.isf(CHANCE, 2, size) else parabola
 
 
-def _polynomial(times: np.ndarray, height: np.ndarray, degree: int) -> tuple[float, ApparentGravity]:
+def _polynomial(
+    times: np.ndarray, height: np.ndarray, degree: int
+) -> tuple[float, ApparentGravity]:
     """(sum of squares that it leaves, gravity by its bend in the middle)."""
     since = times - times.mean()
     design = np.vander(since, degree + 1)

@@ -113,7 +113,7 @@ def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
 def _last_held(
     times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, size: int
 ) -> tuple[int, bool]:
-    """Where the last window begins in which a hand is on, -1 in none; whether noise lets it show."""
+    """Where the last window with a hand on begins, -1: none; and whether noise lets it show."""
     starts = np.arange(len(times_s) - size + 1)
     each = [_accelerations(times_s, one, variance, starts, size) for one in place_m]
     found, sd = np.array([one for one, _ in each]), max(one for _, one in each)

@@ -38,6 +38,12 @@ class Heading:
     is_titled: bool
     frame_s: float | None = None
 
+    def name_of(self, n: int) -> str:
+        """What messages call a column; no two are the same."""
+        title = self.titles[n]
+        is_alone = title and self.titles.count(title) == 1
+        return title if is_alone else f"{title} (column {n + 1})" if title else f"column {n + 1}"
+
 
 def split_heading(path: Path, rows: Rows) -> Heading:
     """Parts the titles from the numbers.

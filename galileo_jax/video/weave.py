@@ -1,6 +1,6 @@
-"""Pictures that are woven from two fields, taken one after the other: found by what moves in them.
+"""Pictures that are woven from two fields, taken at two times: found by what moves in them.
 
-    R = sum |I(y) - I(y + 2)| / sum |I(y) - I(y + 1)|    over pixels that changed since the picture before
+    R = sum |I(y) - I(y + 2)| / sum |I(y) - I(y + 1)|,    over pixels that changed
 
 In a whole picture rows two apart differ more than neighbours (R 1.2 to 2; 1 of pure noise). Where
 odd and even rows were taken at two times, what moves is a comb, and rows two apart are of one time
