@@ -36,7 +36,7 @@ def rows_of(before: UInt8[np.ndarray, "row column"], grey: UInt8[np.ndarray, "ro
     """
     if before.shape != grey.shape or len(grey) < 4:
         return NO_ROWS
-    moved = cv2.compare(cv2.absdiff(grey, before), MOVED_GREY, cv2.CMP_GT)
+    moved = cv2.threshold(cv2.absdiff(grey, before), MOVED_GREY, 255, cv2.THRESH_BINARY)[1]
     even = len(grey) // 2 * 2
     upper, lower = grey[0:even:2], grey[1:even:2]
     fields = moved[0:even:2]
