@@ -6,6 +6,7 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
     board without a table    from the rest after which it comes down, and from where the hand is
                              off; to a stop, a blow, or the rest after which it is carried away
     level                    from where it gains no more speed; to a stop or a blow
+    fall, flight, board      to where the film goes over to slow motion
     fall, flight             from where the hand is off; to a stop (fall) or a blow, unless a floor
                              is declared
     toss                     to the first impact
@@ -31,6 +32,7 @@ from galileo_jax.measurement.find_fold import fold_frame
 from galileo_jax.measurement.find_hand import hand_frame, pushed_frame, thrown_frame
 from galileo_jax.measurement.find_held import let_go_frame, standstill_frame
 from galileo_jax.measurement.find_placed import placed_frames
+from galileo_jax.measurement.find_rate_change import rate_change
 from galileo_jax.measurement.find_rest import rest_frame
 from galileo_jax.measurement.find_return import return_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
@@ -41,6 +43,10 @@ from galileo_jax.observation.observation import Observation
 
 STOPPED = "is stopped by something that is not in the scene"
 STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
+CHANGES_RATE = (
+    "goes on {:.3g} times as fast, its acceleration by the square of that: the frame rate changes "
+    "there (slow motion?), which only a cut film or a table with true times can mend"
+)
 LANDED = "comes down on the table"
 RESTS = "is at rest, and so is everything else that is still seen"
 PLACED = "is put into its place by a hand before that"
@@ -106,6 +112,9 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
         )
         if frame is not None
     ]
+    may_slow = is_board(clip) or clip.scenario in ("fall", "flight")
+    if may_slow and (change := rate_change(observation)) is not None:
+        ends.append((change.last, CHANGES_RATE.format(change.factor)))
     if ends:
         last, end = min(ends)
         if end == STOPPED and goes_on(observation, last):
