@@ -74,6 +74,10 @@ def y_axis_of(
     if scenario.up_shows is None:
         return usual, ()
     found = up_from_motion(scenario.up_shows, times, table.position[0])
+    if found is None and scenario.up_shows == "bend":
+        found_x = up_from_motion("bend", times, table.position[0, ::-1])
+        if found_x is not None:
+            return usual, ()  # it falls along x, of which `check_falls_down` tells
     if found is None and scenario.up_shows == "drop" and np.nanstd(table.position[0, 1]) == 0:
         return usual, ()  # a path along the other axis: up makes no difference
     if found is None:

@@ -112,7 +112,7 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
         )
         if frame is not None
     ]
-    may_slow = is_board(clip) or clip.scenario in ("fall", "flight")
+    may_slow = is_board(clip) or (clip.scenario in ("fall", "flight") and not clip.has_floor)
     if may_slow and (change := rate_change(observation)) is not None:
         ends.append((change.last, CHANGES_RATE.format(change.factor)))
     if ends:
@@ -125,7 +125,8 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
         cuts = [each for each in cuts if each.side == "before"]
         cuts.append(Cut(observation.names[0], float(observation.times_s[last]), "after", end))
     first = hand_frame(observation) if is_let_go else None
-    if clip.scenario in ("fall", "flight") and not clip.objects[0].first_frame:
+    is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
+    if is_free and not clip.objects[0].first_frame:
         first = thrown_frame(observation, rest_belongs=clip.scenario == "fall")
     if is_board(clip) and SCENARIOS[clip.scenario].angle_deg == 0:
         first, why = pushed_frame(observation), PUSHED
