@@ -23,7 +23,7 @@ TURNED_DEG = 6.0
 NEARER = 3.0
 """By so many times an axis of a table must be nearer to the path than the declared way."""
 FEWEST = 5  # points
-STRAIGHT = 0.02  # of its length: a path that bends by more has no direction
+STRAIGHT = 0.02  # of its length: a path that bends by more has no direction but an axis's
 MOST_SD_DEG = 1.0
 
 
@@ -61,15 +61,17 @@ def other_way(clip: Clip, observation: Observation, may_turn: bool) -> OtherWay 
     found = _direction(observation)
     if found is None:
         return None
-    along, sd = found
+    along, sd, is_straight = found
     path = _below_horizontal_deg(along)
     apart = abs(_turn_deg(declared, path, "spring" in scenario.laws))
     known = math.hypot(sd, LEVEL_SD_DEG, clip.ramp_angle_sd_deg)
     off_axis = min(abs(path) % 90.0, 90.0 - abs(path) % 90.0)
     is_along_axis = apart > NEARER * max(off_axis, sd)
-    if sd > MOST_SD_DEG or (apart < CLEAR * known and not (may_turn and is_along_axis)):
+    if may_turn and is_along_axis:
+        return OtherWay(declared, path, sd, True)
+    if sd > MOST_SD_DEG or not is_straight or apart < CLEAR * known:
         return None
-    return OtherWay(declared, path, sd, may_turn and (apart > TURNED_DEG or is_along_axis))
+    return OtherWay(declared, path, sd, may_turn and apart > TURNED_DEG)
 
 
 def turned_back(clip: Clip, observation: Observation, way: OtherWay) -> Observation:
@@ -114,8 +116,8 @@ def _below_horizontal_deg(along: np.ndarray) -> float:
     return math.degrees(math.atan2(-along[1], along[0]))
 
 
-def _direction(observation: Observation) -> tuple[np.ndarray, float] | None:
-    """A unit vector along the path, and its sd in degrees; None where the path is not straight."""
+def _direction(observation: Observation) -> tuple[np.ndarray, float, bool] | None:
+    """A unit vector along the path, its sd in degrees, and whether the path is straight."""
     if observation.position_m.shape[1] != 2:
         return None
     points = observation.position_m[0][:, observation.mask[0]]
@@ -129,8 +131,9 @@ def _direction(observation: Observation) -> tuple[np.ndarray, float] | None:
     furthest = gone[:, int(np.argmax((gone**2).sum(axis=0)))]
     along = axes[:, 1] * math.copysign(1.0, axes[:, 1] @ furthest)
     length = float(np.ptp(along @ away))
-    if not length or np.abs(axes[:, 0] @ away).max() > STRAIGHT * length:
+    if not length:
         return None
+    is_straight = bool(np.abs(axes[:, 0] @ away).max() <= STRAIGHT * length)
     noise = float(np.median(trace)) / 2
     scatter = max(float(values[0]) / (points.shape[1] - 2), noise)
-    return along, math.degrees(math.sqrt(scatter / float(values[1])))
+    return along, math.degrees(math.sqrt(scatter / float(values[1]))), is_straight

@@ -92,3 +92,13 @@ def test_the_floor_ends_a_fall_of_one_coordinate(tmp_path: Path) -> None:
     seen = observed(tmp_path, {"t (s)": times, "y (m)": height}, "scenario: fall").mask[0]
     landed = np.sqrt(2 * 1.1 / 9.81)
     assert abs(times[np.flatnonzero(seen)[-1]] - landed) < 2 / 60
+
+
+def test_a_spring_that_swings_along_x_and_wobbles(tmp_path: Path) -> None:
+    """By a twentieth of its way: no straight path, but the axis is as clear."""
+    times = np.arange(120) / 60
+    swing, wobble = 0.1 * np.cos(9 * times), 0.005 * np.cos(23 * times)
+    found = observed(
+        tmp_path, {"t (s)": times, "x (m)": swing, "y (m)": wobble}, "scenario: spring"
+    )
+    assert abs(np.corrcoef(found.position_m[0, 1], swing)[0, 1]) > 0.999
