@@ -278,6 +278,7 @@ def short(value: Any) -> str:
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Frame = Annotated[int, Field(strict=True, ge=0)]
+Trial = Annotated[int, Field(strict=True, ge=1)] | None
 Point = tuple[Number, Number]
 Correction = tuple[Frame, Number, Number]
 Metres = Annotated[Number, AfterValidator(_metres)]

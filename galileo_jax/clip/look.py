@@ -60,8 +60,11 @@ class Seen:
 
 def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Seen:
     """What a table shows; `fps` makes its frames seconds."""
-    clock = table.frames if table.times_s is None else table.times_s
-    assert clock is not None  # a table has one of the two
+    warnings = table.warnings
+    if (count := len(table.starts)) > 1:
+        warnings += (f"{path}: {count} motions, of which the first is looked at",)
+        table = table.motion(1)
+    clock = table.clock
     is_in_frames = table.times_s is None
     steps = np.diff(clock)
     step = float(np.median(steps)) if steps.size else math.nan
@@ -86,8 +89,8 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
         moved,
         scenario,
         why,
-        _yaml(path, table, scenario, place[:, shown], fps),
-        table.warnings,
+        _yaml(path, table, scenario, place[:, shown], fps, count),
+        warnings,
     )
 
 
@@ -155,10 +158,12 @@ def _acceleration(seconds: np.ndarray, values: np.ndarray) -> float:
 
 
 def _yaml(
-    path: Path, table: TrackTable, scenario: str, place: np.ndarray, fps: float | None
+    path: Path, table: TrackTable, scenario: str, place: np.ndarray, fps: float | None, motions: int
 ) -> str:
     """The clip's yaml; what nobody can know but the user is a comment."""
     lines = [f"track: {path.name}", f"scenario: {scenario}"]
+    if motions > 1:
+        lines.append(f"trial: 1  # of {motions}: one clip for each")
     if table.times_s is None:
         lines.append(f"fps: {fps:g}" if fps else "# fps: of the camera, frames per second")
     if table.unit is None:

@@ -38,6 +38,7 @@ from galileo_jax.clip.fields import (
     Shape,
     Spin,
     Thread,
+    Trial,
     UpAxis,
     YAxis,
     one_of,
@@ -69,6 +70,7 @@ class ClipObject(BaseModel):
         camera; of use to `--motion free` only.
       spin_rad_s: flight: its spin where it was measured, along the track's axes.
       track_name: what another tool's track file calls it; None = the same, or the only one.
+      track_file: a table of its own, on the same clock as `track`; None = it is in `track`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -85,6 +87,7 @@ class ClipObject(BaseModel):
     z_m: Across = 0.0
     spin_rad_s: Spin = None
     track_name: OneLine | None = None
+    track_file: File = None
 
     @property
     def roll_inertia(self) -> float | None:
@@ -119,6 +122,7 @@ class ClipFile(BaseModel):
 
     video: File = None
     track: File = None
+    trial: Trial = None
     track_units: Annotated[LengthUnit, one_of(get_args(LengthUnit))] | None = None
     track_y: Annotated[YAxis, one_of(get_args(YAxis))] | None = None
     track_origin: Point | None = None
@@ -155,6 +159,8 @@ class Clip(ClipFile):
       source: what was asked for, as it was written in the call: a video, a track or the yaml.
       video: the video file; None for a csv track.
       track: the track file, ours or another tool's; None for a video.
+      trial: which of the motions that follow each other in the track, counted from 1; None = the
+        only one.
       track_units: of a track file of another tool, or of its calibration; "px" = pixels.
       track_y: which way its y axis points.
       track_up: which axis of our own csv of a flight in space points up.

@@ -28,9 +28,6 @@ ASKEW_DEG = 45.0
 MOST_SCATTER = 0.3
 """Of gravity: what scatters more from window to window is no fall."""
 
-NEARER = 3.0
-"""By so many times an axis must be nearer to the path than the declared slope."""
-
 MOST_OUT_OF_PLANE = 0.1
 
 
@@ -115,7 +112,7 @@ def along_line(
     times: np.ndarray,
     way_m: np.ndarray,
     rounding_m: float,
-) -> tuple[Observation, tuple[str, ...]]:
+) -> Observation:
     """One coordinate `[object, row]`, m, as a motion along the scenario's line.
 
     Raises:
@@ -141,28 +138,27 @@ def along_line(
         sds.append(max(sd, rounding_m / math.sqrt(12)))
     names = tuple(item.name for item in file.objects)
     sd_m = np.repeat(np.array(sds)[:, None], len(times), axis=1)
-    sign, said = _sign_along(path, file, axis, times, way_m[0])
-    return _line_observation(file, names, times, sign * way_m, sd_m), said
+    is_upright = scenario.line == "down" and axis in ("y", "z")
+    if is_upright and file.track_y is not None:
+        sign = 1 if file.track_y == "up" else -1
+    else:
+        sign = sign_along(file, times, way_m[0])
+    return line_observation(file, names, times, sign * way_m, sd_m)
 
 
-def _sign_along(
-    path: Path, file: ClipFile, axis: str, times: np.ndarray, way: np.ndarray
-) -> tuple[int, tuple[str, ...]]:
-    """1 or -1: by which the way is along the scenario's line, and what was assumed."""
+def sign_along(file: ClipFile, times: np.ndarray, way: np.ndarray) -> int:
+    """1 or -1: by which a way `[row]` counts down the slope, along the level, or up."""
     seen = np.isfinite(way)
     scenario = SCENARIOS[file.scenario]
     if scenario.line == "down":
-        if file.track_y is not None and axis in ("y", "z"):
-            return (1 if file.track_y == "up" else -1), ()
         sign = -_sign(accelerations(times[seen], way[seen])) if scenario.up_shows else 1
-        return sign or 1, ()
+        return sign or 1
     gone = way[seen] - way[seen][0]
-    turned = abs(gone[-1]) < 0.5 * np.abs(gone).max()
-    sign = _sign(accelerations(times[seen], gone)) if turned else int(np.sign(gone[-1]))
-    return sign or 1, ()
+    has_turned = abs(gone[-1]) < 0.5 * np.abs(gone).max()
+    return (_sign(accelerations(times[seen], gone)) if has_turned else int(np.sign(gone[-1]))) or 1
 
 
-def _line_observation(
+def line_observation(
     file: ClipFile, names: tuple[str, ...], times: np.ndarray, way: np.ndarray, sd_m: np.ndarray
 ) -> Observation:
     """Ways `[object, row]`, m, along the scenario's line; across it nothing is known."""
@@ -212,48 +208,6 @@ def swung(
     mask = np.isfinite(angle_rad)
     covariance = np.where(mask[:, None, None], covariance, np.nan)
     return Observation(tuple(i.name for i in file.objects), times, place, covariance, mask)
-
-
-def straightened(
-    path: Path, file: ClipFile, observation: Observation
-) -> tuple[Observation, tuple[str, ...]]:
-    """The observation with a path that lies along an axis of the table as the scenario's line.
-
-    Sensors and programs whose axes were laid along the slope give the way as x, and y as 0; a
-    camera on its side sees a spring swing along x.
-    """
-    scenario = SCENARIOS[file.scenario]
-    is_slope = scenario.line == "slope"
-    declared = file.ramp_angle_deg if is_slope else 90.0
-    is_told = is_slope or (scenario.line == "down" and scenario.up_shows is None)
-    if not is_told or declared is None or observation.position_m.shape[1] != 2:
-        return observation, ()
-    largest = np.einsum("iit->t", observation.covariance_m2[0][..., observation.mask[0]])
-    if not largest.size or largest.max() >= UNMEASURED_SD_M**2:
-        return observation, ()
-    seen = observation.mask[0]
-    place = observation.position_m[0][:, seen]
-    centred = place - place.mean(axis=1, keepdims=True)
-    along = np.linalg.svd(centred, full_matrices=False)[0][:, 0]
-    along = along * math.copysign(1.0, along @ (place[:, -1] - place[:, 0]))
-    falls = math.degrees(math.atan2(-along[1], abs(along[0])))
-    off = {"x": abs(falls), "y": 90 - abs(falls)}
-    axis = min(off, key=lambda one: off[one])
-    apart = abs(falls - declared) if is_slope else off["y"]
-    if NEARER * off[axis] >= apart or (axis == "y" and not is_slope):
-        return observation, ()
-    way = np.einsum("a,oat->ot", along, observation.position_m)
-    sd = np.sqrt(np.einsum("a,b,oabt->ot", along, along, observation.covariance_m2))
-    sign, _ = _sign_along(path, file, axis, observation.times_s, way[0])
-    declared_as, way_as = (
-        (f"at ramp_angle_deg: {declared:g}", "down the slope") if is_slope else ("upright", "up")
-    )
-    said = (
-        f"{path}: the path lies along {axis} ({falls:.2f} degrees), not {declared_as}; taken as "
-        f"the way {way_as}"
-    )
-    found = _line_observation(file, observation.names, observation.times_s, sign * way, sd)
-    return found, (said,)
 
 
 def check_falls_down(yaml_path: Path, path: Path, file: ClipFile, observation: Observation) -> None:

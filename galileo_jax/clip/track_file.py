@@ -11,18 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from galileo_jax.clip.fields import MAX_SCALE_PX_PER_M, MIN_SCALE_PX_PER_M, short
+from galileo_jax.clip.fields import short
 from galileo_jax.clip.lost_frames import with_lost_frames
 from galileo_jax.clip.plane_noise import roughness_covariance_m2
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import ClipFile
+from galileo_jax.clip.table_metres import origin_of, placed, scale_of, unit_of_length, y_axis_of
+from galileo_jax.clip.table_objects import declared_table
 from galileo_jax.clip.track_axes import (
     along_line,
     check_falls_down,
     in_plane,
-    straightened,
     swung,
-    up_from_motion,
 )
 from galileo_jax.clip.track_csv import (
     MAX_POSITION_M,
@@ -35,10 +35,9 @@ from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observat
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.grid import read_cells
 from galileo_jax.table.pandas_h5 import is_hdf5
-from galileo_jax.table.read import read_table
 from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
-from galileo_jax.table.track_table import METRES_PER_UNIT, Calibration, TrackTable
+from galileo_jax.table.track_table import METRES_PER_UNIT, TrackTable
 from galileo_jax.table.tracker_trk import is_trk
 
 TRACK_SUFFIXES = (
@@ -54,8 +53,6 @@ OWN_CSV_SAYS = {
     "direction": "right",
 }
 """What the titles and axes of our own csv say already; a yaml can only repeat it."""
-
-LENGTH_CHOICES = " | ".join((*METRES_PER_UNIT, "px"))
 
 
 @dataclass(frozen=True)
@@ -99,11 +96,11 @@ def read_track(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -
       InputError: one line naming the file and the place that is wrong, or the key that has to
         be given.
     """
-    is_own = _is_ours(path)
+    is_one_table = file.trial is None and not any(item.track_file for item in file.objects)
+    is_own = is_one_table and _is_ours(path)
     found = _own(yaml_path, path, file) if is_own else _foreign(yaml_path, path, file, fps)
-    observation, warnings = straightened(path, file, found.observation)
-    check_falls_down(yaml_path, path, file, observation)
-    return replace(found, observation=observation, warnings=found.warnings + warnings)
+    check_falls_down(yaml_path, path, file, found.observation)
+    return found
 
 
 def _own(yaml_path: Path, path: Path, file: ClipFile) -> FileTrack:
@@ -124,15 +121,15 @@ def _own(yaml_path: Path, path: Path, file: ClipFile) -> FileTrack:
 
 def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> FileTrack:
     """Any other table, in its own units and axes."""
-    table, warnings = _in_declared_order(yaml_path, path, file, read_table(path, fps))
+    table, warnings = declared_table(yaml_path, path, file, fps)
     times = _times(yaml_path, path, table, fps)
     if len(times) < MIN_ROWS:
         raise InputError(f"{path}: {len(times)} rows; at least {MIN_ROWS} expected")
     check_times(path, times)
-    unit = _unit(yaml_path, path, file, table)
+    unit = unit_of_length(yaml_path, path, file, table)
     is_px = unit == "px"
-    scale = _scale(yaml_path, path, file, table.calibration) if is_px else None
-    origin = _origin(file, table) if is_px else None
+    scale = scale_of(yaml_path, path, file, table.calibration) if is_px else None
+    origin = origin_of(file, table) if is_px else None
     metres = 1 / (scale or NOMINAL_SCALE_PX_PER_M) if is_px else METRES_PER_UNIT[unit]
     first = _first_seen(table.position)
     times, table = (
@@ -147,15 +144,15 @@ def _foreign(yaml_path: Path, path: Path, file: ClipFile, fps: float | None) -> 
         observation = swung(yaml_path, path, file, times, table.position[:, 0])
     elif len(table.axes) == 1:
         start = table.position[0, 0, 0] if is_px else 0.0
-        observation, said = along_line(
+        observation = along_line(
             yaml_path, path, file, table.axes[0], times, (table.position[:, 0] - start) * metres,
             floor_m[0],
         )  # fmt: skip
     else:
         table, turned = in_plane(path, file, table)
-        y_axis, told = _y_axis(yaml_path, path, file, table, times, unit)
+        y_axis, told = y_axis_of(yaml_path, path, file, table, times, unit)
         said = turned + told
-        position = _placed(file, table, metres, origin, y_axis, is_px)
+        position = placed(file, table, metres, origin, y_axis, is_px)
         observation = _observation(
             path, names, times, position, floor_m, is_nominal=is_px and scale is None
         )
@@ -221,46 +218,6 @@ def _check_names(yaml_path: Path, path: Path, file: ClipFile, names: tuple[str, 
         )
 
 
-def _in_declared_order(
-    yaml_path: Path, path: Path, file: ClipFile, table: TrackTable
-) -> tuple[TrackTable, tuple[str, ...]]:
-    """The table with the declared objects alone, in their order, and doubts about who is who.
-
-    An object is found by its `track_name`, else by its own name ('mass A' is mass_A); names
-    that say nothing are assigned in this order, where there are as many of them as objects.
-    """
-    by_name = {_plain(name): index for index, name in enumerate(table.names)}
-    wanted = [item.track_name or item.name for item in file.objects]
-    order = [by_name.get(_plain(name)) for name in wanted]
-    warnings = ()
-    for item, index in zip(file.objects, order, strict=True):
-        if item.track_name is not None and index is None:
-            raise InputError(
-                f"{yaml_path}: objects ({item.name}): track_name: {item.track_name!r} is not in "
-                f"{path.name}; it has {', '.join(table.names)}"
-            )
-    if None in order:
-        if len(wanted) != len(table.names) or any(index is not None for index in order):
-            raise InputError(
-                f"{yaml_path}: objects: {', '.join(wanted)} declared, but {path.name} has "
-                f"{', '.join(table.names)}; write which is which, such as "
-                f"track_name: {table.names[0]}"
-            )
-        order = list(range(len(wanted)))
-        pairs = zip(wanted, table.names, strict=True)
-        taken = [f"{theirs!r} as {ours}" for ours, theirs in pairs if theirs != ours]
-        warnings = (
-            (f"{path}: {', '.join(taken)}: assigned in this order",) if len(taken) > 1 else ()
-        )
-    chosen = [index for index in order if index is not None]
-    names = tuple(table.names[index] for index in chosen)
-    return replace(table, names=names, position=table.position[chosen]), warnings
-
-
-def _plain(name: str) -> str:
-    return "".join(name.replace("_", " ").split()).casefold()
-
-
 def _times(yaml_path: Path, path: Path, table: TrackTable, fps: float | None) -> np.ndarray:
     """`[row]`, s."""
     if table.times_s is not None:
@@ -292,102 +249,9 @@ def _doubts(yaml_path: Path, path: Path, table: TrackTable, fps: float | None) -
     )
 
 
-def _scale(
-    yaml_path: Path, path: Path, file: ClipFile, calibration: Calibration | None
-) -> float | None:
-    """Pixels per metre: declared, or else the file's; None = unknown."""
-    if file.pixels_per_metre is not None:
-        return file.pixels_per_metre
-    if calibration is None or not math.isfinite(calibration.pixels_per_unit[0]):
-        return None
-    unit = calibration.unit or file.track_units
-    if unit not in METRES_PER_UNIT:
-        raise InputError(
-            f"{yaml_path}: track_units: missing; {path.name} was calibrated with "
-            f"{calibration.pixels_per_unit[0]:.5g} pixels per unit and does not name the unit; "
-            f"write track_units: {' | '.join(METRES_PER_UNIT)}"
-        )
-    scale = calibration.pixels_per_unit[0] / METRES_PER_UNIT[unit]
-    if not MIN_SCALE_PX_PER_M <= scale <= MAX_SCALE_PX_PER_M:
-        raise InputError(
-            f"{path}: calibrated to {scale:.4g} pixels per metre; {MIN_SCALE_PX_PER_M:g} to "
-            f"{MAX_SCALE_PX_PER_M:g} expected; correct its calibration or give pixels_per_metre"
-        )
-    return scale
-
-
-def _origin(file: ClipFile, table: TrackTable) -> tuple[float, float] | None:
-    """Declared, or else the file's, pixels; None = unknown."""
-    if file.origin_px is not None or table.calibration is None:
-        return file.origin_px
-    return table.calibration.origin_px
-
-
-def _unit(yaml_path: Path, path: Path, file: ClipFile, table: TrackTable) -> str:
-    """The unit of length: what is declared, else what the file says."""
-    if table.axes == ("angle",):
-        return "m"
-    by_scale = "px" if file.pixels_per_metre is not None else None
-    unit = "px" if table.unit == "px" else file.track_units or table.unit or by_scale
-    if unit is None:
-        raise InputError(
-            f"{yaml_path}: track_units: missing; {path.name} does not state its unit of length; "
-            f"write track_units: {LENGTH_CHOICES} (or give it to galileo label)"
-        )
-    return unit
-
-
-def _y_axis(
-    yaml_path: Path, path: Path, file: ClipFile, table: TrackTable, times: np.ndarray, unit: str
-) -> tuple[str, tuple[str, ...]]:
-    """Which way y points: as declared, as the file says, as the motion shows."""
-    if (declared := file.track_y or table.y_axis) is not None:
-        return declared, ()
-    scenario = SCENARIOS[file.scenario]
-    usual = "down" if unit == "px" else "up"
-    if scenario.up_shows is None:
-        return usual, ()
-    found = up_from_motion(scenario.up_shows, times, table.position[0])
-    if found is None:
-        raise InputError(
-            f"{yaml_path}: track_y: missing; {path.name} does not state which way its y axis "
-            "points, and the motion does not show it; write track_y: up | down"
-        )
-    if found == usual:
-        return found, ()
-    return found, (f"{path}: track_y: {found}, as the motion shows; declare it if it is not",)
-
-
 def _first_seen(position: np.ndarray) -> int:
     seen = np.isfinite(position).all(axis=1).any(axis=0)
     return int(seen.argmax()) if seen.any() else 0
-
-
-def _placed(
-    file: ClipFile,
-    table: TrackTable,
-    metres: float,
-    origin: tuple[float, float] | None,
-    y_axis: str,
-    is_px: bool,
-) -> np.ndarray:
-    """`[object, 2, row]`, m, x along the travel, y up; pixels from object 1 without an origin."""
-    position = table.position
-    if not is_px:
-        origin = file.track_origin or (0.0, 0.0)
-    elif origin is None:
-        seen = np.flatnonzero(np.isfinite(position[0]).all(axis=0))
-        origin = tuple(position[0, :, seen[0]]) if seen.size else (0.0, 0.0)
-    x, y = position[:, 0] - origin[0], position[:, 1] - origin[1]
-    y = -y if y_axis == "down" else y
-    calibration = table.calibration
-    if calibration is not None:
-        if math.isfinite(calibration.pixels_per_unit[0]):
-            y = y * calibration.pixels_per_unit[0] / calibration.pixels_per_unit[1]
-        cos, sin = math.cos(calibration.roll_rad), math.sin(calibration.roll_rad)
-        x, y = cos * x + sin * y, cos * y - sin * x
-    found = np.stack([x if file.direction == "right" else -x, y], axis=1) * metres
-    return np.where(np.isfinite(found).all(axis=1, keepdims=True), found, np.nan)
 
 
 def _frame_rate(times_s: np.ndarray) -> float:

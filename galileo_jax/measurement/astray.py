@@ -156,7 +156,7 @@ def _leapt(clip: Clip, observation: Observation, i: int, seen: np.ndarray) -> in
     step_s = np.diff(observation.times_s[seen])
     velocity = np.diff(place) / step_s
     jump = np.hypot(*np.diff(velocity))
-    variance = np.einsum("iit->t", observation.covariance_m2[i, :2, :2][..., seen]) / 2
+    variance = observation.variance_m2[i, seen]
     step_variance = (variance[1:] + variance[:-1]) / step_s**2
     sd = np.sqrt(step_variance[1:] + step_variance[:-1])
     most = BLOW_M_S2 * (step_s[1:] + step_s[:-1]) / 2 + CLEAR * sd

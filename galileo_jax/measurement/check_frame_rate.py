@@ -1,22 +1,26 @@
-"""A frame rate that is wrong by a factor, from the gravity that a clip would have.
+"""A frame rate or a unit that is wrong by a factor, from the gravity that a clip would have.
 
-    gravity by the path = true gravity x (true rate / declared rate)^-2
+    gravity by the path = true gravity x (true rate / declared rate)^-2 x declared unit / true unit
 
 In a fall or a flight gravity is what the path bends by. On a ramp with a table it is
 (a + d cos A) / sin A, a the acceleration down the ramp, d the deceleration on the table: constant
-friction drops out. Without a table only a / sin A is available; friction lowers it, so only values
-that are too large are reported. Effects that were not declared change gravity by tens of per cent,
-a wrong frame rate by the square of its factor. Only large factors are therefore reported.
+friction drops out. Without a table only a / sin A is available, and on the level only d / 1;
+friction lowers the one and is hardly more than 1 in the other, so only values that are too large
+are reported. Of a pendulum it is L (2 pi / T)^2 with the declared thread L. Effects that were not
+declared change gravity by tens of per cent, a wrong frame rate by the square of its factor. Only
+large factors are therefore reported.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import f
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_axes import accelerations
+from galileo_jax.model.scene.period import period_s
 from galileo_jax.observation.observation import Observation
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
@@ -26,8 +30,11 @@ SURE_SDS = 4.0  # by which gravity must be off
 UNIT_WITHIN = 0.08  # of gravity: nearer another unit of length is the likely mistake
 PIXELS_FROM = 20.0  # times gravity: no unit of length, but pixels
 NEAR = 1.25  # a rate that is so near what gravity says is the likely one
-COMMON_FPS = (24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
+COMMON_FPS = (15, 24, 25, 29.97, 30, 48, 50, 59.94, 60, 90, 100, 120, 240, 300, 480, 500, 960, 1000)
 MIN_POINTS = 5  # of a stretch, to tell an acceleration
+CHANCE = 1e-3  # that a path is called no parabola though it is one
+SINE = 0.3  # of its scatter is what a sine leaves of a swing at most
+MOST_FRICTION = 1.0  # on a level table
 BEND_M = 0.05  # past the foot on either side, in which an object turns
 LEAST_WAY_M = 0.03  # on the table, to tell how it slows down
 MOVED_M = 0.003  # of the second object: it has been hit
@@ -61,7 +68,7 @@ def frame_rate_doubt(clip: Clip, observation: Observation) -> str | None:
     if abs(found.value - clip.gravity) < SURE_SDS * found.sd:
         return None
     likely = _likely(clip.fps * factor, clip.container_fps, found.is_least)
-    if (unit := _likely_unit(clip, found.value)) is not None:
+    if (unit := _likely_unit(clip, found)) is not None:
         nearest = min(abs(math.log(fps / clip.fps / factor)) for fps in COMMON_FPS)
         words, off = unit
         likely = f"likely {words}" if off < 2 * nearest else f"{likely} (or {words})"
@@ -84,11 +91,17 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
         return None
     seen = observation.mask[0]
     times, (x, y) = observation.times_s[seen], observation.position_m[0, :2][:, seen]
-    if clip.scenario in ("fall", "flight"):
-        windows = accelerations(times, -y)
-        found = _largest(windows)
-        return None if found is None else ApparentGravity(found, sd=_sd(windows, found))
-    if not scenario.has_ramp or not clip.ramp_angle_deg or times.size < MIN_POINTS:
+    if scenario.up_shows == "bend":
+        return _of_free_body(times, y)
+    if times.size < MIN_POINTS:
+        return None
+    if clip.thread_m is not None:
+        return _of_pendulum(clip.thread_m, times, x)
+    if scenario.is_level or scenario.angle_deg == 0:
+        along = np.hypot(*np.array([x - x[0], y - y[0]]))
+        slowing = _largest(accelerations(times, -along))
+        return None if slowing is None else ApparentGravity(slowing / MOST_FRICTION, is_least=True)
+    if not scenario.has_ramp or not clip.ramp_angle_deg:
         return None
     angle = math.radians(clip.ramp_angle_deg)
     along = x * math.cos(angle) - y * math.sin(angle)
@@ -102,13 +115,57 @@ def apparent_gravity(clip: Clip, observation: Observation) -> ApparentGravity | 
     return ApparentGravity((down + slowing * math.cos(angle)) / math.sin(angle))
 
 
-def _likely_unit(clip: Clip, value: float) -> tuple[str, float] | None:
+def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | None:
+    """By one parabola where nothing more than scatter is left of it, else by those of windows."""
+    found = _of_windows(accelerations(times, -height))
+    size = len(times) - 5
+    if size < 1 or np.ptp(height) == 0:
+        return found
+    (left, parabola), (left_of_more, _) = (_polynomial(times, height, n) for n in (2, 4))
+    gain = (left - left_of_more) / 2 / max(left_of_more / size, np.finfo(float).tiny)
+    return found if gain > f.isf(CHANCE, 2, size) else parabola
+
+
+def _polynomial(
+    times: np.ndarray, height: np.ndarray, degree: int
+) -> tuple[float, ApparentGravity]:
+    """(sum of squares that it leaves, gravity by its bend in the middle)."""
+    since = times - times.mean()
+    design = np.vander(since, degree + 1)
+    solution = np.linalg.lstsq(design, height, rcond=None)[0]
+    left = float(np.sum((height - design @ solution) ** 2))
+    scatter = left / (len(times) - degree - 1)
+    variance = scatter * float(np.linalg.inv(design.T @ design)[-3, -3])
+    return left, ApparentGravity(-2 * float(solution[-3]), sd=2 * math.sqrt(variance))
+
+
+def _of_windows(windows: np.ndarray) -> ApparentGravity | None:
+    found = _largest(windows)
+    return None if found is None else ApparentGravity(found, sd=_sd(windows, found))
+
+
+def _of_pendulum(thread_m: float, times: np.ndarray, x: np.ndarray) -> ApparentGravity | None:
+    """From its period; None of less than a period, or of a swing that is no sine."""
+    period = period_s(times, x)
+    turn = 2 * math.pi * times / period
+    design = np.stack([np.ones_like(turn), np.cos(turn), np.sin(turn)], axis=1)
+    solution = np.linalg.lstsq(design, x, rcond=None)[0]
+    left = float(np.std(x - design @ solution) / np.std(x))
+    if np.ptp(times) < period or left > SINE:
+        return None
+    amplitude = min(float(np.hypot(*solution[1:])) / thread_m, 1.0)
+    longer = 1 + amplitude**2 / 16  # is the period than that of a narrow swing
+    return ApparentGravity(thread_m * (2 * math.pi * longer / period) ** 2)
+
+
+def _likely_unit(clip: Clip, found: ApparentGravity) -> tuple[str, float] | None:
     """The unit of length in which a track's gravity is the true one, and how far off it is then.
 
     The logarithm of the ratio; infinite of pixels, of which any scale is right. None: no unit.
     """
-    if clip.track is None or clip.track_units == "px":
+    if clip.track is None or clip.track_units == "px" or clip.thread_m is not None:
         return None
+    value = found.value
     key = "its columns in" if clip.is_own_track else "track_units:"
     pixels = f"{key} px with {value / clip.gravity:.4g} pixels per metre"
     are_pixels = value > PIXELS_FROM * clip.gravity
@@ -117,8 +174,15 @@ def _likely_unit(clip: Clip, value: float) -> tuple[str, float] | None:
         unit: abs(math.log(value * metres / declared / clip.gravity))
         for unit, metres in METRES_PER_UNIT.items()
     }
+    if found.is_least:
+        would_do = [
+            unit for unit, metres in METRES_PER_UNIT.items()
+            if value * metres / declared / clip.gravity < LEAST_FACTOR
+            and (value / clip.gravity) * metres / declared > 1 / PIXELS_FROM**2
+        ]  # fmt: skip
+        return (f"{key} {' | '.join(would_do)}", math.inf) if would_do else None
     best = min(off, key=lambda unit: off[unit])
-    if off[best] > UNIT_WITHIN:
+    if off[best] > max(UNIT_WITHIN, 2 * found.sd / value):
         return (pixels, math.inf) if are_pixels else None
     would_be = value * METRES_PER_UNIT[best] / declared
     words = f"{key} {best}, with which it would be {would_be:.3g} m/s^2"

@@ -6,7 +6,9 @@ blow by something that is no partner. What lies beyond is left out, and a `Cut` 
     board without a table    from the rest after which it comes down, and from where the hand is
                              off; to a stop, a blow, or the rest after which it is carried away
     level                    from where it gains no more speed; to a stop or a blow
-    fall, flight             to a stop (fall) or a blow, unless a floor is declared
+    fall, flight, board      to where the film goes over to slow motion
+    fall, flight             from where the hand is off; to a stop (fall) or a blow, unless a floor
+                             is declared
     toss                     to the first impact
     pendulum, spring, liquid from where it is let go, to a blow or a stop
     ramp                     to where a box tips over, two that touch turn aside, or object 1 comes
@@ -27,9 +29,10 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.find_blow import blow_frame, goes_on
 from galileo_jax.measurement.find_bounce import bounce_frame
 from galileo_jax.measurement.find_fold import fold_frame
-from galileo_jax.measurement.find_hand import hand_frame, pushed_frame
+from galileo_jax.measurement.find_hand import hand_frame, pushed_frame, thrown_frame
 from galileo_jax.measurement.find_held import let_go_frame, standstill_frame
 from galileo_jax.measurement.find_placed import placed_frames
+from galileo_jax.measurement.find_rate_change import rate_change
 from galileo_jax.measurement.find_rest import rest_frame
 from galileo_jax.measurement.find_return import return_frame
 from galileo_jax.measurement.find_stop import SMEARED_FRAMES, arrest_frame
@@ -40,6 +43,10 @@ from galileo_jax.observation.observation import Observation
 
 STOPPED = "is stopped by something that is not in the scene"
 STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
+CHANGES_RATE = (
+    "goes on {:.3g} times as fast, its acceleration by the square of that: the frame rate changes "
+    "there (slow motion?), which only a cut film or a table with true times can mend"
+)
 LANDED = "comes down on the table"
 RESTS = "is at rest, and so is everything else that is still seen"
 PLACED = "is put into its place by a hand before that"
@@ -105,6 +112,9 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
         )
         if frame is not None
     ]
+    may_slow = is_board(clip) or (clip.scenario in ("fall", "flight") and not clip.has_floor)
+    if may_slow and (change := rate_change(observation)) is not None:
+        ends.append((change.last, CHANGES_RATE.format(change.factor)))
     if ends:
         last, end = min(ends)
         if end == STOPPED and goes_on(observation, last):
@@ -115,6 +125,9 @@ def cut(clip: Clip, observation: Observation) -> tuple[Observation, tuple[Cut, .
         cuts = [each for each in cuts if each.side == "before"]
         cuts.append(Cut(observation.names[0], float(observation.times_s[last]), "after", end))
     first = hand_frame(observation) if is_let_go else None
+    is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
+    if is_free and not clip.objects[0].first_frame:
+        first = thrown_frame(observation, rest_belongs=clip.scenario == "fall")
     if is_board(clip) and SCENARIOS[clip.scenario].angle_deg == 0:
         first, why = pushed_frame(observation), PUSHED
     if first is not None:

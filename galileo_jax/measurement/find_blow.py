@@ -49,7 +49,7 @@ def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False
     times_s, place_m = observation.times_s[seen], observation.position_m[index][:axes, seen]
     step_s = np.diff(times_s)
     velocity = np.diff(place_m) / step_s
-    variance = np.einsum("iit->t", observation.covariance_m2[index][:axes, :axes, seen]) / 2
+    variance = observation.variance_m2[index, seen]
     sd = np.sqrt(variance[1:] + variance[:-1]) / step_s
     middle_s = times_s[:-1] + step_s / 2
     windows = np.lib.stride_tricks.sliding_window_view(velocity, STEPS, axis=1)
@@ -94,15 +94,29 @@ def last_before(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, 
         left[last] = count * np.linalg.slogdet(beside @ beside.T / count + floor)[1]
     last = max(last for last, cost in left.items() if cost <= min(left.values()) + AS_WELL)
     for _ in range(SMEARED):
-        if _continues(times_s, place_m, variance, last):
+        if continues(times_s, place_m, variance, last):
             break
         last -= 1
     return last
 
 
-def _continues(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, last: int) -> bool:
-    """Whether a frame lies where the parabola of those before it goes on to, `CLEAR` sd at most."""
-    own = slice(max(last - PARABOLA_FRAMES, 0), last)
+def continues(
+    times_s: np.ndarray,
+    place_m: np.ndarray,
+    variance: np.ndarray,
+    last: int,
+    own: slice | None = None,
+) -> bool:
+    """Whether a frame lies where the parabola of others goes on to, `CLEAR` sd at most.
+
+    Args:
+      times_s: `[frame]`.
+      place_m: `[axis, frame]`.
+      variance: `[frame]`, m^2.
+      last: the frame.
+      own: the others; None: those before it.
+    """
+    own = slice(max(last - PARABOLA_FRAMES, 0), last) if own is None else own
     since = times_s[own] - times_s[last]
     if len(since) < FEWEST:
         return True

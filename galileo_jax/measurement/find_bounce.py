@@ -34,7 +34,7 @@ def bounce_frame(observation: Observation) -> int | None:
     """
     seen = np.flatnonzero(observation.mask[0])
     times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
-    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / len(place_m)
+    variance = observation.variance_m2[0, seen]
     if len(seen) < 2 * FEWEST:
         return None
     middles = range(FEWEST - 1, len(seen) - FEWEST)

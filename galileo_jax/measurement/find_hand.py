@@ -9,16 +9,22 @@ the first EARLY of the way,
 
 The windows begin where the object has clearly left its place, so that none lies across a release
 from rest.
+
+What falls or flies has one acceleration, in size and direction, as soon as it is free: the hand is
+on where that of a window differs from the usual one by more than `HELD` of it. When it comes free
+exactly the parabola of what follows tells, back to the first frame that it does not meet.
 """
 
 import numpy as np
 
+from galileo_jax.measurement.find_blow import continues
 from galileo_jax.observation.observation import Observation
 
 HELD, PUSHED, CLEAR = 0.5, 2.0, 4.0
 WAY, EARLY = (0.15, 0.7), 0.2  # shares of the length of the way
 WINDOW_SHARE, FEWEST = 0.05, 6  # of the frames in motion; frames
 PUSHED_WAY = 0.5  # of the way on a level table
+LATER = 0.4  # of the windows of what falls or flies: the others tell what is usual
 MOST_SPREAD = 0.5  # of a_way within the way: what accelerates so unevenly has no usual way
 
 
@@ -28,7 +34,7 @@ def hand_frame(observation: Observation) -> int | None:
     if len(seen) < 4 * FEWEST:
         return None
     times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
-    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
+    variance = observation.variance_m2[0, seen]
     gone, length = _gone(place_m)
     left = gone > CLEAR * np.sqrt(variance + variance[0]) + 1e-3 * length
     began = len(left) - int(np.argmin(np.append(left[::-1], False)))
@@ -61,7 +67,7 @@ def pushed_frame(observation: Observation) -> int | None:
     if len(seen) < 4 * FEWEST:
         return None
     times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
-    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
+    variance = observation.variance_m2[0, seen]
     gone, length = _gone(place_m)
     size = max(FEWEST, round(WINDOW_SHARE * len(seen)))
     starts = np.arange(len(seen) - size + 1)
@@ -70,6 +76,77 @@ def pushed_frame(observation: Observation) -> int | None:
     if not gains.size or gone[gains[-1] + size - 1] > PUSHED_WAY * length:
         return None
     return int(seen[min(gains[-1] + size, len(seen) - 1)])
+
+
+def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
+    """The first frame in which object 1 is free of the hand that throws or drops it; None: at once.
+
+    Args:
+      observation: the motion of the scene, to where it ends.
+      rest_belongs: whether it may lie still at first, without a hand.
+    """
+    axes = 2 if observation.is_turning else observation.position_m.shape[1]
+    seen = np.flatnonzero(observation.mask[0])
+    if len(seen) < 3 * FEWEST:
+        return None
+    times_s, place_m = observation.times_s[seen], observation.position_m[0][:axes, seen]
+    variance = observation.variance_m2[0, seen]
+    if rest_belongs:
+        gone = np.linalg.norm(place_m - place_m[:, :1], axis=0)
+        moves = gone > CLEAR * np.sqrt(variance + variance[0]) + 1e-3 * gone.max()
+        began = len(moves) - int(np.argmin(np.append(moves[::-1], False)))
+        times_s, place_m, variance = times_s[began:], place_m[:, began:], variance[began:]
+        seen = seen[began:]
+    size, held = max(FEWEST, round(WINDOW_SHARE * len(seen))), -1
+    while 3 * size <= len(seen):
+        held, is_clear = _last_held(times_s, place_m, variance, size)
+        if held >= 0 or is_clear:
+            break
+        size *= 2  # so short a window does not tell the acceleration
+    first = held + size if held >= 0 else 0
+    free = slice(first, min(first + max(2 * FEWEST, 2 * size), len(seen)))
+    while first > 0 and continues(times_s, place_m, variance, first - 1, free):
+        first -= 1
+    return int(seen[first]) if first else None
+
+
+def _last_held(
+    times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, size: int
+) -> tuple[int, bool]:
+    """Where the last window with a hand on begins, -1: none; and whether noise lets it show."""
+    starts = np.arange(len(times_s) - size + 1)
+    each = [_accelerations(times_s, one, variance, starts, size) for one in place_m]
+    found, sd = np.array([one for one, _ in each]), max(one for _, one in each)
+    velocity = np.gradient(place_m, times_s, axis=1)[:, starts + size // 2]
+    is_later = starts >= LATER * len(starts)
+    apart, weight = _beside_free(found, velocity, is_later, sd)
+    scatter = max(1.4826 * float(np.median(apart[is_later])), sd)
+    clear = max(HELD * weight, CLEAR * scatter, CLEAR * float(np.quantile(apart[is_later], 0.75)))
+    held = np.flatnonzero((apart > clear) & ~is_later)
+    return (int(starts[held[-1]]) if held.size else -1), clear == HELD * weight
+
+
+def _beside_free(
+    found: np.ndarray, velocity: np.ndarray, is_later: np.ndarray, sd: float
+) -> tuple[np.ndarray, float]:
+    """What the later windows' weight, drag and lift leave of each, `[window]`; and the weight.
+
+    Drag is along the velocity and as its square, lift across it and as itself. How large they may
+    be is of the size of the weight.
+    """
+    speed = np.linalg.norm(velocity, axis=0)
+    usual = np.median(found[:, is_later], axis=1)
+    weight, top = float(np.linalg.norm(usual)), max(float(speed[is_later].max()), 1e-30)
+    air = [-speed * velocity / top**2]
+    air += [np.stack([-velocity[1], velocity[0], *(0 * velocity[2:])]) / top]
+    axes = [np.broadcast_to(axis[:, None], velocity.shape) for axis in np.eye(len(velocity))]
+    columns = np.stack([*axes, *air], axis=-1)  # [axis, window, unknown]
+    held_fast = np.diag([*np.zeros(len(axes)), *(2 * [max(sd / max(weight, 1e-30), 1e-6)])])
+    design = np.concatenate([columns[:, is_later].reshape(-1, columns.shape[-1]), held_fast])
+    seen = np.append(found[:, is_later].reshape(-1), np.zeros(len(held_fast)))
+    solution = np.linalg.lstsq(design, seen, rcond=None)[0]
+    weight = float(np.linalg.norm(solution[: len(axes)]))
+    return np.linalg.norm(found - columns @ solution, axis=0), weight
 
 
 def _accelerations(

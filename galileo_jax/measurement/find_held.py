@@ -25,7 +25,7 @@ def let_go_frame(observation: Observation) -> int | None:
         return None
     stood = np.median(place[:, :LEAST_FRAMES], axis=1, keepdims=True)
     gone = np.linalg.norm(place - stood, axis=0)
-    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen])
+    variance = 2 * observation.variance_m2[0, seen]
     farthest = int(np.argmax(gone > EARLY[1] * gone.max()))  # where the first way is that long
     low = max(EARLY[0] * gone.max(), STILL_SD * float(np.sqrt(np.median(variance))))
     moves = np.flatnonzero(gone[: farthest + 1] > low)
@@ -55,7 +55,7 @@ def standstill_frame(observation: Observation) -> int | None:
     ended = times > times[-1] - REST_S if len(seen) else np.zeros(0, bool)
     if ended.sum() < 2 * ENOUGH or ended.all():
         return None
-    variance = np.einsum("iit->t", observation.covariance_m2[0][..., seen])
+    variance = 2 * observation.variance_m2[0, seen]
     still = STILL_SD * float(np.sqrt(np.median(variance)))
     away = np.linalg.norm(place - np.median(place[:, ended], axis=1, keepdims=True), axis=0) > still
     if (away & ended).any() or not away.any():

@@ -58,7 +58,7 @@ def _is_still(observation: Observation, seen: np.ndarray, size: int) -> np.ndarr
     """Which of the frames seen lie in a window at rest, `[frame]`."""
     place = observation.position_m[0][:, seen]
     third = size // 3
-    variance = float(np.median(np.einsum("iit->t", observation.covariance_m2[0][..., seen]))) / 2
+    variance = float(np.median(observation.variance_m2[0, seen]))
     extent = float(np.hypot(*np.ptp(place, axis=1)))
     most = max(STILL * extent, CLEAR * np.sqrt(2 * variance / third))
     means = np.lib.stride_tricks.sliding_window_view(place, third, axis=1).mean(axis=-1)

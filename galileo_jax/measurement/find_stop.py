@@ -30,7 +30,7 @@ def arrest_frame(observation: Observation) -> int | None:
     times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
     step_s = np.diff(times_s)
     velocity = np.diff(place_m) / step_s
-    along = np.einsum("iit->t", observation.covariance_m2[0][..., seen]) / 2
+    along = observation.variance_m2[0, seen]
     speed_sd = np.sqrt(along[1:] + along[:-1]) / step_s
     for i in range(BEFORE + 1, len(step_s)):
         way = velocity[:, i - 1 - BEFORE : i - 1].sum(axis=1)

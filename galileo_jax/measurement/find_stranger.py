@@ -38,7 +38,7 @@ def _hard(clip: Clip, observation: Observation, i: int) -> int | None:
     seen = np.flatnonzero(observation.mask[i])
     step_s = np.diff(observation.times_s[seen])
     velocity = np.diff(observation.position_m[i, :2][:, seen]) / step_s
-    variance = np.einsum("iit->t", observation.covariance_m2[i, :2, :2][..., seen]) / 2
+    variance = observation.variance_m2[i, seen]
     step_variance = (variance[1:] + variance[:-1]) / step_s**2
     sd = np.sqrt(step_variance[1:] + step_variance[:-1])
     jump = np.linalg.norm(np.diff(velocity), axis=0)

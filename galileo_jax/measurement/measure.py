@@ -187,9 +187,9 @@ def _moving(clip: Clip, observation: Observation, cuts: Sequence[Cut], remarks: 
     On a ramp with a table whoever moves at first was perhaps pushed, which is an effect: it is said
     and not assumed.
     """
-    if any(each.why == HELD for each in cuts):
-        return clip.model_copy(update={"starts_moving": True})
     scenario = SCENARIOS[clip.scenario]
+    if any(each.why == HELD for each in cuts) and "starts_moving" in scenario.keys:
+        return clip.model_copy(update={"starts_moving": True})
     if clip.starts_moving is not None or "starts_moving" not in scenario.keys:
         return clip
     found = start_speed(on_ramp(observation) if scenario.has_table else observation)

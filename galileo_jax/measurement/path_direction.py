@@ -1,25 +1,29 @@
-"""Does an object go the way that is declared? Down the board, or straight down.
+"""Does an object go the way that is declared? Down the board, along the table, or straight down.
 
 The direction of a straight path is the principal axis of its points. A camera stands level within
 half a degree; a path that leaves the declared way by more than `CLEAR` standard deviations is said.
-By more than `TURNED_DEG`, no angle was read off wrongly: a table's axes are turned (lengths along
-the board as x, a camera on its side), and its points are turned back.
+By more than `TURNED_DEG`, or where the path lies along an axis of a table, no angle was read off
+wrongly: the axes are turned (lengths along the board as x, a camera on its side). The way along the
+path is then the way along the declared line.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.track_axes import line_observation, sign_along
 from galileo_jax.measurement.infer_slope import LEVEL_SD_DEG
-from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 
 CLEAR = 4.0
 TURNED_DEG = 6.0
+NEARER = 3.0
+"""By so many times an axis of a table must be nearer to the path than the declared way."""
 FEWEST = 5  # points
-STRAIGHT = 0.02  # of its length: a path that bends by more has no direction
+STRAIGHT = 0.02  # of its length: a path that bends by more has no direction but an axis's
 MOST_SD_DEG = 1.0
 
 
@@ -30,7 +34,7 @@ class OtherWay:
     Attributes:
       declared_deg: below the horizontal, along the travel.
       path_deg, sd_deg: the path's, as it was measured.
-      is_turned_back: whether the points were turned, so that the declared angle is used.
+      is_turned_back: whether the way along the path is taken for the declared way.
     """
 
     declared_deg: float
@@ -54,38 +58,44 @@ def other_way(clip: Clip, observation: Observation, may_turn: bool) -> OtherWay 
         return None
     declared = clip.ramp_angle_deg if scenario.has_ramp else 90.0
     assert declared is not None
-    found = _direction_deg(observation)
+    found = _direction(observation)
     if found is None:
         return None
-    path, sd = found
+    along, sd, is_straight = found
+    path = _below_horizontal_deg(along)
     apart = abs(_turn_deg(declared, path, "spring" in scenario.laws))
     known = math.hypot(sd, LEVEL_SD_DEG, clip.ramp_angle_sd_deg)
-    if sd > MOST_SD_DEG or apart < CLEAR * known:
+    off_axis = min(abs(path) % 90.0, 90.0 - abs(path) % 90.0)
+    is_along_axis = apart > NEARER * max(off_axis, sd)
+    if may_turn and is_along_axis:
+        return OtherWay(declared, path, sd, True)
+    if sd > MOST_SD_DEG or not is_straight or apart < CLEAR * known:
         return None
     return OtherWay(declared, path, sd, may_turn and apart > TURNED_DEG)
 
 
 def turned_back(clip: Clip, observation: Observation, way: OtherWay) -> Observation:
-    """The observation with its axes turned so that object 1 goes where it is declared to go."""
-    is_swing = "spring" in SCENARIOS[clip.scenario].laws
-    angle = -math.radians(_turn_deg(way.declared_deg, way.path_deg, is_swing))
-    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-    modes = observation.modes_m
-    return replace(
-        observation,
-        position_m=np.einsum("ab,obt->oat", turn, observation.position_m),
-        covariance_m2=np.einsum("ab,obct,dc->oadt", turn, observation.covariance_m2, turn),
-        modes_m=None if modes is None else np.einsum("ab,mobt->moat", turn, modes),
-    )
+    """The observation with the ways along object 1's path as ways along the declared line.
+
+    What lies across the path says nothing of motion along a line, and counts as not measured.
+    """
+    angle = math.radians(way.path_deg)
+    along = np.array([math.cos(angle), -math.sin(angle)])
+    gone = np.einsum("a,oat->ot", along, observation.position_m)
+    sd_m = np.sqrt(np.einsum("a,b,oabt->ot", along, along, observation.covariance_m2))
+    sign = sign_along(clip, observation.times_s, gone[0])
+    return line_observation(clip, observation.names, observation.times_s, sign * gone, sd_m)
 
 
 def way_text(clip: Clip, way: OtherWay) -> str:
     """The two directions, and which is used, in a line without the clip's name."""
     falls = "falls" if way.path_deg >= 0 else "rises"
+    scenario = SCENARIOS[clip.scenario]
     declared = (
         f"ramp_angle_deg: {way.declared_deg:g} is declared"
-        if SCENARIOS[clip.scenario].has_ramp
-        else f"straight down is what scenario {clip.scenario} says"
+        if scenario.has_ramp and scenario.angle_deg is None
+        else f"{'level' if scenario.has_ramp else 'straight down'} is what scenario "
+        f"{clip.scenario} says"
     )
     text = (
         f"{clip.objects[0].name}'s path {falls} by {abs(way.path_deg):.1f} +- {way.sd_deg:.1g} "
@@ -102,10 +112,18 @@ def _turn_deg(declared_deg: float, path_deg: float, is_either: bool) -> float:
     return (declared_deg - path_deg + period / 2) % period - period / 2
 
 
-def _direction_deg(observation: Observation) -> tuple[float, float] | None:
-    """Below the horizontal, and its standard deviation; None where it is not straight."""
-    points = observation.position_m[0, :2][:, observation.mask[0]]
-    if points.shape[1] < FEWEST or observation.position_m.shape[1] != 2:
+def _below_horizontal_deg(along: np.ndarray) -> float:
+    return math.degrees(math.atan2(-along[1], along[0]))
+
+
+def _direction(observation: Observation) -> tuple[np.ndarray, float, bool] | None:
+    """A unit vector along the path, its sd in degrees, and whether the path is straight."""
+    if observation.position_m.shape[1] != 2:
+        return None
+    points = observation.position_m[0][:, observation.mask[0]]
+    covariance = observation.covariance_m2[0][..., observation.mask[0]]
+    trace = np.einsum("aat->t", covariance)
+    if points.shape[1] < FEWEST or trace.max() >= UNMEASURED_SD_M**2:
         return None
     gone = points - points[:, :1]
     away = points - points.mean(axis=1, keepdims=True)
@@ -113,10 +131,9 @@ def _direction_deg(observation: Observation) -> tuple[float, float] | None:
     furthest = gone[:, int(np.argmax((gone**2).sum(axis=0)))]
     along = axes[:, 1] * math.copysign(1.0, axes[:, 1] @ furthest)
     length = float(np.ptp(along @ away))
-    if not length or np.abs(axes[:, 0] @ away).max() > STRAIGHT * length:
+    if not length:
         return None
-    covariance = observation.covariance_m2[0][..., observation.mask[0]]
-    noise = float(np.median(np.einsum("aat->t", covariance))) / 2
+    is_straight = bool(np.abs(axes[:, 0] @ away).max() <= STRAIGHT * length)
+    noise = float(np.median(trace)) / 2
     scatter = max(float(values[0]) / (points.shape[1] - 2), noise)
-    sd = math.degrees(math.sqrt(scatter / float(values[1])))
-    return math.degrees(math.atan2(-along[1], along[0])), sd
+    return along, math.degrees(math.sqrt(scatter / float(values[1]))), is_straight

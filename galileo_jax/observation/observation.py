@@ -11,6 +11,9 @@ UNMEASURED_SD_M = 10.0
 """Across the way of a motion of which one coordinate was measured: the error says nothing, and is
 still small enough for the other's to keep its digits in one covariance."""
 
+LEAST_SD_M = 1e-6
+"""Smaller errors do not keep their digits beside it."""
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -69,6 +72,16 @@ class Observation:
         one, frame = np.nonzero(trace >= UNMEASURED_SD_M**2)
         found[one, :, frame] = np.linalg.eigh(covariance[one, :, :, frame])[1][..., -1]
         return found
+
+    @property
+    def variance_m2(self) -> Float[np.ndarray, "object frame"]:
+        """The mean variance of a coordinate of place that was measured, m^2; NaN where none was."""
+        axes = 2 if self.is_turning else self.position_m.shape[1]
+        trace = np.einsum("oaat->ot", self.covariance_m2[:, :axes, :axes])
+        is_line = np.where(self.mask, trace, 0.0) >= UNMEASURED_SD_M**2
+        # What is left of the digits of a covariance beside what was not measured.
+        along = np.maximum(trace - UNMEASURED_SD_M**2, LEAST_SD_M**2)
+        return np.where(is_line, along, trace / axes)
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -124,13 +124,16 @@ class Unpacked:
 
 
 def _beside(path: Path) -> list[Path]:
-    """The yaml of a clip, and the video or track that it names."""
+    """The yaml of a clip, and the video or the tables that it names."""
     try:
         yaml = find_yaml(path)
         content = read_mapping(yaml)
     except InputError:
         return []
     named = [content.get(key) for key in ("video", "track")]
+    objects = content.get("objects")
+    items = objects if isinstance(objects, list) else []
+    named += [item.get("track_file") for item in items if isinstance(item, dict)]
     return [yaml, *(yaml.parent / name for name in named if isinstance(name, str))]
 
 

@@ -34,11 +34,12 @@ def clock_times(path: Path, rows: Rows, title: str, at: int, fps: float | None) 
       InputError: a cell is of another form than the first; or whether the last of four fields
         counts frames or hundredths cannot be told.
     """
-    cells = [(line, row[at] if at < len(row) else "") for line, row in rows]
-    first = next((cell for _, cell in cells if not is_nothing(cell)), "")
+    there = (row[at] for _, row in rows if at < len(row))
+    first = next((cell for cell in there if not is_nothing(cell)), "")
     form = next((one for one in (FIELDS, CLOCK, DATE) if one.fullmatch(first)), None)
     if form is None or not is_time(first):
         return None
+    cells = [(line, row[at] if at < len(row) else "") for line, row in rows]
     parsed = []
     for line, cell in cells:
         match = form.fullmatch(cell)

@@ -24,6 +24,7 @@ SAMPLE = 60
 """Lines that tell the dialect; from the middle on, where no titles are."""
 
 MAX_ROWS, MAX_CELLS, MAX_LINE = 200_000, 4_000_000, 200_000
+MAX_COLUMNS = 1000
 EMPTY = "empty; a row of titles and numbers expected"
 
 
@@ -154,6 +155,10 @@ def _split(path: Path, lines: list[tuple[int, str]], separator: str) -> Rows:
 
 
 def _checked(path: Path, rows: Rows) -> Rows:
+    if (width := max(len(row) for _, row in rows)) > MAX_COLUMNS:
+        raise InputError(
+            f"{path}: {width} columns; at most {MAX_COLUMNS} expected; keep time and place"
+        )
     if (count := sum(len(row) for _, row in rows)) > MAX_CELLS:
         raise InputError(
             f"{path}: {count} cells; at most {MAX_CELLS} expected; keep time and place"

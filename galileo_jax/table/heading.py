@@ -11,7 +11,7 @@ from pathlib import Path
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.clock import is_time
 from galileo_jax.table.grid import COMMENT
-from galileo_jax.table.numbers import Rows, is_nothing, is_number
+from galileo_jax.table.numbers import MOST_LOOKED_AT, Rows, is_nothing, is_number
 from galileo_jax.table.titles import Title, title_of, unit_of
 
 MULTI = "multi:"
@@ -37,6 +37,12 @@ class Heading:
     body: Rows
     is_titled: bool
     frame_s: float | None = None
+
+    def name_of(self, n: int) -> str:
+        """What messages call a column; no two are the same."""
+        title = self.titles[n]
+        is_alone = title and self.titles.count(title) == 1
+        return title if is_alone else f"{title} (column {n + 1})" if title else f"column {n + 1}"
 
 
 def split_heading(path: Path, rows: Rows) -> Heading:
@@ -102,7 +108,7 @@ def _is_value(cell: str) -> bool:
 
 def _word_columns(rows: Rows, width: int) -> set[int]:
     """Columns of words: labels that most rows have."""
-    later = [row for _, row in rows[len(rows) // 2 :]][:2000]
+    later = [row for _, row in rows[len(rows) // 2 :][:MOST_LOOKED_AT]]
     found = set()
     for n in range(width):
         cells = [row[n] for row in later if n < len(row) and not is_nothing(row[n])]
@@ -148,8 +154,8 @@ def _last_used(body: Rows, words: set[int]) -> tuple[int, int]:
     """(last column that has a cell, line where it has)."""
     best = (-1, 0)
     for line, row in body:
-        last = max((n for n, cell in enumerate(row) if cell and n not in words), default=-1)
-        best = max(best, (last, -line))
+        used = (n for n in range(len(row) - 1, -1, -1) if row[n] and n not in words)
+        best = max(best, (next(used, -1), -line))
     return best[0], -best[1]
 
 

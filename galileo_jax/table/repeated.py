@@ -1,9 +1,33 @@
-"""Rows with the same time: one that is written twice, and two places at one time."""
+"""Rows with the same time, and times that begin anew: one motion after the other in one table."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+
+LEAST_ROWS = 4
+"""Of a motion; after fewer a smaller time is a mistake in the file."""
+MOST_STEPS = 3.0
+"""From the first row of a motion to its second."""
+
+
+def motion_starts(clock: np.ndarray | None) -> tuple[int, ...]:
+    """The rows at which motions begin: the first, and those where a clock falls back to its start.
+
+    The first alone where a time goes back in any other way, which is for others to refuse.
+    """
+    if clock is None:
+        return (0,)
+    starts = [0, *(1 + np.flatnonzero(np.diff(clock) < 0)).tolist()]
+    ends = [*starts[1:], len(clock)]
+    is_whole = all(end - start >= LEAST_ROWS for start, end in zip(starts, ends, strict=True))
+    step = float(np.median(np.abs(np.diff(clock)))) if len(clock) > 1 else 0.0
+    if not is_whole:
+        return (0,)
+    begin = np.array(starts)
+    is_back = np.abs(clock[begin] - clock[0]) <= step
+    goes_on = clock[begin + 1] - clock[begin] <= MOST_STEPS * step
+    return tuple(starts) if is_back.all() and goes_on.all() else (0,)
 
 
 def without_repeats(

@@ -1,7 +1,7 @@
 """What a file says of a motion, before its units and axes are settled."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -74,6 +74,7 @@ class TrackTable:
         nothing was rounded.
       y_axis: "up" or "down"; None where the file does not tell.
       calibration: of a file in pixels; None where it has none.
+      starts: rows at which a motion begins: the first, and those in which the clock begins anew.
       columns: of a table, all that it has, in their order.
       warnings: doubts, one line each.
     """
@@ -89,5 +90,25 @@ class TrackTable:
     resolution: tuple[float, ...] = ()
     y_axis: Literal["up", "down"] | None = None
     calibration: Calibration | None = None
+    starts: tuple[int, ...] = (0,)
     columns: tuple[Column, ...] = ()
     warnings: tuple[str, ...] = ()
+
+    @property
+    def clock(self) -> np.ndarray:
+        """`[row]`: times in s, or frames where it has no times."""
+        found = self.frames if self.times_s is None else self.times_s
+        assert found is not None  # a reader gives one of the two
+        return found
+
+    def motion(self, number: int) -> "TrackTable":
+        """One of its motions, counted from 1."""
+        ends = (*self.starts[1:], self.position.shape[-1])
+        rows = slice(self.starts[number - 1], ends[number - 1])
+        return replace(
+            self,
+            position=self.position[..., rows],
+            times_s=None if self.times_s is None else self.times_s[rows],
+            frames=None if self.frames is None else self.frames[rows],
+            starts=(0,),
+        )

@@ -17,6 +17,7 @@ import numpy as np
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video.stamps import at_declared_rate, clock_of, is_blank, listed, repeats
+from galileo_jax.video.weave import NO_ROWS, Rows, first_field, rows_of
 
 MIN_FRAMES = 4
 """With fewer pictures there is no change of speed to see; also tells a picture from a film."""
@@ -197,18 +198,16 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
         yield container, stream
 
 
-def _stream(path: Path, first_field: str | None) -> Iterator[Any]:
+def _stream(path: Path, first: str | None) -> Iterator[Any]:
     """The film's frames in the order in which they are shown; damaged parts are passed over."""
     with _opened(path) as (container, stream):
-        yield from _shown(container, stream, first_field)
+        yield from _shown(container, stream, first)
 
 
-def _shown(container: Any, stream: Any, first_field: str | None) -> Iterator[Any]:
+def _shown(container: Any, stream: Any, first: str | None) -> Iterator[Any]:
     """The frames, or the fields that they are woven from."""
     decoded = _decoded(container, stream)
-    if first_field is None:
-        return decoded
-    return _filtered(decoded, stream, FIELDS.format(first_field))
+    return decoded if first is None else _filtered(decoded, stream, FIELDS.format(first))
 
 
 def _decoded(container: Any, stream: Any) -> Iterator[Any]:
@@ -224,11 +223,10 @@ def _decoded(container: Any, stream: Any) -> Iterator[Any]:
             continue
 
 
-def _filtered(decoded: Iterator[Any], stream: Any, *filters: str) -> Iterator[Any]:
-    """The frames as a chain of FFmpeg's filters makes them."""
+def _filtered(decoded: Iterator[Any], stream: Any, filter_: str) -> Iterator[Any]:
+    """The frames as one of FFmpeg's filters makes them."""
     graph = av.filter.Graph()
-    nodes = [graph.add_buffer(template=stream)]
-    nodes += [graph.add(*each.split("=", 1)) for each in filters]
+    nodes = graph.add_buffer(template=stream), graph.add(*filter_.split("=", 1))
     graph.link_nodes(*nodes, graph.add("buffersink")).configure()
     for frame in itertools.chain(decoded, (None,)):  # None: that was all
         graph.vpush(frame)
@@ -268,42 +266,28 @@ def _scan(path: Path) -> _Scan:
 @functools.lru_cache(64)
 def _scanned(path: Path, _whole: Path, *_stamp: int) -> _Scan:
     """Once for each content: who draws marks has the clip checked at every step."""
-    scan = _passed(path, _first_field(path))
+    scan, rows = _passed(path, None)
+    if (first := first_field(rows)) is not None:
+        scan, _ = _passed(path, first)
     if len(scan.kinds) == 0:
         raise InputError(f"{path}: cannot be decoded: without frames, or damaged; a video expected")
     return scan
 
 
-def _first_field(path: Path) -> str | None:
-    """Which field comes first of pictures that are woven from two; None: they are whole.
-
-    A file that says that they are woven may still hold whole pictures, and many are wrong about
-    which field is first: FFmpeg's `idet` looks at edges that move.
-    """
-    with _opened(path) as (container, stream):
-        first = next(_decoded(container, stream), None)
-        if first is None or not first.interlaced_frame:
-            return None
-    with _opened(path) as (container, stream):
-        judged = [
-            frame.metadata.get("lavfi.idet.multiple.current_frame")
-            for frame in _filtered(_decoded(container, stream), stream, "idet")
-        ]
-    found = max(("tff", "bff"), key=judged.count)
-    return found if judged.count(found) >= judged.count("progressive") else None
-
-
-def _passed(path: Path, first_field: str | None) -> _Scan:
-    stamps_s, kinds, change, contrast = [], [], [], []
+def _passed(path: Path, first: str | None) -> tuple[_Scan, Rows]:
+    """What one pass shows, of whole pictures or of fields, and what `first_field` reads."""
+    stamps_s, kinds, change, contrast, rows = [], [], [], [], NO_ROWS
     size_px, tick_s, before = (0, 0), 0.0, None
     with _opened(path) as (container, stream):
         aspect = float(stream.sample_aspect_ratio or 1)
         rate = float(stream.average_rate or 0)
         is_even = container.format.name == "avi"  # whose stamps are the order of coding
-        for frame in _shown(container, stream, first_field):
+        for frame in _shown(container, stream, first):
+            grey = frame.to_ndarray(format="gray")
             if before is None:
                 size_px = _shown_size(frame, aspect)
-            grey = frame.to_ndarray(format="gray")
+            elif first is None:
+                rows = rows + rows_of(before, grey)
             change.append(np.inf if before is None else _change(before, grey))
             contrast.append(float(cv2.meanStdDev(grey)[1][0, 0]))
             stamps_s.append(np.nan if frame.pts is None else float(frame.pts * frame.time_base))
@@ -311,11 +295,11 @@ def _passed(path: Path, first_field: str | None) -> _Scan:
             tick_s, before = float(frame.time_base or 0), grey
         missing = _num_missing(container, stream, np.array(stamps_s))
     stamps = np.sort(stamps_s) if is_even else np.array(stamps_s)
-    warnings = _said(size_px, aspect, first_field is not None)
-    return _Scan(
-        size_px, aspect, first_field, stamps, is_even, tick_s, "".join(kinds), np.array(change),
-        np.array(contrast), rate, missing, warnings,
+    scan = _Scan(
+        size_px, aspect, first, stamps, is_even, tick_s, "".join(kinds), np.array(change),
+        np.array(contrast), rate, missing, _said(size_px, aspect, first is not None),
     )  # fmt: skip
+    return scan, rows
 
 
 def _change(before: np.ndarray, grey: np.ndarray) -> float:

@@ -83,3 +83,22 @@ def test_lost_frames_are_named_and_their_time_put_back(tmp_path: Path) -> None:
     assert "missing after rows 7, 13 (2), 23" in load_clip(tmp_path / "a.yaml").warnings[0]
     whole = observed(tmp_path, {"t (s)": T, "x (m)": NOISE[1], "y (m)": FALL}, "scenario: fall")
     np.testing.assert_allclose(whole.times_s, T, atol=1e-6)
+
+
+def test_the_floor_ends_a_fall_of_one_coordinate(tmp_path: Path) -> None:
+    """What was not measured across does not hide what was."""
+    times = np.arange(60) / 60
+    height = np.maximum(1.5 - 4.905 * times**2, 0.4) + np.random.default_rng(2).normal(0, 3e-4, 60)
+    seen = observed(tmp_path, {"t (s)": times, "y (m)": height}, "scenario: fall").mask[0]
+    landed = np.sqrt(2 * 1.1 / 9.81)
+    assert abs(times[np.flatnonzero(seen)[-1]] - landed) < 2 / 60
+
+
+def test_a_spring_that_swings_along_x_and_wobbles(tmp_path: Path) -> None:
+    """By a twentieth of its way: no straight path, but the axis is as clear."""
+    times = np.arange(120) / 60
+    swing, wobble = 0.1 * np.cos(9 * times), 0.005 * np.cos(23 * times)
+    found = observed(
+        tmp_path, {"t (s)": times, "x (m)": swing, "y (m)": wobble}, "scenario: spring"
+    )
+    assert abs(np.corrcoef(found.position_m[0, 1], swing)[0, 1]) > 0.999

@@ -1,6 +1,9 @@
 """A frame rate wrong by a factor is told of, with the likely one; effects are not taken for it."""
 
+import math
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -111,3 +114,46 @@ def test_nonsense_is_not_likely(tmp_path):
     clip = clip.model_copy(update={"is_own_track": False})
     doubt = frame_rate_doubt(clip, replace(seen, position_m=2e-4 * seen.position_m))
     assert doubt is not None and "no usual rate explains that" in doubt and "; likely" not in doubt
+
+
+def table(folder: Path, keys: dict, times: np.ndarray, place: np.ndarray) -> tuple:
+    """A clip of a table in metres and what is seen in it, with errors of 10 mm."""
+    noise = 0.01 * np.random.default_rng(3).standard_normal(place.shape)
+    rows = [f"{t},{x},{y}" for t, x, y in zip(times, *(place + noise), strict=True)]
+    (folder / "a.csv").write_text("\n".join(["t (s),x (m),y (m)", *rows]) + "\n")
+    declared = {"track": "a.csv", "objects": [{"name": "ball", "shape": "sphere"}]} | keys
+    (folder / "a.yaml").write_text(yaml.safe_dump(declared))
+    clip = load_clip(folder / "a.yaml")
+    return clip, measure(clip).whole
+
+
+def test_eleven_coarse_rows_tell_enough(tmp_path):
+    """Whose windows scatter by half: one parabola through all tells gravity to a tenth."""
+    t = np.arange(11) / 15
+    place = np.array([1.5 * t, 3.0 * t - 9.81 / 2 * t**2])
+    clip, seen = table(tmp_path, {"scenario": "flight", "track_y": "up"}, t * 15 / 25, place)
+    doubt = frame_rate_doubt(clip, seen)
+    assert doubt is not None and "likely fps: 15" in doubt and "27" in doubt
+
+
+@pytest.mark.parametrize(("rate", "is_said"), [(1.0, False), (0.5, True), (4.0, True)])
+def test_a_pendulum_whose_thread_is_declared(rate, is_said, tmp_path):
+    t = np.arange(120) / 60
+    angle = 0.3 * np.cos(math.sqrt(9.81 / 0.5) * t)
+    place = 0.5 * np.array([np.sin(angle), -np.cos(angle)])
+    keys = {"scenario": "pendulum", "thread_m": 0.5, "track_y": "up"}
+    clip, seen = table(tmp_path, keys, t / rate, place)
+    doubt = frame_rate_doubt(clip, seen)
+    assert (doubt is not None) == is_said
+    if doubt is not None:
+        assert re.search("likely fps: (60|59.94)", doubt) and "track_units" not in doubt
+
+
+@pytest.mark.parametrize(("per_metre", "is_said"), [(1.0, False), (100.0, True)])
+def test_a_level_table_in_centimetres(per_metre, is_said, tmp_path):
+    t = np.arange(60) / 60
+    place = per_metre * np.array([1.0 * t - 0.3 * t**2, 0 * t])
+    clip, seen = table(tmp_path, {"scenario": "level"}, t, place)
+    doubt = frame_rate_doubt(clip, seen)
+    assert (doubt is not None) == is_said
+    assert doubt is None or "(or track_units: cm | mm | in)" in doubt

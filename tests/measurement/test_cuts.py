@@ -180,3 +180,34 @@ def test_the_frames_of_a_blow_go_too(steps):
     error = np.broadcast_to(sd**2 * np.eye(2)[None, :, :, None], (1, 2, 2, len(y)))
     times, mask = np.arange(len(y)) / 250, np.ones((1, len(y)), bool)
     assert blow_frame(Observation(("object1",), times, place[None], error, mask)) == 12
+
+
+def flight_with_clock(clock: np.ndarray, bounce: float | None = None) -> Observation:
+    """A throw at true times `clock`, written at 60 frames/s; with a blow in its middle or not."""
+    place = np.array([1.5 * clock, 2.0 * clock - 9.81 / 2 * clock**2])
+    if bounce is not None:
+        half = len(clock) // 2
+        since = clock[half:] - clock[half]
+        place[0, half:] += (bounce - 1.5) * since
+    place += 3e-4 * np.random.default_rng(8).standard_normal(place.shape)
+    count = len(clock)
+    covariance = np.tile(9e-8 * np.eye(2)[None, ..., None], (1, 1, 1, count))
+    return Observation(
+        ("ball",), np.arange(count) / 60, place[None], covariance, np.ones((1, count), bool)
+    )
+
+
+def test_slow_motion_within_a_film_is_named(tmp_path):
+    """From 30 pictures a second on to 120 played as slowly: speed a quarter, acceleration 1/16."""
+    clip = load_clip(write_clip(tmp_path, "flight"))
+    steps = np.repeat([1 / 60, 1 / 240], [25, 60])
+    clock = np.cumsum(steps) - steps[0]
+    (found,) = cut(clip, flight_with_clock(clock))[1]
+    assert "goes on 0.2" in found.why and "the frame rate changes there" in found.why
+    assert found.time_s == pytest.approx(24 / 60, abs=3 / 60)
+
+
+def test_a_blow_is_no_change_of_the_rate(tmp_path):
+    clip = load_clip(write_clip(tmp_path, "flight"))
+    (found,) = cut(clip, flight_with_clock(np.arange(60) / 60, bounce=-5.0))[1]
+    assert found.why == STRUCK

@@ -71,7 +71,7 @@ def test_an_axis_along_the_slope_is_the_way_down_it(tmp_path, path_deg):
     assert abs(found.parameters["k1"]["mean"] - K1) < 0.004
     assert found.result["error"]["chi2_per_dof"] < 1.5
     (measured,) = found.measurements
-    assert any("the path lies along x" in line for line in measured.warnings)
+    assert any("the axes are taken to be turned" in line for line in measured.warnings)
 
 
 def test_a_fall_along_x(tmp_path):

@@ -66,7 +66,7 @@ def test_damaged_spreadsheets(tmp_path: Path) -> None:
     "content, words",
     [
         (b"t,x,y\n" + b"0.1,0.2,0.3\n" * 1_000_000, "1000001 rows; at most 200000"),
-        (b"1," * 10_000 + b"\n" + b"2," * 10_000 + b"\n", "not told by no titles"),
+        (b"1," * 10_000 + b"\n" + b"2," * 10_000 + b"\n", "10001 columns; at most 1000"),
         (b"1" * 5_000_000, "5000000 letters"),
     ],
     ids=["a_million_rows", "ten_thousand_columns", "one_line"],

@@ -308,3 +308,28 @@ def test_what_cannot_be_read_is_one_line(content: str, words: str, tmp_path: Pat
     with pytest.raises(InputError, match=words) as caught:
         read(tmp_path, content)
     assert "a.csv: " in str(caught.value) and "\n" not in str(caught.value)
+
+
+def unsure(title: str, share_sure: float) -> str:
+    """A throw in pixels, some of whose points are elsewhere, and how sure somebody was of each."""
+    rng = np.random.default_rng(4)
+    is_sure = rng.random(ROWS) < share_sure
+    rows = []
+    for (t, x, y), sure in zip(truth().T, is_sure, strict=True):
+        there = (400 * x, 900 - 400 * y) if sure else (700.0, 100.0)
+        rows.append(
+            f"{round(t / STEP_S)},{there[0]:.2f},{there[1]:.2f},{0.98 if sure else 0.1:.3f}"
+        )
+    return text(f"frame,nose_x,nose_y,{title}", body=rows)
+
+
+@pytest.mark.parametrize("title", ["nose_likelihood", "nose_conf", "Vertrauen"])
+def test_how_sure_a_program_was_counts_whatever_it_is_called(title: str, tmp_path: Path) -> None:
+    table = read(tmp_path, unsure(title, 0.8))
+    seen = np.isfinite(table.position[0, 0])
+    np.testing.assert_array_equal(seen, np.random.default_rng(4).random(ROWS) < 0.8)
+    assert table.unit == "px" and 0 < seen.sum() < ROWS
+
+
+def test_a_column_beside_that_is_no_sureness_is_not_taken_for_one(tmp_path: Path) -> None:
+    assert np.isfinite(read(tmp_path, unsure("area", 0.3)).position).all()

@@ -191,8 +191,10 @@ def test_what_an_edit_list_hides_is_not_there(tmp_path: Path) -> None:
     assert middle_of(next(frames(path)))[0] == pytest.approx(30 + 4 * 7, abs=0.5)
 
 
+@pytest.mark.parametrize("is_said", [True, False])
 @pytest.mark.parametrize("first", ["tff", "bff"])
-def test_fields_have_their_own_times(first: str, tmp_path: Path) -> None:
+def test_fields_have_their_own_times(first: str, is_said: bool, tmp_path: Path) -> None:
+    """Whether the file says that its pictures are woven or not."""
     fields = [disc_at(20 + 2 * index, 48) for index in range(48)]
     woven = []
     for one, other in zip(fields[::2], fields[1::2], strict=True):
@@ -201,7 +203,8 @@ def test_fields_have_their_own_times(first: str, tmp_path: Path) -> None:
         woven[-1][1::2] = lower[1::2]
     path = write_film(
         tmp_path / "clip.mp4", woven, fps=25,
-        options={"x264-params": f"{first}=1:crf=10", "flags": "+ilme+ildct"},
+        options={"x264-params": f"{first}=1:crf=10", "flags": "+ilme+ildct"}
+        if is_said else {"crf": "10"},
     )  # fmt: skip
     info = probe(path, 25.0)
     np.testing.assert_allclose(info.times_s, np.arange(48) / 50, atol=1e-6)

@@ -1,0 +1,194 @@
+"""Files as people have them: is each read right, or refused for the right reason?
+
+    python benchmarks/people.py run [--only WORD] [--journal FILE]    # goes on where it was
+    python benchmarks/people.py table [--journal FILE]                # the markdown of the docs
+
+What is right for each file stands in people.yaml. Every case is a command of its own, as a user
+would type it. The journal is of one version: delete it to measure another.
+"""
+
+import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from journal import add, finished
+
+FOLDER = Path(__file__).parents[1] / ".." / "shared" / "data" / "people"
+JOURNAL = Path("/tmp/people.jsonl")
+PACKAGE = Path(__file__).parents[1]
+CASES = Path(__file__).with_suffix(".yaml")
+TOO_LONG_S = 300.0
+DISTRUST = "do not trust"
+IMPLIED = ("track", "video", "objects")
+"""Keys that say nothing but which file, and that there is something in it."""
+
+
+def main() -> None:
+    """Runs cases, or prints their table."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("do", choices=("run", "table"))
+    parser.add_argument("--folder", type=Path, default=FOLDER)
+    parser.add_argument("--journal", type=Path, default=JOURNAL)
+    parser.add_argument("--only", default="", help="part of the file's name")
+    parser.add_argument("--package", type=Path, default=PACKAGE, help="the checkout to be tried")
+    asked = parser.parse_args()
+    cases = [one for one in yaml.safe_load(CASES.read_text()) if asked.only in one["file"]]
+    if asked.do == "run":
+        for case in cases:
+            if name_of(case) not in finished(asked.journal):
+                row = tried(asked.folder, asked.package, case)
+                add(asked.journal, row)
+                print(f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}", flush=True)
+    rows = finished(asked.journal)
+    done = [rows[name_of(case)] for case in cases if name_of(case) in rows]
+    if asked.do == "table":
+        print("\n".join(markdown(done)))
+    print(dict(Counter(row["judged"] for row in done)), file=sys.stderr)
+
+
+def name_of(case: Mapping[str, Any]) -> str:
+    """A case's name in the journal."""
+    return f"{case['file']}: {case['what']}"
+
+
+def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any]:
+    """A row: what the command said of a case, in how long, and how that is judged."""
+    with tempfile.TemporaryDirectory() as scratch:
+        place = Path(scratch) / "in"
+        shutil.copytree((folder / case["file"]).parent, place)
+        path = place / Path(case["file"]).name
+        declared = _declared(path, case)
+        path.write_text(yaml.safe_dump(declared))
+        ask = case.get("ask", "fit")
+        call = [sys.executable, "-m", f"galileo_jax.{ask}", str(path), "--out", f"{scratch}/out"]
+        call += ["--free", case["free"]] if "free" in case else []
+        began = time.monotonic()
+        code, said, cpu_s = _run(call, package)
+        wall_s = time.monotonic() - began
+        result = Path(scratch) / "out" / "result.json"
+        values = _values(json.loads(result.read_text())) if result.is_file() else {}
+    row = {"case": name_of(case), "file": case["file"], "what": case["what"], "code": code,
+           "values": {name: values[name] for name in case.get("right", {}) if name in values},
+           "right": _right(case), "wall_s": round(wall_s, 1), "cpu_s": round(cpu_s, 1),
+           "keys": _num_keys(declared), "said": said.strip().splitlines()[-25:]}  # fmt: skip
+    return row | {"judged": judged(case, row, values, said)}
+
+
+def judged(
+    case: Mapping[str, Any], row: Mapping[str, Any], values: Mapping[str, Any], said: str
+) -> str:
+    """In a word or two, how a case went."""
+    if row["wall_s"] > TOO_LONG_S:
+        return "too long"
+    if row["code"] == 2 and "refused" in case and re.search(case["refused"], said):
+        return "refused, rightly"
+    if row["code"] == 2:
+        return "refused"
+    if row["code"]:
+        return "failed"
+    is_right = all(_is_near(values.get(name), goal) for name, goal in case.get("right", {}).items())
+    is_said = re.search(case.get("words", ""), said) is not None
+    is_quiet = "never" not in case or re.search(case["never"], said) is None
+    is_only_refusal = not {"right", "words", "never"} & set(case)
+    is_trusted = DISTRUST not in said
+    if is_right and is_said and is_quiet and not is_only_refusal:
+        return "right" if is_trusted or not case.get("trusted") else "right, not trusted"
+    return "wrong" if is_trusted else "wrong, not trusted"
+
+
+def markdown(rows: list[dict[str, Any]]) -> list[str]:
+    """The rows as a table for the docs."""
+    lines = ["| File | What it is | Right | Found, 95 % interval | Judged | s | Keys |",
+             "|---|---|---|---|---|---|---|"]  # fmt: skip
+    for row in rows:
+        found = "; ".join(f"{name} {_shown(value)}" for name, value in row["values"].items())
+        name = row["file"].removesuffix(".yaml").removesuffix(".wanted")
+        lines.append(
+            f"| `{name}` | {row['what'].removeprefix('real: ')} | {row['right']} | "
+            f"{found or _line(row)} | {row['judged']} | {row['wall_s']:.0f} | {row['keys']} |"
+        )
+    return lines
+
+
+def _declared(path: Path, case: Mapping[str, Any]) -> dict[str, Any]:
+    """The clip's yaml without what a case drops, and with what it sets."""
+    declared = yaml.safe_load(path.read_text())
+    for key in case.get("drop", ()):
+        declared.pop(key, None)
+        for item in declared["objects"]:
+            item.pop(key, None)
+    return declared | case.get("set", {})
+
+
+def _run(call: list[str], package: Path) -> tuple[int, str, float]:
+    """(exit code, what it printed, processor seconds)."""
+    before = os.times()
+    try:
+        done = subprocess.run(
+            call, capture_output=True, text=True, timeout=4 * TOO_LONG_S, check=False, cwd=package,
+            env={**os.environ, "PYTHONPATH": str(package)},
+        )  # fmt: skip
+        code, said = done.returncode, f"{done.stdout}\n{done.stderr}"
+    except subprocess.TimeoutExpired:
+        code, said = 124, "stopped by the benchmark"
+    after = os.times()
+    used = after.children_user + after.children_system
+    return code, said, used - before.children_user - before.children_system
+
+
+def _values(document: Mapping[str, Any]) -> dict[str, Any]:
+    """All that a result states, by name."""
+    return {**document["nuisances"], **document["derived"], **document["parameters"]}
+
+
+def _is_near(found: Mapping[str, Any] | None, goal: Any) -> bool:
+    if found is None or not found["identified"]:
+        return False
+    low, high = found["q025"], found["q975"]
+    if isinstance(goal, Mapping):
+        return low <= goal["holds"] <= high and high - low <= goal["width"]
+    return abs(found["mean"] - goal[0]) <= goal[1]
+
+
+def _right(case: Mapping[str, Any]) -> str:
+    goals = [
+        f"{name} {goal['holds']:g}" if isinstance(goal, Mapping)
+        else f"{name} {goal[0]:g} ± {goal[1]:g}"
+        for name, goal in case.get("right", {}).items()
+    ]  # fmt: skip
+    words = [f"says `{case['words']}`"] if "words" in case else []
+    never = [f"never `{case['never']}`"] if "never" in case else []
+    or_else = [f"or refuses: `{case['refused']}`"] if "refused" in case else []
+    return "; ".join(goals + words + never + or_else).replace("|", " or ")
+
+
+def _num_keys(declared: Mapping[str, Any]) -> int:
+    items = sum(len(set(item) - {"name", "shape"}) for item in declared["objects"])
+    return len(set(declared) - set(IMPLIED)) + items
+
+
+def _shown(value: Mapping[str, Any]) -> str:
+    if not value["identified"]:
+        return "not determined"
+    return f"{value['mean']:.4g} [{value['q025']:.4g}, {value['q975']:.4g}]"
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    """What was said, where no number is asked for."""
+    said = [line for line in row["said"] if "galileo: error" in line or "warning:" in line]
+    return (said[-1] if row["code"] and said else "-").replace("|", "/")[:160]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,69 @@
+"""What is in the hand at first: the frame in which a throw or a drop becomes free."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from galileo_jax.measurement.find_hand import thrown_frame
+from galileo_jax.observation.observation import Observation
+
+G = np.array([0.0, -9.81])
+
+
+def seen(times: np.ndarray, place: np.ndarray, noise_m: float) -> Observation:
+    axes, frames = place.shape
+    place = place + noise_m * np.random.default_rng(1).standard_normal(place.shape)
+    covariance = np.tile(noise_m**2 * np.eye(axes)[None, ..., None], (1, 1, 1, frames))
+    return Observation(("ball",), times, place[None], covariance, np.ones((1, frames), bool))
+
+
+def thrown(fps: float, hand_s: float, drag_per_m: float = 0.0, lasts_s: float = 0.9) -> tuple:
+    """Speeded up evenly by a hand from rest to (2, 4) m/s; then gravity and the air."""
+    start = np.array([2.0, 4.0])
+    before = -np.arange(round(hand_s * fps), 0, -1) / fps
+    times = np.arange(round(lasts_s * fps)) / fps
+
+    def moves(_: float, state: np.ndarray) -> np.ndarray:
+        velocity = state[2:]
+        return np.append(velocity, G - drag_per_m * np.hypot(*velocity) * velocity)
+
+    found = solve_ivp(moves, (0, lasts_s), [0, 0, *start], t_eval=times, rtol=1e-9)
+    in_hand = np.outer(start, before)
+    if hand_s:
+        in_hand = in_hand + np.outer(start / hand_s, before**2 / 2)
+    all_times = np.concatenate([before, times])
+    return all_times - all_times[0], np.concatenate([in_hand, found.y[:2]], axis=1)
+
+
+@pytest.mark.parametrize("fps", [25.0, 60.0, 240.0])
+@pytest.mark.parametrize("drag_per_m", [0.0, 0.1])
+def test_a_throw_begins_when_the_hand_is_off(fps: float, drag_per_m: float) -> None:
+    times, place = thrown(fps, hand_s=0.16, drag_per_m=drag_per_m)
+    first = thrown_frame(seen(times, place, 5e-4), rest_belongs=False)
+    assert first is not None
+    # A hand's acceleration changes within so long, or within two frames and a half.
+    assert abs(times[first] - 0.16) <= max(0.05, 2.5 / fps)
+
+
+@pytest.mark.parametrize("drag_per_m", [0.0, 0.02, 0.15])
+@pytest.mark.parametrize("noise_m", [1e-5, 3e-3])
+def test_what_flies_from_the_first_frame_is_left_whole(drag_per_m: float, noise_m: float) -> None:
+    times, place = thrown(60.0, hand_s=0.0, drag_per_m=drag_per_m)
+    assert thrown_frame(seen(times, place, noise_m), rest_belongs=False) is None
+
+
+def dropped(lowered_m_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Held still, or lowered steadily, for 0.3 s; then it falls."""
+    times = np.arange(60) / 60
+    free = np.maximum(times - 0.3, 0.0)
+    height = 2 - lowered_m_s * times - 9.81 / 2 * free**2
+    return times, np.stack([0 * height, height])
+
+
+def test_a_drop_from_rest_has_no_hand_and_one_that_is_lowered_has() -> None:
+    assert thrown_frame(seen(*dropped(0.0), 5e-4), rest_belongs=True) is None
+    times, place = dropped(0.4)
+    first = thrown_frame(seen(times, place, 5e-4), rest_belongs=True)
+    assert first is not None and abs(times[first] - 0.3) <= 0.05
+    # What lies still before it is thrown is no flight.
+    assert thrown_frame(seen(*dropped(0.0), 5e-4), rest_belongs=False) is not None
