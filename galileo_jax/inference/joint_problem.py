@@ -21,6 +21,7 @@ import numpy as np
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import LogNormal, Parameter, PriorTable
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.statespace.term import Term
 
 NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
 NOISE_SCALE = Parameter("noise_scale", "1", LogNormal(1.0, NOISE_SD), 1.0, "nuisance", step=None)
@@ -161,6 +162,23 @@ class JointProblem:
                 brought[:, joint] = [parameter.name in own for own in named.values()]
                 is_given[joint] = parameter.role == "given"
         return {name: row for row, name in enumerate(named)}, brought, is_given
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Imperfections that have a place in any of the clips, by name."""
+        found = {term.name: term for problem in self.problems for term in problem.terms}
+        return tuple(found[name] for name in sorted(found))
+
+    @cached_property
+    def sizes(self) -> np.ndarray:
+        """`[term]`, their log sizes in units of their priors."""
+        known = self.problems[0].sizes
+        return np.array([known.get(term.name, 0.0) for term in self.terms])
+
+    def with_sizes(self, x: np.ndarray) -> "JointProblem":
+        """The same with other sizes, `[term]` as `sizes`: of all clips the same."""
+        named = {term.name: float(own) for term, own in zip(self.terms, x, strict=True)}
+        return JointProblem(tuple(problem.with_sizes(named) for problem in self.problems))
 
     @property
     def all_effects(self) -> tuple[str, ...]:
