@@ -17,7 +17,9 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
+from galileo_jax.inference.fits.imperfect import fit_with_imperfections
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
+from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior, two_solutions
 from galileo_jax.inference.posterior import Posterior
@@ -255,6 +257,9 @@ def _fitted(
         timings["compile"] = time.perf_counter() - began
         began = time.perf_counter()
         gradient, starts, extra = _gradient(fitter, options)
+        if gradient.sizes is not None:
+            problem = problem.with_sizes(gradient.sizes.by_name)
+            extra |= {"imperfections": imperfections(problem, gradient.sizes)}
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
         if options.discrepancy == "gp":
@@ -305,9 +310,13 @@ def _gradient(
         start = start_from_network(fitter.trials, options.seed, chains)
         return start.fit, start.z, start.notes
     shares = {"searching": 0.1, "refining": 0.3, "searching on": 0.3}
-    found = fitter.fit(
-        options.seed, on_stage=lambda stage: progress.report(stage, shares.get(stage, 0.2))
-    )
+
+    def on_stage(stage: str) -> None:
+        progress.report(stage, shares.get(stage, 0.2))
+
+    if options.discrepancy != "none" or fitter.trials.problems[0].engine.name != "rigid":
+        return fitter.fit(options.seed, on_stage), None, {}
+    _, found = fit_with_imperfections(fitter.trials, options.seed, on_stage)
     return found, None, {}
 
 

@@ -10,6 +10,7 @@ from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.free_quantities import make_free_quantities
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.nuisances import NUISANCES
+from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
 from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import build_scene
 from galileo_jax.observation.observation import Observation
@@ -40,6 +41,7 @@ def make_problem(
     noise: NoiseModel | None = None,
     motion: str = "planar",
     free: Sequence[str] = (),
+    is_one_of_several: bool = False,
 ) -> Problem:
     """A clip with a model of it: the base model, or one with effects.
 
@@ -51,6 +53,7 @@ def make_problem(
       noise: of the observation; default: `noise_of` the clip.
       motion: see `Model`.
       free: names of declared quantities that are inferred ("gravity").
+      is_one_of_several: trials of the same things, between which friction differs.
 
     Raises:
       InputError: an effect has no place in the scenario, the engine is not for this model, or
@@ -67,7 +70,10 @@ def make_problem(
         scene,
         _duration_s(scene.surroundings, observation, LONGER if effects else 1.0),
         effects,
-        LAWS + make_free_quantities(free) + NUISANCES,
+        LAWS
+        + make_free_quantities(free)
+        + NUISANCES
+        + ((TrialFriction(),) if is_one_of_several else ()),
         motion=motion,
     )
     noise = noise or noise_of(clip, scene.surroundings)
@@ -104,7 +110,7 @@ def make_joint_problem(
                     f"{first.gravity:g}; one gravity is inferred for all clips"
                 )
     problems = [
-        make_problem(clip, observation, engine, effects, noise, motion, free)
+        make_problem(clip, observation, engine, effects, noise, motion, free, len(clips) > 1)
         for clip, observation in zip(clips, observations, strict=True)
     ]
     return JointProblem(with_shared_parameters(problems))

@@ -10,7 +10,7 @@ A hypothesis says which of the models' effects are there: the parameters of all 
 held at `absent`, in their units, and have no z.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -169,16 +169,14 @@ class JointProblem:
         found = {term.name: term for problem in self.problems for term in problem.terms}
         return tuple(found[name] for name in sorted(found))
 
-    @cached_property
-    def sizes(self) -> np.ndarray:
-        """`[term]`, their log sizes in units of their priors."""
-        known = self.problems[0].sizes
-        return np.array([known.get(term.name, 0.0) for term in self.terms])
+    @property
+    def sizes(self) -> Mapping[str, float] | None:
+        """Of imperfections, as `Problem.sizes`: of all clips the same."""
+        return self.problems[0].sizes
 
-    def with_sizes(self, x: np.ndarray) -> "JointProblem":
-        """The same with other sizes, `[term]` as `sizes`: of all clips the same."""
-        named = {term.name: float(own) for term, own in zip(self.terms, x, strict=True)}
-        return JointProblem(tuple(problem.with_sizes(named) for problem in self.problems))
+    def with_sizes(self, sizes: Mapping[str, float] | None) -> "JointProblem":
+        """The same with other sizes of imperfections."""
+        return JointProblem(tuple(problem.with_sizes(sizes) for problem in self.problems))
 
     @property
     def all_effects(self) -> tuple[str, ...]:

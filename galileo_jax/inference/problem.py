@@ -1,7 +1,7 @@
 """The inverse problem of one clip: its data, and a model of it."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -45,7 +45,7 @@ class Problem:
       engine: rolls the model out.
       name: of the clip.
       noise: see `GaussianLikelihood.prepare`.
-      sizes: by the term's name, its log size in units of its prior; others are at their medians.
+      sizes: of imperfections by name, `statespace.sizes.Sizes.x`; None: there are none.
     """
 
     observation: Observation
@@ -53,7 +53,7 @@ class Problem:
     engine: Engine
     name: str = "clip"
     noise: NoiseModel = "camera"
-    sizes: Mapping[str, float] = field(default_factory=dict)
+    sizes: Mapping[str, float] | None = None
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -89,8 +89,9 @@ class Problem:
     def data(self) -> Whitening:
         """The data and their covariance, decomposed."""
         every = [self.fixed_patterns]
-        for name, patterns in self.patterns.items():
-            every.append(TERMS[name].factor ** self.sizes.get(name, 0.0) * patterns)
+        if self.sizes is not None:
+            for name, patterns in self.patterns.items():
+                every.append(TERMS[name].factor ** self.sizes.get(name, 0.0) * patterns)
         return whitening_of(self.observation, self._inverse_root, np.concatenate(every))
 
     @cached_property
@@ -124,13 +125,25 @@ class Problem:
         """Those that have a place in the clip."""
         return tuple(TERMS[name] for name in self.patterns)
 
+    def size(self, term: Term, x: float) -> float:
+        """The size of a term in its unit; `x` as in `sizes`."""
+        return term.median(self.seen_motion) * term.factor**x
+
+    def unusual(self, sizes: Mapping[str, float]) -> list[str]:
+        """Names of the terms that are larger than such things usually are."""
+        return [
+            term.name
+            for term in self.terms
+            if self.size(term, sizes.get(term.name, 0.0)) > term.ordinary(self.seen_motion)
+        ]
+
     @cached_property
     def _inverse_root(self) -> Float[np.ndarray, "object axis axis frame"]:
         return inverse_root_of(self.observation)
 
-    def with_sizes(self, sizes: Mapping[str, float]) -> "Problem":
+    def with_sizes(self, sizes: Mapping[str, float] | None) -> "Problem":
         """The same with other sizes of imperfections; what they are made of is not made again."""
-        other = replace(self, sizes=dict(sizes))
+        other = replace(self, sizes=sizes)
         for name in ("fixed_patterns", "patterns", "seen_motion", "_inverse_root"):
             other.__dict__[name] = getattr(self, name)
         return other

@@ -122,4 +122,6 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     if (discrepancy := result.get("discrepancy")) is not None:
         spans = discrepancy["spans_s"][Path(result["clips"][0]).stem]
         problem = with_free_acceleration(problem, spans)
+    if (found := result.get("imperfections")) is not None:
+        problem = problem.with_sizes({name: entry["z"] for name, entry in found.items()})
     return Run(folder, clip, problem, posterior, result)

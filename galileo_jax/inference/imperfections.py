@@ -1,0 +1,34 @@
+"""`imperfections` of result.json: how large what no model knows is, and whether that is usual."""
+
+import math
+from typing import Any
+
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.statespace.sizes import Sizes
+
+INTERVAL_SDS = 1.959964
+
+
+def imperfections(trials: JointProblem, sizes: Sizes) -> dict[str, dict[str, Any]]:
+    """By name `{mean, sd, q025, q975, unit, ordinary, meaning, z}`; the posterior is log-normal.
+
+    Args:
+      trials: the first clip's are the units of what depends on a clip.
+      sizes: as fitted; `z` is the logarithm of each over its prior's median, in the prior's sds.
+    """
+    problem, found = trials.problems[0], {}
+    for name, x, sd in zip(sizes.names, sizes.x, sizes.sd, strict=True):
+        term = next(term for term in trials.terms if term.name == name)
+        middle, width = problem.size(term, float(x)), float(sd) * math.log(term.factor)
+        mean = middle * math.exp(width**2 / 2)
+        found[name] = {
+            "mean": mean,
+            "sd": mean * math.sqrt(math.expm1(width**2)),
+            "q025": middle * math.exp(-INTERVAL_SDS * width),
+            "q975": middle * math.exp(INTERVAL_SDS * width),
+            "unit": term.unit,
+            "ordinary": name not in problem.unusual(sizes.by_name),
+            "meaning": term.meaning,
+            "z": float(x),
+        }
+    return found
