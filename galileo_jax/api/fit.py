@@ -3,12 +3,18 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of
-from galileo_jax.api.fit_options import BLOCK_STEPS, OF_THESIS, FitOptions, ignored_options
+from galileo_jax.api.fit_options import (
+    BLOCK_STEPS,
+    OF_THESIS,
+    Discrepancy,
+    FitOptions,
+    ignored_options,
+)
 from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
@@ -47,7 +53,7 @@ def fit(
     effects: EffectsLike = (),
     effects_from: Sequence[str | Path] = (),
     free: EffectsLike = (),
-    discrepancy: Literal["none", "gp"] = "none",
+    discrepancy: Discrepancy = "none",
     motion: str = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
@@ -75,8 +81,9 @@ def fit(
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
       free: declared quantities to infer instead, such as "gravity".
-      discrepancy: "none", or "gp": allow for an acceleration of unknown form, whose size and
-        smoothness are inferred (method "grad").
+      discrepancy: "none"; "rough": allow for what no surface, hit, trial or mark is free of, by
+        sizes that are inferred (`imperfections` of the result); "gp": allow for an acceleration of
+        unknown form, whose size and smoothness are inferred (method "grad").
       motion: "planar", or "free": from the first hit on objects turn and tip (boxes by the
         rigid engine, cylinders by MuJoCo's C engine).
       engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
@@ -150,12 +157,15 @@ def _check(options: FitOptions) -> None:
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
     check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
-    check_known("--discrepancy", "discrepancy", options.discrepancy, ("none", "gp"))
-    if options.discrepancy != "none" and (options.method, options.motion) != ("grad", "planar"):
+    check_known("--discrepancy", "discrepancy", options.discrepancy, get_args(Discrepancy))
+    methods = {"rough": ("grad", "mh"), "gp": ("grad",)}.get(options.discrepancy)
+    if methods and (options.method not in methods or options.motion != "planar"):
         raise InputError(
-            f"--discrepancy {options.discrepancy}: of --method grad and --motion planar, not of "
-            f"--method {options.method} and --motion {options.motion}"
+            f"--discrepancy {options.discrepancy}: of --method {' or '.join(methods)} and --motion "
+            f"planar, not of --method {options.method} and --motion {options.motion}"
         )
+    if options.discrepancy == "rough" and (options.init, options.preset) != ("grad", "galileo"):
+        raise InputError("--discrepancy rough: of --init grad and --preset galileo only")
     check_known("--engine", "engine", options.engine, ENGINES)
     check_known("--motion", "motion", options.motion, MOTIONS)
     check_known("--init", "init", options.init, ("grad", "cnn"))
@@ -202,7 +212,14 @@ def _problem(
     """
     effects = chosen_effects(options.effects, options.effects_from)
     problem = make_joint_problem(
-        clips, observations, options.engine, effects, options.noise, options.motion, options.free
+        clips,
+        observations,
+        options.engine,
+        effects,
+        options.noise,
+        options.motion,
+        options.free,
+        trials_differ=options.discrepancy == "rough",
     )
     if absent := problem.without_place():
         raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
@@ -259,7 +276,6 @@ def _fitted(
         gradient, starts, extra = _gradient(fitter, options)
         if gradient.sizes is not None:
             problem = problem.with_sizes(gradient.sizes.by_name)
-            extra |= {"imperfections": imperfections(problem, gradient.sizes)}
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
         if options.discrepancy == "gp":
@@ -293,6 +309,8 @@ def _fitted(
         notes["free"] = sorted(options.free)
     if options.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
+    if gradient is not None and gradient.sizes is not None:
+        notes["imperfections"] = imperfections(problem, gradient.sizes, posterior)
     made = finish(posterior, z_best, notes)
     progress.report("fitted", 1.0, made)
     return made
@@ -314,10 +332,10 @@ def _gradient(
     def on_stage(stage: str) -> None:
         progress.report(stage, shares.get(stage, 0.2))
 
-    if options.discrepancy != "none" or fitter.trials.problems[0].engine.name != "rigid":
-        return fitter.fit(options.seed, on_stage), None, {}
-    _, found = fit_with_imperfections(fitter.trials, options.seed, on_stage)
-    return found, None, {}
+    if options.discrepancy == "rough":
+        _, found = fit_with_imperfections(fitter.trials, options.seed, on_stage)
+        return found, None, {}
+    return fitter.fit(options.seed, on_stage), None, {}
 
 
 def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:

@@ -41,7 +41,7 @@ def make_problem(
     noise: NoiseModel | None = None,
     motion: str = "planar",
     free: Sequence[str] = (),
-    is_one_of_several: bool = False,
+    trials_differ: bool = False,
 ) -> Problem:
     """A clip with a model of it: the base model, or one with effects.
 
@@ -53,7 +53,7 @@ def make_problem(
       noise: of the observation; default: `noise_of` the clip.
       motion: see `Model`.
       free: names of declared quantities that are inferred ("gravity").
-      is_one_of_several: trials of the same things, between which friction differs.
+      trials_differ: whether this is a trial of several, between which friction differs.
 
     Raises:
       InputError: an effect has no place in the scenario, the engine is not for this model, or
@@ -73,7 +73,7 @@ def make_problem(
         LAWS
         + make_free_quantities(free)
         + NUISANCES
-        + ((TrialFriction(),) if is_one_of_several else ()),
+        + ((TrialFriction(),) if trials_differ else ()),
         motion=motion,
     )
     noise = noise or noise_of(clip, scene.surroundings)
@@ -95,8 +95,11 @@ def make_joint_problem(
     noise: NoiseModel | None = None,
     motion: str = "planar",
     free: Sequence[str] = (),
+    trials_differ: bool = False,
 ) -> JointProblem:
     """Clips of the same objects with the same model; arguments and errors as `make_problem`.
+
+    With `trials_differ` friction differs between them, where there are several.
 
     Raises:
       InputError: besides, clips that declare different gravities and are to tell one.
@@ -109,8 +112,9 @@ def make_joint_problem(
                     f"{clip.path}: gravity: {clip.gravity:g}, but {first.path}: "
                     f"{first.gravity:g}; one gravity is inferred for all clips"
                 )
+    differ = trials_differ and len(clips) > 1
     problems = [
-        make_problem(clip, observation, engine, effects, noise, motion, free, len(clips) > 1)
+        make_problem(clip, observation, engine, effects, noise, motion, free, differ)
         for clip, observation in zip(clips, observations, strict=True)
     ]
     return JointProblem(with_shared_parameters(problems))

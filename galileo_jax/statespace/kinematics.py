@@ -169,6 +169,6 @@ def _hit(step: int, front: int, observation: Observation, place: np.ndarray) -> 
     touching = apart[step : step + 3].min()
     close = np.flatnonzero(apart[step + 1 :] - touching < NEAR_M)
     near = np.zeros(len(times) - 1, bool)
-    near[step : step + 1 + (int(close[-1]) + 1 if close.size else 0)] = True
+    near[step + 1 : step + 1 + (int(close[-1]) + 1 if close.size else 0)] = True
     kept, given = np.clip([left / came, went / came], 0.0, [1.0, 2.0])
     return Hit(step, rear, front, kept, given, max(came - left, 0.0), max(went, 0.0), near)

@@ -58,9 +58,7 @@ def deviations(
     return covariance(way, start, seen)
 
 
-def _with_events(
-    way: Transitions, motion: Kinematics, jumps: np.ndarray | None
-) -> Transitions:
+def _with_events(way: Transitions, motion: Kinematics, jumps: np.ndarray | None) -> Transitions:
     """Speeds end where bodies rest; hits change and pass on deviations; speeds jump."""
     step, noise = way.step.copy(), way.noise.copy()
     count = len(motion.moves)

@@ -38,7 +38,7 @@ class Term:
 
     Attributes:
       name: as in `imperfections` of result.json.
-      meaning: one phrase for the user.
+      meaning: one sentence for the user, with {size}.
       unit: of the size.
       median, factor: of the size's log-normal prior; `median` maps what was seen to it.
       ordinary: up to which size such a thing is as usual; None: nothing is unusual.

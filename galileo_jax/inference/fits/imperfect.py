@@ -4,8 +4,8 @@ Linear round the fit, with the parameters integrated out under their priors (z ~
 
     e = w - J z_fit  ~  N(0, s^2 1 + U U^T + J J^T + sum_k size_k^2 K_k)
 
-in units of the stated tracking errors; the log sizes have normal priors, x_k = log(size_k / median_k)
-/ log(factor_k) ~ N(0, 1). Their most probable values come by Newton steps with the average
+in units of the stated tracking errors; sizes are log-normal before the data: x_k = log(size_k
+/ median_k) / log(factor_k) ~ N(0, 1). The most probable ones come by Newton steps with the average
 information, their evidence by Laplace,
 
     log p(e) = log p(e | x) - x.x / 2 - log det(H) / 2.
@@ -23,9 +23,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
-from jaxtyping import Float
 
-from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter, Settings
+from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.statespace.sizes import Sizes
@@ -88,9 +87,7 @@ def is_ordinary(trials: JointProblem, fit: GradientFit) -> bool:
     return not any(problem.unusual(fit.sizes.by_name) for problem in trials.problems)
 
 
-def with_imperfections(
-    trials: JointProblem, fit: GradientFit, settings: Settings = Settings()
-) -> tuple[JointProblem, GradientFit]:
+def with_imperfections(trials: JointProblem, fit: GradientFit) -> tuple[JointProblem, GradientFit]:
     """The trials with the sizes of imperfections that a fit asks for, and the fit with these.
 
     Sizes and parameters are fitted by turns until both stand still.
@@ -98,7 +95,6 @@ def with_imperfections(
     Args:
       trials: that were fitted, with sizes or without.
       fit: of them, with the valleys beside it.
-      settings: of the fits.
     """
     if not trials.terms or fit.code is Code.FAILED:
         return trials, fit
@@ -107,7 +103,7 @@ def with_imperfections(
         sizes = fitted_sizes(trials, fit, x)
         moved, x = np.abs(sizes.x - x).max(), sizes.x
         trials = trials.with_sizes(sizes.by_name)
-        fit = replace(GradientFitter(trials, settings).continued(fit), sizes=sizes)
+        fit = replace(GradientFitter(trials).continued(fit), sizes=sizes)
         if moved < SETTLED:
             break
     more = sizes.log_evidence

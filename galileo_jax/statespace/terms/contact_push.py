@@ -24,8 +24,8 @@ def _patterns(seen: Seen) -> Patterns:
 register(
     Term(
         name="contact_push",
-        meaning="two bodies that are near each other push at random; by how much their relative "
-        "speed changes in a second",
+        meaning="two bodies that are near each other change their relative speed by {size} in a "
+        "second",
         unit="m/s",
         median=lambda _: 0.03,
         factor=3.0,

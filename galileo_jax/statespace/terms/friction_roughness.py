@@ -16,7 +16,7 @@ def _patterns(seen: Seen) -> Patterns:
 register(
     Term(
         name="friction_roughness",
-        meaning="friction varies along the way, over a centimetre",
+        meaning="the friction coefficient varies by {size} along the way",
         unit="1",
         median=lambda _: 0.005,
         factor=3.0,

@@ -26,7 +26,7 @@ def _patterns(seen: Seen) -> Patterns:
 register(
     Term(
         name="gusts",
-        meaning="accelerations at random that last a twentieth of a second",
+        meaning="accelerations vary by {size} for a twentieth of a second at a time",
         unit="m/s^2",
         median=lambda _: 0.02,
         factor=4.0,

@@ -19,7 +19,7 @@ def _patterns(seen: Seen) -> Patterns:
 register(
     Term(
         name="hit_impulse",
-        meaning="a hit's impulse that does not stay between the two bodies",
+        meaning="a share of {size} of a hit's impulse does not stay between the two bodies",
         unit="1",
         median=lambda _: 0.005,
         factor=3.0,

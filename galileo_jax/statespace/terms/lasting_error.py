@@ -34,8 +34,8 @@ def _brief(seen: Seen) -> Patterns:
 
 
 for name, meaning, patterns in (
-    ("lasting_error", "places are off by an error that lasts a sixth of the track", _long),
-    ("brief_error", "places are off by an error that lasts some frames", _brief),
+    ("lasting_error", "the marks are off by {size} for a sixth of the time", _long),
+    ("brief_error", "the marks are off by {size} for some frames", _brief),
 ):
     register(
         Term(

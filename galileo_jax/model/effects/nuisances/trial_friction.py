@@ -22,14 +22,15 @@ class TrialFriction(Effect):
     """A factor on the friction of each object, of each trial another."""
 
     name: ClassVar[str] = "trial_friction"
+    spread: ClassVar[str] = "friction_spread"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
         """The spread, which trials share, and each object's deviation; none without a surface."""
         if not scene.has_surface:
             return ()
-        spread = LogNormal(SPREAD, SPREAD_FACTOR)
+        between = LogNormal(SPREAD, SPREAD_FACTOR)
         return (
-            Parameter("friction_spread", "1", spread, 0.0, "latent", 0.2),
+            Parameter(self.spread, "1", between, 0.0, "latent", 0.2),
             *(
                 Parameter(f"trial_friction_{i + 1}", "1", Normal(0.0, 1.0), 0.0, "nuisance", 0.2)
                 for i in range(len(scene.names))
@@ -42,7 +43,7 @@ class TrialFriction(Effect):
             return None
         deviation = [theta[f"trial_friction_{i + 1}"] for i in range(len(scene.names))]
         xp = deviation[0].__array_namespace__()
-        factor = xp.exp(theta["friction_spread"][..., None] * xp.stack(deviation, axis=-1))
+        factor = xp.exp(theta[self.spread][..., None] * xp.stack(deviation, axis=-1))
 
         def law(state: State, k: Array) -> Array:
             return k * factor
