@@ -3,12 +3,18 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 
 from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of
-from galileo_jax.api.fit_options import BLOCK_STEPS, OF_THESIS, FitOptions, ignored_options
+from galileo_jax.api.fit_options import (
+    BLOCK_STEPS,
+    OF_THESIS,
+    Discrepancy,
+    FitOptions,
+    ignored_options,
+)
 from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
@@ -17,7 +23,9 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
+from galileo_jax.inference.fits.imperfect import fit_with_imperfections
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
+from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior, two_solutions
 from galileo_jax.inference.posterior import Posterior
@@ -45,7 +53,7 @@ def fit(
     effects: EffectsLike = (),
     effects_from: Sequence[str | Path] = (),
     free: EffectsLike = (),
-    discrepancy: Literal["none", "gp"] = "none",
+    discrepancy: Discrepancy = "none",
     motion: str = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
@@ -73,8 +81,9 @@ def fit(
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
       free: declared quantities to infer instead, such as "gravity".
-      discrepancy: "none", or "gp": allow for an acceleration of unknown form, whose size and
-        smoothness are inferred (method "grad").
+      discrepancy: "none"; "rough": allow for what no surface, hit, trial or mark is free of, by
+        sizes that are inferred (`imperfections` of the result); "gp": allow for an acceleration of
+        unknown form, whose size and smoothness are inferred (method "grad").
       motion: "planar", or "free": from the first hit on objects turn and tip (boxes by the
         rigid engine, cylinders by MuJoCo's C engine).
       engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
@@ -148,12 +157,15 @@ def _check(options: FitOptions) -> None:
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
     check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
-    check_known("--discrepancy", "discrepancy", options.discrepancy, ("none", "gp"))
-    if options.discrepancy != "none" and (options.method, options.motion) != ("grad", "planar"):
+    check_known("--discrepancy", "discrepancy", options.discrepancy, get_args(Discrepancy))
+    methods = {"rough": ("grad", "mh"), "gp": ("grad",)}.get(options.discrepancy)
+    if methods and (options.method not in methods or options.motion != "planar"):
         raise InputError(
-            f"--discrepancy {options.discrepancy}: of --method grad and --motion planar, not of "
-            f"--method {options.method} and --motion {options.motion}"
+            f"--discrepancy {options.discrepancy}: of --method {' or '.join(methods)} and --motion "
+            f"planar, not of --method {options.method} and --motion {options.motion}"
         )
+    if options.discrepancy == "rough" and (options.init, options.preset) != ("grad", "galileo"):
+        raise InputError("--discrepancy rough: of --init grad and --preset galileo only")
     check_known("--engine", "engine", options.engine, ENGINES)
     check_known("--motion", "motion", options.motion, MOTIONS)
     check_known("--init", "init", options.init, ("grad", "cnn"))
@@ -200,7 +212,14 @@ def _problem(
     """
     effects = chosen_effects(options.effects, options.effects_from)
     problem = make_joint_problem(
-        clips, observations, options.engine, effects, options.noise, options.motion, options.free
+        clips,
+        observations,
+        options.engine,
+        effects,
+        options.noise,
+        options.motion,
+        options.free,
+        trials_differ=options.discrepancy == "rough",
     )
     if absent := problem.without_place():
         raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
@@ -255,6 +274,8 @@ def _fitted(
         timings["compile"] = time.perf_counter() - began
         began = time.perf_counter()
         gradient, starts, extra = _gradient(fitter, options)
+        if gradient.sizes is not None:
+            problem = problem.with_sizes(gradient.sizes.by_name)
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
         if options.discrepancy == "gp":
@@ -288,6 +309,8 @@ def _fitted(
         notes["free"] = sorted(options.free)
     if options.effects_from:
         notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
+    if gradient is not None and gradient.sizes is not None:
+        notes["imperfections"] = imperfections(problem, gradient.sizes, posterior)
     made = finish(posterior, z_best, notes)
     progress.report("fitted", 1.0, made)
     return made
@@ -305,10 +328,14 @@ def _gradient(
         start = start_from_network(fitter.trials, options.seed, chains)
         return start.fit, start.z, start.notes
     shares = {"searching": 0.1, "refining": 0.3, "searching on": 0.3}
-    found = fitter.fit(
-        options.seed, on_stage=lambda stage: progress.report(stage, shares.get(stage, 0.2))
-    )
-    return found, None, {}
+
+    def on_stage(stage: str) -> None:
+        progress.report(stage, shares.get(stage, 0.2))
+
+    if options.discrepancy == "rough":
+        _, found = fit_with_imperfections(fitter.trials, options.seed, on_stage)
+        return found, None, {}
+    return fitter.fit(options.seed, on_stage), None, {}
 
 
 def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:

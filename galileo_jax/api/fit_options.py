@@ -8,6 +8,8 @@ MAX_STEPS = 4000
 OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
 OF_THESIS = ("similarity", "acceptance", "selection")
 
+Discrepancy = Literal["none", "rough", "gp"]
+
 
 @dataclass(frozen=True)
 class FitOptions:
@@ -17,7 +19,7 @@ class FitOptions:
     effects: tuple[str, ...] = ()
     effects_from: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
-    discrepancy: Literal["none", "gp"] = "none"
+    discrepancy: Discrepancy = "none"
     motion: str = "planar"
     engine: str = "auto"
     noise: Literal["camera", "bodies", "tracker"] | None = None

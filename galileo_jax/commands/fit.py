@@ -2,9 +2,9 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
-from galileo_jax.api.fit_options import ignored_options
+from galileo_jax.api.fit_options import Discrepancy, ignored_options
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
 from galileo_jax.commands.options import adder
@@ -84,13 +84,15 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
         f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
         f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}); {result['status']}"
     )
-    from galileo_jax.report.fit_text import CHI2_BAD, CHI2_HIGH, distance
+    from galileo_jax.report.fit_text import CHI2_BAD, CHI2_HIGH, distance, imperfection_text
 
     if near := distance(error):
         lines.append(f"the fit is {near}")
     words = shlex.join(result["clips"])
     if "no_verdict" in result:
         lines.append(result["no_verdict"])
+    elif "imperfections" in result:
+        lines += imperfection_text(result["imperfections"])
     elif not error["chi2_per_dof"] <= CHI2_BAD:
         lines.append(
             "The model does not describe the data: do not trust its parameters. See where it "
@@ -112,7 +114,7 @@ def _parser() -> command.Parser:
     add("effects", metavar="A,B", help="effects in the model (default: none)")
     add("free", metavar="A,B", help=f"declared quantities to infer: {FREE} (default: none)")
     add_clip_options(parser, "fit", out="folder of the run (default runs/CLIP)")
-    add("discrepancy", choices=("none", "gp"), metavar=None)
+    add("discrepancy", choices=get_args(Discrepancy), metavar=None)
     add("motion", choices=MOTIONS, metavar=None)
     add("noise", choices=("camera", "bodies", "tracker"), metavar=None)
     add = adder(parser.add_argument_group("--method mh"), "fit")

@@ -116,7 +116,10 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     """Compares a fitted hypothesis with the data; the same seed gives the same result."""
     theta = trials.theta(fit.z, fit.free)
     fitted = np.array([trials.noise_scale(theta, c) for c in range(len(trials.problems))])
-    scales = np.clip(fitted, *JUDGED_SCALE_RANGE)
+    judged_range = JUDGED_SCALE_RANGE
+    if trials.sizes is not None:  # errors beyond the independent ones have sizes of their own
+        judged_range = (min(float(fitted.min()), 1.0), JUDGED_SCALE_RANGE[1])
+    scales = np.clip(fitted, *judged_range)
     measured = whitened(trials, theta[None], scales)
     sizes = [
         fitted_mode_size(white[0], scale, problem.data, problem.errors_in_full)
@@ -153,7 +156,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         )
         return _p_value(own, others, cells, pulls)
 
-    p, z = judged(JUDGED_SCALE_RANGE)
+    p, z = judged(judged_range)
     low, high = NOISE_SCALE_RANGE
     is_usual = low <= fitted.min() and fitted.max() <= high
     if p < ADEQUATE_P and not is_usual:

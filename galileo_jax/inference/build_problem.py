@@ -10,6 +10,7 @@ from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.free_quantities import make_free_quantities
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.nuisances import NUISANCES
+from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
 from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import build_scene
 from galileo_jax.observation.observation import Observation
@@ -40,6 +41,7 @@ def make_problem(
     noise: NoiseModel | None = None,
     motion: str = "planar",
     free: Sequence[str] = (),
+    trials_differ: bool = False,
 ) -> Problem:
     """A clip with a model of it: the base model, or one with effects.
 
@@ -51,6 +53,7 @@ def make_problem(
       noise: of the observation; default: `noise_of` the clip.
       motion: see `Model`.
       free: names of declared quantities that are inferred ("gravity").
+      trials_differ: whether this is a trial of several, between which friction differs.
 
     Raises:
       InputError: an effect has no place in the scenario, the engine is not for this model, or
@@ -67,7 +70,10 @@ def make_problem(
         scene,
         _duration_s(scene.surroundings, observation, LONGER if effects else 1.0),
         effects,
-        LAWS + make_free_quantities(free) + NUISANCES,
+        LAWS
+        + make_free_quantities(free)
+        + NUISANCES
+        + ((TrialFriction(),) if trials_differ else ()),
         motion=motion,
     )
     noise = noise or noise_of(clip, scene.surroundings)
@@ -89,8 +95,11 @@ def make_joint_problem(
     noise: NoiseModel | None = None,
     motion: str = "planar",
     free: Sequence[str] = (),
+    trials_differ: bool = False,
 ) -> JointProblem:
     """Clips of the same objects with the same model; arguments and errors as `make_problem`.
+
+    With `trials_differ` friction differs between them, where there are several.
 
     Raises:
       InputError: besides, clips that declare different gravities and are to tell one.
@@ -103,8 +112,9 @@ def make_joint_problem(
                     f"{clip.path}: gravity: {clip.gravity:g}, but {first.path}: "
                     f"{first.gravity:g}; one gravity is inferred for all clips"
                 )
+    differ = trials_differ and len(clips) > 1
     problems = [
-        make_problem(clip, observation, engine, effects, noise, motion, free)
+        make_problem(clip, observation, engine, effects, noise, motion, free, differ)
         for clip, observation in zip(clips, observations, strict=True)
     ]
     return JointProblem(with_shared_parameters(problems))

@@ -10,7 +10,7 @@ A hypothesis says which of the models' effects are there: the parameters of all 
 held at `absent`, in their units, and have no z.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,6 +21,7 @@ import numpy as np
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import LogNormal, Parameter, PriorTable
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.statespace.term import Term
 
 NOISE_SD = 0.3  # the tracker knows its noise within some thirty per cent
 NOISE_SCALE = Parameter("noise_scale", "1", LogNormal(1.0, NOISE_SD), 1.0, "nuisance", step=None)
@@ -161,6 +162,21 @@ class JointProblem:
                 brought[:, joint] = [parameter.name in own for own in named.values()]
                 is_given[joint] = parameter.role == "given"
         return {name: row for row, name in enumerate(named)}, brought, is_given
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Imperfections that have a place in any of the clips, by name."""
+        found = {term.name: term for problem in self.problems for term in problem.terms}
+        return tuple(found[name] for name in sorted(found))
+
+    @property
+    def sizes(self) -> Mapping[str, float] | None:
+        """Of imperfections, as `Problem.sizes`: of all clips the same."""
+        return self.problems[0].sizes
+
+    def with_sizes(self, sizes: Mapping[str, float] | None) -> "JointProblem":
+        """The same with other sizes of imperfections."""
+        return JointProblem(tuple(problem.with_sizes(sizes) for problem in self.problems))
 
     @property
     def all_effects(self) -> tuple[str, ...]:

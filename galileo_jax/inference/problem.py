@@ -26,7 +26,13 @@ from galileo_jax.similarity.gaussian_likelihood import (
     GaussianLikelihood,
     NoiseModel,
     Whitening,
+    fixed_patterns,
+    inverse_root_of,
+    white_patterns,
+    whitening_of,
 )
+from galileo_jax.statespace.kinematics import kinematics
+from galileo_jax.statespace.term import TERMS, Seen, Term
 
 
 @dataclass(frozen=True)
@@ -39,6 +45,7 @@ class Problem:
       engine: rolls the model out.
       name: of the clip.
       noise: see `GaussianLikelihood.prepare`.
+      sizes: of imperfections by name, `statespace.sizes.Sizes.x`; None: there are none.
     """
 
     observation: Observation
@@ -46,6 +53,7 @@ class Problem:
     engine: Engine
     name: str = "clip"
     noise: NoiseModel = "camera"
+    sizes: Mapping[str, float] | None = None
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -80,8 +88,65 @@ class Problem:
     @cached_property
     def data(self) -> Whitening:
         """The data and their covariance, decomposed."""
+        every = [self.fixed_patterns]
+        if self.sizes is not None:
+            for name, patterns in self.patterns.items():
+                every.append(TERMS[name].factor ** self.sizes.get(name, 0.0) * patterns)
+        return whitening_of(self.observation, self._inverse_root, np.concatenate(every))
+
+    @cached_property
+    def fixed_patterns(self) -> Float[np.ndarray, "pattern object axis frame"]:
+        """Imperfections of known size, in units of the stated errors."""
         scene = self.model.scene.surroundings
-        return GaussianLikelihood.prepare(self.observation, scene, self.noise)
+        fixed = fixed_patterns(self.observation, scene, self.noise)
+        return white_patterns(fixed, self._inverse_root)
+
+    @cached_property
+    def patterns(self) -> dict[str, Float[np.ndarray, "pattern object axis frame"]]:
+        """By the term's name, its patterns at the median of its size, in the stated errors."""
+        if self.noise == "tracker":
+            return {}
+        seen, found = self.seen_motion, {}
+        for name, term in TERMS.items():
+            patterns = term.patterns(seen)
+            if len(patterns):
+                median = term.median(seen)
+                found[name] = white_patterns(median * patterns, self._inverse_root)
+        return found
+
+    @cached_property
+    def seen_motion(self) -> Seen:
+        """What terms are made of."""
+        scene = self.model.scene.surroundings
+        return Seen(self.observation, scene, kinematics(self.observation, scene))
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Those that have a place in the clip."""
+        return tuple(TERMS[name] for name in self.patterns)
+
+    def size(self, term: Term, x: float) -> float:
+        """The size of a term in its unit; `x` as in `sizes`."""
+        return term.median(self.seen_motion) * term.factor**x
+
+    def unusual(self, sizes: Mapping[str, float]) -> list[str]:
+        """Names of the terms that are larger than such things usually are."""
+        return [
+            term.name
+            for term in self.terms
+            if self.size(term, sizes.get(term.name, 0.0)) > term.ordinary(self.seen_motion)
+        ]
+
+    @cached_property
+    def _inverse_root(self) -> Float[np.ndarray, "object axis axis frame"]:
+        return inverse_root_of(self.observation)
+
+    def with_sizes(self, sizes: Mapping[str, float] | None) -> "Problem":
+        """The same with other sizes of imperfections; what they are made of is not made again."""
+        other = replace(self, sizes=sizes)
+        for name in ("fixed_patterns", "patterns", "seen_motion", "_inverse_root"):
+            other.__dict__[name] = getattr(self, name)
+        return other
 
     @cached_property
     def errors_in_full(self) -> Float[np.ndarray, "mode mode"] | None:

@@ -70,6 +70,7 @@ OUTSIDE = (  # what nuisances mean that are far from what is usual
 )
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
+TOLD_FACTOR = 10.0  # an interval that spans more tells no size
 # Residuals of the noise's size may still follow a pattern that noise does not have.
 PATTERNS = "galileo compare tests whether they have a pattern"
 
@@ -160,9 +161,28 @@ def fit_quality(result: dict[str, Any]) -> str:
     """How near the fit comes, and chi2 per degree of freedom, in two sentences or three."""
     near = distance(result["error"])
     lead = f"The fit is {near}. " if near else ""
+    if "imperfections" in result:
+        return f"{lead}{' '.join(imperfection_text(result['imperfections']))}"
     if result.get("no_verdict"):
         return f"{lead}{result['no_verdict']}."
     return lead + _of_chi2(result)
+
+
+def imperfection_text(found: Mapping[str, Any]) -> list[str]:
+    """What of imperfections shows, and whether it is usual: a sentence for each.
+
+    Args:
+      found: `imperfections` of result.json.
+    """
+    said = []
+    for entry in found.values():
+        shows = entry["q975"] < TOLD_FACTOR * entry["q025"]
+        if shows or not entry["ordinary"]:
+            size = f"{entry['mean']:.2g}{'' if entry['unit'] == '1' else ' ' + entry['unit']}"
+            usual = "as is usual" if entry["ordinary"] else "which is more than usual"
+            text = entry["meaning"].format(size=size)
+            said.append(f"{text[0].upper()}{text[1:]}, {usual}.")
+    return said or ["Nothing beside the model and the stated noise shows."]
 
 
 def _of_chi2(result: dict[str, Any]) -> str:
@@ -219,6 +239,8 @@ def fits(result: dict[str, Any]) -> bool:
     """Whether chi2 per degree of freedom is one that noise gives, of enough frames to tell."""
     if result.get("no_verdict"):
         return False
+    if "imperfections" in result:
+        return all(entry["ordinary"] for entry in result["imperfections"].values())
     chi2 = result["error"]["chi2_per_dof"]
     return chi2 is not None and chi2 <= CHI2_HIGH  # False for NaN
 
@@ -256,6 +278,8 @@ def fit_command(run: Run) -> str:
     words += [f"--{key} {result[key]}" for key in ("preset", "sampler") if result.get(key)]
     if result.get("discrepancy"):
         words.append(f"--discrepancy {result['discrepancy']['kind']}")
+    if result.get("imperfections"):
+        words.append("--discrepancy rough")
     if run.problem.model.motion != "planar":
         words.append(f"--motion {run.problem.model.motion}")
     return " ".join([*words, f"--engine {run.problem.engine.name}", f"--seed {result['seed']}"])

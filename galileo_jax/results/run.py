@@ -24,6 +24,7 @@ from galileo_jax.inference.free_force.free_fit import with_free_acceleration
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
+from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
 from galileo_jax.model.effects.registry import load_file, make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results.shared_errors import save_shared_errors, with_shared_errors
@@ -118,8 +119,20 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
     effects = make_effects(result["effects"])
     motion = result.get("motion", "planar")
     free = result.get("free", [])
-    problem = make_problem(clip, observation, engine, effects, motion=motion, free=free)
+    problem = make_problem(
+        clip,
+        observation,
+        engine,
+        effects,
+        motion=motion,
+        free=free,
+        trials_differ=TrialFriction.spread in posterior.names,
+    )
     if (discrepancy := result.get("discrepancy")) is not None:
         spans = discrepancy["spans_s"][Path(result["clips"][0]).stem]
         problem = with_free_acceleration(problem, spans)
+    if (found := result.get("imperfections")) is not None:
+        problem = problem.with_sizes(
+            {name: entry["z"] for name, entry in found.items() if "z" in entry}
+        )
     return Run(folder, clip, problem, posterior, result)

@@ -53,7 +53,10 @@ class GaussianLikelihood:
 
     @staticmethod
     def prepare(
-        observation: Observation, scene: Surroundings, noise: NoiseModel = "camera"
+        observation: Observation,
+        scene: Surroundings,
+        noise: NoiseModel = "camera",
+        more: Float[np.ndarray, "pattern object axis frame"] | None = None,
     ) -> Whitening:
         """Decomposes the covariance of an observation in a scene.
 
@@ -63,36 +66,13 @@ class GaussianLikelihood:
           noise: "camera": the tracker's errors and all of `discrepancy`; "bodies": without
             the camera's part of it; "tracker": the tracker's errors alone, to see what the
             rest is good for.
+          more: patterns beside these, as `white_patterns`.
         """
-        mask = observation.mask
-        covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
-        axes = observation.position_m.shape[1]
-        covariance[~mask] = np.eye(axes)
-        if noise == "tracker":
-            patterns = np.stack(offsets(observation))
-        elif scene.is_level:
-            patterns = level_modes(observation, scene, is_filmed=noise == "camera")
-        elif axes == 3:
-            size_m = WANDER_SD_M if observation.wander_m is None else observation.wander_m
-            patterns = np.stack([*offsets(observation), *wander(observation, size_m)])
-        else:
-            patterns = modes(observation, scene, is_filmed=noise == "camera")
-            patterns = np.concatenate([patterns, crossings(observation, scene)])
-        if observation.modes_m is not None:
-            patterns = np.concatenate([patterns, observation.modes_m])
-        inverse_root = np.linalg.inv(np.linalg.cholesky(covariance)) * mask[..., None, None]
-        inverse_root = np.moveaxis(inverse_root, 1, -1)
-        patterns = np.einsum("oijt,mojt->moit", inverse_root, patterns)
-        flat = patterns.reshape(len(patterns), -1)
-        _, gain, basis = np.linalg.svd(flat, full_matrices=False)
-        gain, basis = gain[gain > IDLE], basis[gain > IDLE]  # many patterns are alike
-        return Whitening(
-            np.where(mask[:, None], observation.position_m, 0.0),
-            inverse_root,
-            basis.reshape(len(gain), *patterns.shape[1:]),  # of short tracks fewer than patterns
-            gain,
-            np.float64(axes * mask.sum() - (observation.across != 0).any(axis=1).sum()),
-        )
+        inverse_root = inverse_root_of(observation)
+        patterns = white_patterns(fixed_patterns(observation, scene, noise), inverse_root)
+        if more is not None:
+            patterns = np.concatenate([patterns, more])
+        return whitening_of(observation, inverse_root, patterns)
 
     @staticmethod
     def whiten(difference_m: Places, noise_scale: Float[jax.Array, ""], data: Whitening) -> Places:
@@ -157,6 +137,62 @@ class GaussianLikelihood:
         gain = data.gain / noise_scale
         xp = gain.__array_namespace__()
         return data.num_values * xp.log(noise_scale**2) + xp.sum(xp.log1p(gain**2))
+
+
+def inverse_root_of(observation: Observation) -> Float[np.ndarray, "object axis axis frame"]:
+    """L^-1 of the tracker's covariance L L^T of each frame; 0 where masked."""
+    mask, axes = observation.mask, observation.position_m.shape[1]
+    covariance = np.moveaxis(observation.covariance_m2, -1, 1).copy()  # object frame 2 2
+    covariance[~mask] = np.eye(axes)
+    inverse_root = np.linalg.inv(np.linalg.cholesky(covariance)) * mask[..., None, None]
+    return np.moveaxis(inverse_root, 1, -1)
+
+
+def white_patterns(
+    patterns_m: Float[np.ndarray, "pattern object axis frame"],
+    inverse_root: Float[np.ndarray, "object axis axis frame"],
+) -> Float[np.ndarray, "pattern object axis frame"]:
+    """Patterns in units of the tracker's stated errors; 0 where masked."""
+    return np.einsum("oijt,mojt->moit", inverse_root, patterns_m)
+
+
+def fixed_patterns(
+    observation: Observation, scene: Surroundings, noise: NoiseModel
+) -> Float[np.ndarray, "pattern object axis frame"]:
+    """What is imperfect by a size that is known, `[pattern, object, axis, frame]`, m."""
+    axes = observation.position_m.shape[1]
+    if noise == "tracker":
+        patterns = np.stack(offsets(observation))
+    elif scene.is_level:
+        patterns = level_modes(observation, scene, is_filmed=noise == "camera")
+    elif axes == 3:
+        size_m = WANDER_SD_M if observation.wander_m is None else observation.wander_m
+        patterns = np.stack([*offsets(observation), *wander(observation, size_m)])
+    else:
+        patterns = modes(observation, scene, is_filmed=noise == "camera")
+        patterns = np.concatenate([patterns, crossings(observation, scene)])
+    if observation.modes_m is not None:
+        patterns = np.concatenate([patterns, observation.modes_m])
+    return patterns
+
+
+def whitening_of(
+    observation: Observation,
+    inverse_root: Float[np.ndarray, "object axis axis frame"],
+    patterns: Float[np.ndarray, "pattern object axis frame"],
+) -> Whitening:
+    """The covariance of the tracker's errors and of patterns in units of them, decomposed."""
+    mask, axes = observation.mask, observation.position_m.shape[1]
+    flat = patterns.reshape(len(patterns), -1)
+    _, gain, basis = np.linalg.svd(flat, full_matrices=False)
+    gain, basis = gain[gain > IDLE], basis[gain > IDLE]  # many patterns are alike
+    return Whitening(
+        np.where(mask[:, None], observation.position_m, 0.0),
+        inverse_root,
+        basis.reshape(len(gain), *patterns.shape[1:]),  # of short tracks fewer than patterns
+        gain,
+        np.float64(axes * mask.sum() - (observation.across != 0).any(axis=1).sum()),
+    )
 
 
 def _with_modes_times(

@@ -3,11 +3,11 @@
 With C = s^2 D + U U^T, of whose modes the amplitudes are a and the gains g (see
 `gaussian_likelihood.Whitening`), the log-likelihood is stationary in s where
 
-    sum of (tracking errors at s)^2  =  degrees(s) - used,
+    sum of (tracking errors at s)^2  =  degrees(s) - used + log(s) / prior_sd^2,
 
-the squares and the count both without what the modes take up.
+the squares and the count both without what the modes take up; the last part is the prior's.
 
-Source: MacKay (1992), Bayesian interpolation, Neural Computation 4, 415 (the fixed point).
+Source: MacKay (1992), Bayesian interpolation, Neural Computation 4, 415 (the condition).
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
-MOST_ITERATIONS, SETTLED = 100, 1e-10  # of the variance, in one iteration
+LOG_VARIANCES, NUM_HALVINGS = (-16.0, 16.0), 48  # where noise scales are looked for
 MODE_SIZES = np.linspace(0.0, 1.0, 41)
 
 
@@ -39,16 +39,16 @@ def fitted_noise_scale(
     modes = (white @ data.basis.reshape(len(gain2), -1).T) ** 2
     rest = np.maximum(np.sum(white**2, axis=1) - np.sum(modes, axis=1), 0.0) * variance[:, 0]
     amplitude2 = modes * (variance + gain2)
-    wide = 1 / (2 * prior_sd**2)  # the prior, at 1, is worth this many values
-    for _ in range(MOST_ITERATIONS):
-        share = variance / (variance + gain2)
+    low, high = (np.full(len(white), end) for end in LOG_VARIANCES)
+    for _ in range(NUM_HALVINGS):
+        middle = (low + high) / 2
+        share = 1 / (1 + gain2 * np.exp(-middle)[:, None])
         degrees = data.num_values - np.sum(1 - share, axis=1)
         total = rest + np.sum(amplitude2 * share**2, axis=1)
-        left = np.maximum(degrees - used, 1.0)
-        before, variance = variance, ((total + wide) / (left + wide))[:, None]
-        if np.all(np.abs(variance - before) <= SETTLED * before):
-            break
-    return np.sqrt(variance[:, 0])
+        asked = np.maximum(degrees - used, 1.0) + middle / (2 * prior_sd**2)
+        is_larger = total * np.exp(-middle) > asked
+        low, high = np.where(is_larger, middle, low), np.where(is_larger, high, middle)
+    return np.exp((low + high) / 4)
 
 
 def fitted_mode_size(

@@ -14,6 +14,7 @@ from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.model.parameters import prior_deviations
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from galileo_jax.similarity.noise_scale import errors_at
+from galileo_jax.statespace.sizes import Sizes
 
 
 class Code(StrEnum):
@@ -47,6 +48,7 @@ class GradientFit:
         `prior_deviations`.
       num_pulled: how many numbers' worth of the data the nuisances were fitted with.
       beside: fits in other valleys that explain the data about as well; they share the posterior.
+      sizes: of imperfections, with which it was fitted; None: there are none.
     """
 
     z: Float[np.ndarray, " parameter"]
@@ -62,6 +64,7 @@ class GradientFit:
     pull: float
     num_pulled: float
     beside: tuple["GradientFit", ...] = ()
+    sizes: Sizes | None = None
 
     @property
     def num_fitted(self) -> float:

@@ -144,6 +144,7 @@ class GradientFitter:
         seed: int,
         on_stage: Callable[[str], None] = lambda _: None,
         effects: Sequence[str] | None = None,
+        is_enough: Callable[[GradientFit], bool] | None = None,
     ) -> GradientFit:
         """Fits from scattered starts; the same seed gives the same result.
 
@@ -151,6 +152,8 @@ class GradientFitter:
           seed: of the starts.
           on_stage: told what is being done.
           effects: names of the effects that are there; default: all of the models'.
+          is_enough: of what a first search found, whether a second one is spared; default:
+            `is_explained`.
         """
         self._residuals.num_rollouts = 0
         effects = self.trials.all_effects if effects is None else effects
@@ -160,7 +163,7 @@ class GradientFitter:
         ends = self._ends(starts, free, self.settings.num_refined)
         on_stage("refining")
         fits = self._in_valleys(ends, free)
-        if ends.num_agreeing >= LEAST_AGREEING and self.is_explained(_best_of(fits)):
+        if ends.num_agreeing >= LEAST_AGREEING and (is_enough or self.is_explained)(_best_of(fits)):
             return self._looked_round(fits, seed)
         on_stage("searching on")
         num = self.settings.num_second_starts
@@ -181,6 +184,21 @@ class GradientFitter:
         self._residuals.num_rollouts = 0
         count = self._count
         return self._best_variant(fit.z[:count], fit.free[:count], 0)
+
+    def continued(self, fit: GradientFit) -> GradientFit:
+        """A fit of other sizes of imperfections, gone on from, with the valleys beside it."""
+        self._residuals.num_rollouts = 0
+        every, count = (fit, *fit.beside), self._count
+        z = np.stack([one.z for one in every])
+        free = np.stack([one.free[:count] for one in every])
+        points = Batch(z[:, :count], free, np.exp(NOISE_SD * z[:, count:]))
+        num_steps = int(fit.stats.get("num_steps", 0))
+        found = self._at_rest(
+            list(self._polish(points, np.zeros(len(every), int), num_steps).values())
+        )
+        if found.code is Code.CONVERGED and not self.is_explained(found, NOISE_SCALE_RANGE[1]):
+            return replace(found, code=Code.MISFIT)
+        return found
 
     def fit_from(
         self,

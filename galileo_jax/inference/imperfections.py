@@ -1,0 +1,52 @@
+"""`imperfections` of result.json: how large what no model knows is, and whether that is usual."""
+
+import math
+from typing import Any
+
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.summarise import summary_of
+from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
+from galileo_jax.statespace.sizes import Sizes
+
+INTERVAL_SDS = 1.959964
+BETWEEN_TRIALS, USUAL_SPREAD = "friction_between_trials", 0.15
+
+
+def imperfections(
+    trials: JointProblem, sizes: Sizes, posterior: Posterior
+) -> dict[str, dict[str, Any]]:
+    """By name `{mean, sd, q025, q975, unit, ordinary, meaning}`; sizes are log-normal.
+
+    `z`, of those that have it, is the logarithm of the most probable size over its prior's median,
+    in the prior's standard deviations: what a run is loaded with.
+
+    Args:
+      trials: the first clip's are the units of what depends on a clip.
+      sizes: as fitted.
+      posterior: of the parameters, how far trials differ among them.
+    """
+    problem, found = trials.problems[0], {}
+    for name, x, sd in zip(sizes.names, sizes.x, sizes.sd, strict=True):
+        term = next(term for term in trials.terms if term.name == name)
+        middle, width = problem.size(term, float(x)), float(sd) * math.log(term.factor)
+        mean = middle * math.exp(width**2 / 2)
+        found[name] = {
+            "mean": mean,
+            "sd": mean * math.sqrt(math.expm1(width**2)),
+            "q025": middle * math.exp(-INTERVAL_SDS * width),
+            "q975": middle * math.exp(INTERVAL_SDS * width),
+            "unit": term.unit,
+            "ordinary": name not in problem.unusual(sizes.by_name),
+            "meaning": term.meaning,
+            "z": float(x),
+        }
+    if TrialFriction.spread in posterior.names:
+        entry = summary_of(posterior, posterior[TrialFriction.spread].reshape(-1))
+        found[BETWEEN_TRIALS] = {
+            **entry,
+            "unit": "1",
+            "ordinary": entry["mean"] <= USUAL_SPREAD,
+            "meaning": "friction differs from trial to trial by a share of {size}",
+        }
+    return found

@@ -1,0 +1,174 @@
+"""How bodies on a path moved, from their measured places: random deviations build on it.
+
+Deviations are small, so that their own speed does not change how fast a body crosses a surface;
+and a covariance that comes from the data alone is the same for every hypothesis.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.observation.observation import Observation
+
+AROUND = 2  # frames to either side that tell a speed
+STILL_M_S = 0.02  # what is slower rests
+CLEAR = 3.0  # standard deviations of a speed
+MOVED_M = 0.002  # an object that has gone so far has been hit
+NEAR_M = 0.006  # boxes that turn a little about the vertical touch at such gaps between faces
+BEFORE, AFTER = 3, 4  # frames that tell speeds at a hit
+
+
+@dataclass(frozen=True)
+class Hit:
+    """One body that meets the next one, which rests.
+
+    Attributes:
+      step: the hit is between frames `step` and `step + 1`.
+      rear, front: the bodies.
+      kept, given: speeds after it over the rear's before it.
+      lost_m_s, gained_m_s: by which the rear's and the front's speed change.
+      near: `[frame-1]`, steps in which faces of the two are near each other.
+    """
+
+    step: int
+    rear: int
+    front: int
+    kept: float
+    given: float
+    lost_m_s: float
+    gained_m_s: float
+    near: Bool[np.ndarray, " step"]
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """Measured motion along a path.
+
+    Attributes:
+      times_s: `[frame]`.
+      tangent: `[object, 2, frame]`, unit vectors of the path, in the direction of travel.
+      speed_m_s: `[object, frame]`, along the path; 0 at rest.
+      moves: `[object, frame-1]`, whether each moves from frame to frame.
+      normal_m_s2: `[object, frame]`, what presses each onto the surface, over its mass.
+      hits: in time's order.
+    """
+
+    times_s: Float[np.ndarray, " frame"]
+    tangent: Float[np.ndarray, "object 2 frame"]
+    speed_m_s: Float[np.ndarray, "object frame"]
+    moves: Bool[np.ndarray, "object step"]
+    normal_m_s2: Float[np.ndarray, "object frame"]
+    hits: tuple[Hit, ...] = ()
+
+    @property
+    def step_s(self) -> Float[np.ndarray, " step"]:
+        """From each frame to the next."""
+        return np.diff(self.times_s)
+
+
+def kinematics(observation: Observation, scene: Surroundings) -> Kinematics | None:
+    """How bodies moved on a ramp, a table, a level; None where no surface leads them."""
+    if not scene.has_surface or scene.is_level or observation.position_m.shape[1] != 2:
+        return None
+    times = observation.times_s
+    count, frames = observation.mask.shape
+    angle = np.zeros((count, frames))
+    speed, moves = np.zeros((count, frames)), np.zeros((count, max(frames - 1, 0)), bool)
+    place = np.zeros((count, frames))
+    for i in range(count):
+        x, y = _filled(observation, i)
+        angle[i] = scene.angle_rad
+        if scene.has_table:
+            is_on_ramp = scene.comes_down[i] & (x < scene.corner_m[i])
+            angle[i] = np.where(is_on_ramp, scene.angle_rad, 0.0)
+        past = np.where(angle[i] == 0, 0.0, 1.0)
+        place[i] = np.where(
+            past == 1,
+            (x - _finite(scene.corner_m[i])) * np.cos(angle[i]) - y * np.sin(angle[i]),
+            x - _finite(scene.corner_m[i]),
+        )
+        sd = _noise_m(observation, i)
+        speed[i] = np.abs(_slope(times, place[i]))
+        least = max(STILL_M_S, CLEAR * sd / _lever_s(times))
+        speed[i][speed[i] < least] = 0.0
+        moves[i] = (speed[i, 1:] > 0) | (speed[i, :-1] > 0)
+    tangent = np.stack([np.cos(angle), -np.sin(angle)], axis=1)
+    found = Kinematics(times, tangent, speed, moves, scene.gravity * np.cos(angle))
+    return replace(found, hits=_hits(observation, place))
+
+
+def _finite(corner_m: float) -> float:
+    return corner_m if math.isfinite(corner_m) else 0.0
+
+
+def _filled(observation: Observation, i: int) -> np.ndarray:
+    """`[2, frame]`, places; between measured ones on straight lines."""
+    seen = np.flatnonzero(observation.mask[i])
+    if not seen.size:
+        return np.zeros_like(observation.position_m[i])
+    every = np.arange(len(observation.times_s))
+    return np.stack([np.interp(every, seen, own[seen]) for own in observation.position_m[i]])
+
+
+def _noise_m(observation: Observation, i: int) -> float:
+    seen = observation.mask[i]
+    if not seen.any():
+        return 0.0
+    return float(np.sqrt(np.median(observation.covariance_m2[i, 0, 0, seen])))
+
+
+def _slope(times_s: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """By least squares over `AROUND` frames to either side."""
+    found = np.zeros(len(place))
+    for frame in range(len(place)):
+        own = slice(max(frame - AROUND, 0), frame + AROUND + 1)
+        t = times_s[own] - times_s[own].mean()
+        square = float(t @ t)
+        found[frame] = t @ place[own] / square if square > 0 else 0.0
+    return found
+
+
+def _lever_s(times_s: np.ndarray) -> float:
+    """A place's error over this is a slope's."""
+    step = float(np.median(np.diff(times_s))) if len(times_s) > 1 else 1.0
+    return step * math.sqrt(sum(2 * k * k for k in range(1, AROUND + 1)))
+
+
+def _hits(observation: Observation, place: np.ndarray) -> tuple[Hit, ...]:
+    found = []
+    for front in range(1, len(place)):
+        seen = np.flatnonzero(observation.mask[front])
+        if not seen.size:
+            continue
+        gone = np.abs(place[front] - np.median(place[front, seen[:3]]))
+        moved = observation.mask[front] & (gone > MOVED_M)
+        step = int(np.argmax(moved)) - 1
+        if moved.any() and step >= 1:
+            hit = _hit(step, front, observation, place)
+            found += [] if hit is None else [hit]
+    return tuple(sorted(found, key=lambda hit: hit.step))
+
+
+def _hit(step: int, front: int, observation: Observation, place: np.ndarray) -> Hit | None:
+    """The hit before frame `step + 1`; None where speeds are not those of a hit."""
+    times, rear = observation.times_s, front - 1
+
+    def speed(body: int, frames: slice) -> float:
+        t = times[frames]
+        return float(np.polyfit(t - t.mean(), place[body, frames], 1)[0]) if len(t) > 1 else 0.0
+
+    before, after = slice(max(step - BEFORE + 1, 0), step + 1), slice(step + 1, step + 1 + AFTER)
+    came = speed(rear, before)
+    if came < STILL_M_S:
+        return None
+    left, went = speed(rear, after), speed(front, after)
+    apart = place[front] - place[rear]
+    touching = apart[step : step + 3].min()
+    close = np.flatnonzero(apart[step + 1 :] - touching < NEAR_M)
+    near = np.zeros(len(times) - 1, bool)
+    near[step + 1 : step + 1 + (int(close[-1]) + 1 if close.size else 0)] = True
+    kept, given = np.clip([left / came, went / came], 0.0, [1.0, 2.0])
+    return Hit(step, rear, front, kept, given, max(came - left, 0.0), max(went, 0.0), near)

@@ -1,0 +1,88 @@
+"""A term: a random function that no model knows, at unit size, and a prior of its size."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.random_patterns import random_patterns
+from galileo_jax.runtime.registry import Registry
+from galileo_jax.statespace.kinematics import Kinematics
+
+SMALLEST = 1e-7  # of the largest pattern's variance; what is smaller is left out
+
+Patterns = Float[np.ndarray, "pattern object axis frame"]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What terms are made of.
+
+    Attributes:
+      observation: the data.
+      scene: what they show.
+      motion: along the path; None where no surface leads the bodies.
+    """
+
+    observation: Observation
+    scene: Surroundings
+    motion: Kinematics | None
+
+
+@dataclass(frozen=True)
+class Term:
+    """A random function of unknown size.
+
+    Attributes:
+      name: as in `imperfections` of result.json.
+      meaning: one sentence for the user, with {size}.
+      unit: of the size.
+      median, factor: of the size's log-normal prior; `median` maps what was seen to it.
+      ordinary: up to which size such a thing is as usual; None: nothing is unusual.
+      patterns: `[pattern, object, axis, frame]`, m, whose squares sum to the covariance at unit
+        size; none where the term has no place.
+    """
+
+    name: str
+    meaning: str
+    unit: str
+    median: Callable[[Seen], float]
+    factor: float
+    ordinary: Callable[[Seen], float]
+    patterns: Callable[[Seen], Patterns]
+
+
+TERMS: Registry[Term] = Registry("imperfection", "imperfections", "galileo_jax.statespace.terms")
+register = TERMS.register
+
+
+def none(seen: Seen) -> Patterns:
+    """An empty batch of patterns."""
+    return np.zeros((0, *seen.observation.position_m.shape))
+
+
+def along_path(
+    covariance: Float[np.ndarray, "frame object frame object"], motion: Kinematics, seen: Seen
+) -> Patterns:
+    """Patterns of deviations along the path, of which `covariance` is that of all bodies, m^2."""
+    frames, count = covariance.shape[:2]
+    flat = covariance.reshape(frames * count, -1)
+    if not flat.any():
+        return none(seen)
+    patterns = random_patterns(flat, SMALLEST).reshape(-1, frames, count)
+    return np.einsum("mto,oat->moat", patterns, motion.tangent)
+
+
+def of_axis(covariance: Float[np.ndarray, "frame frame"], seen: Seen) -> Patterns:
+    """The same patterns in each axis of each body, independent of each other."""
+    patterns = random_patterns(covariance, SMALLEST)
+    shape = seen.observation.position_m.shape
+    num_axes = shape[1] - int(seen.observation.is_turning)
+    found = np.zeros((shape[0], num_axes, len(patterns), *shape))
+    for i in range(shape[0]):
+        for axis in range(num_axes):
+            found[i, axis, :, i, axis] = patterns
+    return found.reshape(-1, *shape)
