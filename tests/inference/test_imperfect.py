@@ -1,0 +1,71 @@
+"""Sizes of imperfections: those that are there are found, those that are not cost little."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from galileo_jax.inference.fits.gradient import Code, GradientFitter
+from galileo_jax.inference.fits.imperfect import fit_with_imperfections
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.problem import Problem
+from tests.oracle_trials import make_trials
+from tests.ramp_model import HIT
+
+LASTS_S, SIZE_M = 0.25, 1e-3
+
+
+@pytest.fixture(scope="module")
+def smooth():
+    trials = make_trials([HIT])
+    return trials, GradientFitter(trials).fit(0)
+
+
+def sd_of(trials, fit, name):
+    return np.sqrt(fit.covariance[trials.names.index(name), trials.names.index(name)])
+
+
+def test_what_is_not_there_costs_little(smooth):
+    """A perfect track: every size is far below its median, intervals are hardly wider."""
+    trials, plain = smooth
+    rough, fit = fit_with_imperfections(trials, 0)
+    sizes = fit.sizes.by_name
+    assert fit.code is Code.CONVERGED
+    assert not rough.problems[0].unusual(sizes)
+    assert sizes["friction_roughness"] < 0
+    for name, truth in (("k1", HIT.friction[0]), ("k2", HIT.friction[1])):
+        assert sd_of(rough, fit, name) < 2.0 * sd_of(trials, plain, name)
+        where = trials.names.index(name)
+        assert abs(rough.theta(fit.z)[where] - truth) < 0.02
+
+
+def with_errors(trials: JointProblem) -> JointProblem:
+    """Marks that are off by a millimetre for a quarter of a second, of both bodies and axes."""
+    [problem] = trials.problems
+    times, shape = problem.observation.times_s, problem.observation.position_m.shape
+    apart = np.abs(times[:, None] - times)
+    root = np.linalg.cholesky(np.exp(-apart / LASTS_S) + 1e-9 * np.eye(len(times)))
+    errors = np.random.default_rng(5).standard_normal(shape) @ root.T
+    seen = replace(problem.observation, position_m=problem.observation.position_m + SIZE_M * errors)
+    return JointProblem((Problem(seen, problem.model, problem.engine, problem.name),))
+
+
+def test_errors_that_last_are_found_and_widen_intervals(smooth):
+    """Their size within its interval; without them the fit is contradicted and far too sure."""
+    trials = with_errors(smooth[0])
+    plain = GradientFitter(trials).fit(0)
+    rough, fit = fit_with_imperfections(trials, 0)
+    assert plain.code is Code.MISFIT
+    assert fit.code is Code.CONVERGED
+    problem, where = rough.problems[0], fit.sizes.names.index("lasting_error")
+    term = next(term for term in rough.terms if term.name == "lasting_error")
+    low, high = (
+        problem.size(term, fit.sizes.x[where] + 2 * s * fit.sizes.sd[where]) for s in (-1, 1)
+    )
+    assert low < SIZE_M < high
+    k1 = trials.names.index("k1")
+    width = sd_of(rough, fit, "k1")
+    assert (
+        abs(fit.z[k1] - rough.parameters[k1].prior.inverse(np.array(HIT.friction[0]))) < 3 * width
+    )
+    assert width > 1.5 * sd_of(trials, plain, "k1")
