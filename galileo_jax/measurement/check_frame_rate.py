@@ -15,7 +15,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
@@ -123,7 +122,9 @@ def _of_free_body(times: np.ndarray, height: np.ndarray) -> ApparentGravity | No
         return found
     (left, parabola), (left_of_more, _) = (_polynomial(times, height, n) for n in (2, 4))
     gain = (left - left_of_more) / 2 / max(left_of_more / size, np.finfo(float).tiny)
-    return found if gain > f.isf(CHANCE, 2, size) else parabola
+    # Of Fisher's F with 2 and `size` degrees of freedom: P(F > x) = (1 + 2 x / size)^(-size / 2).
+    least = size / 2 * (CHANCE ** (-2 / size) - 1)
+    return found if gain > least else parabola
 
 
 def _polynomial(

@@ -29,6 +29,7 @@ def test_what_is_not_there_costs_little(smooth):
     """A perfect track: every size is far below its median, intervals are hardly wider."""
     trials, plain = smooth
     rough, fit = fit_with_imperfections(trials, 0)
+    assert fit.sizes is not None
     sizes = fit.sizes.by_name
     assert fit.code is Code.CONVERGED
     assert not rough.problems[0].unusual(sizes)
@@ -57,6 +58,7 @@ def test_errors_that_last_are_found_and_widen_intervals(smooth):
     rough, fit = fit_with_imperfections(trials, 0)
     assert plain.code is Code.MISFIT
     assert fit.code is Code.CONVERGED
+    assert fit.sizes is not None
     problem, where = rough.problems[0], fit.sizes.names.index("lasting_error")
     term = next(term for term in rough.terms if term.name == "lasting_error")
     low, high = (

@@ -136,7 +136,9 @@ def test_summary(data):
 def test_loo_prefers_the_model_that_fits(fitted, data):
     """Finite, with good weights, and far better than that of a wrong friction."""
     az = arviz()
-    loo = az.loo(data, pointwise=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of weights that are judged below
+        loo = az.loo(data, pointwise=True)
     assert np.isfinite(loo.elpd_loo)
     assert float(loo.pareto_k.max()) < 0.7
     trials, posterior = fitted

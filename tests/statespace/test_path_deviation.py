@@ -67,7 +67,9 @@ def test_nothing_happens_before_its_cause(motion):
 def test_terms_have_no_place_where_their_cause_is_absent():
     """No hit, no push; no surface, no friction; on a surface, no gusts."""
     seen = observe(HIT, 0)
-    motion = replace(kinematics(seen, SCENE), hits=())
+    motion = kinematics(seen, SCENE)
+    assert motion is not None
+    motion = replace(motion, hits=())
     assert not len(TERMS["contact_push"].patterns(Seen(seen, SCENE, motion)))
     assert not len(TERMS["gusts"].patterns(Seen(seen, SCENE, motion)))
     assert not len(TERMS["friction_roughness"].patterns(Seen(seen, SCENE, None)))

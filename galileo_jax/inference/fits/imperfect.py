@@ -193,7 +193,8 @@ def _look(clips: Sequence[_Clip], terms: Sequence[Term], x: np.ndarray) -> _Look
         units = [*(clip.of_terms[terms[k].name] for k in own[:-1]), np.eye(len(clip.e))]
         parts = [np.exp(2 * widths[k] * x[k]) * unit for k, unit in zip(own, units, strict=True)]
         root = scipy.linalg.cholesky(clip.fixed + sum(parts), lower=True)
-        inverse = scipy.linalg.lapack.dpotri(root, lower=True)[0]
+        (dpotri,) = scipy.linalg.get_lapack_funcs(("potri",), (root,))
+        inverse = dpotri(root, lower=True)[0]
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         pulled = inverse @ clip.e
         value -= 0.5 * float(clip.e @ pulled) + float(np.log(np.diag(root)).sum())
