@@ -56,7 +56,6 @@ class GaussianLikelihood:
         observation: Observation,
         scene: Surroundings,
         noise: NoiseModel = "camera",
-        more: Float[np.ndarray, "pattern object axis frame"] | None = None,
     ) -> Whitening:
         """Decomposes the covariance of an observation in a scene.
 
@@ -66,12 +65,9 @@ class GaussianLikelihood:
           noise: "camera": the tracker's errors and all of `discrepancy`; "bodies": without
             the camera's part of it; "tracker": the tracker's errors alone, to see what the
             rest is good for.
-          more: patterns beside these, as `white_patterns`.
         """
         inverse_root = inverse_root_of(observation)
         patterns = white_patterns(fixed_patterns(observation, scene, noise), inverse_root)
-        if more is not None:
-            patterns = np.concatenate([patterns, more])
         return whitening_of(observation, inverse_root, patterns)
 
     @staticmethod

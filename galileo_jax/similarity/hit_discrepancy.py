@@ -6,6 +6,7 @@ import numpy as np
 
 from galileo_jax.observation.observation import Observation
 from galileo_jax.observation.random_patterns import random_patterns
+from galileo_jax.statespace.kinematics import STILL_M_S, first_moved
 
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
 HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none
@@ -21,21 +22,15 @@ OWN_DRIFT_SD_M = 5e-5
 # the other on: they come apart, or together, otherwise than points do.
 PUSH_SD_M_S2, PUSH_S = 0.05, 0.2
 CLOSE_M = 0.008  # half of a box 60 mm deep, against another, each turned by some eight degrees
-STILL_M_S = 0.02  # what is slower rests
-MOVED_M = 0.002  # an object that has gone so far has been hit
 
 
 def after_hits(position: np.ndarray, observation: Observation, is_filmed: bool) -> list[np.ndarray]:
     """For each hit and who is in it a step, the way it goes from there; filmed, a slow drift."""
     found = []
     for i in range(1, len(position)):
-        seen = np.flatnonzero(observation.mask[i])
-        if not seen.size:
-            continue
-        gone = np.abs(position[i, 0] - np.median(position[i, 0, seen[:3]]))
-        moved = observation.mask[i] & (gone > MOVED_M)
-        if moved.any():
-            hit = max(int(np.argmax(moved)) - 1, 0)
+        moved = first_moved(position[i, 0], observation.mask[i])
+        if moved is not None:
+            hit = max(moved - 1, 0)
             found.extend(_after(hit, (i - 1, i), position))
             found.extend(_at_the_hit(hit, i, position, observation))
             if is_filmed:

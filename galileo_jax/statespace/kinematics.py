@@ -137,17 +137,28 @@ def _lever_s(times_s: np.ndarray) -> float:
     return step * math.sqrt(sum(2 * k * k for k in range(1, AROUND + 1)))
 
 
+def first_moved(
+    place_m: Float[np.ndarray, " frame"], seen: Bool[np.ndarray, " frame"]
+) -> int | None:
+    """The first frame in which a body that rested has left its place; None: it never does.
+
+    Args:
+      place_m: along the path.
+      seen: where it was measured.
+    """
+    known = np.flatnonzero(seen)
+    if not known.size:
+        return None
+    moved = seen & (np.abs(place_m - np.median(place_m[known[:3]])) > MOVED_M)
+    return int(np.argmax(moved)) if moved.any() else None
+
+
 def _hits(observation: Observation, place: np.ndarray) -> tuple[Hit, ...]:
     found = []
     for front in range(1, len(place)):
-        seen = np.flatnonzero(observation.mask[front])
-        if not seen.size:
-            continue
-        gone = np.abs(place[front] - np.median(place[front, seen[:3]]))
-        moved = observation.mask[front] & (gone > MOVED_M)
-        step = int(np.argmax(moved)) - 1
-        if moved.any() and step >= 1:
-            hit = _hit(step, front, observation, place)
+        moved = first_moved(place[front], observation.mask[front])
+        if moved is not None and moved >= 2:
+            hit = _hit(moved - 1, front, observation, place)
             found += [] if hit is None else [hit]
     return tuple(sorted(found, key=lambda hit: hit.step))
 

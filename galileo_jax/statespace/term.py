@@ -41,7 +41,7 @@ class Term:
       meaning: one sentence for the user, with {size}.
       unit: of the size.
       median, factor: of the size's log-normal prior; `median` maps what was seen to it.
-      ordinary: up to which size such a thing is as usual; None: nothing is unusual.
+      ordinary: maps what was seen to the size up to which such a thing is as usual.
       patterns: `[pattern, object, axis, frame]`, m, whose squares sum to the covariance at unit
         size; none where the term has no place.
     """
