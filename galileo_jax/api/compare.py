@@ -24,6 +24,7 @@ from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.statespace.term import USUAL
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -208,6 +209,9 @@ def compare(
 
 
 def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
+    if any(x > USUAL for x in (fit.problem.sizes or {}).values()):
+        # With imperfections so large the model fails nowhere; without them it is seen where.
+        fit = replace(fit, problem=fit.problem.with_sizes(None), gradient=None)
     gradient = fit.gradient
     if gradient is None or seed != int(fit.result["seed"]):
         progress.report("fitting", 0.0)

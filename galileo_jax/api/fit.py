@@ -23,7 +23,8 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
-from galileo_jax.inference.fits.imperfect import fit_with_imperfections
+from galileo_jax.inference.fits.imperfect import World, Worlds, fit_worlds
+
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
@@ -53,7 +54,7 @@ def fit(
     effects: EffectsLike = (),
     effects_from: Sequence[str | Path] = (),
     free: EffectsLike = (),
-    discrepancy: Discrepancy = "none",
+    discrepancy: Discrepancy = "auto",
     motion: str = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
@@ -81,9 +82,10 @@ def fit(
       effects: names of effects in the model ("a,b" or a sequence), or classes.
       effects_from: Python files that register more effects.
       free: declared quantities to infer instead, such as "gravity".
-      discrepancy: "none"; "rough": allow for what no surface, hit, trial or mark is free of, by
-        sizes that are inferred (`imperfections` of the result); "gp": allow for an acceleration of
-        unknown form, whose size and smoothness are inferred (method "grad").
+      discrepancy: "auto": what no surface, hit, trial or mark is free of may be there or not, and
+        the evidence decides; "rough": it is there, by sizes that are inferred (`imperfections` of
+        the result); "none": it is not; "gp": an acceleration of unknown form is allowed for, whose
+        size and smoothness are inferred (method "grad").
       motion: "planar", or "free": from the first hit on objects turn and tip (boxes by the
         rigid engine, cylinders by MuJoCo's C engine).
       engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
@@ -219,11 +221,20 @@ def _problem(
         options.noise,
         options.motion,
         options.free,
-        trials_differ=options.discrepancy == "rough",
+        trials_differ=_has_imperfections(options),
     )
     if absent := problem.without_place():
         raise InputError(f"--effects: {absent[0]} has no place in {clips[0].path}")
     return problem
+
+
+def _has_imperfections(options: FitOptions) -> bool:
+    """Whether imperfections of unknown size may be in the model: networks and the thesis know none.
+
+    Nor does motion off the plane, nor chains that start from the network.
+    """
+    is_plain = (options.init, options.preset, options.motion) == ("grad", "galileo", "planar")
+    return options.discrepancy in ("auto", "rough") and options.method != "cnn" and is_plain
 
 
 def _compile_beside(clips: Sequence[Clip], options: FitOptions) -> Any:
@@ -273,9 +284,8 @@ def _fitted(
         fitter.compile()
         timings["compile"] = time.perf_counter() - began
         began = time.perf_counter()
-        gradient, starts, extra = _gradient(fitter, options)
-        if gradient.sizes is not None:
-            problem = problem.with_sizes(gradient.sizes.by_name)
+        worlds, starts, extra = _gradient(fitter, options)
+        problem, gradient = worlds.best.trials, worlds.best.fit
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
         if options.discrepancy == "gp":
@@ -286,6 +296,9 @@ def _fitted(
         else:
             make = laplace_posterior if options.method == "mh" else fit_posterior
             posterior = make(problem, gradient, options.seed)
+            if worlds.other is not None and options.method != "mh":
+                other = fit_posterior(worlds.other.trials, worlds.other.fit, options.seed)
+                posterior = posterior.mixed_with(other, worlds.share)
         z_best = gradient.z
         extra = {"status": gradient.code.value} | extra
         if options.method == "mh":
@@ -311,6 +324,7 @@ def _fitted(
         notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
     if gradient is not None and gradient.sizes is not None:
         notes["imperfections"] = imperfections(problem, gradient.sizes, posterior)
+    notes["discrepancy_asked"] = options.discrepancy
     made = finish(posterior, z_best, notes)
     progress.report("fitted", 1.0, made)
     return made
@@ -318,24 +332,26 @@ def _fitted(
 
 def _gradient(
     fitter: GradientFitter, options: FitOptions
-) -> tuple[GradientFit, np.ndarray | None, dict[str, Any]]:
-    """The mode, where chains start in z (None: dispersed round it), and notes."""
+) -> tuple[Worlds, np.ndarray | None, dict[str, Any]]:
+    """What the clips may show, where chains start in z (None: dispersed round it), and notes."""
     if options.init == "cnn":
         from galileo_jax.inference.metropolis import NUM_CHAINS
         from galileo_jax.neural.start import start_from_network
 
         chains = options.chains or NUM_CHAINS
         start = start_from_network(fitter.trials, options.seed, chains)
-        return start.fit, start.z, start.notes
+        return Worlds(World(fitter.trials, start.fit)), start.z, start.notes
     shares = {"searching": 0.1, "refining": 0.3, "searching on": 0.3}
 
     def on_stage(stage: str) -> None:
         progress.report(stage, shares.get(stage, 0.2))
 
-    if options.discrepancy == "rough":
-        _, found = fit_with_imperfections(fitter.trials, options.seed, on_stage)
-        return found, None, {}
-    return fitter.fit(options.seed, on_stage), None, {}
+    if _has_imperfections(options):
+        is_open = options.discrepancy == "auto"
+        worlds = fit_worlds(fitter.trials, options.seed, on_stage, may_be_exact=is_open)
+        share = worlds.share if worlds.best.fit.sizes is None else 1 - worlds.share
+        return worlds, None, {"probability_imperfect": share} if is_open else {}
+    return Worlds(World(fitter.trials, fitter.fit(options.seed, on_stage))), None, {}
 
 
 def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:

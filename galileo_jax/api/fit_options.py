@@ -8,7 +8,7 @@ MAX_STEPS = 4000
 OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
 OF_THESIS = ("similarity", "acceptance", "selection")
 
-Discrepancy = Literal["none", "rough", "gp"]
+Discrepancy = Literal["auto", "none", "rough", "gp"]
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class FitOptions:
     effects: tuple[str, ...] = ()
     effects_from: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
-    discrepancy: Discrepancy = "none"
+    discrepancy: Discrepancy = "auto"
     motion: str = "planar"
     engine: str = "auto"
     noise: Literal["camera", "bodies", "tracker"] | None = None

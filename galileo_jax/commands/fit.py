@@ -84,25 +84,9 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
         f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
         f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}); {result['status']}"
     )
-    from galileo_jax.report.fit_text import CHI2_BAD, CHI2_HIGH, distance, imperfection_text
+    from galileo_jax.report.fit_text import fit_quality
 
-    if near := distance(error):
-        lines.append(f"the fit is {near}")
-    words = shlex.join(result["clips"])
-    if "no_verdict" in result:
-        lines.append(result["no_verdict"])
-    elif "imperfections" in result:
-        lines += imperfection_text(result["imperfections"])
-    elif not error["chi2_per_dof"] <= CHI2_BAD:
-        lines.append(
-            "The model does not describe the data: do not trust its parameters. See where it "
-            f"fails: galileo compare {words}; find what is missing: galileo diagnose {words}"
-        )
-    elif error["chi2_per_dof"] > CHI2_HIGH:
-        lines.append(
-            "There is more noise than stated, or the model lacks an effect. See which: galileo "
-            f"compare {words}"
-        )
+    lines += fit_quality(result)
     return "\n".join(lines)
 
 

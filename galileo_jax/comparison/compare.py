@@ -93,6 +93,7 @@ class Comparison:
       noise_scale: of each clip, the errors' size over what is stated, as fitted.
       is_noise_misstated: the residuals contradict the stated noise at the most: they look like
         noise of `noise_scale`, and no tracker is so wrong about its own.
+      unusual: names of imperfections that are larger than such things usually are.
       no_verdict: why too little was seen to tell whether it is adequate; None where enough was.
     """
 
@@ -104,12 +105,13 @@ class Comparison:
     white: tuple[np.ndarray, ...]
     noise_scale: tuple[float, ...]
     is_noise_misstated: bool
+    unusual: tuple[str, ...] = ()
     no_verdict: str | None = None
 
     @property
     def is_adequate(self) -> bool:
-        """Whether the data do not contradict the model."""
-        return self.p_value >= ADEQUATE_P
+        """Whether the data do not contradict the model, with imperfections of usual sizes."""
+        return self.p_value >= ADEQUATE_P and not self.unusual
 
 
 def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
@@ -181,6 +183,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         ),
         noise_scale=tuple(map(float, fitted)),
         is_noise_misstated=p >= ADEQUATE_P and not is_usual,
+        unusual=() if fit.sizes is None else tuple(fit.sizes.unusual),
     )
 
 

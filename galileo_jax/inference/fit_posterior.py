@@ -13,7 +13,9 @@ import numpy as np
 
 from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
 from galileo_jax.inference.fits.look_round import MOST_PARAMETERS
+
 from galileo_jax.inference.fits.residuals import Residuals
+from galileo_jax.inference.fits.sized_density import SizedDensity
 from galileo_jax.inference.fits.weighed import weighed
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
@@ -27,10 +29,10 @@ FEW, TOO_FEW = 100.0, 10.0
 
 
 def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterior:
-    """Draws of the posterior round a fit and the valleys beside it.
+    """Draws of the posterior round a fit and the valleys beside it, sizes integrated.
 
-    Where weighed draws are worth too few, or rollouts are slow (all engines but the rigid one in a
-    plane), those of the normal approximation.
+    Those of the normal approximation, at the most probable sizes, where weighed draws are worth too few, or rollouts are slow (all engines but the rigid one in a
+    plane).
 
     Args:
       trials: that were fitted.
@@ -42,7 +44,10 @@ def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterio
         return laplace_posterior(trials, fit, seed)
     valleys = (fit, *fit.beside)
     residuals = Residuals(trials)
-    found = weighed(valleys, residuals, seed, num=NUM_AT_ONCE, most=MOST, enough=ENOUGH)
+    density = None if fit.sizes is None else SizedDensity(trials, fit, residuals.clips)
+    found = weighed(
+        valleys, residuals, seed, num=NUM_AT_ONCE, most=MOST, enough=ENOUGH, density=density
+    )
     num_rollouts = fit.stats.get("num_rollouts", 0) + residuals.num_rollouts
     stats = {**fit.stats, "num_rollouts": num_rollouts}
     if found.ess < TOO_FEW:

@@ -1,7 +1,8 @@
 """`imperfections` of result.json: how large what no model knows is, and whether that is usual."""
 
-import math
 from typing import Any
+
+import numpy as np
 
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
@@ -9,14 +10,13 @@ from galileo_jax.inference.summarise import summary_of
 from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
 from galileo_jax.statespace.sizes import Sizes
 
-INTERVAL_SDS = 1.959964
 BETWEEN_TRIALS, USUAL_SPREAD = "friction_between_trials", 0.15
 
 
 def imperfections(
     trials: JointProblem, sizes: Sizes, posterior: Posterior
 ) -> dict[str, dict[str, Any]]:
-    """By name `{mean, sd, q025, q975, unit, ordinary, meaning}`; sizes are log-normal.
+    """By name `{mean, sd, q025, q975, unit, ordinary, meaning}`, of the draws of the sizes.
 
     `z`, of those that have it, is the logarithm of the most probable size over its prior's median,
     in the prior's standard deviations: what a run is loaded with.
@@ -27,17 +27,17 @@ def imperfections(
       posterior: of the parameters, how far trials differ among them.
     """
     problem, found = trials.problems[0], {}
-    for name, x, sd in zip(sizes.names, sizes.x, sizes.sd, strict=True):
+    for name, x, drawn in zip(sizes.names, sizes.x, sizes.draws.T, strict=False):
         term = next(term for term in trials.terms if term.name == name)
-        middle, width = problem.size(term, float(x)), float(sd) * math.log(term.factor)
-        mean = middle * math.exp(width**2 / 2)
+        own = np.array([problem.size(term, float(each)) for each in drawn])
+        low, high = np.quantile(own, [0.025, 0.975])
         found[name] = {
-            "mean": mean,
-            "sd": mean * math.sqrt(math.expm1(width**2)),
-            "q025": middle * math.exp(-INTERVAL_SDS * width),
-            "q975": middle * math.exp(INTERVAL_SDS * width),
+            "mean": float(own.mean()),
+            "sd": float(own.std()),
+            "q025": float(low),
+            "q975": float(high),
             "unit": term.unit,
-            "ordinary": name not in problem.unusual(sizes.by_name),
+            "ordinary": name not in sizes.unusual,
             "meaning": term.meaning,
             "z": float(x),
         }

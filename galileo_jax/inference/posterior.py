@@ -87,6 +87,24 @@ class Posterior:
         """The marginal of some parameters, under other names."""
         return replace(self, draws=self.draws[..., columns], names=tuple(names))
 
+    def mixed_with(self, other: Self, share: float) -> Self:
+        """Draws of two posteriors of the same parameters, one of which is right, in any order.
+
+        Args:
+          other: as many draws.
+          share: the probability of the other.
+        """
+        count = self.draws.shape[1]
+        num_other = round(share * count)
+        order = np.random.default_rng(0).permutation(count)
+        both = [
+            np.concatenate([own[:, num_other:], more[:, :num_other]], axis=1)[:, order]
+            for own, more in ((self.draws, other.draws), (self.log_density, other.log_density))
+        ]
+        worth = [one.provenance.get(ESS, count) for one in (self, other)]
+        notes = {**self.provenance, ESS: (1 - share) * worth[0] + share * worth[1]}
+        return replace(self, draws=both[0], log_density=both[1], provenance=notes)
+
     def worth(self, values: np.ndarray) -> float:
         """How many independent draws the posterior's are worth for a function of them.
 

@@ -90,9 +90,13 @@ class Problem:
         """The data and their covariance, decomposed."""
         every = [self.fixed_patterns]
         if self.sizes is not None:
-            for name, patterns in self.patterns.items():
-                every.append(TERMS[name].factor ** self.sizes.get(name, 0.0) * patterns)
+            every += [self._sized(name) for name in self.patterns]
         return whitening_of(self.observation, self._inverse_root, np.concatenate(every))
+
+    def _sized(self, name: str) -> Float[np.ndarray, "pattern object axis frame"]:
+        """Patterns of a term at its size, in the stated errors."""
+        assert self.sizes is not None
+        return TERMS[name].factor ** self.sizes.get(name, 0.0) * self.patterns[name]
 
     @cached_property
     def fixed_patterns(self) -> Float[np.ndarray, "pattern object axis frame"]:
@@ -128,14 +132,6 @@ class Problem:
     def size(self, term: Term, x: float) -> float:
         """The size of a term in its unit; `x` as in `sizes`."""
         return term.median(self.seen_motion) * term.factor**x
-
-    def unusual(self, sizes: Mapping[str, float]) -> list[str]:
-        """Names of the terms that are larger than such things usually are."""
-        return [
-            term.name
-            for term in self.terms
-            if self.size(term, sizes.get(term.name, 0.0)) > term.ordinary(self.seen_motion)
-        ]
 
     @cached_property
     def _inverse_root(self) -> Float[np.ndarray, "object axis axis frame"]:
@@ -238,6 +234,28 @@ class Problem:
         """
         difference = self.data.observed_m - predicted_m
         return GaussianLikelihood.whiten_batch(difference, noise_scale, self.data)
+
+    def followed(self, predicted_m: np.ndarray) -> np.ndarray:
+        """Where bodies most probably were: a prediction and their most probable deviation from it.
+
+            d = U_b U_b^T C^-1 r,    U_b: patterns of what bodies do, not of errors of the marks
+
+        Args:
+          predicted_m: `[object, axis, frame]`.
+
+        Returns:
+          the same shape; the prediction where imperfections have no sizes.
+        """
+        names = [name for name in self.patterns if not TERMS[name].is_of_marks]
+        if self.sizes is None or not names:
+            return predicted_m
+        own = [self._sized(name) for name in names]
+        patterns, data = np.concatenate(own), self.data
+        left = self.tracking_errors(predicted_m)  # in stated errors, C^-1 of them at scale 1
+        white = np.tensordot(patterns.reshape(len(patterns), -1) @ left, patterns, 1)
+        root = np.where(self.observation.mask[:, None, None], data.inverse_root, 0.0)
+        root = np.linalg.pinv(np.moveaxis(root, -1, 1))  # [object, frame, axis, axis]
+        return predicted_m + np.einsum("otij,ojt->oit", root, white)
 
     def tracking_errors(self, predicted_m: np.ndarray, noise_scale: float = 1.0) -> np.ndarray:
         """The tracking errors that a prediction leaves, in units of their sd.

@@ -9,10 +9,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc
 
 from galileo_jax import __version__
 from galileo_jax.inference.confounded import confounded_with_gravity
-from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
 from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.inference.per_mass import (
     SUFFIX,
@@ -42,6 +43,7 @@ FREE_SCALE_WARNING = (
 
 UNSHOWN = ("latent", "given")  # roles that have no entry of their own in result.json
 
+CHANCE = 0.01  # noise leaves as much so seldom: then it is something else
 PULLED_Z = 3.0  # of a nuisance's prior standard deviations; one in four hundred is by chance
 
 
@@ -136,10 +138,12 @@ def error_of(
         predicted = problem.simulate(trials.of_clip(theta, clip))
         chi2 += float(np.sum(problem.tracking_errors(predicted) ** 2))
         count += float(GaussianLikelihood.degrees(1.0, problem.data))
-        predictions.append(predicted)
+        predictions.append(problem.followed(predicted))
     error = velocity_error(trials.problems, predictions)
     error |= distance_error(trials.problems, predictions)
-    error["chi2_per_dof"] = chi2 / max(count - num_fitted, 1.0)
+    degrees = max(count - num_fitted, 1.0)
+    error["chi2_per_dof"] = chi2 / degrees
+    error["explained_by_noise"] = bool(chdtrc(degrees, chi2 / NOISE_SCALE_RANGE[1] ** 2) > CHANCE)
     return error
 
 

@@ -121,7 +121,7 @@ def _header(title: str, run: Run) -> str:
             for line in (*_cuts(result), *result.get("taken_as_exact", []))
         )
     )
-    return header("fit", title, fit_text.fit_quality(result), more, fit_text.fits(result))
+    return header("fit", title, " ".join(fit_text.fit_quality(result)), more, fit_text.fits(result))
 
 
 def _cuts(result: Mapping[str, Any]) -> list[str]:

@@ -69,7 +69,7 @@ OUTSIDE = (  # what nuisances mean that are far from what is usual
     ),
 )
 FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
-CHI2_GOOD, CHI2_HIGH, CHI2_BAD = 0.7, 1.5, 3.0
+CHI2_GOOD = 0.7
 TOLD_FACTOR = 10.0  # an interval that spans more tells no size
 # Residuals of the noise's size may still follow a pattern that noise does not have.
 PATTERNS = "galileo compare tests whether they have a pattern"
@@ -157,15 +157,27 @@ def distance(error: Mapping[str, Any]) -> str:
     return ", in ".join(filter(None, [said, frames]))
 
 
-def fit_quality(result: dict[str, Any]) -> str:
-    """How near the fit comes, and chi2 per degree of freedom, in two sentences or three."""
+def fit_quality(result: Mapping[str, Any]) -> list[str]:
+    """How near the fit comes, what it leaves, and what to do where that is too much: sentences."""
     near = distance(result["error"])
-    lead = f"The fit is {near}. " if near else ""
+    said = [f"The fit is {near}."] if near else []
     if "imperfections" in result:
-        return f"{lead}{' '.join(imperfection_text(result['imperfections']))}"
+        said += imperfection_text(result["imperfections"])
+    elif not result.get("no_verdict"):
+        said.append(_of_chi2(result["error"]))
+    if found := result.get("discrepancy"):
+        said.append(discrepancy_text(found))
+    said += map(pull_text, result.get("pulls", []))
     if result.get("no_verdict"):
-        return f"{lead}{result['no_verdict']}."
-    return lead + _of_chi2(result)
+        return [*said, f"{result['no_verdict']}."]
+    if fits(result):
+        return said
+    words = shlex.join(result["clips"])
+    return [
+        *said,
+        f"See where it fails: galileo compare {words}; find what is missing: galileo diagnose "
+        f"{words}",
+    ]
 
 
 def imperfection_text(found: Mapping[str, Any]) -> list[str]:
@@ -182,32 +194,19 @@ def imperfection_text(found: Mapping[str, Any]) -> list[str]:
             usual = "as is usual" if entry["ordinary"] else "which is more than usual"
             text = entry["meaning"].format(size=size)
             said.append(f"{text[0].upper()}{text[1:]}, {usual}.")
-    return said or ["Nothing beside the model and the stated noise shows."]
+    return said or ["How large each imperfection is does not show."]
 
 
-def _of_chi2(result: dict[str, Any]) -> str:
-    chi2 = result["error"]["chi2_per_dof"]
+def _of_chi2(error: Mapping[str, Any]) -> str:
+    chi2 = error["chi2_per_dof"]
     if chi2 is None or not math.isfinite(chi2):
         return "chi2 per degree of freedom cannot be computed."
     size = f"{math.sqrt(chi2):.2g} times the stated noise"
+    if not error.get("explained_by_noise", True):
+        return f"What it leaves is {size}, more than noise and usual imperfections explain."
     if chi2 < CHI2_GOOD:
-        text = f"The residuals are smaller than the stated noise; {PATTERNS}"
-    elif chi2 <= CHI2_HIGH:
-        text = f"The residuals have the size of the stated noise; {PATTERNS}"
-    elif chi2 <= CHI2_BAD:
-        text = (
-            f"The residuals are {size}: there is more noise than stated, or the model lacks an "
-            "effect; galileo compare tests which"
-        )
-    else:
-        text = (
-            f"The residuals are {size}: the model does not describe the data, so do not trust its "
-            "parameters"
-        )
-    text = f"{text} (chi2 per degree of freedom {chi2:.2f})."
-    if found := result.get("discrepancy"):
-        text = f"{text} {discrepancy_text(found)}"
-    return " ".join([text, *map(pull_text, result.get("pulls", []))])
+        return f"What it leaves is smaller than the stated noise; {PATTERNS}."
+    return f"What it leaves has the size of noise, {size}; {PATTERNS}."
 
 
 def discrepancy_text(found: Mapping[str, Any]) -> str:
@@ -231,18 +230,17 @@ def pull_text(pull: Mapping[str, Any]) -> str:
             text = phrase.format(*found.groups(), value=value, size=1e3 * abs(value), side=side)
     return (
         f"{text[0].upper()}{text[1:]}, {abs(pull['z']):.0f} standard deviations from the "
-        "expected value; galileo diagnose looks for the cause."
+        "expected value."
     )
 
 
-def fits(result: dict[str, Any]) -> bool:
-    """Whether chi2 per degree of freedom is one that noise gives, of enough frames to tell."""
+def fits(result: Mapping[str, Any]) -> bool:
+    """Whether noise and imperfections of usual sizes explain what is left of enough frames."""
     if result.get("no_verdict"):
         return False
     if "imperfections" in result:
         return all(entry["ordinary"] for entry in result["imperfections"].values())
-    chi2 = result["error"]["chi2_per_dof"]
-    return chi2 is not None and chi2 <= CHI2_HIGH  # False for NaN
+    return bool(result["error"].get("explained_by_noise", True))
 
 
 def convergence(run: Run) -> str:
@@ -278,8 +276,8 @@ def fit_command(run: Run) -> str:
     words += [f"--{key} {result[key]}" for key in ("preset", "sampler") if result.get(key)]
     if result.get("discrepancy"):
         words.append(f"--discrepancy {result['discrepancy']['kind']}")
-    if result.get("imperfections"):
-        words.append("--discrepancy rough")
+    elif result.get("discrepancy_asked", "auto") != "auto":
+        words.append(f"--discrepancy {result['discrepancy_asked']}")
     if run.problem.model.motion != "planar":
         words.append(f"--motion {run.problem.model.motion}")
     return " ".join([*words, f"--engine {run.problem.engine.name}", f"--seed {result['seed']}"])

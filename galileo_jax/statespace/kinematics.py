@@ -114,10 +114,12 @@ def _filled(observation: Observation, i: int) -> np.ndarray:
 
 
 def _noise_m(observation: Observation, i: int) -> float:
+    """In the direction that is known best: across a path it may not be known at all."""
     seen = observation.mask[i]
     if not seen.any():
         return 0.0
-    return float(np.sqrt(np.median(observation.covariance_m2[i, 0, 0, seen])))
+    each = np.linalg.eigvalsh(np.moveaxis(observation.covariance_m2[i][:, :, seen], -1, 0))
+    return float(np.sqrt(np.median(each[:, 0])))
 
 
 def _slope(times_s: np.ndarray, place: np.ndarray) -> np.ndarray:

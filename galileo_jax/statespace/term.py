@@ -13,6 +13,7 @@ from galileo_jax.runtime.registry import Registry
 from galileo_jax.statespace.kinematics import Kinematics
 
 SMALLEST = 1e-7  # of the largest pattern's variance; what is smaller is left out
+USUAL = 2.0  # standard deviations of the prior of a size: larger is more than usual
 
 Patterns = Float[np.ndarray, "pattern object axis frame"]
 
@@ -41,9 +42,9 @@ class Term:
       meaning: one sentence for the user, with {size}.
       unit: of the size.
       median, factor: of the size's log-normal prior; `median` maps what was seen to it.
-      ordinary: maps what was seen to the size up to which such a thing is as usual.
       patterns: `[pattern, object, axis, frame]`, m, whose squares sum to the covariance at unit
         size; none where the term has no place.
+      is_of_marks: whether it is where bodies are seen, and not where they are.
     """
 
     name: str
@@ -51,8 +52,8 @@ class Term:
     unit: str
     median: Callable[[Seen], float]
     factor: float
-    ordinary: Callable[[Seen], float]
     patterns: Callable[[Seen], Patterns]
+    is_of_marks: bool = False
 
 
 TERMS: Registry[Term] = Registry("imperfection", "imperfections", "galileo_jax.statespace.terms")

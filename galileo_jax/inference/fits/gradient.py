@@ -185,17 +185,21 @@ class GradientFitter:
         count = self._count
         return self._best_variant(fit.z[:count], fit.free[:count], 0)
 
-    def continued(self, fit: GradientFit) -> GradientFit:
-        """A fit of other sizes of imperfections, gone on from, with the valleys beside it."""
+    def continued(self, fit: GradientFit, to_rest: bool = True) -> GradientFit:
+        """A fit of other sizes of imperfections, gone on from, with the valleys beside it.
+
+        Args:
+          fit: with the sizes of before.
+          to_rest: whether it goes on until it stands still.
+        """
         self._residuals.num_rollouts = 0
         every, count = (fit, *fit.beside), self._count
         z = np.stack([one.z for one in every])
         free = np.stack([one.free[:count] for one in every])
         points = Batch(z[:, :count], free, np.exp(NOISE_SD * z[:, count:]))
         num_steps = int(fit.stats.get("num_steps", 0))
-        found = self._at_rest(
-            list(self._polish(points, np.zeros(len(every), int), num_steps).values())
-        )
+        ends = list(self._polish(points, np.zeros(len(every), int), num_steps).values())
+        found = self._at_rest(ends) if to_rest else _with_beside(ends)
         if found.code is Code.CONVERGED and not self.is_explained(found, NOISE_SCALE_RANGE[1]):
             return replace(found, code=Code.MISFIT)
         return found

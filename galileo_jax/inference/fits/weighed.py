@@ -21,7 +21,8 @@ Bayesian inference in econometric models using Monte Carlo integration, Economet
 (the t).
 """
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,6 +112,7 @@ def weighed(
     most: int = MOST_DRAWS,
     width: float = 1.0,
     enough: float = ENOUGH_ESS,
+    density: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> Weighed:
     """The evidence of a hypothesis, and weighed draws of its posterior.
 
@@ -123,8 +125,11 @@ def weighed(
       most: of draws in all; more than `num` only while too few of them count.
       width: of the t, in that of the posterior.
       enough: draws of the posterior itself that they must be worth.
+      density: of likelihood times exp(-z.z / 2), its logarithm at `[point, parameter]`, up to a
+        constant; default: at the sizes of imperfections that were fitted with.
     """
     fit, generator = fits[0], np.random.default_rng([seed, 23])
+    density = density or functools.partial(_log_densities, fit, residuals)
     parts, shares = _parts(fits, residuals, width)
     if without is not None and fit.log_evidence < without.log_evidence + HARDLY_BETTER:
         parts.append(_part(without, fit, residuals, width))
@@ -135,7 +140,7 @@ def weighed(
     best, better, made = -np.inf, None, _Mixture(parts)
     while len(made.z) < num or (made.ess < enough and len(made.z) < most):
         new = made.draw(generator, num, shares, fit.free)
-        both = _log_densities(fit, residuals, np.concatenate([new, modes]))
+        both = density(np.concatenate([new, modes]))
         made.add(both[:num] - constant)
         best = max(best, both[num:].max() + BETTER_NATS)
         if both[:num].max() > best:

@@ -29,7 +29,6 @@ register(
         unit="m/s",
         median=lambda _: 0.03,
         factor=3.0,
-        ordinary=lambda _: 0.3,
         patterns=_patterns,
     )
 )

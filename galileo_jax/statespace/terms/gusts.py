@@ -30,7 +30,6 @@ register(
         unit="m/s^2",
         median=lambda _: 0.02,
         factor=4.0,
-        ordinary=lambda _: 0.3,
         patterns=_patterns,
     )
 )

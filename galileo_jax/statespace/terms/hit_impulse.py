@@ -23,7 +23,6 @@ register(
         unit="1",
         median=lambda _: 0.005,
         factor=3.0,
-        ordinary=lambda _: 0.03,
         patterns=_patterns,
     )
 )

@@ -1,10 +1,16 @@
-"""An error of the marks that lasts: lens, scale, blur, the eye, an encoder."""
+"""Errors of the marks that last: lens, scale, blur, the eye, an encoder.
+
+Smooth ones over a third of the track (Matern's process, nu = 3/2) and brief ones over three rows
+(Ornstein and Uhlenbeck's, nu = 1/2), in each axis of each body.
+
+Source: Rasmussen and Williams (2006), Gaussian Processes for Machine Learning, section 4.2.1.
+"""
 
 import numpy as np
 
 from galileo_jax.statespace.term import Patterns, Seen, Term, of_axis, register
 
-LASTS, BRIEFLY = 1 / 6, 3.0  # of the track; rows
+LASTS, BRIEFLY = 1 / 3, 3.0  # of the track; rows
 
 
 def way_m(seen: Seen) -> float:
@@ -16,25 +22,24 @@ def way_m(seen: Seen) -> float:
     return max(longest, 1e-3)
 
 
-def _patterns(seen: Seen, lasts_s: float) -> Patterns:
+def _apart(seen: Seen, lasts_s: float) -> np.ndarray:
+    """`[frame, frame]`, times between frames over a duration."""
     times = seen.observation.times_s
-    apart = np.abs(times[:, None] - times)
-    return of_axis(np.exp(-apart / max(lasts_s, 1e-9)), seen)
+    return np.abs(times[:, None] - times) / max(lasts_s, 1e-9)
 
 
 def _long(seen: Seen) -> Patterns:
-    times = seen.observation.times_s
-    return _patterns(seen, LASTS * float(np.ptp(times)))
+    apart = np.sqrt(3) * _apart(seen, LASTS * float(np.ptp(seen.observation.times_s)))
+    return of_axis((1 + apart) * np.exp(-apart), seen)
 
 
 def _brief(seen: Seen) -> Patterns:
-    times = seen.observation.times_s
-    step = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
-    return _patterns(seen, BRIEFLY * step)
+    steps = np.diff(seen.observation.times_s)
+    return of_axis(np.exp(-_apart(seen, BRIEFLY * float(np.median(steps) if steps.size else 1.0))), seen)
 
 
 for name, meaning, patterns in (
-    ("lasting_error", "the marks are off by {size} for a sixth of the time", _long),
+    ("lasting_error", "the marks are off by {size} for a third of the time", _long),
     ("brief_error", "the marks are off by {size} for some frames", _brief),
 ):
     register(
@@ -44,7 +49,7 @@ for name, meaning, patterns in (
             unit="m",
             median=lambda seen: 2e-4 * way_m(seen),
             factor=5.0,
-            ordinary=lambda seen: 5e-3 * way_m(seen),
             patterns=patterns,
+            is_of_marks=True,
         )
     )

@@ -1,0 +1,291 @@
+"""Sizes of imperfections, by what a fit leaves, in the linear model round it.
+
+    e + J z ~ N(0, C(x)),    C = s^2 1 + U U^T + sum_k size_k^2 K_k,    z ~ N(0, 1)
+
+in units of the stated tracking errors; e: the residuals that the fit would leave at z = 0. Sizes
+are log-normal before the data: x_k = log(size_k / median_k) / log(factor_k) ~ N(0, 1), and so are
+the noise scales s. With the parameters integrated out, e ~ N(0, C + J J^T). The most probable x come
+by Newton steps with the average information, from where all sizes are at their medians and from
+where one is larger and the others are smaller: an error may be brief or last long, and hardly any
+track tells. What x may be is drawn by importance, from the prior and normal distributions round
+these modes.
+
+Each clip of several is taken with parameters of its own, so that what differs from trial to trial
+is not taken for roughness within one.
+
+Source: Gilmour, Thompson and Cullis (1995), Average information REML, Biometrics 51, 1440; MacKay
+(1992), Bayesian interpolation, Neural Computation 4, 415; Owen and Zhou (2000), Safe and effective
+importance sampling, J. Am. Stat. Assoc. 95, 135.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy.linalg
+from jaxtyping import Float
+from scipy.special import logsumexp
+
+from galileo_jax.inference.fits.evidence import GradientFit
+from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
+from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
+from galileo_jax.inference.problem import Problem
+from galileo_jax.inference.resampled import resampled
+from galileo_jax.statespace.sizes import Sizes
+from galileo_jax.statespace.term import Term
+
+MOST_VALUES = 300  # of a clip that tell sizes: of more, neighbours are averaged
+MOST_STEPS, STILL = 60, 1e-6
+STILL_NATS = 1e-9
+LEAST_DAMPING = 1e-6
+LONGEST_STEP = 1.5  # of a log size, in units of its prior's width
+LARGEST = 6.0
+ASIDE = 1.5  # from the medians, of starts: one size larger, all others smaller
+APART = 0.5  # modes that are nearer are one
+NUM_TRIED, NUM_DRAWS = 96, 128  # of each part of the proposal; of what is kept
+NUM_SCALES = 121  # of noise, over which is integrated
+WIDER = 1.3  # than the normal approximation round a mode is what is drawn there
+
+
+@dataclass(frozen=True)
+class LinearClip:
+    """What of one clip tells sizes and parameters.
+
+    Attributes:
+      e: `[value]`, residuals at z = 0.
+      slopes: `[value, model parameter]`, J; 0 where pinned.
+      fixed: `[value, value]`, U U^T, the covariance whatever the sizes are.
+      of_terms: by the term's name, K at the median `[value, value]`.
+    """
+
+    e: Float[np.ndarray, " value"]
+    slopes: Float[np.ndarray, "value parameter"]
+    fixed: Float[np.ndarray, "value value"]
+    of_terms: dict[str, Float[np.ndarray, "value value"]]
+
+    def covariance(
+        self, terms: Sequence[Term], x: np.ndarray, log_scale: float
+    ) -> Float[np.ndarray, "value value"]:
+        """C; `x` `[term]`, `log_scale` the noise scale's, in units of its prior's width."""
+        found = self.fixed + np.exp(2 * NOISE_SD * log_scale) * np.eye(len(self.e))
+        for term, own in zip(terms, x, strict=True):
+            if term.name in self.of_terms:
+                found += term.factor ** (2 * own) * self.of_terms[term.name]
+        return found
+
+
+class Mode(NamedTuple):
+    """Sizes round which others are less probable.
+
+    Attributes:
+      both: `[term and clip]`, log sizes and log noise scales.
+      value: their log posterior.
+      information: `[term and clip, term and clip]`, average, the prior included.
+      count: of terms.
+    """
+
+    both: np.ndarray
+    value: float
+    information: np.ndarray
+    count: int
+
+    @property
+    def x(self) -> np.ndarray:
+        """`[term]`, log sizes."""
+        return self.both[: self.count]
+
+
+def linear_clips(trials: JointProblem, fit: GradientFit) -> list[LinearClip]:
+    """The clips round a fit, its residuals and slopes as they are."""
+    theta, count = trials.theta(fit.z, fit.free), len(trials.model_parameters)
+    found, first = [], 0
+    for index, problem in enumerate(trials.problems):
+        size = problem.observation.position_m.size
+        scale = trials.noise_scale(theta, index)
+        rows = fit.jacobian[first : first + size]
+        first += size
+        white = problem.whiten(problem.simulate(trials.of_clip(theta, index)), scale)
+        every = np.column_stack([white - rows @ fit.z[:count], rows])
+        every = _averaged(_in_stated_errors(every, scale, problem).T, problem)
+        modes = _averaged(problem.fixed_patterns, problem)
+        of_terms = {}
+        for term, patterns in problem.patterns.items():
+            own = _averaged(patterns, problem)
+            of_terms[term] = own.T @ own
+        found.append(LinearClip(every[0], every[1:].T, modes.T @ modes, of_terms))
+    return found
+
+
+def _averaged(values: np.ndarray, problem: Problem) -> Float[np.ndarray, "row value"]:
+    """Rows of measured values; neighbours of many are averaged, independent errors staying so.
+
+    Args:
+      values: `[row, ...]`, whitened, as many in each row as `Problem.whiten` gives.
+      problem: a place that is known along a line only is one value, not two.
+    """
+    observation = problem.observation
+    seen = np.repeat(observation.mask[:, None], observation.position_m.shape[1], axis=1)
+    is_line = (observation.across != 0).any(axis=1)
+    if is_line.any():
+        along = np.stack([-observation.across[:, 1], observation.across[:, 0]], axis=1)
+        white = np.einsum("oijt,ojt->oit", problem.data.inverse_root, along)
+        white /= np.maximum(np.linalg.norm(white, axis=1, keepdims=True), 1e-300)
+        values = values.reshape(len(values), *observation.position_m.shape).copy()
+        told = np.einsum("roit,oit->rot", values, white)
+        values[:, :, 0] = np.where(is_line, told, values[:, :, 0])
+        seen[:, 1] &= ~is_line
+    own = np.repeat(np.arange(seen.shape[0] * seen.shape[1]), seen.shape[2])[seen.reshape(-1)]
+    values = values.reshape(len(values), -1)[:, seen.reshape(-1)]
+    together = -(-len(own) // MOST_VALUES)
+    if together < 2 or not len(values):
+        return values
+    rank = np.arange(len(own)) - np.searchsorted(own, own)
+    starts = np.flatnonzero((rank % together == 0) | (np.diff(own, prepend=-1) > 0))
+    number = np.diff(starts, append=len(own))
+    return np.add.reduceat(values, starts, axis=1) / np.sqrt(number)
+
+
+def _in_stated_errors(white: np.ndarray, scale: float, problem: Problem) -> np.ndarray:
+    """Columns of whitened residuals in units of the stated tracking errors."""
+    data = problem.data
+    basis = data.basis.reshape(len(data.gain), -1)
+    along = basis @ white
+    more = np.sqrt(scale**2 + data.gain**2) - scale
+    return scale * white + basis.T @ (more[:, None] * along)
+
+
+def most_probable(
+    clips: Sequence[LinearClip],
+    terms: Sequence[Term],
+    starts: Sequence[np.ndarray] | None,
+    fit: GradientFit,
+) -> list[Mode]:
+    """The most probable sizes first, and others to which starts lead.
+
+    Args:
+      clips: as of `linear_clips`.
+      terms: that have a size, in the order of x.
+      starts: `[term]` each; None: the medians and one term after the other.
+      fit: its noise scales are where these begin.
+    """
+    if starts is None:
+        aside = ASIDE * (2 * np.eye(len(terms)) - 1)
+        starts = [np.zeros(len(terms)), *(aside if len(terms) > 1 else [])]
+    scales = fit.z[len(fit.steps) :]
+    marginal = [_without_parameters(clip) for clip in clips]
+    found = [_climbed(marginal, terms, np.concatenate([x, scales])) for x in starts]
+    modes: list[Mode] = []
+    for mode in sorted(found, key=lambda one: -one.value):
+        if all(np.abs(mode.both - other.both).max() > APART for other in modes):
+            modes.append(mode)
+    return modes
+
+
+def _without_parameters(clip: LinearClip) -> LinearClip:
+    """The clip with its parameters integrated out."""
+    fixed = clip.fixed + clip.slopes @ clip.slopes.T
+    return LinearClip(clip.e, clip.slopes[:, :0], fixed, clip.of_terms)
+
+
+def _climbed(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray) -> Mode:
+    """The mode above `both` `[term and clip]`."""
+    value, gradient, information = _look(clips, terms, both)
+    damping = LEAST_DAMPING
+    for _ in range(MOST_STEPS):
+        step = np.linalg.solve(information + damping * np.eye(len(both)), gradient)
+        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), STILL))
+        there = np.clip(both + step, -LARGEST, LARGEST)
+        new = _look(clips, terms, there)
+        if new[0] < value - STILL_NATS:
+            damping *= 10
+            continue
+        moved, both, (value, gradient, information) = np.abs(there - both).max(), there, new
+        damping = max(damping / 5, LEAST_DAMPING)
+        if moved < STILL:
+            break
+    return Mode(both, value, information, len(terms))
+
+
+def _look(
+    clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """The log posterior of log sizes and noise scales, its gradient, its average information."""
+    value, gradient, information = -0.5 * float(both @ both), -both.copy(), np.eye(len(both))
+    count = len(terms)
+    widths = np.append([np.log(term.factor) for term in terms], np.full(len(clips), NOISE_SD))
+    for index, clip in enumerate(clips):
+        own = [k for k, term in enumerate(terms) if term.name in clip.of_terms] + [count + index]
+        units = [*(clip.of_terms[terms[k].name] for k in own[:-1]), np.eye(len(clip.e))]
+        parts = [np.exp(2 * widths[k] * both[k]) * u for k, u in zip(own, units, strict=True)]
+        root = scipy.linalg.cholesky(clip.fixed + sum(parts), lower=True)
+        (dpotri,) = scipy.linalg.get_lapack_funcs(("potri",), (root,))
+        inverted = dpotri(root, lower=True)[0]
+        inverted = np.tril(inverted) + np.tril(inverted, -1).T
+        pulled = inverted @ clip.e
+        value -= 0.5 * float(clip.e @ pulled) + float(np.log(np.diag(root)).sum())
+        moved = np.stack([part @ pulled for part in parts], axis=1) * widths[own]
+        volume = widths[own] * [np.sum(inverted * part) for part in parts]
+        gradient[own] += pulled @ moved - volume
+        information[np.ix_(own, own)] += 2 * moved.T @ inverted @ moved
+    return value, gradient, information
+
+
+def integrated(clips: Sequence[LinearClip], terms: Sequence[Term], modes: Sequence[Mode]) -> Sizes:
+    """Sizes with draws of their posterior, and the evidence with all of them integrated.
+
+    Args:
+      clips: as of `linear_clips`.
+      terms: of the sizes.
+      modes: the most probable first.
+    """
+    marginal = [_without_parameters(clip) for clip in clips]
+    best, count = modes[0], len(terms)
+    roots = [WIDER * symmetric_root(inverse(mode.information)) for mode in modes]
+    wide = np.eye(len(best.both))  # of the prior; noise scales are known much better than by it
+    wide[count:, count:] = 2 * roots[0][count:, count:]
+    middles = [np.append(np.zeros(count), best.both[count:]), *(mode.both for mode in modes)]
+    normal = np.random.default_rng(0).standard_normal((len(middles), NUM_TRIED, len(best.both)))
+    parts = list(zip(middles, [wide, *roots], strict=True))
+    tried = np.concatenate([m + one @ root for one, (m, root) in zip(normal, parts, strict=True)])
+    log_q = logsumexp([_log_normal(tried, m, root) for m, root in parts], axis=0)
+    values = np.array([_value(marginal, terms, each) for each in tried])
+    log_weights = values - 0.5 * tried.shape[1] * np.log(2 * np.pi)
+    log_weights -= log_q - np.log(len(parts))
+    noise = np.linalg.slogdet(best.information[count:, count:])[1]
+    at_best = best.value + 0.5 * float(best.x @ best.x) - 0.5 * float(noise)
+    evidence = float(logsumexp(log_weights)) - np.log(len(tried)) - at_best
+    which = resampled(log_weights, NUM_DRAWS, np.random.default_rng(1))
+    return Sizes(tuple(term.name for term in terms), best.x, tried[which], evidence)
+
+
+def _value(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray) -> float:
+    """`_look`'s value alone."""
+    value, count = -0.5 * float(both @ both), len(terms)
+    for index, clip in enumerate(clips):
+        cover = clip.covariance(terms, both[:count], both[count + index])
+        root = scipy.linalg.cholesky(cover, lower=True)
+        white = scipy.linalg.solve_triangular(root, clip.e, lower=True)
+        value -= 0.5 * float(white @ white) + float(np.log(np.diag(root)).sum())
+    return value
+
+
+def log_likelihood(
+    clips: Sequence[LinearClip], terms: Sequence[Term], x: Float[np.ndarray, " term"]
+) -> float:
+    """log p(y | x), parameters and noise scales integrated, up to a constant."""
+    total, log_scale = 0.0, np.linspace(-LARGEST, LARGEST, NUM_SCALES)
+    for clip in map(_without_parameters, clips):
+        unit = np.eye(len(clip.e))
+        values, vectors = np.linalg.eigh(clip.covariance(terms, x, 0.0) - unit)
+        along2 = (vectors.T @ clip.e) ** 2
+        cover = np.exp(2 * NOISE_SD * log_scale)[:, None] + np.maximum(values, 0.0)
+        each = -0.5 * np.sum(np.log(cover) + along2 / cover, axis=1) - 0.5 * log_scale**2
+        total += float(logsumexp(each))
+    return total
+
+
+def _log_normal(values: np.ndarray, middle: np.ndarray, root: np.ndarray) -> np.ndarray:
+    white = np.linalg.solve(root, (values - middle).T)
+    log_volume = np.linalg.slogdet(root)[1] + 0.5 * len(middle) * np.log(2 * np.pi)
+    return -0.5 * np.sum(white**2, axis=0) - log_volume

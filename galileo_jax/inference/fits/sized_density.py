@@ -1,0 +1,65 @@
+"""The posterior of parameters with the sizes of imperfections integrated.
+
+    p(z | y) = mean over x of p(z | y, x),    p(z | y, x) = p(y | z, x) p(z) / p(y | x),
+
+x: draws of what the data leave open of the sizes, of which the linear model round the fit gives
+p(y | x), too (`linear_clip`). What is measured is normal given z and x, with no linear model
+between.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import logsumexp
+
+from galileo_jax.inference.fits.evidence import GradientFit
+from galileo_jax.inference.fits.fitted_clip import FittedClip
+from galileo_jax.inference.fits.linear_clip import linear_clips, log_likelihood
+from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
+from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
+
+NUM_SIZES = 32  # of the draws of sizes
+
+
+class SizedDensity:
+    """The log density of parameters and noise scales, up to a constant."""
+
+    def __init__(self, trials: JointProblem, fit: GradientFit, clips: Sequence[FittedClip]):
+        assert fit.sizes is not None
+        self._clips, self._fit = clips, fit
+        draws = fit.sizes.draws[:: -(-len(fit.sizes.draws) // NUM_SIZES), : len(fit.sizes.x)]
+        linear = linear_clips(trials, fit)
+        self._of_sizes = [log_likelihood(linear, trials.terms, x) for x in draws]
+        self._data = [
+            [clip.problem.with_sizes(dict(zip(fit.sizes.names, x, strict=True))).data for x in draws]
+            for clip in clips
+        ]
+
+    def __call__(self, z: Float[np.ndarray, "point parameter"]) -> Float[np.ndarray, " point"]:
+        """At `z`, noise scales last."""
+        count = len(self._fit.steps)
+        noise = np.exp(NOISE_SD * z[:, count:])
+        free = np.broadcast_to(self._fit.free[:count], (len(z), count))
+        found = np.zeros((len(self._of_sizes), len(z)))
+        for c, (clip, each) in enumerate(zip(self._clips, self._data, strict=True)):
+            predicted = clip.problem.simulate_batch(clip.theta(z[:, :count], free))
+            found += [_log_likelihood(predicted, noise[:, c], data) for data in each]
+        found -= np.array(self._of_sizes)[:, None] - max(self._of_sizes)
+        mean = np.asarray(logsumexp(found, axis=0)) - np.log(len(found))
+        return np.nan_to_num(mean, nan=-np.inf) - 0.5 * np.sum(z**2, axis=1)
+
+
+def _log_likelihood(
+    predicted_m: np.ndarray, noise: np.ndarray, data: Whitening
+) -> Float[np.ndarray, " point"]:
+    """Of what was measured, up to the constant of the tracker's own covariance."""
+    basis = data.basis.reshape(len(data.gain), -1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        left = np.einsum("oijt,pojt->poit", data.inverse_root, data.observed_m - predicted_m)
+        left = left.reshape(len(noise), -1)
+        along2 = (left @ basis.T) ** 2
+        rest = np.sum(left**2, axis=1) - np.sum(along2, axis=1)
+        square = rest / noise**2 + np.sum(along2 / (noise[:, None] ** 2 + data.gain**2), axis=1)
+    volume = [GaussianLikelihood.log_determinant(scale, data) for scale in noise]
+    return -0.5 * (square + np.array(volume))
