@@ -24,7 +24,6 @@ from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.fits.imperfect import World, Worlds, fit_worlds
-
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem

@@ -1,6 +1,5 @@
 """`galileo fit`: from a clip to masses and friction coefficients."""
 
-import shlex
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, get_args
 

@@ -9,6 +9,8 @@
    form explains the data better, the best single effects are joined by others. Where it leaves only
    noise, all pairs are searched for those that do so, too (`second_effect`). Pairs stand in the
    same table (rules: `verdict`, `law_verdict`).
+   Before pairs are tried it is asked whether imperfections of usual sizes, with no effect or with
+   one, explain the data (`imperfect_world`). Pairs and formulas must beat imperfections of any size.
 4. What leaves only noise and is far more probable than all else is named, unless a clip like this
    one would not tell it from another (`expected_lead`). Several are ambiguous.
 5. Where only a form explains the data, or nothing does, or only what could explain much (two
@@ -20,7 +22,7 @@
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
@@ -36,9 +38,17 @@ from galileo_jax.diagnosis.fitted_pairs import (
     pairs_from_base,
     pairs_like_the_best,
 )
+from galileo_jax.diagnosis.imperfect_world import ImperfectWorld, imperfect_world
 from galileo_jax.diagnosis.known_constants import with_known_constants
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
-from galileo_jax.diagnosis.law_verdict import best_formula, is_law_needed, law_to_doubt, needs_laws
+from galileo_jax.diagnosis.law_verdict import (
+    best_formula,
+    is_law_needed,
+    joined_names,
+    law_to_doubt,
+    law_verdict,
+    needs_laws,
+)
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
 from galileo_jax.diagnosis.library_again import singles_beside, singles_of_pairs
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
@@ -49,14 +59,15 @@ from galileo_jax.diagnosis.second_effect import (
     pairs_near,
     with_second,
 )
-from galileo_jax.diagnosis.slow_errors import unless_slow_errors
 from galileo_jax.diagnosis.verdict import (
     CONVINCING,
     PAIR_P,
+    UNEVEN,
     best_named,
     decisive_margin,
     explains,
     form_that_leads,
+    is_about_pairs,
     is_nothing_missing,
     looked_at_again,
     needs_pairs,
@@ -67,6 +78,7 @@ from galileo_jax.diagnosis.verdict import (
     to_compare,
     verdict_of,
     within_luck,
+    without_a_name,
 )
 from galileo_jax.diagnosis.wide_search import widely_searched
 from galileo_jax.inference.fits.gradient import GradientFitter
@@ -138,63 +150,36 @@ def diagnose(
     compared: dict[tuple[str, ...], Comparison] = {}
     decisive = decisive_margin(is_adequate)
     candidates = _compared(trials, candidates, decisive, seed, compared)
-    pairs, near, because = _pairs(race, candidates, library, decisive, on_stage)
-    why = (*why, *because)
-    if pairs:
-        for candidate in pairs:
-            on_candidate(candidate)
-        on_stage("comparing the best pairs with the data")
-        candidates = _compared(trials, (*candidates, *pairs), decisive, seed, compared)
-        if not any(explains(c) for c in candidates):
-            on_stage("searching pairs from the fit without effects")
-            better = pairs_from_base(race, candidates)
-            candidates = _improved(trials, candidates, better, decisive, seed, compared)
-        if not any(explains(c) for c in candidates):
-            on_stage("searching the best pairs from more starts")
-            better, tried = widely_searched(race, candidates), dict(compared)
-            wider = _improved(trials, candidates, better, decisive, seed, tried)
-            # Else formulas would be looked for beside a pair that is wrong in another way.
-            if any(explains(c) for c in wider):
-                candidates, compared = wider, tried
-        better = singles_of_pairs(race, candidates)
-        candidates = _improved(trials, candidates, better, decisive, seed, compared)
-        on_stage("looking at pairs that could be confused with the best")
-        better = pairs_like_the_best(race, candidates, library)
-        candidates = _improved(trials, candidates, better, decisive, seed, compared)
-    verdict = _judged(trials, candidates, decisive, on_stage)
+    rough, verdict = None, None
+    if not is_adequate:
+        on_stage("allowing for imperfections")
+        rough = imperfect_world(trials, base, decisive, seed)
+    if rough is not None and not rough.is_beaten_by(candidates):
+        rough = rough.with_candidates(trials, candidates, seed)
+        verdict = _in_imperfect_world(trials, rough, on_stage)
+        if verdict.status == "unknown" or verdict.effects in UNEVEN:
+            verdict = None  # a pair or a formula may explain it
     views: list[View] = []
-    if needs_laws(verdict, candidates):
-        on_stage("inferring the missing force")
-        # Where much is missing, friction without it is far from the truth: to 0, say. Beside a
-        # wrong effect it may be so, too.
-        start = reduced(trials, candidates[0].hypothesis, ())
-        views = views_of(trials, start, base)
-        on_stage("looking for a law: comparing formulas with the missing force")
-        laws = law_candidates(trials, base, start, views, len(library), candidates, on_stage)
-        for candidate in ranked(laws):
-            on_candidate(candidate)
-        both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
-        law = law_to_doubt(both)
-        better = []
-        if law is not None:
-            on_stage("fitting the library's effects again, starting from the law")
-            better = singles_beside(race, law, candidates)
-        if better:
-            candidates = _improved(trials, candidates, better, decisive, seed, compared)
-            both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
-            verdict = _judged(trials, candidates, decisive, on_stage)
-        if law is None or is_law_needed(verdict, candidates, law, decisive):
-            candidates, verdict = both, law_or(trials, verdict, both, decisive)
+    if verdict is None:
+        found = _searched(trials, race, candidates, decisive, seed, compared, on_stage)
+        verdict, candidates, views = found.verdict, found.candidates, found.views
+        why = (*why, *found.reasons)
+        if not is_adequate and (verdict.status in ("unknown", "law") or is_about_pairs(verdict)):
+            rough, verdict = _instead(trials, rough, verdict, candidates, seed, on_stage)
         else:
-            why = (*why, reasons.library_says_it(best_named(candidates), law))
-        verdict = _or_pair(trials, verdict, candidates, decisive, on_stage)
-        verdict = unless_slow_errors(trials, base, verdict, candidates, decisive)
+            rough = None
+    if rough is not None:
+        candidates = rough.with_the_rest(candidates)
+        first = Round(rough.base, rough.comparison)
+        rounds = [first] if verdict.status == "none" else rounds
     verdict = with_known_constants(trials, verdict, candidates, seed)
-    verdict = with_second(verdict, candidates, near)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
+    if rough is not None and verdict.effects in UNEVEN:
+        rounds.append(replace(first, called=verdict.effects))
+        on_round(rounds[-1])
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
-        comparison = compared.get(chosen.effects)
+        comparison = None if rough is not None else compared.get(chosen.effects)
         if comparison is None:
             comparison = compare(chosen.hypothesis.of(trials), chosen.hypothesis.fit, seed)
         rounds.append(Round(chosen.hypothesis, comparison))
@@ -216,8 +201,168 @@ def diagnose(
     each: tuple[EachClip, ...] = ()
     if len(trials.problems) > 1:
         on_stage("looking at each clip by itself")
-        each = each_clip(trials, base.fit, first.comparison)
+        each = each_clip(trials, base.fit, rounds[0].comparison)
     return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each)
+
+
+@dataclass(frozen=True)
+class _Searched:
+    """What pairs and formulas came to.
+
+    Attributes:
+      verdict: on the whole table.
+      candidates: the table.
+      views: of the missing force, where formulas were looked for.
+      reasons: why pairs were tried, and what came of it.
+    """
+
+    verdict: Verdict
+    candidates: tuple[Candidate, ...]
+    views: list[View]
+    reasons: tuple[Reason, ...]
+
+
+def _searched(
+    trials: JointProblem,
+    race: Race,
+    candidates: tuple[Candidate, ...],
+    decisive: float,
+    seed: int,
+    compared: dict[tuple[str, ...], Comparison],
+    on_stage: Callable[[str], None],
+) -> _Searched:
+    """Pairs and, where these or what they say is not enough, formulas, in an exact world.
+
+    Args:
+      trials: what was diagnosed.
+      race: that has fitted single effects.
+      candidates: these, ranked, compared with the data.
+      decisive: nats by which one hypothesis must be ahead of another.
+      seed: of the replicates.
+      compared: comparisons by effects; those made here are added.
+      on_stage: told what is being done.
+    """
+    library = [name for name in trials.all_effects if name not in FORM_NAMES]
+    pairs, near, why = _pairs(race, candidates, library, decisive, on_stage)
+    if pairs:
+        candidates = _with_pairs(
+            trials, race, candidates, pairs, decisive, seed, compared, on_stage
+        )
+    verdict = _judged(trials, candidates, decisive, on_stage)
+    views: list[View] = []
+    if needs_laws(verdict, candidates):
+        on_stage("inferring the missing force")
+        # Where much is missing, friction without it is far from the truth: to 0, say. Beside a
+        # wrong effect it may be so, too.
+        start = reduced(trials, candidates[0].hypothesis, ())
+        views = views_of(trials, start, race.base)
+        on_stage("looking for a law: comparing formulas with the missing force")
+        laws = law_candidates(trials, race.base, start, views, len(library), candidates, on_stage)
+        for candidate in ranked(laws):
+            race.on_candidate(candidate)
+        both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
+        law = law_to_doubt(both)
+        better = []
+        if law is not None:
+            on_stage("fitting the library's effects again, starting from the law")
+            better = singles_beside(race, law, candidates)
+        if better:
+            candidates = _improved(trials, candidates, better, decisive, seed, compared)
+            both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
+            verdict = _judged(trials, candidates, decisive, on_stage)
+        if law is None or is_law_needed(verdict, candidates, law, decisive):
+            candidates, verdict = both, law_or(trials, verdict, both, decisive)
+        else:
+            why = [*why, reasons.library_says_it(best_named(candidates), law)]
+        verdict = _or_pair(trials, verdict, candidates, decisive, on_stage)
+    verdict = with_second(verdict, candidates, near)
+    return _Searched(verdict, candidates, views, tuple(why))
+
+
+def _with_pairs(
+    trials: JointProblem,
+    race: Race,
+    candidates: tuple[Candidate, ...],
+    pairs: Sequence[Candidate],
+    decisive: float,
+    seed: int,
+    compared: dict[tuple[str, ...], Comparison],
+    on_stage: Callable[[str], None],
+) -> tuple[Candidate, ...]:
+    """The table with pairs, looked for from more starts where none explains the data."""
+    library = [name for name in trials.all_effects if name not in FORM_NAMES]
+    for candidate in pairs:
+        race.on_candidate(candidate)
+    on_stage("comparing the best pairs with the data")
+    candidates = _compared(trials, (*candidates, *pairs), decisive, seed, compared)
+    if not any(explains(c) for c in candidates):
+        on_stage("searching pairs from the fit without effects")
+        better = pairs_from_base(race, candidates)
+        candidates = _improved(trials, candidates, better, decisive, seed, compared)
+    if not any(explains(c) for c in candidates):
+        on_stage("searching the best pairs from more starts")
+        better, tried = widely_searched(race, candidates), dict(compared)
+        wider = _improved(trials, candidates, better, decisive, seed, tried)
+        # Else formulas would be looked for beside a pair that is wrong in another way.
+        if any(explains(c) for c in wider):
+            candidates = wider
+            compared.clear()
+            compared.update(tried)
+    better = singles_of_pairs(race, candidates)
+    candidates = _improved(trials, candidates, better, decisive, seed, compared)
+    on_stage("looking at pairs that could be confused with the best")
+    better = pairs_like_the_best(race, candidates, library)
+    return _improved(trials, candidates, better, decisive, seed, compared)
+
+
+def _in_imperfect_world(
+    trials: JointProblem, rough: ImperfectWorld, on_stage: Callable[[str], None]
+) -> Verdict:
+    """The verdict on a table of hypotheses with imperfections."""
+    plain = without_a_name(rough.comparison, rough.table)
+    if plain is not None:
+        return plain
+    law = law_verdict(rough.table, rough.decisive)
+    if law is not None:
+        return law
+    found = _judged(trials, rough.table, rough.decisive, on_stage)
+    is_law = {c.name for c in rough.table if c.law is not None}
+    is_named = not is_law & set(joined_names(found))
+    return found if is_named else Verdict("unknown", (), reasons=found.reasons)
+
+
+def _instead(
+    trials: JointProblem,
+    rough: ImperfectWorld | None,
+    verdict: Verdict,
+    candidates: Sequence[Candidate],
+    seed: int,
+    on_stage: Callable[[str], None],
+) -> tuple[ImperfectWorld | None, Verdict]:
+    """Another verdict where imperfections explain the data as well as what it is about.
+
+    Args:
+      trials: what was diagnosed.
+      rough: as far as it is known.
+      verdict: in the exact world.
+      candidates: on which it is, ranked.
+      seed: of the replicates.
+      on_stage: told what is being done.
+
+    Returns:
+      The imperfect world, None where the verdict stands in the exact one; and the verdict.
+    """
+    if rough is None:
+        return None, verdict
+    on_stage("allowing for imperfections")
+    rough = rough.with_candidates(trials, candidates, seed)
+    other = _in_imperfect_world(trials, rough, on_stage)
+    if other.status in ("none", "named", "ambiguous") and other.effects != verdict.effects:
+        return rough, other
+    if verdict.status == "unknown":
+        said = reasons.imperfections_fail(rough.comparison)
+        return None, replace(verdict, reasons=(*verdict.reasons, said))
+    return None, verdict
 
 
 def fitter_of(trials: JointProblem) -> GradientFitter:

@@ -52,6 +52,7 @@ class Candidate:
       law: the formula, where it is a law that the missing force suggested; else None.
       num_constants: parameters of its effects.
       num_expected: how many of its effects the clip leads to expect, as the drag of the air.
+      unusual: names of imperfections that are larger beside it than such things usually are.
     """
 
     effects: tuple[str, ...]
@@ -66,6 +67,7 @@ class Candidate:
     law: "Law | None" = None
     num_constants: int = 1
     num_expected: int = 0
+    unusual: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -135,10 +137,22 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Round:
-    """One round of the loop: a model, how it was fitted, how it compares with the data."""
+    """One round of the loop: a model, how it was fitted, how it compares with the data.
+
+    Attributes:
+      hypothesis: the fit.
+      comparison: of it with the data.
+      called: names of imperfections that count as effects, being larger than usual.
+    """
 
     hypothesis: Hypothesis
     comparison: Comparison
+    called: tuple[str, ...] = ()
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """What the model has, beside what it always has."""
+        return (*self.hypothesis.effects, *self.called)
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ def with_known_constants(
         if name not in form.named_values or rival is None:
             continue
         if table[name].log_evidence - rival.log_evidence < DECISIVE:
-            draws = fit_posterior(trials, rival.hypothesis.fit, seed)
+            draws = fit_posterior(rival.hypothesis.of(trials), rival.hypothesis.fit, seed)
             low, high = np.quantile(draws[f"{form.name}_{form.constant}"], INTERVAL).tolist()
             said.append(reasons.constant_by_data(table[name], form, low, high))
     return replace(verdict, reasons=(*verdict.reasons, *said))

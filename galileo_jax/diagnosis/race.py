@@ -44,7 +44,7 @@ class Race:
         on_candidate: Callable[[Candidate], None],
     ):
         self.fitter, self.base, self.is_adequate, self.seed = fitter, base, is_adequate, seed
-        self._on_candidate = on_candidate
+        self.on_candidate = on_candidate
         self._made: dict[tuple[str, ...], Candidate] = {}
 
     def __call__(
@@ -95,7 +95,7 @@ class Race:
         def on_fit(hypothesis: Hypothesis) -> None:
             made = make(hypothesis)
             table = ranked(self._made.values())
-            self._on_candidate(next(c for c in table if c.effects == made.effects))
+            self.on_candidate(next(c for c in table if c.effects == made.effects))
 
         found = fit_candidates(
             self.fitter, bases, sets, self.seed, matters, on_fit, needs_mending, starts

@@ -483,26 +483,31 @@ def constant_by_data(named: Candidate, form: Form, low: float, high: float) -> R
     )
 
 
-def slow_errors(title: str, lasts_s: float, size: float, rival: Candidate, ahead: float) -> Reason:
-    """Errors of the track that change slowly explain the data about as well as the best, or better.
+def imperfections_explain(comparison: Comparison) -> Reason:
+    """Imperfections leave nothing but noise without any effect.
 
     Args:
-      title: of the hypothesis that they stand beside.
-      lasts_s: how soon they change, s.
-      size: over what is stated of a point.
-      rival: the most probable without them.
-      ahead: nats by which they are more probable than it; less than 0 where they are less.
+      comparison: of the model without effects, with imperfections.
     """
-    times = f"{times_text(ahead)} as"
+    size = f"larger than usual: {', '.join(comparison.unusual)}" if comparison.unusual else "usual"
     return Reason(
-        "slow_errors",
-        f"Slow errors of the track (changing within {lasts_s:.2g} s, {size:.2g} times as large as "
-        f"stated for a point), together with {title}, are {times} probable as {rival.title}.",
-        {
-            "hypothesis": rival.name,
-            "beside": title,
-            "log_odds_ahead": ahead,
-            "lasts_s": lasts_s,
-            "size": size,
-        },
+        "imperfections_explain",
+        f"With imperfections, of sizes that are {size}, the data do not contradict the model "
+        f"without effects ({p_equals(comparison.p_value)}), and no effect beside them is "
+        "convincing.",
+        {"p_value": comparison.p_value, "unusual": ", ".join(comparison.unusual) or None},
+    )
+
+
+def imperfections_fail(comparison: Comparison) -> Reason:
+    """Nor do imperfections explain what no effect explains; argument as above."""
+    why = (
+        f"would have to be larger than usual: {', '.join(comparison.unusual)}"
+        if comparison.unusual
+        else f"leave more than noise ({p_equals(comparison.p_value)})"
+    )
+    return Reason(
+        "imperfections_fail",
+        f"Imperfections of surfaces, hits and marks {why}.",
+        {"p_value": comparison.p_value, "unusual": ", ".join(comparison.unusual) or None},
     )

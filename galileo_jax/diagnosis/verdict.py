@@ -15,7 +15,7 @@ from math import comb, log, sqrt
 import numpy as np
 from scipy.special import softmax
 
-from galileo_jax.comparison.compare import ADEQUATE_P
+from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.candidates import MAY_STILL_GAIN
 from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
@@ -27,6 +27,9 @@ DECISIVE = 3.0
 # was believed beforehand separates it from its rival (10^0.5 times: H. Jeffreys, Theory of
 # Probability, 3rd ed. 1961, app. B, 'substantial').
 SUBSTANTIAL = log(10) / 2
+# Imperfections that have the name of an effect where they are larger than usual.
+AS_EFFECTS = {("friction_roughness",): "uneven_friction"}
+UNEVEN = tuple((name,) for name in AS_EFFECTS.values())
 # How much wider that margin is where the base model already passes its comparison: the effect is
 # then so faint that more hypotheses stay possible.
 FAINT_FACTOR = 2.0
@@ -100,6 +103,27 @@ def is_nothing_missing(is_base_accepted: bool, candidates: Sequence[Candidate]) 
       candidates: ranked; forms without a name do not count.
     """
     return is_base_accepted and best_named(candidates).log_odds < CONVINCING
+
+
+def without_a_name(comparison: Comparison, candidates: Sequence[Candidate]) -> Verdict | None:
+    """The verdict where no effect is needed in an imperfect world; None where one is.
+
+    None is missing where imperfections of usual sizes leave nothing but noise, and the friction
+    is uneven where it varies by more. An effect that convinces all the same speaks against both.
+
+    Args:
+      comparison: of the model without effects, with imperfections.
+      candidates: ranked, with imperfections, compared with the data.
+    """
+    named = [c for c in candidates if explains(c) and c.log_odds >= CONVINCING]
+    if comparison.p_value < ADEQUATE_P or named:
+        return None
+    if not comparison.unusual:
+        return Verdict("none", (), reasons=(reasons.imperfections_explain(comparison),))
+    name = AS_EFFECTS.get(comparison.unusual)
+    if name is None:
+        return None
+    return Verdict("named", (name,), reasons=(reasons.imperfections_explain(comparison),))
 
 
 def best_named(candidates: Sequence[Candidate]) -> Candidate:
@@ -184,8 +208,9 @@ def rivals(candidate: Candidate, all_of: Sequence[Candidate]) -> tuple[str, ...]
 
 
 def explains(candidate: Candidate) -> bool:
-    """Whether a candidate was compared with the data and leaves nothing but noise."""
-    return candidate.p_value is not None and candidate.p_value >= _least_p(candidate)
+    """Whether a candidate was compared with the data and leaves nothing but what is usual."""
+    is_enough = candidate.p_value is not None and candidate.p_value >= _least_p(candidate)
+    return is_enough and not candidate.unusual
 
 
 def _least_p(candidate: Candidate) -> float:
@@ -400,14 +425,23 @@ def to_add(verdict: Verdict, candidates: Sequence[Candidate]) -> Candidate | Non
     is unknown, the best named effect is shown if it helps, though it does not explain the data.
 
     Args:
-      verdict: not none.
+      verdict: any; nothing is added where it is none or an imperfection.
       candidates: ranked.
     """
+    if verdict.status == "none" or verdict.effects in UNEVEN:
+        return None
     if verdict.status == "unknown":
         best = best_named(candidates)
         return best if best.log_evidence > LEAST_GAIN else None
     names = ("+".join(verdict.effects), verdict.effects[0])
     return next(c for c in candidates if c.name in names)
+
+
+def is_about_pairs(verdict: Verdict) -> bool:
+    """Whether all hypotheses that a verdict is about are of several effects."""
+    if verdict.status == "named":
+        return len(verdict.effects) > 1
+    return verdict.status == "ambiguous" and all("+" in name for name in verdict.effects)
 
 
 def is_close_call(

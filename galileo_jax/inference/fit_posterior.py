@@ -13,7 +13,6 @@ import numpy as np
 
 from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
 from galileo_jax.inference.fits.look_round import MOST_PARAMETERS
-
 from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.sized_density import SizedDensity
 from galileo_jax.inference.fits.weighed import weighed

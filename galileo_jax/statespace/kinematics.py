@@ -100,6 +100,16 @@ def kinematics(observation: Observation, scene: Surroundings) -> Kinematics | No
     return replace(found, hits=_hits(observation, place))
 
 
+def velocities(observation: Observation) -> Float[np.ndarray, "object axis frame"]:
+    """How fast bodies are seen to move, m/s; 0 of turning, which is no place."""
+    found = np.zeros_like(observation.position_m)
+    for i in range(len(found)):
+        places = _filled(observation, i)
+        for axis in range(found.shape[1] - int(observation.is_turning)):
+            found[i, axis] = _slope(observation.times_s, places[axis])
+    return found
+
+
 def _finite(corner_m: float) -> float:
     return corner_m if math.isfinite(corner_m) else 0.0
 

@@ -273,7 +273,7 @@ def _value(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray)
 def log_likelihood(
     clips: Sequence[LinearClip], terms: Sequence[Term], x: Float[np.ndarray, " term"]
 ) -> float:
-    """log p(y | x), parameters and noise scales integrated, up to a constant."""
+    """Log p(y | x), parameters and noise scales integrated, up to a constant."""
     total, log_scale = 0.0, np.linspace(-LARGEST, LARGEST, NUM_SCALES)
     for clip in map(_without_parameters, clips):
         unit = np.eye(len(clip.e))

@@ -32,7 +32,10 @@ class SizedDensity:
         linear = linear_clips(trials, fit)
         self._of_sizes = [log_likelihood(linear, trials.terms, x) for x in draws]
         self._data = [
-            [clip.problem.with_sizes(dict(zip(fit.sizes.names, x, strict=True))).data for x in draws]
+            [
+                clip.problem.with_sizes(dict(zip(fit.sizes.names, x, strict=True))).data
+                for x in draws
+            ]
             for clip in clips
         ]
 

@@ -35,7 +35,9 @@ def _long(seen: Seen) -> Patterns:
 
 def _brief(seen: Seen) -> Patterns:
     steps = np.diff(seen.observation.times_s)
-    return of_axis(np.exp(-_apart(seen, BRIEFLY * float(np.median(steps) if steps.size else 1.0))), seen)
+    return of_axis(
+        np.exp(-_apart(seen, BRIEFLY * float(np.median(steps) if steps.size else 1.0))), seen
+    )
 
 
 for name, meaning, patterns in (
