@@ -29,7 +29,7 @@ JOURNAL = Path("/tmp/people.jsonl")
 PACKAGE = Path(__file__).parents[1]
 CASES = Path(__file__).with_suffix(".yaml")
 TOO_LONG_S = 300.0
-DISTRUST = "do not trust"
+DISTRUST = "See where it fails"
 IMPLIED = ("track", "video", "objects")
 """Keys that say nothing but which file, and that there is something in it."""
 

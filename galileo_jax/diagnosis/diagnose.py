@@ -10,7 +10,7 @@
    noise, all pairs are searched for those that do so, too (`second_effect`). Pairs stand in the
    same table (rules: `verdict`, `law_verdict`).
    Before pairs are tried it is asked whether imperfections of usual sizes, with no effect or with
-   one, explain the data (`imperfect_world`). Pairs and formulas must beat imperfections of any size.
+   one, explain the data (`imperfect_world`). Pairs and formulas must beat imperfections.
 4. What leaves only noise and is far more probable than all else is named, unless a clip like this
    one would not tell it from another (`expected_lead`). Several are ambiguous.
 5. Where only a form explains the data, or nothing does, or only what could explain much (two

@@ -97,7 +97,7 @@ def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:
 def _history_row(one: Round, entries: Entries) -> dict[str, Any]:
     error = one.comparison.error
     return {
-        "effects": list(one.hypothesis.effects),
+        "effects": list(one.effects),
         "rmse": error["rmse"],
         "noise": error["noise"],
         "chi2_per_dof": error["chi2_per_dof"],

@@ -30,8 +30,8 @@ FEW, TOO_FEW = 100.0, 10.0
 def fit_posterior(trials: JointProblem, fit: GradientFit, seed: int) -> Posterior:
     """Draws of the posterior round a fit and the valleys beside it, sizes integrated.
 
-    Those of the normal approximation, at the most probable sizes, where weighed draws are worth too few, or rollouts are slow (all engines but the rigid one in a
-    plane).
+    Those of the normal approximation, at the most probable sizes, where weighed draws are worth too
+    few, or rollouts are slow (all engines but the rigid one in a plane).
 
     Args:
       trials: that were fitted.

@@ -16,7 +16,7 @@ def rounds_chart(rounds: Sequence[Round]) -> Chart:
     """The velocity error of each round beside what tracking noise alone would give."""
     errors = [one.comparison.error for one in rounds]
     rmse = [float(error["rmse"]) for error in errors]
-    names = [f"{i}. {effects_text(one.hypothesis.effects)}" for i, one in enumerate(rounds, 1)]
+    names = [f"{i}. {effects_text(one.effects)}" for i, one in enumerate(rounds, 1)]
     texts = tuple(f"{value:.4f}" for value in rmse)
     noise = [float(error["noise"]) for error in errors]
     marks = (

@@ -101,7 +101,7 @@ def _fitted(trials: JointProblem, diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def _title(one: Round) -> str:
-    return diagnosis_text.effects_text(one.hypothesis.effects)
+    return diagnosis_text.effects_text(one.effects)
 
 
 def _verdict(title: str, report: DiagnosisReport) -> str:

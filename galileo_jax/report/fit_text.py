@@ -201,11 +201,11 @@ def _of_chi2(error: Mapping[str, Any]) -> str:
     chi2 = error["chi2_per_dof"]
     if chi2 is None or not math.isfinite(chi2):
         return "chi2 per degree of freedom cannot be computed."
-    size = f"{math.sqrt(chi2):.2g} times the stated noise"
+    size = f"{math.sqrt(chi2):.2g} times the stated noise (chi2 per degree of freedom {chi2:.2f})"
     if not error.get("explained_by_noise", True):
         return f"What it leaves is {size}, more than noise and usual imperfections explain."
     if chi2 < CHI2_GOOD:
-        return f"What it leaves is smaller than the stated noise; {PATTERNS}."
+        return f"What it leaves is smaller than noise, {size}; {PATTERNS}."
     return f"What it leaves has the size of noise, {size}; {PATTERNS}."
 
 

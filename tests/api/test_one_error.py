@@ -11,7 +11,7 @@ import pytest
 
 import galileo_jax as gx
 from galileo_jax.report.diagnosis_text import adequacy
-from galileo_jax.report.fit_text import CHI2_BAD, CHI2_HIGH, fit_quality
+from galileo_jax.report.fit_text import fit_quality
 
 HIDDEN = {
     "ramp": ("air_drag", "friction_patch", "restitution"),
@@ -53,10 +53,12 @@ def test_nothing_contradicts_anything_else(tmp_path, scenario, case):
     )
     fit = gx.fit(tmp_path / "seen.csv", seed=case)
     check = gx.compare(fit)
+    if not all(entry["ordinary"] for entry in fit.result.get("imperfections", {}).values()):
+        fit = gx.fit(tmp_path / "seen.csv", seed=case, discrepancy="none")  # as is compared
     error = fit.result["error"]
 
     for name, value in check.error.items():
-        assert error[name] == pytest.approx(value, rel=SAME), name
+        assert error[name] == pytest.approx(value, rel=SAME, nan_ok=True), name
     whole = check.cells[check.cells.phase == "whole"]
     if set(whole.axis) >= {"x", "y"}:
         assert np.sqrt((whole.noise**2).mean()) == pytest.approx(error["noise"], rel=0.05)
@@ -64,17 +66,17 @@ def test_nothing_contradicts_anything_else(tmp_path, scenario, case):
     shown = np.concatenate([[path.along, path.across] for path in check.paths], axis=1)
     assert np.nansum(shown**2) == pytest.approx(np.nansum(white**2), rel=SAME)
 
-    chi2, said = error["chi2_per_dof"], fit_quality(dict(fit.result))
-    (stated,) = re.findall(r"freedom ([\d.]+)\)", said)
-    assert float(stated) == pytest.approx(chi2, abs=0.006)
+    chi2, said = error["chi2_per_dof"], " ".join(fit_quality(fit.result))
+    if "imperfections" not in fit.result:
+        (stated,) = re.findall(r"freedom ([\d.]+)\)", said)
+        assert float(stated) == pytest.approx(chi2, abs=0.006)
     lead = adequacy(check.found, check.fit.effects)
     fails = [path for path in check.paths if path.failing_s is not None]
     assert ("not adequate" in lead) == (not check.is_adequate)
     if check.is_adequate:
         assert not fails, "an interval is shaded, but the model is said to be adequate"
-        assert chi2 <= CHI2_BAD or "times what was stated" in lead
-        assert "do not trust" not in said or "times what was stated" in lead
+        assert "See where it fails" not in said or "times as large as stated" in lead
     else:
         assert check.found.pulls or fails, "the model fails, and nowhere is it shown"
-    if chi2 <= CHI2_HIGH:
+    if "imperfections" not in fit.result and error["explained_by_noise"]:
         assert "the size of" in said or "smaller" in said

@@ -33,8 +33,8 @@ def test_sizes_stand_in_the_result_and_nothing_is_unusual(made, fit):
     for one in found.values():
         assert 0 < one["q025"] < one["mean"] < one["q975"]
         assert one["ordinary"]
-    said = fit_quality(fit.result)
-    assert "do not trust" not in said
+    said = " ".join(fit_quality(fit.result))
+    assert "See where it fails" not in said
     assert "{size}" not in said
 
 
@@ -66,3 +66,24 @@ def test_options_that_do_not_go_with_it_are_refused(made):
     """The network and the thesis know nothing of sizes."""
     with pytest.raises(InputError, match="--discrepancy rough: of --method grad or mh"):
         gx.fit(made[0], discrepancy="rough", method="cnn")
+
+
+def test_an_exact_track_is_mostly_told_by_the_exact_fit(made):
+    """By default both worlds are fitted; where hardly anything is imperfect intervals are as in
+    the exact one, up to the share of the other."""
+    both, exact = gx.fit(made[0], seed=0), gx.fit(made[0], discrepancy="none", seed=0)
+    share = both.result["probability_imperfect"]
+    assert 0.0 <= share < 0.6
+    assert "imperfections" not in both.result
+    assert both.parameters["k1"]["sd"] < 1.5 * exact.parameters["k1"]["sd"]
+
+
+def test_what_a_hidden_drag_leaves_is_more_than_usual(tmp_path):
+    """It passes for uneven friction in a fit, which says so; compare shows where it fails."""
+    path = tmp_path / "drag.csv"
+    gx.simulate(path, seed=SEED, effects={"air_drag": {}}, strength=1, track_only=True)
+    fit = gx.fit(path, seed=0)
+    assert "galileo diagnose" in fit_quality(fit.result)[-1]
+    check = gx.compare(fit)
+    assert not check.is_adequate
+    assert any(path.failing_s is not None for path in check.paths)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
-from galileo_jax.inference.fits.imperfect import fit_with_imperfections
+from galileo_jax.inference.fits.imperfect import fit_worlds
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from tests.oracle_trials import make_trials
@@ -28,11 +28,12 @@ def sd_of(trials, fit, name):
 def test_what_is_not_there_costs_little(smooth):
     """A perfect track: every size is far below its median, intervals are hardly wider."""
     trials, plain = smooth
-    rough, fit = fit_with_imperfections(trials, 0)
+    world = fit_worlds(trials, 0, may_be_exact=False).best
+    rough, fit = world.trials, world.fit
     assert fit.sizes is not None
     sizes = fit.sizes.by_name
     assert fit.code is Code.CONVERGED
-    assert not rough.problems[0].unusual(sizes)
+    assert not fit.sizes.unusual
     assert sizes["friction_roughness"] < 0
     for name, truth in (("k1", HIT.friction[0]), ("k2", HIT.friction[1])):
         assert sd_of(rough, fit, name) < 2.0 * sd_of(trials, plain, name)
@@ -55,14 +56,15 @@ def test_errors_that_last_are_found_and_widen_intervals(smooth):
     """Their size within its interval; without them the fit is contradicted and far too sure."""
     trials = with_errors(smooth[0])
     plain = GradientFitter(trials).fit(0)
-    rough, fit = fit_with_imperfections(trials, 0)
+    world = fit_worlds(trials, 0, may_be_exact=False).best
+    rough, fit = world.trials, world.fit
     assert plain.code is Code.MISFIT
     assert fit.code is Code.CONVERGED
     assert fit.sizes is not None
     problem, where = rough.problems[0], fit.sizes.names.index("lasting_error")
     term = next(term for term in rough.terms if term.name == "lasting_error")
     low, high = (
-        problem.size(term, fit.sizes.x[where] + 2 * s * fit.sizes.sd[where]) for s in (-1, 1)
+        problem.size(term, x) for x in np.quantile(fit.sizes.draws[:, where], [0.025, 0.975])
     )
     assert low < SIZE_M < high
     k1 = trials.names.index("k1")

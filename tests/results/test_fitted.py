@@ -56,7 +56,7 @@ def test_too_few_frames_are_no_verdict(clip, tmp_path, capsys):
     clip.write_text("\n".join(kept) + "\n")
     assert command.run(fit.main, [str(clip), "--out", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out
-    assert "no verdict: only 11 of 40 frames are used" in said and "do not trust" not in said
+    assert "no verdict: only 11 of 40 frames are used" in said and "See where" not in said
     check = gx.compare(tmp_path / "run")
     assert check.document["adequate"] is None
     assert "only 11 of 40 frames" in check.document["no_verdict"]

@@ -15,7 +15,7 @@ from galileo_jax.inference.fits.linear_clip import integrated, linear_clips, mos
 from galileo_jax.inference.joint_problem import JointProblem
 
 MOST_ROUNDS, SETTLED = 4, 0.02  # of sizes and fits by turns; of a log size
-EXCLUDED = 0.01  # a world that is less probable has no part in the posterior
+EXCLUDED = 0.05  # a world that is less probable has no part in the posterior
 
 
 @dataclass(frozen=True)

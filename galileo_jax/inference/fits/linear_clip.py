@@ -4,10 +4,10 @@
 
 in units of the stated tracking errors; e: the residuals that the fit would leave at z = 0. Sizes
 are log-normal before the data: x_k = log(size_k / median_k) / log(factor_k) ~ N(0, 1), and so are
-the noise scales s. With the parameters integrated out, e ~ N(0, C + J J^T). The most probable x come
-by Newton steps with the average information, from where all sizes are at their medians and from
-where one is larger and the others are smaller: an error may be brief or last long, and hardly any
-track tells. What x may be is drawn by importance, from the prior and normal distributions round
+the noise scales s. With the parameters integrated out, e ~ N(0, C + J J^T). The most probable x
+come by Newton steps with the average information, from where all sizes are at their medians and
+from where one is larger and the others are smaller: an error may be brief or last long, and hardly
+any track tells. What x may be is drawn by importance, from the prior and normal distributions round
 these modes.
 
 Each clip of several is taken with parameters of its own, so that what differs from trial to trial
@@ -36,7 +36,7 @@ from galileo_jax.statespace.sizes import Sizes
 from galileo_jax.statespace.term import Term
 
 MOST_VALUES = 300  # of a clip that tell sizes: of more, neighbours are averaged
-MOST_STEPS, STILL = 60, 1e-6
+MOST_STEPS, STILL = 60, 1e-4
 STILL_NATS = 1e-9
 LEAST_DAMPING = 1e-6
 LONGEST_STEP = 1.5  # of a log size, in units of its prior's width

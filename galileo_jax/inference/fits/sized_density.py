@@ -17,7 +17,7 @@ from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.fitted_clip import FittedClip
 from galileo_jax.inference.fits.linear_clip import linear_clips, log_likelihood
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
-from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, Whitening
+from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 NUM_SIZES = 32  # of the draws of sizes
 
@@ -47,22 +47,30 @@ class SizedDensity:
         found = np.zeros((len(self._of_sizes), len(z)))
         for c, (clip, each) in enumerate(zip(self._clips, self._data, strict=True)):
             predicted = clip.problem.simulate_batch(clip.theta(z[:, :count], free))
-            found += [_log_likelihood(predicted, noise[:, c], data) for data in each]
+            left = _in_stated_errors(predicted, each[0])
+            found += [_log_likelihood(left, noise[:, c], data) for data in each]
         found -= np.array(self._of_sizes)[:, None] - max(self._of_sizes)
         mean = np.asarray(logsumexp(found, axis=0)) - np.log(len(found))
         return np.nan_to_num(mean, nan=-np.inf) - 0.5 * np.sum(z**2, axis=1)
 
 
-def _log_likelihood(
-    predicted_m: np.ndarray, noise: np.ndarray, data: Whitening
-) -> Float[np.ndarray, " point"]:
-    """Of what was measured, up to the constant of the tracker's own covariance."""
-    basis = data.basis.reshape(len(data.gain), -1)
+def _in_stated_errors(
+    predicted_m: np.ndarray, data: Whitening
+) -> Float[np.ndarray, "point value"]:
+    """Residuals in units of the stated errors, which no size changes."""
     with np.errstate(over="ignore", invalid="ignore"):
         left = np.einsum("oijt,pojt->poit", data.inverse_root, data.observed_m - predicted_m)
-        left = left.reshape(len(noise), -1)
+    return left.reshape(len(left), -1)
+
+
+def _log_likelihood(
+    left: Float[np.ndarray, "point value"], noise: Float[np.ndarray, " point"], data: Whitening
+) -> Float[np.ndarray, " point"]:
+    """Of what was measured, up to the constant of the tracker's own covariance."""
+    basis, variance = data.basis.reshape(len(data.gain), -1), noise[:, None] ** 2
+    with np.errstate(over="ignore", invalid="ignore"):
         along2 = (left @ basis.T) ** 2
         rest = np.sum(left**2, axis=1) - np.sum(along2, axis=1)
-        square = rest / noise**2 + np.sum(along2 / (noise[:, None] ** 2 + data.gain**2), axis=1)
-    volume = [GaussianLikelihood.log_determinant(scale, data) for scale in noise]
-    return -0.5 * (square + np.array(volume))
+        square = rest / variance[:, 0] + np.sum(along2 / (variance + data.gain**2), axis=1)
+    volume = np.sum(np.log1p(data.gain**2 / variance), axis=1)
+    return -0.5 * (square + data.num_values * np.log(variance[:, 0]) + volume)
