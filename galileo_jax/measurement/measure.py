@@ -19,8 +19,6 @@ from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.coding_errors import with_coding_errors
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
-from galileo_jax.measurement.errors_in_time import with_errors_in_time
-from galileo_jax.measurement.errors_of_clock import with_errors_of_clock
 from galileo_jax.measurement.find_start_speed import on_ramp, start_speed
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_radii import (
@@ -134,13 +132,6 @@ def measure(clip: Clip) -> Measurement:
         # that is told by the track would take for it.
         pucks = measured.clip
         observation = with_wander(observation, pucks.objects, pucks.walls)
-    if pixels is None and observation.position_m.shape[1] == 2:
-        # In space and from above the likelihood lets every track wander.
-        observation, said = with_errors_in_time(observation)
-        remarks.extend(f"{clip.path}: {line}" for line in said)
-    elif pixels is None and clip.scenario == "flight":
-        observation, said = with_errors_of_clock(observation)
-        remarks.extend(f"{clip.path}: {line}" for line in said)
     frames_used = int(observation.mask.any(axis=0).sum())
     if pixels is None:
         observation, said = with_rows_averaged(observation)

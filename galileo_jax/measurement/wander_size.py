@@ -7,7 +7,7 @@ w sqrt(2 dt / tau). So, before any physics, each coordinate is described in piec
 
     measured = smooth path + wander + error,    w^2 K_tau + s^2 sd^2 1
 
-with a path as in `errors_in_time`: a parabola and a thrice integrated white noise of any size. The
+with a path that is a parabola and a thrice integrated white noise of any size. The
 size w is that which explains all pieces of all pucks best, averaged over what explains them well;
 s and the path's size are averaged over in each piece.
 
@@ -25,7 +25,6 @@ from scipy.special import logsumexp
 
 from galileo_jax.clip.schema import ClipObject
 from galileo_jax.clip.walls import Wall, bounces
-from galileo_jax.measurement.errors_in_time import smooth_path
 from galileo_jax.observation.observation import Observation
 
 LARGEST_M, LASTS_S = 4e-4, 0.3
@@ -78,6 +77,17 @@ def with_wander(
         return replace(observation, wander_m=largest_m)
     weight = np.exp(evidence - np.asarray(logsumexp(evidence)))
     return replace(observation, wander_m=float(np.sqrt(weight @ sizes_m**2)))
+
+
+def smooth_path(since: np.ndarray) -> Float[np.ndarray, "row row"]:
+    """The covariance of thrice integrated white noise: int_0^s (s-u)^2 (t-u)^2 / 4 du, s <= t.
+
+    Source: Wahba (1978), Improper priors, spline smoothing and the problem of guarding against
+    model errors in regression, J. R. Statist. Soc. B 40, 364.
+    """
+    first = np.minimum(since[:, None], since)
+    gap = np.abs(since[:, None] - since)
+    return first**5 / 20 + gap * first**4 / 8 + gap**2 * first**3 / 12
 
 
 def _pieces(observation: Observation, i: int, bounced: Sequence[int]) -> list[np.ndarray]:
