@@ -73,8 +73,14 @@ def check_answered(known: Understood, answers: Answers) -> None:
     )
 
 
-def parsed(question: Question, text: str, known: Understood) -> dict[str, Any]:
+def parsed(question: Question, text: str, known: Understood, answers: Answers) -> dict[str, Any]:
     """An answer as a person types it, by keys of the yaml.
+
+    Args:
+      question: that is answered.
+      text: as typed; empty: the default.
+      known: what it is asked about.
+      answers: that were given before.
 
     Raises:
       InputError: it is none; says what would be right.
@@ -85,7 +91,7 @@ def parsed(question: Question, text: str, known: Understood) -> dict[str, Any]:
     if question.key == "points":
         return {"points": _chosen(text, known)}
     if question.key == "pixels_per_metre":
-        return _scale_of(text, known)
+        return _scale_of(text, _length_px(known, answers))
     if question.key in NUMBERS:
         return {question.key: None if text == "path" else _number(text, question.key)}
     if question.choices and text not in question.choices:
@@ -228,15 +234,14 @@ def _chosen(text: str, known: Understood) -> list[tuple[float, float]]:
     return [(float(numbers[0]), float(numbers[1]))]
 
 
-def _scale_of(text: str, known: Understood) -> dict[str, Any]:
-    """Pixels per metre, or what the length of the first thing makes of it."""
+def _scale_of(text: str, length: float | None) -> dict[str, Any]:
+    """Pixels per metre, or what they are where something of a known size is `length` pixels."""
     found = LENGTH.fullmatch(text)
     if found is None or found["unit"] not in ("", "px", *METRES_PER_UNIT):
         raise InputError(f"pixels_per_metre: {text!r}; such as 900 px or 0.06 m expected")
     size = _number(found["size"], "pixels_per_metre")
     if found["unit"] in ("", "px"):
         return {"pixels_per_metre": size}
-    length = _length_px(known, {})
     if length is None or size <= 0:
         raise InputError(f"pixels_per_metre: {text!r}; such as 900 px expected")
     scale = length / (size * METRES_PER_UNIT[found["unit"]])

@@ -109,7 +109,7 @@ def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
         default = f" [{one.default}]" if one.default is not None else ""
         command.say(f"{one.text}\n  ({one.why})")
         try:
-            answers = answers | parsed(one, input(f"  {one.key}{default}: "), known)
+            answers = answers | parsed(one, input(f"  {one.key}{default}: "), known, answers)
         except EOFError:
             raise InputError(f"{known.source}: {one.key}: no answer; nothing was written") from None
         except InputError as error:

@@ -46,10 +46,10 @@ def paragraph(
         *(_ratio(name, entry, body) for name, entry in known.items() if RATIO.fullmatch(name)),
         _values(rest),
         _unknown([name for name in entries if name not in known], known),
-        _nearness(result["error"], result["effects"]),
+        _nearness(result["error"], _model(result, diagnosis)),
         *_imperfections(result),
         _verdict(result, check, diagnosis),
-        _values(effects),
+        "" if _status(diagnosis) == "law" else _values(effects),  # the law's text has them
         _only_if(result, diagnosis),
         _unseen(diagnosis),
     ]
@@ -126,12 +126,23 @@ def _unknown(names: Sequence[str], known: Mapping[str, Any]) -> str:
     )
 
 
-def _nearness(error: Mapping[str, Any], effects: Sequence[str]) -> str:
+def _status(diagnosis: Mapping[str, Any] | None) -> str:
+    return "" if diagnosis is None else str(diagnosis["verdict"]["status"])
+
+
+def _model(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
+    """What the model is called that the values are of."""
+    if not result["effects"]:
+        return "The model"
+    effects = _listed([words(one) for one in result["effects"]])
+    return f"The model with {'a law' if _status(diagnosis) == 'law' else effects}"
+
+
+def _nearness(error: Mapping[str, Any], model: str) -> str:
     """How near the model comes to what was seen."""
     millimetres, share = error.get("rms_mm"), error.get("rms_percent_of_way")
     sizes = [f"{millimetres:.2g} mm"] if _is_size(millimetres) else []
     sizes += [f"{share:.2g} % of the way"] if _is_size(share) else []
-    model = f"The model with {_listed([words(one) for one in effects])}" if effects else "The model"
     return f"{model} follows the motion to {', '.join(sizes)}." if sizes else ""
 
 
@@ -149,7 +160,7 @@ def _verdict(
     result: Mapping[str, Any], check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None
 ) -> str:
     if diagnosis is not None:
-        text = words(str(diagnosis["sentence"]))
+        text = words(str(diagnosis["sentence"]))  # names of effects, in words
         return f"{text[:1].upper()}{text[1:]}"
     if check.get("adequate") is None or result.get("no_verdict"):
         return f"{result.get('no_verdict') or 'Whether the model is right cannot be told'}."
@@ -165,7 +176,7 @@ def _verdict(
 
 def _only_if(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
     """That the values hang on one of several explanations."""
-    if diagnosis is None or diagnosis["verdict"]["status"] != "ambiguous" or not result["effects"]:
+    if _status(diagnosis) != "ambiguous" or not result["effects"]:
         return ""
     return f"All values are those with {_listed([words(one) for one in result['effects']])}."
 
