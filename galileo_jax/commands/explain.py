@@ -15,6 +15,7 @@ from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
@@ -74,8 +75,7 @@ def _clips(files: Sequence[str], said: dict[str, Any]) -> "list[Clip]":
     to_write: list[tuple[Understood, dict[str, Any]]] = []
     answers = said
     for source in sources_of(list(files)):
-        with progress_display() as display:
-            display("looking", 0.0)
+        with progress_display() as display, progress.scope(display):
             known = understood(source, said)
         if isinstance(known, Understood):
             answers = asked(known, answers) if is_terminal else answers
@@ -96,12 +96,17 @@ def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
     Raises:
       InputError: the input ended (Ctrl-D) before all was answered.
     """
-    from galileo_jax.api.questions import parsed, questions
+    from galileo_jax.api.questions import Question, parsed, questions
 
     seen = known.look.summary().split("\n\n")[0].splitlines()
     told = [seen[0], *(line for line in seen if line.startswith(("moves:", "time step:")))]
     is_first = True
-    while open_ones := questions(known, answers):
+
+    def still_open() -> Sequence[Question]:
+        with progress_display() as display, progress.scope(display):
+            return questions(known, answers)  # of a film what moves may have to be followed
+
+    while open_ones := still_open():
         if is_first:
             command.say("\n".join(told))
             is_first = False

@@ -67,9 +67,7 @@ def made(folder: Path, noise: float) -> JointProblem:
 def found_of(trials: JointProblem, p_value: float) -> Diagnosis:
     base = Hypothesis((), GradientFitter(trials).fit(0, effects=()))
     rounds = (Round(base, comparison_of(trials, p_value)),)
-    candidates = tuple(
-        replace(candidate_of(trials, name, 0.1), log_prior=-3.0) for name in EFFECTS
-    )
+    candidates = tuple(replace(candidate_of(trials, name, 0.1), log_prior=-3.0) for name in EFFECTS)
     return Diagnosis(rounds, candidates, Verdict("none", ()))
 
 
