@@ -9,7 +9,6 @@ import yaml
 
 from galileo_jax.api.questions import check_answered, questions
 from galileo_jax.api.understand import USUAL_FPS, Answers, Understood, needs_angle
-from galileo_jax.clip.label import KEY_ORDER
 from galileo_jax.clip.load import check_clip, with_unused
 from galileo_jax.clip.look import proposed_yaml, usual_shape
 from galileo_jax.clip.schema import Clip
@@ -96,6 +95,8 @@ def _plain(declared: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _of_film(known: Understood, answers: Answers) -> dict[str, Any]:
+    from galileo_jax.clip.label import KEY_ORDER  # and OpenCV, which a table does not need
+
     scenario = known.scenario(answers)
     assert scenario is not None  # else a question is open
     points = known.points(answers)

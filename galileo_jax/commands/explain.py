@@ -157,7 +157,7 @@ def _parser() -> command.Parser:
     add("engine", choices=ENGINES, metavar=None)
     add("seed", type=command.whole_number(0))
     parser.examples(
-        "galileo slide.mp4                                     asks for what only you can know",
-        "galileo drop.csv --out results/drop                   a table of any program",
+        "galileo explain slide.mp4                             or just: galileo slide.mp4",
+        "galileo explain trials/ --out results                 a folder of trials together",
     )
     return parser
