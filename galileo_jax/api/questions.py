@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.api.understand import Answers, Understood, needs_angle
+from galileo_jax.clip.look import FALL_M_S2
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.track_axes import accelerations
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.table.track_table import METRES_PER_UNIT
 
-GRAVITY_M_S2 = (7.0, 12.0)  # what a fall in the right unit accelerates with, air and slopes in it
 LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
 SIZE_SD_PX = 5.0  # of a thing in the picture, whose ends are where its texture ends
 MOST_SD_SHARE = 0.2  # of a scale, as its key allows
@@ -176,7 +176,7 @@ def _unit_by_gravity(known: Understood, answers: Answers) -> str | None:
     fits = [
         unit
         for unit, metres in METRES_PER_UNIT.items()
-        if GRAVITY_M_S2[0] < size * metres < GRAVITY_M_S2[1]
+        if FALL_M_S2[0] < size * metres < FALL_M_S2[1]
     ]
     return fits[0] if len(fits) == 1 else None
 

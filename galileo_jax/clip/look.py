@@ -1,7 +1,7 @@
 """What a table shows before anything is declared: its columns, its time, what moves and how."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,14 @@ from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 STRAIGHT = 0.03
 """Of a path's length: what stays within this of a line is straight."""
 
-LEVEL_DEG = 2.0
+LEVEL_DEG, STEEP_DEG = 2.0, 60.0
+"""Between these a straight way is a slope; a steeper one may be a table seen from above."""
+
 SWINGS = 3
 """Turns back of a motion that swings."""
+
+FALL_M_S2 = (7.0, 12.0)
+"""What a fall accelerates with, air and a camera that is not level in it."""
 
 GAP = 1.5
 """Of the usual step."""
@@ -130,7 +135,13 @@ def _likely(
         return Likely("pendulum", "an angle in time", is_clear=True)
     if len(place) == 1:
         return _along_a_line(seconds, place[0], metres_per_unit)
-    return likely_in_plane(place[0], place[1])
+    found = likely_in_plane(place[0], place[1])
+    if found.scenario != "fall":
+        return found
+    size = abs(_acceleration(seconds, place[1]) * metres_per_unit)
+    if not math.isfinite(size) or FALL_M_S2[0] < size < FALL_M_S2[1]:
+        return found
+    return replace(found, is_clear=False, why=f"{found.why}, {size:.3g} m/s^2")
 
 
 def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) -> Likely:
@@ -138,7 +149,7 @@ def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) 
     if (turns := _turns(way)) >= SWINGS:
         return Likely("spring", f"one coordinate, which turns back {turns} times")
     size = _acceleration(seconds, way) * metres_per_unit
-    if math.isfinite(size) and 7 < abs(size) < 12:
+    if math.isfinite(size) and FALL_M_S2[0] < abs(size) < FALL_M_S2[1]:
         why = f"one coordinate, {short(round(abs(size), 2))} m/s^2"
         return Likely("fall", why, is_clear=True)
     told = f", {abs(size):.3g} m/s^2" if math.isfinite(size) else ""
@@ -151,14 +162,15 @@ def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     straight, degrees = _straight(x, y)
     if turns >= SWINGS:
         kind = "spring" if straight else "pendulum"
-        return Likely(kind, f"turns back {turns} times", is_clear=not straight)
+        return Likely(kind, f"turns back {turns} times")
     if not straight:
         is_thrown = _bends_once(x, y)
         return Likely("flight", "a path that bends", is_clear=is_thrown)
     if degrees > 90 - LEVEL_DEG:
         return Likely("fall", "a straight way up or down", is_clear=True, slope_deg=degrees)
     why = f"a straight way at {degrees:.2f} degrees"
-    return Likely("incline", why, is_clear=degrees > LEVEL_DEG, slope_deg=degrees)
+    is_slope = LEVEL_DEG < degrees < STEEP_DEG
+    return Likely("incline", why, is_clear=is_slope, slope_deg=degrees)
 
 
 def _bends_once(x: np.ndarray, y: np.ndarray) -> bool:
