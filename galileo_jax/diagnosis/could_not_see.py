@@ -12,7 +12,7 @@ known to sd_z. The smallest s at which this is what the verdict asks for (`CONVI
 answer. It is an estimate without a fit: from slopes, taken again at the strength that they gave.
 Chance adds or takes away some nats in every single clip. Of effects that were hidden with just this
 strength, seven clips each, the log odds were on average 6.4 (air_drag) and 7.0 (viscous_drag) on a
-board, 2.2 +- 2.4 (air_drag) on a ramp with a table; 7 are asked for.
+board, 2.2 +- 2.3 (air_drag) on a ramp with a table; 7 are asked for.
 """
 
 from collections.abc import Mapping
