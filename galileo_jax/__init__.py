@@ -2,6 +2,7 @@
 
     import galileo_jax as gx
 
+    said = gx.explain("clip.mp4").paragraph         # all of what follows, in words
     track = gx.track("clip.mp4")                    # where the objects are, in metres
     fit = gx.fit(track)                             # masses and frictions, with intervals
     check = gx.compare(fit)                         # is the model adequate, and where does it fail?
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from galileo_jax.api.compare import Comparison, compare
     from galileo_jax.api.diagnose import Diagnosis, diagnose
     from galileo_jax.api.discover import Discovery, discover
+    from galileo_jax.api.explain import Explanation, explain
     from galileo_jax.api.export import export
     from galileo_jax.api.fit import fit
     from galileo_jax.api.fit_result import Fit
@@ -68,6 +70,7 @@ _PLACES = {
     "galileo_jax.api.predict": ("Prediction", "predict"),
     "galileo_jax.api.propose": ("Proposal", "propose"),
     "galileo_jax.api.motion": ("Motion",),
+    "galileo_jax.api.explain": ("Explanation", "explain"),
     "galileo_jax.api.export": ("export",),
     "galileo_jax.api.label": ("label",),
     "galileo_jax.api.look": ("Look", "look"),
@@ -96,6 +99,7 @@ __all__ = [
     "Diagnosis",
     "Discovery",
     "Effect",
+    "Explanation",
     "Fit",
     "Force",
     "Friction",
@@ -122,6 +126,7 @@ __all__ = [
     "diagnose",
     "discover",
     "effects",
+    "explain",
     "export",
     "fit",
     "fit_tosses",

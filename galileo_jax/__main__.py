@@ -1,4 +1,7 @@
-"""The `galileo` console script: `galileo VERB ...` is `python -m galileo_jax.VERB ...`."""
+"""The `galileo` console script: `galileo VERB ...` is `python -m galileo_jax.VERB ...`.
+
+`galileo FILE ...` is `galileo explain FILE ...`.
+"""
 
 import os
 import sys
@@ -18,6 +21,7 @@ VERBS = (
     ("diagnose", "find the missing effect, add it, watch the error fall"),
     ("track", "track the objects of a clip; check the overlay by eye"),
     ("studio", "the same with the mouse, on a page in your browser"),
+    ("explain", "all of it in one call, in words: what galileo FILE does"),
     ("look", "show what is understood of a table or film"),
     ("label", "write points and scale into a clip's yaml"),
     ("simulate", "simulate a clip whose truth is known"),
@@ -32,17 +36,18 @@ VERBS = (
     ("scenarios", "list the kinds of motion that a clip can show"),
 )
 
-USAGE = "usage: galileo VERB ..., galileo VERB --help, galileo --version"
+USAGE = "usage: galileo FILE, galileo VERB ..., galileo VERB --help, galileo --version"
+EXPLAIN = "explain"  # the verb of a call without one
 
 
 def main(argv: Sequence[str]) -> int | None:
     """Hands the arguments after the verb to that verb's module, imported only now.
 
     Raises:
-      InputError: no verb, or one that there is not.
+      InputError: no verb and no file, or a verb that there is not.
     """
     if not argv:
-        raise InputError(f"no verb given; {_known()}; see galileo --help")
+        raise InputError(f"no file and no verb given; {_known()}; see galileo --help")
     verb, *rest = argv
     if verb in ("-h", "--help"):
         print(_help())
@@ -54,6 +59,9 @@ def main(argv: Sequence[str]) -> int | None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     without_search_for_rocm()
     if verb not in dict(VERBS):
+        explain = import_module(f"galileo_jax.commands.{EXPLAIN}")
+        if explain.looks_like_a_file(verb):
+            return explain.main(argv)
         hint = did_you_mean(verb, dict(VERBS)) or ";"
         raise InputError(f"unknown verb {verb!r}{hint} {_known()}")
     return import_module(f"galileo_jax.commands.{verb}").main(rest)

@@ -20,6 +20,8 @@ class Look:
       seen: of a table; None of a film.
       film: of a film, one line; "" of a table.
       warnings: doubts, one line each.
+      table: of a table, all that was read.
+      fps: of a film, frames per second as its file says.
     """
 
     path: Path
@@ -27,6 +29,7 @@ class Look:
     film: str = ""
     warnings: tuple[str, ...] = ()
     table: TrackTable | None = None
+    fps: float | None = None
 
     @property
     def yaml(self) -> str:
@@ -72,7 +75,7 @@ def look(file: str | Path, *, fps: float | None = None) -> Look:
     info = decode.probe(path, fps)
     width, height = info.size_px
     film = f"{info.frame_count} frames of {width} x {height} pixels, {info.fps:.4g} a second"
-    return Look(path, None, film, info.warnings)
+    return Look(path, None, film, info.warnings, fps=info.fps)
 
 
 def _lines(seen: Seen) -> list[str]:

@@ -1,7 +1,7 @@
 """What a table shows before anything is declared: its columns, its time, what moves and how."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +13,14 @@ from galileo_jax.table.track_table import METRES_PER_UNIT, Column, TrackTable
 STRAIGHT = 0.03
 """Of a path's length: what stays within this of a line is straight."""
 
-LEVEL_DEG = 2.0
+LEVEL_DEG, STEEP_DEG = 2.0, 60.0
+"""Between these a straight way is a slope; a steeper one may be a table seen from above."""
+
 SWINGS = 3
 """Turns back of a motion that swings."""
+
+FALL_M_S2 = (7.0, 12.0)
+"""What a fall accelerates with, air and a camera that is not level in it."""
 
 GAP = 1.5
 """Of the usual step."""
@@ -38,6 +43,8 @@ class Seen:
       moved: how far object 1 moves along each axis, in the file's unit.
       scenario: the likeliest kind of motion.
       why: what speaks for it, one phrase.
+      is_clear: no other kind of motion looks like it.
+      slope_deg: of a straight path in two coordinates, against the horizontal; None of others.
       yaml: that would be written beside the file.
       warnings: doubts, one line each.
     """
@@ -56,6 +63,25 @@ class Seen:
     why: str
     yaml: str
     warnings: tuple[str, ...] = ()
+    is_clear: bool = False
+    slope_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class Likely:
+    """The likeliest kind of motion of a path.
+
+    Attributes:
+      scenario: its name.
+      why: what speaks for it, one phrase.
+      is_clear: no other kind of motion looks like it.
+      slope_deg: of a straight path in two coordinates, against the horizontal; None of others.
+    """
+
+    scenario: str
+    why: str
+    is_clear: bool = False
+    slope_deg: float | None = None
 
 
 def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Seen:
@@ -75,7 +101,7 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
     frame_s = (1 / fps if fps else table.frame_s) if is_in_frames else 1.0
     seconds = clock[shown] * (frame_s or math.nan)
     per_unit = METRES_PER_UNIT.get(table.unit or "", math.nan)
-    scenario, why = _likely(table, seconds, place[:, shown], per_unit)
+    likely = _likely(table, seconds, place[:, shown], per_unit)
     return Seen(
         path,
         table.columns,
@@ -87,42 +113,72 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
         table.unit,
         table.axes,
         moved,
-        scenario,
-        why,
-        _yaml(path, table, scenario, place[:, shown], fps, count),
+        likely.scenario,
+        likely.why,
+        proposed_yaml(path, table, likely.scenario, fps, count),
         warnings,
+        likely.is_clear,
+        likely.slope_deg,
     )
 
 
 def _likely(
     table: TrackTable, seconds: np.ndarray, place: np.ndarray, metres_per_unit: float
-) -> tuple[str, str]:
-    """The likeliest scenario of object 1's path, and why."""
+) -> Likely:
+    """The likeliest scenario of object 1's path."""
     if len(table.names) > 1:
-        return "from_above", f"{len(table.names)} objects; a ramp, if one slides down into others"
+        why = f"{len(table.names)} objects; a ramp, if one slides down into others"
+        return Likely("from_above", why)
     if place.shape[1] < 2:
-        return "fall", "too few rows to tell"
+        return Likely("fall", "too few rows to tell")
     if table.axes == ("angle",):
-        return "pendulum", "an angle in time"
-    turns = _turns(place[int(np.argmax(np.ptp(place, axis=1)))])
+        return Likely("pendulum", "an angle in time", is_clear=True)
     if len(place) == 1:
-        if turns >= SWINGS:
-            return "spring", f"one coordinate, which turns back {turns} times"
-        size = _acceleration(seconds, place[0]) * metres_per_unit
-        if math.isfinite(size) and 7 < abs(size) < 12:
-            return "fall", f"one coordinate, {short(round(abs(size), 2))} m/s^2"
-        told = f", {abs(size):.3g} m/s^2" if math.isfinite(size) else ""
-        return "incline", f"one coordinate{told}"
-    x, y = place[:2]
+        return _along_a_line(seconds, place[0], metres_per_unit)
+    found = likely_in_plane(place[0], place[1])
+    if found.scenario != "fall":
+        return found
+    size = abs(_acceleration(seconds, place[1]) * metres_per_unit)
+    if not math.isfinite(size) or FALL_M_S2[0] < size < FALL_M_S2[1]:
+        return found
+    return replace(found, is_clear=False, why=f"{found.why}, {size:.3g} m/s^2")
+
+
+def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) -> Likely:
+    """The likeliest scenario of one coordinate in time."""
+    if (turns := _turns(way)) >= SWINGS:
+        return Likely("spring", f"one coordinate, which turns back {turns} times")
+    size = _acceleration(seconds, way) * metres_per_unit
+    if math.isfinite(size) and FALL_M_S2[0] < abs(size) < FALL_M_S2[1]:
+        why = f"one coordinate, {short(round(abs(size), 2))} m/s^2"
+        return Likely("fall", why, is_clear=True)
+    told = f", {abs(size):.3g} m/s^2" if math.isfinite(size) else ""
+    return Likely("incline", f"one coordinate{told}")
+
+
+def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
+    """The likeliest scenario of one object's path in a plane, in any unit and without a clock."""
+    turns = _turns(x if np.ptp(x) >= np.ptp(y) else y)
     straight, degrees = _straight(x, y)
     if turns >= SWINGS:
         kind = "spring" if straight else "pendulum"
-        return kind, f"turns back {turns} times"
+        return Likely(kind, f"turns back {turns} times")
     if not straight:
-        return "flight", "a path that bends"
+        is_thrown = _bends_once(x, y)
+        return Likely("flight", "a path that bends", is_clear=is_thrown)
     if degrees > 90 - LEVEL_DEG:
-        return "fall", "a straight way up or down"
-    return "incline", f"a straight way at {degrees:.2f} degrees"
+        return Likely("fall", "a straight way up or down", is_clear=True, slope_deg=degrees)
+    why = f"a straight way at {degrees:.2f} degrees"
+    is_slope = LEVEL_DEG < degrees < STEEP_DEG
+    return Likely("incline", why, is_clear=is_slope, slope_deg=degrees)
+
+
+def _bends_once(x: np.ndarray, y: np.ndarray) -> bool:
+    """Whether a path is a parabola over x, as of what is thrown, and no ramp with a table."""
+    if np.ptp(x) == 0:
+        return False
+    left = y - np.polyval(np.polyfit(x - x.mean(), y, 2), x - x.mean())
+    return bool(np.ptp(left) <= STRAIGHT * np.hypot(np.ptp(x), np.ptp(y)))
 
 
 def _turns(values: np.ndarray) -> int:
@@ -157,10 +213,20 @@ def _acceleration(seconds: np.ndarray, values: np.ndarray) -> float:
     return float(np.median(found)) if found.size else math.nan
 
 
-def _yaml(
-    path: Path, table: TrackTable, scenario: str, place: np.ndarray, fps: float | None, motions: int
+def proposed_yaml(
+    path: Path, table: TrackTable, scenario: str, fps: float | None = None, motions: int = 1
 ) -> str:
-    """The clip's yaml; what nobody can know but the user is a comment."""
+    """The clip's yaml; what nobody can know but the user is a comment.
+
+    Args:
+      path: of the table.
+      table: the motion that is looked at.
+      scenario: the kind of motion.
+      fps: frames per second, where somebody gave them.
+      motions: how many follow each other in the file.
+    """
+    place = table.position[0]
+    place = place[:, np.isfinite(place).all(axis=0)]
     lines = [f"track: {path.name}", f"scenario: {scenario}"]
     if motions > 1:
         lines.append(f"trial: 1  # of {motions}: one clip for each")
@@ -171,10 +237,10 @@ def _yaml(
     if table.unit == "px":
         lines.append("# pixels_per_metre: where it is known")
     if scenario == "incline":
-        degrees = _straight(*place[:2])[1] if len(place) > 1 else 0.0
+        degrees = _straight(*place[:2])[1] if len(place) > 1 and place.shape[1] > 1 else 0.0
         seen = f"; the path lies at {degrees:.1f}" if degrees > LEVEL_DEG else ""
         lines.append(f"# ramp_angle_deg: measured, in degrees{seen}")
-    shape = {"fall": "sphere", "flight": "sphere", "from_above": "cylinder"}.get(scenario, "box")
+    shape = usual_shape(scenario)
     lines.append("objects:")
     for name in table.names:
         plain = "".join(c if c.isalnum() and c.isascii() else "_" for c in name).strip("_")
@@ -182,3 +248,8 @@ def _yaml(
         track_name = f", track_name: '{name}'" if len(table.names) > 1 else ""
         lines.append(f"  - {{name: {plain}, shape: {shape}{track_name}}}")
     return "\n".join(lines) + "\n"
+
+
+def usual_shape(scenario: str) -> str:
+    """The shape that most bodies have in such a motion."""
+    return {"fall": "sphere", "flight": "sphere", "from_above": "cylinder"}.get(scenario, "box")

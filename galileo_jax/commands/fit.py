@@ -1,19 +1,17 @@
 """`galileo fit`: from a clip to masses and friction coefficients."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, get_args
+from collections.abc import Sequence
+from typing import get_args
 
 from galileo_jax.api.fit_options import Discrepancy, ignored_options
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.fit_table import table
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.engine_names import MOTIONS
 from galileo_jax.runtime.registry import entry_names
-
-if TYPE_CHECKING:
-    from galileo_jax.api.fit_result import Fit
 
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
 FREE = ", ".join(entry_names("galileo_jax.model.effects.free"))
@@ -55,38 +53,6 @@ def main(argv: Sequence[str]) -> int | None:
     pages = [out] if len(measured) == 1 else [out / one.name for one in measured]
     command.say(", ".join([f"{out}/result.json", *(f"{page}/report.html" for page in pages)]))
     return None
-
-
-def table(found: "Fit", truth: Mapping[str, float]) -> str:
-    """What the user asked for, in a few lines; with a column for the truth if it is known."""
-    from galileo_jax.inference.per_mass import SUFFIX
-    from galileo_jax.results.shown_digits import shown
-    from galileo_jax.results.shown_parameters import shown_parameters
-
-    result: Mapping[str, Any] = found.result
-    entries = shown_parameters(result)
-    title = f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"
-    lines = [title] if entries else []
-    for name, entry in entries.items():
-        unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-        mean, sd, low, high = (shown(entry, key) for key in ("mean", "sd", "q025", "q975"))
-        interval = f"[{low}, {high}]{unit}"
-        true = f"{truth[name]:.4g}" if name in truth else ""
-        known = f"{mean:>10}{sd:>10}   {interval}"
-        if f"{name}{SUFFIX}" in result["derived"]:
-            known = "   not determined by this clip: only per mass, below"
-        elif not entry["identified"]:
-            known = f"   not determined by this clip: anything in {interval}"
-        lines.append(f"{name:<18}{true:>10}{known}")
-    error = result["error"]
-    lines.append(
-        f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
-        f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}); {result['status']}"
-    )
-    from galileo_jax.report.fit_text import fit_quality
-
-    lines += fit_quality(result)
-    return "\n".join(lines)
 
 
 def _parser() -> command.Parser:

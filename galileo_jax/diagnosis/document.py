@@ -10,6 +10,7 @@ import numpy as np
 
 from galileo_jax.comparison.document import comparison_document
 from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.could_not_see import could_not_see
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.diagnosis.each_clip import kind_of
 from galileo_jax.diagnosis.law_verdict import best_formula
@@ -61,6 +62,7 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             {"rule": why.rule, "sentence": why.sentence, **why.numbers}
             for why in diagnosis.verdict.reasons
         ],
+        "could_not_see": could_not_see(trials, diagnosis, seed),
         "history": [_history_row(one, entries) for one, (entries, _) in rounds],
     }
     if diagnosis.missing is not None:

@@ -36,16 +36,20 @@ PAGE = "report.html"
 HEADLINES = re.compile(r"gravity|k\d+|mass_ratio(_\d+_\d+)?")
 
 
-def write_report(run: Run, page: Path | None = None) -> Path:
+def write_report(
+    run: Run, page: Path | None = None, lead: str = "", beside: Mapping[str, str] | None = None
+) -> Path:
     """Writes a finished fit's page; returns its path.
 
     Args:
       run: the fit.
       page: where to; default: report.html in the run's folder.
+      lead: the result in words, for the top of the page.
+      beside: titles of other pages to their places, for links.
     """
     page = page or run.folder / PAGE
     fitted = posterior_predictive(run, seed=int(run.result["seed"]))
-    write_text(page, _render(run, fitted, fit_charts(run, fitted)))
+    write_text(page, _render(run, fitted, fit_charts(run, fitted), lead, beside or {}))
     return page
 
 
@@ -67,11 +71,17 @@ def fit_charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
     }
 
 
-def _render(run: Run, fitted: PosteriorPredictive, charts: Mapping[str, Sequence[Chart]]) -> str:
+def _render(
+    run: Run,
+    fitted: PosteriorPredictive,
+    charts: Mapping[str, Sequence[Chart]],
+    lead: str,
+    beside: Mapping[str, str],
+) -> str:
     title = ", ".join(Path(clip).name for clip in run.result["clips"])
     key = _key(run)
     sections = [
-        _header(title, run) + _headlines(run),
+        _header(title, run, lead, beside) + _headlines(run),
         _undetermined(run, fitted),
         _motion(run, fitted),
         chart_section("Velocity", VELOCITY, charts["velocity"], legend=key),
@@ -106,7 +116,7 @@ VELOCITY = (
 )
 
 
-def _header(title: str, run: Run) -> str:
+def _header(title: str, run: Run, lead: str, beside: Mapping[str, str]) -> str:
     result = run.result
     effects = ", ".join(result["effects"]) or "none besides friction and impact"
     mark = "" if result["converged"] else ' class="warn"'
@@ -121,7 +131,14 @@ def _header(title: str, run: Run) -> str:
             for line in (*_cuts(result), *result.get("taken_as_exact", []))
         )
     )
-    return header("fit", title, " ".join(fit_text.fit_quality(result)), more, fit_text.fits(result))
+    quality, is_good = " ".join(fit_text.fit_quality(result)), fit_text.fits(result)
+    if not lead:
+        return header("fit", title, quality, more, is_good)
+    links = "".join(
+        f'<p><a href="{escape(place, quote=True)}">{escape(text)}</a></p>\n'
+        for text, place in beside.items()
+    )
+    return header("explanation", title, lead, f"{links}<p>{escape(quality)}</p>\n{more}", is_good)
 
 
 def _cuts(result: Mapping[str, Any]) -> list[str]:

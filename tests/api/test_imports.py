@@ -12,7 +12,7 @@ OF_OTHERS = {
 }
 
 
-@pytest.mark.parametrize("function", ["fit", "compare", "diagnose", "track"])
+@pytest.mark.parametrize("function", ["fit", "compare", "diagnose", "explain", "track"])
 def test_importing_a_function_imports_nothing_that_it_may_not_need(function):
     code = f"import sys, galileo_jax as gx; gx.{function}; print(' '.join(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -4,7 +4,7 @@ from importlib import import_module
 
 import pytest
 
-VERBS = ("simulate", "label", "export", "train")
+VERBS = ("explain", "simulate", "label", "export", "train")
 
 
 @pytest.mark.parametrize("verb", VERBS)

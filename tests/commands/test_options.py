@@ -20,6 +20,7 @@ VERBS = (
     "sweep",
     "next_experiment",
     "discover",
+    "explain",
 )
 
 

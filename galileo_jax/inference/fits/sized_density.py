@@ -54,9 +54,7 @@ class SizedDensity:
         return np.nan_to_num(mean, nan=-np.inf) - 0.5 * np.sum(z**2, axis=1)
 
 
-def _in_stated_errors(
-    predicted_m: np.ndarray, data: Whitening
-) -> Float[np.ndarray, "point value"]:
+def _in_stated_errors(predicted_m: np.ndarray, data: Whitening) -> Float[np.ndarray, "point value"]:
     """Residuals in units of the stated errors, which no size changes."""
     with np.errstate(over="ignore", invalid="ignore"):
         left = np.einsum("oijt,pojt->poit", data.inverse_root, data.observed_m - predicted_m)

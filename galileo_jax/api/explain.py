@@ -1,0 +1,270 @@
+"""`explain`: everything about a film or table in one call, as a lab report says it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from galileo_jax.api.clips import ClipLike, as_list, load
+from galileo_jax.api.command_line import command_line
+from galileo_jax.api.compare import Comparison, compare
+from galileo_jax.api.diagnose import Diagnosis, diagnose
+from galileo_jax.api.fit import fit as fit_tracks
+from galileo_jax.api.fit_result import Fit
+from galileo_jax.api.look import Look, look
+from galileo_jax.api.proposed_clip import clip_of
+from galileo_jax.api.track import Track
+from galileo_jax.api.understand import Understood, is_declared, understand
+from galileo_jax.clip.load import YAML_SUFFIXES, has_yaml, load_clip
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.sources import source_of
+from galileo_jax.clip.track_file import is_track
+from galileo_jax.report.paragraph import paragraph
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.atomic_write import write_json
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.runtime.progress import CancelFlag, OnProgress
+
+UNDERSTOOD, FITTED, COMPARED = 0.1, 0.35, 0.4  # shares of the work, for progress
+FILM_SUFFIXES = (".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".mts", ".wmv")
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What a film or table shows.
+
+    Attributes:
+      fit: the fit that is told: of the model with what was found missing, if anything was.
+      check: the model without missing effects against the data; `check.fit` is its fit.
+      diagnosis: what is missing; None where nothing is, or where the clip cannot tell.
+      command: the command that does the same.
+      files: that were written.
+    """
+
+    fit: Fit
+    check: Comparison
+    diagnosis: Diagnosis | None
+    command: str
+    files: tuple[Path, ...] = ()
+
+    @cached_property
+    def looks(self) -> tuple[Look, ...]:
+        """What is seen in each file before anything is fitted."""
+        clips = [one.clip for one in self.fit.measurements]
+        return tuple(look(source) for clip in clips if (source := clip.video or clip.track))
+
+    @property
+    def look(self) -> Look:
+        """What is seen in the first file."""
+        return self.looks[0]
+
+    @cached_property
+    def paragraph(self) -> str:
+        """The result in the words of a lab report."""
+        shapes = [item.shape for item in self.fit.measurements[0].clip.objects]
+        found = None if self.diagnosis is None else self.diagnosis.document
+        return paragraph(self.fit.result, self.check.document, found, shapes)
+
+    @in_float64
+    def report(self, path: str | Path, beside: Mapping[str, str] | None = None) -> tuple[Path, ...]:
+        """Writes the page: the paragraph, then all of the fit.
+
+        Args:
+          path: the page; of several clips each has its own: NAME.html becomes NAME_CLIP.html.
+          beside: titles of other pages to their places, for links; None: none.
+        """
+        from galileo_jax.report.fit_page import write_report
+
+        path = Path(path)
+        runs = self.fit.runs(path.parent)
+        several = len(runs) > 1
+        return tuple(
+            write_report(
+                run,
+                path.with_name(f"{path.stem}_{run.problem.name}{path.suffix}") if several else path,
+                self.paragraph,
+                beside or {},
+            )
+            for run in runs
+        )
+
+    @in_float64
+    def save(self, folder: str | Path) -> "Explanation":
+        """Writes the run as `Fit.save` does, its page with the paragraph, and what it rests on.
+
+        That is compare/compare.json and, where something is missing, diagnosis/.
+
+        Returns:
+          the explanation, with its `files`.
+        """
+        folder = Path(folder)
+        fit = self.fit.save(folder, report=False)
+        beside: dict[str, str] = {}
+        files = [folder / "result.json"]
+        write_json(folder / "compare" / "compare.json", self.check.document)
+        files.append(folder / "compare" / "compare.json")
+        if self.diagnosis is not None:
+            self.diagnosis.save(folder / "diagnosis")
+            files += [folder / "diagnosis" / name for name in ("diagnosis.json", "report.html")]
+            beside["what is missing, and why"] = "diagnosis/report.html"
+        pages = self.report(folder / "report.html", beside)
+        return replace(self, fit=fit, files=(*pages, *files))
+
+    def __repr__(self) -> str:
+        """In one line."""
+        return f"<Explanation {', '.join(self.fit.names)}: {self.paragraph}>"
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        return f"<p>{escape(self.paragraph)}</p>{self.fit._repr_html_()}"
+
+
+@in_float64
+def explain(
+    clips: ClipLike | Sequence[ClipLike],
+    *,
+    out: str | Path | None = None,
+    scenario: str | None = None,
+    ramp_angle: float | None = None,
+    pixels_per_metre: float | None = None,
+    track_units: str | None = None,
+    fps: float | None = None,
+    point: Sequence[float] | None = None,
+    engine: str = "auto",
+    seed: int = 0,
+    on_progress: OnProgress | None = None,
+    cancel: CancelFlag | None = None,
+) -> Explanation:
+    """Looks, tracks, fits, tests the model, and finds out what is missing where it fails.
+
+    What is said here goes before what a yaml beside the file declares; what neither says is taken
+    from the file where that shows it.
+
+    Args:
+      clips: a film or table of any program, its yaml or a clip; or several, or a folder with them:
+        trials of the same objects.
+      out: a folder for the results; None: nothing is written.
+      scenario: what the clip shows, such as ramp, incline or flight; None: as the path looks.
+      ramp_angle: degrees; None: as the path lies, where that shows it.
+      pixels_per_metre: of the picture; None: not known.
+      track_units: of a table: m, cm, mm, km, in, ft or px; None: as the table says.
+      fps: true frames per second; None: as the file says.
+      point: (x, y), the middle of the object in the first picture, px; None: what moves first.
+      engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
+      seed: of all random numbers; the same seed gives the same result.
+      on_progress: called with the stage, the share done (0 to 1) and what there is of the result.
+      cancel: a flag with `is_set`, such as `threading.Event`.
+
+    Raises:
+      InputError: a file is wrong, or something is missing that only a person can know; one line
+        names all of it.
+      Cancelled: `cancel` was set.
+
+    Examples:
+      >>> import galileo_jax as gx
+      >>> made = gx.simulate("slide.csv", scenario="incline", seed=3, track_only=True)
+      >>> found = gx.explain("slide.csv")
+      >>> found.paragraph.split(" with")[0]
+      'The block slid'
+    """
+    answers = answers_of(
+        scenario=scenario,
+        ramp_angle_deg=ramp_angle,
+        pixels_per_metre=pixels_per_metre,
+        track_units=track_units,
+        fps=fps,
+        points=None if point is None else [tuple(point)],
+    )
+    with progress.scope(on_progress, cancel):
+        progress.report("looking", 0.0)
+        with progress.part(0.0, UNDERSTOOD):
+            checked = [_checked(one, answers) for one in sources_of(clips)]
+        found = _explained(checked, engine, seed)
+        if out is not None:
+            progress.report("writing the page", 0.97)
+            found = found.save(out)
+        progress.report("explained", 1.0, found)
+        return found
+
+
+def answers_of(**said: Any) -> dict[str, Any]:
+    """What was said, by keys of the yaml, without what was not."""
+    return {key: value for key, value in said.items() if value is not None}
+
+
+def sources_of(clips: ClipLike | Sequence[ClipLike]) -> list[ClipLike]:
+    """The clips of a call; of a folder all in it, in the order of their names.
+
+    Raises:
+      InputError: there is none.
+    """
+    given = as_list(clips)
+    if not given:
+        raise InputError("no clip given; at least one expected")
+    found: list[ClipLike] = []
+    for one in given:
+        is_folder = isinstance(one, str | Path) and Path(one).is_dir()
+        found += _in_folder(Path(one)) if is_folder else [one]
+    return found
+
+
+def _in_folder(folder: Path) -> list[Path]:
+    if (folder / "result.json").is_file():
+        raise InputError(f"{folder}: a run, which is a result; a film, a table or a folder of them")
+    found = [
+        path
+        for path in sorted(folder.iterdir())
+        if path.is_file() and (is_track(path) or path.suffix.lower() in FILM_SUFFIXES)
+    ]
+    if not found:
+        raise InputError(f"{folder}: no film and no table in this folder")
+    return found
+
+
+def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
+    """The checked clip, where its yaml leaves nothing open; else what is understood of the file.
+
+    Args:
+      clip: of which it is asked.
+      answers: what a person said, by keys of the yaml: it goes before what a yaml declares.
+
+    Raises:
+      InputError: the file or its yaml is wrong.
+    """
+    if isinstance(clip, Clip):
+        return clip
+    if isinstance(clip, Mapping):
+        return load(clip)
+    path = Path(clip)
+    is_elsewhere = path.is_file() and not has_yaml(path) and source_of(path) is not None
+    is_yaml = path.suffix.lower() in YAML_SUFFIXES
+    if is_elsewhere or is_declared(path) or (is_yaml and not path.is_file()):
+        if "points" in answers:
+            raise InputError(f"{path}: point (given in the call): its objects are declared already")
+        return load_clip(clip, **answers)
+    return understand(path)
+
+
+def _checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:
+    known = understood(clip, answers)
+    return known if isinstance(known, Clip) else clip_of(known, answers, str(clip))
+
+
+def _explained(clips: Sequence[Clip], engine: str, seed: int) -> Explanation:
+    with progress.part(UNDERSTOOD, FITTED):
+        first = fit_tracks(clips, engine=engine, seed=seed)
+    with progress.part(FITTED, COMPARED):
+        check = compare(first)
+    command = command_line(
+        "explain", [clip.source for clip in clips], engine=engine, seed=seed or None
+    )
+    if check.is_adequate or check.found.no_verdict is not None:
+        return Explanation(first, check, None, command)
+    tracks = [Track(one.clip, one.pixels, one) for one in first.measurements]
+    with progress.part(COMPARED, 0.95):
+        found = diagnose(tracks, engine=engine, seed=seed)
+        progress.report("fitting with what is missing", 0.98)
+        return Explanation(found.best, check, found, command)

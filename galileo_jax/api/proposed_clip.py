@@ -1,0 +1,139 @@
+"""The clip that a file, its yaml and a person's answers make together, and its yaml."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from galileo_jax.api.questions import check_answered, questions
+from galileo_jax.api.understand import USUAL_FPS, Answers, Understood, needs_angle
+from galileo_jax.clip.load import check_clip, with_unused
+from galileo_jax.clip.look import proposed_yaml, usual_shape
+from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.yaml_file import yaml_text
+from galileo_jax.runtime.atomic_write import write_text
+from galileo_jax.runtime.errors import InputError
+
+FOOT_SD_PX = 3.0  # of a foot that was found, not marked
+
+
+def clip_of(known: Understood, answers: Answers, source: str | None = None) -> Clip:
+    """The checked clip.
+
+    Args:
+      known: what the file shows and its yaml declares.
+      answers: what a person said; it goes before what the yaml declares.
+      source: what the clip is called in results; None: its file.
+
+    Raises:
+      InputError: something that only a person can know is missing (one line names all of it), or
+        what was said is wrong.
+    """
+    check_answered(known, answers)
+    content = known.declared or yaml.safe_load(yaml_of(known, answers))
+    said = {key: value for key, value in answers.items() if key != "points"}
+    if known.declared:
+        content = _completed(known, answers) | said
+    clip = with_unused(check_clip(known.yaml_path, content, overridden=frozenset(said)))
+    return clip.model_copy(update={"source": source or str(known.source)})
+
+
+def yaml_of(known: Understood, answers: Answers) -> str:
+    """The yaml to be written beside the file, where there is none."""
+    scenario = known.scenario(answers)
+    if scenario is None:
+        raise InputError(f"{known.source}: scenario: missing")
+    if known.is_film:
+        return yaml_text(_of_film(known, answers))
+    table = known.look.table
+    assert table is not None  # of a table
+    first = table.motion(1)
+    text = proposed_yaml(known.source, first, scenario.name, None, len(table.starts))
+    said: dict[str, Any] = {
+        key: value for key, value in answers.items() if key not in ("points", "scenario")
+    }
+    if needs_angle(scenario):
+        said.setdefault("ramp_angle_deg", None)
+    if (unit := _sure_unit(known, answers)) is not None:
+        said.setdefault("track_units", unit)
+    return _filled(text, said)
+
+
+def write_yaml(known: Understood, answers: Answers) -> Path | None:
+    """Writes the yaml beside the file; None where there is one, which stays as it is.
+
+    Raises:
+      InputError: the folder cannot be written to.
+    """
+    if known.declared or known.yaml_path.exists():
+        return None
+    try:
+        write_text(known.yaml_path, yaml_of(known, answers))
+    except OSError as error:
+        raise InputError(f"{known.yaml_path}: {error.strerror or error}") from error
+    return known.yaml_path
+
+
+def _completed(known: Understood, answers: Answers) -> dict[str, Any]:
+    """What an incomplete yaml declares, and what it lacks."""
+    content = dict(known.declared)
+    made = yaml.safe_load(yaml_of(known, {**_plain(known.declared), **answers}))
+    kind, other = ("video", "track") if known.is_film else ("track", "video")
+    content.pop(other, None)
+    content[kind] = known.source.name
+    wanted = {"scenario", "objects", "track_units", "ramp_angle_deg", "pixels_per_metre"}
+    wanted |= {"fps", "pixels_per_metre_sd"} & {*answers, *(["fps"] if known.is_film else [])}
+    for key in wanted & set(made):
+        content.setdefault(key, made[key])
+    return content
+
+
+def _plain(declared: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: declared[key] for key in ("scenario", "fps") if key in declared}
+
+
+def _of_film(known: Understood, answers: Answers) -> dict[str, Any]:
+    from galileo_jax.clip.label import KEY_ORDER  # and OpenCV, which a table does not need
+
+    scenario = known.scenario(answers)
+    assert scenario is not None  # else a question is open
+    points = known.points(answers)
+    fps = answers.get("fps") or round(known.look.fps or USUAL_FPS, 4)
+    content: dict[str, Any] = {"video": known.source.name, "scenario": scenario.name, "fps": fps}
+    if needs_angle(scenario):
+        content["ramp_angle_deg"] = answers.get("ramp_angle_deg")
+    if points and len(points) == 1:
+        content["direction"] = known.path(points[0]).direction
+    content["pixels_per_metre"] = answers.get("pixels_per_metre")
+    if answers.get("pixels_per_metre_sd") is not None:
+        content["pixels_per_metre_sd"] = answers["pixels_per_metre_sd"]
+    if scenario.has_table and known.foot is not None:
+        content |= {"origin_px": list(known.foot), "origin_sd_px": FOOT_SD_PX}
+    shape = usual_shape(scenario.name)
+    content["objects"] = [
+        {"name": f"object{n}", "shape": shape, "point_px": [float(x), float(y)]}
+        for n, (x, y) in enumerate(points, 1)
+    ]
+    return {key: content[key] for key in KEY_ORDER if key in content}
+
+
+def _sure_unit(known: Understood, answers: Answers) -> str | None:
+    """The unit of a table that does not say it, where its motion does."""
+    for one in questions(known, answers):
+        if one.key == "track_units" and not one.is_open:
+            return one.default
+    return None
+
+
+def _filled(text: str, said: Mapping[str, Any]) -> str:
+    """A proposal with values in place of its comments; new keys stand before the objects."""
+    for key, value in said.items():
+        line = f"{key}: {'null' if value is None else value}"
+        if value is None and key == "ramp_angle_deg":
+            line += "  # taken from the path"
+        text, found = re.subn(rf"^(# )?{key}:.*$", line, text, flags=re.MULTILINE)
+        if not found:
+            text = text.replace("objects:\n", f"{line}\nobjects:\n", 1)
+    return text

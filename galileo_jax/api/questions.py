@@ -1,0 +1,262 @@
+"""What only a person can know of a clip, as questions: what is asked, why, and what is likely."""
+
+import math
+import re
+import shlex
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.api.understand import Answers, Understood, needs_angle
+from galileo_jax.clip.look import FALL_M_S2
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.track_axes import accelerations
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.table.track_table import METRES_PER_UNIT
+
+LENGTH = re.compile(r"(?P<size>[\d.,]+)\s*(?P<unit>px|[a-z]*)")
+SIZE_SD_PX = 5.0  # of a thing in the picture, whose ends are where its texture ends
+MOST_SD_SHARE = 0.2  # of a scale, as its key allows
+NUMBERS = {"fps": "frames per second", "ramp_angle_deg": "degrees"}
+
+
+@dataclass(frozen=True)
+class Question:
+    """Something that is asked of a person.
+
+    Attributes:
+      key: of the yaml; "points" for which things are meant.
+      text: what is asked.
+      why: why it is asked, or what speaks for the default.
+      option: of `galileo FILE` that answers it, as an example.
+      default: what no answer means, as text; None where a guess would give a wrong result.
+      choices: what may be answered; empty: anything.
+      is_open: nobody but a person can say; else the default will do.
+    """
+
+    key: str
+    text: str
+    why: str
+    option: str
+    default: str | None = None
+    choices: tuple[str, ...] = ()
+    is_open: bool = True
+
+
+def questions(known: Understood, answers: Answers) -> tuple[Question, ...]:
+    """What is still to be asked, in the order in which it is; changes with what is answered."""
+    asked = [
+        _points(known),
+        _scenario(known, answers),
+        _fps(known),
+        _units(known, answers),
+        _angle(known, answers),
+        _scale(known, answers),
+    ]
+    told = {*answers, *known.declared}
+    return tuple(one for one in asked if one is not None and one.key not in told)
+
+
+def check_answered(known: Understood, answers: Answers) -> None:
+    """Raises `InputError`, one line with all that is missing, where only a person can say."""
+    missing = [one for one in questions(known, answers) if one.is_open]
+    if not missing:
+        return
+    keys = ", ".join(f"{one.key} ({one.why})" for one in missing)
+    options = " ".join(one.option for one in missing)
+    name = known.yaml_path.name
+    unsaid = f"{name} does not say" if known.declared else f"there is no {name} beside it that says"
+    raise InputError(
+        f"{known.source}: {unsaid} what the file does not show: {keys}; write it there, or say it "
+        f"in the call, such as: galileo {shlex.quote(str(known.source))} {options}"
+    )
+
+
+def parsed(question: Question, text: str, known: Understood, answers: Answers) -> dict[str, Any]:
+    """An answer as a person types it, by keys of the yaml.
+
+    Args:
+      question: that is answered.
+      text: as typed; empty: the default.
+      known: what it is asked about.
+      answers: that were given before.
+
+    Raises:
+      InputError: it is none; says what would be right.
+    """
+    text = text.strip() or question.default or ""
+    if not text:
+        raise InputError(f"{question.key}: an answer is needed; {question.option}")
+    if question.key == "points":
+        return {"points": _chosen(text, known)}
+    if question.key == "pixels_per_metre":
+        return _scale_of(text, _length_px(known, answers))
+    if question.key in NUMBERS:
+        return {question.key: None if text == "path" else _number(text, question.key)}
+    if question.choices and text not in question.choices:
+        raise InputError(f"{question.key}: {text!r}; one of {', '.join(question.choices)} expected")
+    return {question.key: text}
+
+
+def _points(known: Understood) -> Question | None:
+    if not known.is_film or known.has_objects:
+        return None
+    text = "Which thing is to be followed? x y of its middle in the first picture, pixels"
+    if not known.things:
+        return Question("points", text, "no moving thing was found", "--point 312 221")
+    if len(known.things) == 1:
+        return None
+    listed = "; ".join(
+        f"{n} is at {x:.0f} {y:.0f}, {width:.0f} x {height:.0f} pixels"
+        for n, ((x, y), (width, height)) in enumerate(known.things.items(), 1)
+    )
+    default = "both" if known.is_pair else "1"
+    why = f"{len(known.things)} things move, in the order in which they set out: {listed}"
+    text = "Which thing is to be followed? A number, both (one runs into the other), or x y"
+    return Question("points", text, why, "--point 312 221", default)
+
+
+def _scenario(known: Understood, answers: Answers) -> Question | None:
+    if "scenario" in known.declared:
+        return None
+    likely = known.likely(answers)
+    if likely is not None and likely.is_clear:
+        return None
+    text = f"What kind of motion is it? One of {', '.join(SCENARIOS)}"
+    if likely is None:
+        why = "the motion could not be followed"
+        return Question("scenario", text, why, "--scenario ramp", None, tuple(SCENARIOS))
+    why = f"perhaps {likely.scenario}: {likely.why}"
+    example = f"--scenario {likely.scenario}"
+    return Question("scenario", text, why, example, likely.scenario, tuple(SCENARIOS))
+
+
+def _fps(known: Understood) -> Question | None:
+    seen = known.look.seen
+    if seen is None or not seen.is_in_frames or "fps" in known.declared:
+        return None
+    if known.look.table is not None and known.look.table.frame_s is not None:
+        return None
+    text = "How many frames per second does the camera take?"
+    return Question("fps", text, "the table counts frames and has no times", "--fps 30")
+
+
+def _units(known: Understood, answers: Answers) -> Question | None:
+    seen = known.look.seen
+    if seen is None or seen.unit is not None or seen.axes == ("angle",):
+        return None
+    if known.declared.get("pixels_per_metre") is not None:
+        return None
+    choices = (*METRES_PER_UNIT, "px")
+    text = f"In which unit are its lengths? One of {', '.join(choices)}"
+    size = max(seen.moved)
+    if (unit := _unit_by_gravity(known, answers)) is not None:
+        why = f"it falls as free fall does in {unit}"
+        return Question("track_units", text, why, f"--track-units {unit}", unit, choices, False)
+    default = "px" if size >= 50 else "m" if size <= 20 else "cm"
+    why = f"the table does not say; the way is {size:.4g} long"
+    return Question("track_units", text, why, f"--track-units {default}", default, choices)
+
+
+def _unit_by_gravity(known: Understood, answers: Answers) -> str | None:
+    """The unit in which a body that flies falls with about 9.8 m/s^2; None where none is."""
+    table, scenario = known.look.table, known.scenario(answers)
+    fps = answers.get("fps") or known.declared.get("fps")
+    if table is None or scenario is None or scenario.up_shows != "bend":
+        return None
+    frame_s = 1 / fps if fps else table.frame_s
+    seconds = table.motion(1).clock * (1.0 if table.times_s is not None else frame_s or math.nan)
+    if not np.isfinite(seconds).all():
+        return None
+    place = table.motion(1).position[0]
+    shown = np.isfinite(place).all(axis=0)
+    fallen = [accelerations(seconds[shown], one[shown]) for one in place]
+    size = max((abs(float(np.median(one))) for one in fallen if one.size), default=0.0)
+    fits = [
+        unit
+        for unit, metres in METRES_PER_UNIT.items()
+        if FALL_M_S2[0] < size * metres < FALL_M_S2[1]
+    ]
+    return fits[0] if len(fits) == 1 else None
+
+
+def _angle(known: Understood, answers: Answers) -> Question | None:
+    scenario = known.scenario(answers)
+    if scenario is None or not needs_angle(scenario):
+        return None
+    text = "What is the ramp's angle to the horizontal, in degrees, as measured?"
+    likely = known.likely(answers)
+    told = likely.slope_deg if likely is not None else None
+    if known.is_film and told is None and (known.is_pair or known.foot is not None):
+        why = "else it is taken from the path in the picture"
+        return Question("ramp_angle_deg", text, why, "--ramp-angle 20", "path", (), False)
+    if told is None or likely is None or not likely.is_clear:
+        why = "friction cannot be told from slope without it"
+        return Question("ramp_angle_deg", text, why, "--ramp-angle 20")
+    why = f"else it is taken from the path, which lies at {told:.1f} degrees"
+    return Question("ramp_angle_deg", text, why, f"--ramp-angle {told:.0f}", "path", (), False)
+
+
+def _scale(known: Understood, answers: Answers) -> Question | None:
+    scenario = known.scenario(answers)
+    unit = known.look.seen.unit if known.look.seen else "px"
+    unit = known.declared.get("track_units") or answers.get("track_units") or unit
+    is_told = {"rectangle", "pixels_per_metre"} & set(known.declared)
+    table = known.look.table
+    is_told = is_told or (table is not None and table.calibration is not None)
+    on_surface = scenario is not None and (scenario.has_ramp or scenario.line == "level")
+    if unit != "px" or is_told or not on_surface or known.has_objects:
+        return None
+    text = "How many pixels are a metre? Pixels, such as 900 px"
+    size = _length_px(known, answers)
+    if size is not None:
+        text += f"; or how long object 1 is (about {size:.0f} px), such as 0.06 m"
+    why = "friction cannot be told from lengths in pixels"
+    return Question("pixels_per_metre", text, why, "--pixels-per-metre 900")
+
+
+def _length_px(known: Understood, answers: Answers) -> float | None:
+    points = known.points(answers) if known.is_film else ()
+    size = known.things.get(points[0]) if points else None
+    return max(size) if size is not None else None
+
+
+def _chosen(text: str, known: Understood) -> list[tuple[float, float]]:
+    things = list(known.things)
+    if text == "both" and len(things) > 1:
+        return things[:2]
+    if text.isdecimal() and 1 <= int(text) <= len(things):
+        return [things[int(text) - 1]]
+    numbers = re.findall(r"[\d.]+", text)
+    if len(numbers) != 2:
+        raise InputError(f"points: {text!r}; x and y expected, such as 312 221")
+    return [(float(numbers[0]), float(numbers[1]))]
+
+
+def _scale_of(text: str, length: float | None) -> dict[str, Any]:
+    """Pixels per metre, or what they are where something of a known size is `length` pixels."""
+    found = LENGTH.fullmatch(text)
+    if found is None or found["unit"] not in ("", "px", *METRES_PER_UNIT):
+        raise InputError(f"pixels_per_metre: {text!r}; such as 900 px or 0.06 m expected")
+    size = _number(found["size"], "pixels_per_metre")
+    if found["unit"] in ("", "px"):
+        return {"pixels_per_metre": size}
+    if length is None or size <= 0:
+        raise InputError(f"pixels_per_metre: {text!r}; such as 900 px expected")
+    scale = length / (size * METRES_PER_UNIT[found["unit"]])
+    share = min(SIZE_SD_PX / length, MOST_SD_SHARE)
+    return {
+        "pixels_per_metre": round(scale, 1),
+        "pixels_per_metre_sd": float(f"{share * scale:.2g}"),
+    }
+
+
+def _number(text: str, key: str) -> float:
+    try:
+        value = float(text.replace(",", "."))
+    except ValueError:
+        raise InputError(f"{key}: {text!r} is not a number") from None
+    if not math.isfinite(value):
+        raise InputError(f"{key}: {text!r} is not a number")
+    return value

@@ -1,0 +1,163 @@
+"""`galileo FILE`: look, track, fit, test the model, find what is missing, and say it in words."""
+
+import os
+import shutil
+import sys
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from galileo_jax.commands import command
+from galileo_jax.commands.clip_options import out_folder, warn
+from galileo_jax.commands.fit_table import table
+from galileo_jax.commands.options import adder
+from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.results.truth import true_parameters
+from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
+
+if TYPE_CHECKING:
+    from galileo_jax.api.understand import Understood
+    from galileo_jax.clip.schema import Clip
+
+WIDTH = 100  # of a paragraph, at most
+OF_YAML = {"ramp_angle": "ramp_angle_deg"}  # options that a yaml's key has another name for
+
+
+def looks_like_a_file(word: str) -> bool:
+    """Whether a first argument that is no verb is meant for a file or folder."""
+    has_slash = os.sep in word or "/" in word
+    is_name = not word.startswith("-") and bool(Path(word).suffix)
+    return has_slash or is_name or Path(word).exists()
+
+
+def main(argv: Sequence[str]) -> int | None:
+    """Explains a film or table, or trials together; asks at a terminal for what is missing."""
+    call = vars(_parser().parse_args(argv))
+    files, to = call.pop("clips"), call.pop("out")
+    engine, seed = call.pop("engine"), call.pop("seed")
+    said = {OF_YAML.get(key, key): value for key, value in call.items() if value is not None}
+    if (point := said.pop("point", None)) is not None:
+        said["points"] = [tuple(point)]
+    clips = _clips(files, said)
+    is_folder = len(files) == 1 and Path(files[0]).is_dir()
+    to = to or (f"runs/{Path(files[0]).resolve().name}" if is_folder else None)
+    out = out_folder(to, clips)
+    warn(warning for clip in clips for warning in clip.warnings)
+    from galileo_jax.api.explain import explain
+    from galileo_jax.results.stale_outputs import stale_documents
+
+    with progress_display() as display:
+        found = explain(clips, out=out, engine=engine, seed=seed, on_progress=display)
+    print(textwrap.fill(found.paragraph, min(WIDTH, shutil.get_terminal_size().columns)))
+    print(f"\n{table(found.fit, true_parameters(clips[0]))}")
+    measured = found.fit.measurements
+    warn(line for one in measured for line in (*one.remarks, *one.doubts))
+    doubts = {doubt for one in measured for doubt in one.doubts}
+    warn(line for line in found.fit.warnings if line not in doubts)
+    warn(stale_documents(out, [one.observation for one in measured]))
+    for line in found.fit.taken_as_exact:
+        command.say(f"note: {line}")
+    command.say(", ".join(map(str, found.files)))
+    return None
+
+
+def _clips(files: Sequence[str], said: dict[str, Any]) -> "list[Clip]":
+    """The checked clips; writes the yaml of those that have none, when all of them are right."""
+    from galileo_jax.api.explain import sources_of, understood
+    from galileo_jax.api.proposed_clip import clip_of, write_yaml
+    from galileo_jax.api.understand import Understood
+
+    is_terminal = sys.stdin.isatty() and sys.stdout.isatty()
+    clips: list[Clip] = []
+    to_write: list[tuple[Understood, dict[str, Any]]] = []
+    answers = said
+    for source in sources_of(list(files)):
+        with progress_display() as display, progress.scope(display):
+            known = understood(source, said)
+        if isinstance(known, Understood):
+            answers = asked(known, answers) if is_terminal else answers
+            clips.append(clip_of(known, answers, str(source)))
+            to_write.append((known, answers))
+            # What holds of one trial holds of the next, but where its things are.
+            answers = {key: value for key, value in answers.items() if key != "points"}
+        else:
+            clips.append(known)
+    for known, answers in to_write:
+        _write(known, answers, write_yaml)
+    return clips
+
+
+def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
+    """Asks at the terminal for all that is open; Enter takes what stands in brackets.
+
+    Raises:
+      InputError: the input ended (Ctrl-D) before all was answered.
+    """
+    from galileo_jax.api.questions import Question, parsed, questions
+
+    seen = known.look.summary().split("\n\n")[0].splitlines()
+    told = [seen[0], *(line for line in seen if line.startswith(("moves:", "time step:")))]
+    is_first = True
+
+    def still_open() -> Sequence[Question]:
+        with progress_display() as display, progress.scope(display):
+            return questions(known, answers)  # of a film what moves may have to be followed
+
+    while open_ones := still_open():
+        if is_first:
+            command.say("\n".join(told))
+            is_first = False
+        one = open_ones[0]
+        default = f" [{one.default}]" if one.default is not None else ""
+        command.say(f"{one.text}\n  ({one.why})")
+        try:
+            answers = answers | parsed(one, input(f"  {one.key}{default}: "), known, answers)
+        except EOFError:
+            raise InputError(f"{known.source}: {one.key}: no answer; nothing was written") from None
+        except InputError as error:
+            command.say(str(error))
+    return answers
+
+
+def _write(known: "Understood", answers: dict[str, Any], write: Callable[..., Path | None]) -> None:
+    """Writes a yaml that is not there; says what one that is there lacks."""
+    try:
+        written = write(known, answers)
+    except InputError as error:
+        command.say(f"warning: {error}; the next call asks again")
+        return
+    if written is not None:
+        command.say(f"{written}: written; the next call asks nothing")
+        return
+    lacks = {key: v for key, v in answers.items() if key not in (*known.declared, "points")}
+    if lacks:
+        lines = ", ".join(f"{key}: {'null' if v is None else v}" for key, v in lacks.items())
+        command.say(f"{known.yaml_path}: left as it is; it lacks {lines}")
+
+
+def _parser() -> command.Parser:
+    parser = command.Parser(prog="galileo explain", description=__doc__)
+    parser.add_argument(
+        "clips",
+        nargs="+",
+        metavar="FILE",
+        help="film, table or yaml; several, or a folder with them: trials of the same objects",
+    )
+    add = adder(parser, "explain")
+    parser.add_argument("--out", metavar="DIR", help="folder of the results (default runs/FILE)")
+    add("scenario", metavar="NAME")
+    add("ramp_angle", metavar="DEG")
+    add("pixels_per_metre", metavar="SCALE")
+    add("track_units", metavar="UNIT")
+    add("fps", metavar="HZ")
+    add("point", nargs=2, type=float, action="store", default=None, metavar=("X", "Y"))
+    add("engine", choices=ENGINES, metavar=None)
+    add("seed", type=command.whole_number(0))
+    parser.examples(
+        "galileo explain slide.mp4                             or just: galileo slide.mp4",
+        "galileo explain trials/ --out results                 a folder of trials together",
+    )
+    return parser

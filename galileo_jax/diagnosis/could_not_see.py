@@ -1,0 +1,125 @@
+"""What a clip could not have shown: of each effect the smallest strength that it would have.
+
+An effect of strength s bends the whitened residuals by d(s), as far as the free parameters, with
+their priors, cannot take it up. It would raise the log odds of the effect over the model without it
+to about
+
+    n / 2 log(1 + |d(s)|^2 / n) - z^2 / 2 + log sd_z + log prior
+
+The first term is the gain, where the model without the effect takes d for larger noise in its n
+residuals; the next two are what the evidence charges for a strength that has z in its prior and is
+known to sd_z. The smallest s at which this is what the verdict asks for (`CONVINCING`) is the
+answer. It is an estimate without a fit: from slopes, taken again at the strength that they gave.
+Chance adds or takes away some nats in every single clip. Of effects that were hidden with just this
+strength, seven clips each, the log odds were on average 6.4 (air_drag) and 7.0 (viscous_drag) on a
+board, 2.2 +- 2.3 (air_drag) on a ramp with a table; 7 are asked for.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.diagnosis import Diagnosis
+from galileo_jax.diagnosis.score_tests import shapes_beside, slopes_along, strength_of
+from galileo_jax.diagnosis.verdict import CONVINCING
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.inference.per_mass import force_constants, is_any_weighed
+from galileo_jax.model.parameters import Prior, in_units
+
+ROUNDS = 3  # of slopes: each at the strength that the one before gave
+PRIOR_Z = np.linspace(-6.0, 4.0, 401)  # strengths that are looked at, in their prior
+
+
+def could_not_see(
+    trials: JointProblem, diagnosis: Diagnosis, seed: int
+) -> dict[str, dict[str, Any]]:
+    """The smallest strength of each effect that the clips would have shown, beside the last model.
+
+    Args:
+      trials: those diagnosed, with the whole library.
+      diagnosis: what was found.
+      seed: of the places and lengths at which effects that have them are tried.
+
+    Returns:
+      effect to `strength` and `unit`, as diagnosis.json has them; strength None where not even the
+      largest that anybody expects would show. Of effects of the library that are not in the last
+      model; empty where that does not describe the clips, for then nobody knows their noise.
+    """
+    last = diagnosis.rounds[-1]
+    own = last.hypothesis.of(trials)  # with imperfections, perhaps
+    if not last.comparison.is_adequate or own.names != trials.names:
+        return {}
+    log_priors = {
+        one.effects[0]: one.log_prior
+        for one in diagnosis.candidates
+        if len(one.effects) == 1 and one.law is None and not one.is_form
+    }
+    asked = [name for name in log_priors if name not in last.hypothesis.effects]
+    return {
+        name: _entry(own, last.hypothesis, name, log_priors[name], seed) for name in sorted(asked)
+    }
+
+
+def smallest_shown(
+    power: float, num_left: float, prior: Prior, absent: float, log_prior: float
+) -> float | None:
+    """The smallest strength whose expected log odds convince; None where none does.
+
+    Args:
+      power: squared length of the slope to a strength of 1, in units of the noise.
+      num_left: how many residuals tell the noise.
+      prior: of the strength.
+      absent: at which the effect is not there.
+      log_prior: of the effect, over that of the model without it.
+    """
+    strength = in_units(prior, PRIOR_Z)
+    wide = np.gradient(strength, PRIOR_Z)  # d strength / dz
+    sd_z = 1 / np.sqrt(1 + power * wide**2)
+    gain = 0.5 * num_left * np.log1p(power * (strength - absent) ** 2 / num_left)
+    odds = gain - 0.5 * PRIOR_Z**2 + np.log(sd_z) + log_prior
+    shown = np.abs(strength - absent)[odds >= CONVINCING]
+    return float(shown.min()) if shown.size else None
+
+
+def _entry(
+    trials: JointProblem, last: Hypothesis, effect: str, log_prior: float, seed: int
+) -> dict[str, Any]:
+    """Of one effect; of one with a place or a length the median of those that are tried."""
+    where, _ = strength_of(trials, effect)
+    own = trials.model_parameters[where[0]]
+    effects = (*last.effects, effect)
+    _, probes = shapes_beside(trials, last.fit, effects, seed)
+    found = _smallest(trials, last.fit, probes, where, log_prior)
+    shown = float(np.median([np.inf if one is None else one for one in found]))
+    unit = own.unit
+    constants: Mapping[str, str] = force_constants(trials)
+    if effect in constants and "m1" in trials.names and not is_any_weighed(trials):
+        theta = trials.theta(last.fit.z, last.fit.free)
+        shown, unit = shown / float(theta[trials.names.index("m1")]), constants[effect]
+    return {"strength": float(f"{shown:.3g}") if np.isfinite(shown) else None, "unit": unit}
+
+
+def _smallest(
+    trials: JointProblem,
+    fit: GradientFit,
+    probes: np.ndarray,
+    where: np.ndarray,
+    log_prior: float,
+) -> list[float | None]:
+    """Of each probe (a shape of the effect), by slopes that are taken nearer and nearer to it."""
+    own = trials.model_parameters[where[0]]
+    probes = probes.copy()
+    num_left = max(fit.num_values - fit.num_used, 1.0)
+    found: list[float | None] = [None] * len(probes)
+    for _ in range(ROUNDS):
+        _, power = slopes_along(trials, fit, probes)
+        size = probes[:, where[0]] - own.absent
+        for i, squared in enumerate(power / size**2):
+            tried = float(squared), num_left, own.prior, own.absent, log_prior
+            found[i] = smallest_shown(*tried)
+            if (strength := found[i]) is not None:
+                probes[i, where] = own.absent + strength
+    return found

@@ -1,0 +1,204 @@
+"""The result in the words of a lab report: one paragraph, of what the files of a run say."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from galileo_jax.diagnosis.reasons import p_equals
+from galileo_jax.inference.per_mass import SUFFIX
+from galileo_jax.report.fit_text import discrepancy_text, imperfection_text, meaning
+from galileo_jax.results.shown_digits import shown
+from galileo_jax.results.shown_parameters import shown_parameters
+
+BODIES = {"box": "block", "cylinder": "cylinder", "torus": "ring", "sphere": "ball"}
+FRICTION, RATIO = re.compile(r"k(\d+)"), re.compile(r"mass_ratio(?:_(\d+)_(\d+))?")
+MOST_UNSEEN = 3  # effects of which it is said what could not have been seen
+SAME_AS_RATIO = "phi"  # says again what the ratio of the masses says
+
+
+def paragraph(
+    result: Mapping[str, Any],
+    check: Mapping[str, Any],
+    diagnosis: Mapping[str, Any] | None = None,
+    shapes: Sequence[str] = (),
+) -> str:
+    """What was measured, how well the model follows it, what is missing, what could not be seen.
+
+    Args:
+      result: result.json of the fit that is told.
+      check: compare.json of the model without what was found missing.
+      diagnosis: diagnosis.json; None where nothing is missing.
+      shapes: of the objects, as they are declared.
+    """
+    entries = {
+        name: entry for name, entry in shown_parameters(result).items() if name != SAME_AS_RATIO
+    }
+    known = {name: entry for name, entry in entries.items() if entry["identified"]}
+    effects = {name: entry for name, entry in known.items() if _is_of(name, result["effects"])}
+    rest = {
+        name: entry
+        for name, entry in known.items()
+        if name not in effects and not FRICTION.fullmatch(name) and not RATIO.fullmatch(name)
+    }
+    body = BODIES.get(shapes[0], "body") if shapes else "body"
+    said = [
+        _frictions(known, body, shapes),
+        *(_ratio(name, entry, body) for name, entry in known.items() if RATIO.fullmatch(name)),
+        _values(rest),
+        _unknown([name for name in entries if name not in known], known),
+        _nearness(result["error"], _model(result, diagnosis)),
+        *_imperfections(result),
+        _verdict(result, check, diagnosis),
+        "" if _status(diagnosis) == "law" else _values(effects),  # the law's text has them
+        _only_if(result, diagnosis),
+        _unseen(diagnosis),
+    ]
+    return " ".join(sentence for sentence in said if sentence)
+
+
+def value_text(entry: Mapping[str, Any]) -> str:
+    """A value, its standard deviation and its unit, as a lab report writes them."""
+    return f"{shown(entry)} ± {shown(entry, 'sd')}{_unit(entry['unit'])}"
+
+
+def words(name: str) -> str:
+    """An effect's name in words."""
+    return name.replace("_", " ")
+
+
+def _unit(unit: str) -> str:
+    if unit == "1":
+        return ""
+    plain = unit.replace("^2", "²")
+    return f" {plain.removeprefix('1')}"
+
+
+def _frictions(known: Mapping[str, Any], body: str, shapes: Sequence[str]) -> str:
+    """How the bodies slid."""
+    found = {int(m[1]): entry for name, entry in known.items() if (m := FRICTION.fullmatch(name))}
+    if not found:
+        return ""
+    parts = []
+    for number, entry in found.items():
+        round_one = number <= len(shapes) and shapes[number - 1] != "box"
+        who = f"the {body}" if number == 1 else f"object {number}"
+        verb = f"{who} {'moved' if round_one else 'slid'} with a friction coefficient of"
+        value = value_text(entry)
+        parts.append(f"{who} with {value}" if parts else f"{verb} {value}")
+    return _sentence(", ".join(parts))
+
+
+def _ratio(name: str, entry: Mapping[str, Any], body: str) -> str:
+    found = RATIO.fullmatch(name)
+    one, other = (found[1], found[2]) if found and found[1] else ("1", "2")
+    who = f"the {body}" if one == "1" else f"object {one}"
+    return _sentence(f"{who} is {value_text(entry)} times as heavy as object {other}")
+
+
+def _is_of(name: str, effects: Sequence[str]) -> bool:
+    """Whether a parameter, or what is derived from it, belongs to one of the effects."""
+    return any(name == effect or name.startswith(f"{effect}_") for effect in effects)
+
+
+def _values(entries: Mapping[str, Any]) -> str:
+    """All in one sentence."""
+    parts = []
+    for name, entry in entries.items():
+        what = _called(name)
+        parts.append(f"the {what}{',' if ',' in what else ''} is {value_text(entry)}")
+    return _sentence("; ".join(parts)) if parts else ""
+
+
+def _called(name: str) -> str:
+    """A parameter in a phrase without an article."""
+    if name.endswith(SUFFIX):
+        return f"{words(name.removesuffix(SUFFIX))} over the mass"
+    return meaning(name) or words(name)
+
+
+def _unknown(names: Sequence[str], known: Mapping[str, Any]) -> str:
+    """What the clip does not determine; a force that is known per mass counts as known."""
+    open_ones = [name for name in names if f"{name}{SUFFIX}" not in known]
+    if not open_ones:
+        return ""
+    return (
+        f"This clip does not determine {_listed([f'the {_called(name)}' for name in open_ones])}."
+    )
+
+
+def _status(diagnosis: Mapping[str, Any] | None) -> str:
+    return "" if diagnosis is None else str(diagnosis["verdict"]["status"])
+
+
+def _model(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
+    """What the model is called that the values are of."""
+    if not result["effects"]:
+        return "The model"
+    effects = _listed([words(one) for one in result["effects"]])
+    return f"The model with {'a law' if _status(diagnosis) == 'law' else effects}"
+
+
+def _nearness(error: Mapping[str, Any], model: str) -> str:
+    """How near the model comes to what was seen."""
+    millimetres, share = error.get("rms_mm"), error.get("rms_percent_of_way")
+    sizes = [f"{millimetres:.2g} mm"] if _is_size(millimetres) else []
+    sizes += [f"{share:.2g} % of the way"] if _is_size(share) else []
+    return f"{model} follows the motion to {', '.join(sizes)}." if sizes else ""
+
+
+def _is_size(value: Any) -> bool:
+    return isinstance(value, int | float) and value == value and value > 0
+
+
+def _imperfections(result: Mapping[str, Any]) -> list[str]:
+    if found := result.get("imperfections"):
+        return imperfection_text(found)
+    return [discrepancy_text(result["discrepancy"])] if result.get("discrepancy") else []
+
+
+def _verdict(
+    result: Mapping[str, Any], check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None
+) -> str:
+    if diagnosis is not None:
+        text = words(str(diagnosis["sentence"]))  # names of effects, in words
+        return f"{text[:1].upper()}{text[1:]}"
+    if check.get("adequate") is None or result.get("no_verdict"):
+        return f"{result.get('no_verdict') or 'Whether the model is right cannot be told'}."
+    p = p_equals(check["p_value"])
+    if not check["adequate"]:
+        return f"The data contradict the model ({p})."
+    text = f"What it leaves looks like noise: nothing is missing ({p})."
+    if check.get("noise_misstated"):
+        sizes = " and ".join(f"{size:.1f}" for size in check["noise_scale"])
+        text += f" The tracking errors are {sizes} times as large as stated."
+    return text
+
+
+def _only_if(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
+    """That the values hang on one of several explanations."""
+    if _status(diagnosis) != "ambiguous" or not result["effects"]:
+        return ""
+    return f"All values are those with {_listed([words(one) for one in result['effects']])}."
+
+
+def _unseen(diagnosis: Mapping[str, Any] | None) -> str:
+    """The smallest strengths that would have shown, of the likeliest of all other effects."""
+    if diagnosis is None:
+        return ""
+    found = diagnosis.get("could_not_see") or {}
+    in_question = {name for one in diagnosis["verdict"]["effects"] for name in one.split("+")}
+    asked = [row["effect"] for row in diagnosis["candidates"] if row["effect"] not in in_question]
+    told = [name for name in asked if name in found and found[name]["strength"] is not None]
+    parts = [
+        f"{words(name)} below {found[name]['strength']:.2g}{_unit(found[name]['unit'])}"
+        for name in told[:MOST_UNSEEN]
+    ]
+    return _sentence(f"{_listed(parts)} could not have been seen") if parts else ""
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."

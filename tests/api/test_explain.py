@@ -1,0 +1,136 @@
+"""`explain`: the parts in their order, nothing done twice, nothing written unasked."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+import galileo_jax as gx
+from galileo_jax.api import explain as module
+from galileo_jax.api.compare import compare
+from galileo_jax.api.track import Track
+from galileo_jax.runtime.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def board(tmp_path_factory) -> Path:
+    """A simulated board without an effect."""
+    path = tmp_path_factory.mktemp("board") / "board.csv"
+    gx.simulate(path, scenario="incline", seed=3, track_only=True)
+    return path
+
+
+@pytest.fixture(scope="module")
+def plain(board) -> gx.Explanation:
+    """Of a clip in which nothing is missing."""
+    return gx.explain(board)
+
+
+def test_what_nothing_is_missing_in_is_fitted_once_and_not_diagnosed(board, monkeypatch):
+    import galileo_jax.api.compare as compare_module
+
+    monkeypatch.setattr(module, "diagnose", None)
+    monkeypatch.setattr(compare_module, "GradientFitter", None)  # would fit again
+    before = sorted(board.parent.iterdir())
+    stages: list[str] = []
+    found = gx.explain(board, on_progress=lambda stage, share, partial: stages.append(stage))
+    assert found.diagnosis is None and found.check.fit is found.fit and found.files == ()
+    assert sorted(board.parent.iterdir()) == before, "nothing is written"
+    assert stages[0] == "looking" and stages[-1] == "explained"
+    assert found.look.seen is not None and found.look.seen.num_rows > 10
+
+
+def test_the_paragraph_tells_the_friction_of_the_fit(plain):
+    told = float(plain.paragraph.partition("a friction coefficient of ")[2].split()[0])
+    assert plain.paragraph.startswith("The block slid with")
+    assert told == pytest.approx(plain.fit.parameters["k1"]["mean"], abs=1e-3)
+    assert "nothing is missing (p = " in plain.paragraph
+    assert plain.paragraph in repr(plain)
+
+
+def test_what_is_saved_is_a_run_whose_page_begins_with_the_paragraph(plain, tmp_path):
+    saved = plain.save(tmp_path / "out")
+    assert all(path.is_file() for path in saved.files)
+    assert {path.name for path in saved.files} == {"report.html", "result.json", "compare.json"}
+    page = (tmp_path / "out" / "report.html").read_text()
+    lead = page.index('<p class="lead')
+    assert lead < page.index(plain.paragraph[:40]) < page.index("<main>")
+    assert gx.load_run(tmp_path / "out").parameters["k1"] == plain.fit.parameters["k1"]
+
+
+def test_where_the_check_fails_the_same_track_is_diagnosed(board, plain, monkeypatch):
+    """The clip is neither tracked nor read again, and the fit that is told is the diagnosis's."""
+    handed = []
+
+    def failed(fit):
+        made = compare(fit)
+        return replace(made, found=replace(made.found, p_value=1e-9))
+
+    def diagnosed(tracks, **options):
+        handed.extend(tracks)
+        return SimpleNamespace(best=plain.fit, document={})
+
+    monkeypatch.setattr(module, "compare", failed)
+    monkeypatch.setattr(module, "diagnose", diagnosed)
+    found = gx.explain(board, seed=0)
+    (track,) = handed
+    assert isinstance(track, Track) and track.measurement is found.check.fit.measurements[0]
+    assert found.fit is plain.fit and found.diagnosis is not None
+
+
+def test_a_clip_that_cannot_tell_is_not_diagnosed(board, plain, monkeypatch):
+    def failed(fit):
+        made = compare(fit)
+        return replace(made, found=replace(made.found, p_value=1e-9, no_verdict="too few frames"))
+
+    monkeypatch.setattr(module, "compare", failed)
+    monkeypatch.setattr(module, "diagnose", None)
+    assert gx.explain(board).diagnosis is None
+
+
+def test_a_folder_is_trials_of_the_same_objects(tmp_path):
+    for n in (1, 2):
+        path = tmp_path / "trials" / f"{n}.csv"
+        gx.simulate(path, scenario="incline", seed=3, track_only=True)
+    assert module.sources_of(tmp_path / "trials") == [
+        tmp_path / "trials" / "1.csv", tmp_path / "trials" / "2.csv"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ([], "no clip given"),
+        ("empty", "no film and no table"),
+        ("run", "a run, which is a result"),
+        ("none.csv", "no such file"),
+    ],
+)
+def test_what_is_no_clip_is_one_line(given, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "result.json").write_text("{}")
+    with pytest.raises(InputError, match=said):
+        gx.explain(given)
+
+
+def test_an_answer_goes_before_the_yaml_but_objects_are_not_declared_twice(board):
+    clip = module.understood(board, {"ramp_angle_deg": 22.0})
+    assert isinstance(clip, gx.Clip) and clip.ramp_angle_deg == 22.0
+    with pytest.raises(InputError, match="declared already"):
+        gx.explain(board, point=(10.0, 20.0))
+
+
+@pytest.mark.slow
+def test_a_hidden_drag_is_named_and_its_strength_told(tmp_path):
+    path = tmp_path / "drag.csv"
+    gx.simulate(path, seed=3, effects={"air_drag": {}}, strength=1, track_only=True)
+    found = gx.explain(path, out=tmp_path / "out")
+    assert found.diagnosis is not None and found.fit.effects == ("air_drag",)
+    assert "Air drag explains the data" in found.paragraph
+    assert "could not have been seen" in found.paragraph
+    names = {path.relative_to(tmp_path / "out").as_posix() for path in found.files}
+    assert names >= {"report.html", "diagnosis/diagnosis.json", "diagnosis/report.html"}
+    assert 'href="diagnosis/report.html"' in (tmp_path / "out" / "report.html").read_text()

@@ -1,0 +1,93 @@
+"""What a clip could not have shown: strengths by slopes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from galileo_jax.api.clips import load
+from galileo_jax.api.diagnose import with_library
+from galileo_jax.api.simulate import simulate
+from galileo_jax.diagnosis.candidates import Hypothesis
+from galileo_jax.diagnosis.could_not_see import could_not_see, smallest_shown
+from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
+from galileo_jax.diagnosis.verdict import CONVINCING
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.measurement.measure import measure
+from galileo_jax.model.parameters import LogNormal, Normal, Uniform
+from tests.found import candidate_of, comparison_of
+from tests.precision import in_64_bit
+
+EFFECTS = ("air_drag", "rolling", "ramp_angle")
+
+
+@pytest.fixture(autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
+def test_where_all_is_linear_the_strength_is_what_the_formula_gives():
+    """A broad prior, many residuals: |d|^2 / 2 = CONVINCING + log(prior width / sd) + z^2 / 2."""
+    power, sd = 1e4, 1.0
+    found = smallest_shown(power, 1e9, Normal(0.0, sd), 0.0, 0.0)
+    assert found is not None
+    needed = CONVINCING + 0.5 * np.log(1 + power * sd**2) + 0.5 * found**2
+    assert found == pytest.approx(np.sqrt(2 * needed / power), rel=0.2)  # the grid of strengths
+
+
+@pytest.mark.parametrize("prior", [LogNormal(0.3, 1.2), Normal(0.0, 0.2), Uniform(0.0, 1.0)])
+def test_better_data_show_less(prior):
+    found = [smallest_shown(power, 100.0, prior, 0.0, -3.0) for power in (1e3, 1e4, 1e5)]
+    assert all(one is not None for one in found)
+    assert found[0] > found[1] > found[2] > 0  # pyright: ignore
+
+
+def test_what_is_less_probable_must_be_stronger_and_few_residuals_tell_less():
+    plain = smallest_shown(1e4, 100.0, Normal(0.0, 0.5), 0.0, 0.0)
+    rare = smallest_shown(1e4, 100.0, Normal(0.0, 0.5), 0.0, -8.0)
+    few = smallest_shown(1e4, 10.0, Normal(0.0, 0.5), 0.0, 0.0)
+    assert plain is not None and rare is not None and few is not None
+    assert rare > plain and few > plain
+
+
+def test_what_no_strength_shows_has_none():
+    assert smallest_shown(0.1, 100.0, Normal(0.0, 0.2), 0.0, -3.0) is None
+
+
+def made(folder: Path, noise: float) -> JointProblem:
+    """A simulated board without effects; its model has three."""
+    simulate(folder / "a.csv", scenario="incline", seed=3, track_only=True, track_noise=noise)
+    seen = measure(load(folder / "a.csv"))
+    return with_library([seen.clip], [seen.observation], "rigid", EFFECTS)
+
+
+def found_of(trials: JointProblem, p_value: float) -> Diagnosis:
+    base = Hypothesis((), GradientFitter(trials).fit(0, effects=()))
+    rounds = (Round(base, comparison_of(trials, p_value)),)
+    candidates = tuple(replace(candidate_of(trials, name, 0.1), log_prior=-3.0) for name in EFFECTS)
+    return Diagnosis(rounds, candidates, Verdict("none", ()))
+
+
+def test_each_effect_of_the_library_has_a_strength_and_a_unit(tmp_path):
+    trials = made(tmp_path, 0.0003)
+    seen = could_not_see(trials, found_of(trials, 0.5), 0)
+    assert set(seen) == set(EFFECTS)
+    assert seen["air_drag"]["unit"] == "1/m", "nobody weighed it"
+    assert 0.001 < seen["air_drag"]["strength"] < 1.0
+    assert seen["rolling"]["strength"] is None, "friction takes its place on one slope"
+
+
+def test_larger_errors_hide_more(tmp_path):
+    strengths = []
+    for noise in (0.0002, 0.002):
+        trials = made(tmp_path, noise)
+        strengths.append(could_not_see(trials, found_of(trials, 0.5), 0)["air_drag"]["strength"])
+    assert 3.0 < strengths[1] / strengths[0] < 30.0
+
+
+def test_nothing_is_said_where_the_last_model_does_not_describe_the_clip(tmp_path):
+    trials = made(tmp_path, 0.0003)
+    assert could_not_see(trials, found_of(trials, 1e-9), 0) == {}

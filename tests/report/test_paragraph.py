@@ -1,0 +1,148 @@
+"""The paragraph of a lab report says what the files of a run say, and no more."""
+
+from typing import Any
+
+import pytest
+
+from galileo_jax.report.paragraph import paragraph
+
+ERROR = {"rms_mm": 0.81, "rms_percent_of_way": 0.21, "chi2_per_dof": 1.0}
+CHECK = {"adequate": True, "p_value": 0.42, "noise_misstated": False, "noise_scale": [1.0]}
+BAD = CHECK | {"adequate": False, "p_value": 1e-14}
+
+
+def entry(mean: float, sd: float, unit: str = "1", identified: bool = True) -> dict[str, Any]:
+    low, high = mean - 2 * sd, mean + 2 * sd
+    named = {"mean": mean, "sd": sd, "q025": low, "q975": high}
+    return named | {"unit": unit, "identified": identified}
+
+
+def result(*effects: str, derived: dict | None = None, **parameters: dict) -> dict[str, Any]:
+    return {
+        "parameters": parameters,
+        "derived": derived or {},
+        "error": ERROR,
+        "effects": list(effects),
+        "clips": ["slide.csv"],
+    }
+
+
+def diagnosis(status: str, effects: list[str], sentence: str, unseen: dict) -> dict[str, Any]:
+    return {
+        "sentence": sentence,
+        "verdict": {"status": status, "effects": effects},
+        "could_not_see": unseen,
+        "candidates": [{"effect": name} for name in ("air_drag", "rolling", "table_tilt", "magnus",
+                                                     "stribeck")],
+    }  # fmt: skip
+
+
+def test_a_block_whose_friction_is_known_and_nothing_is_missing():
+    said = paragraph(result(k1=entry(0.29, 0.004)), CHECK, None, ["box"])
+    assert said == (
+        "The block slid with a friction coefficient of 0.2900 ± 0.0040. The model follows the "
+        "motion to 0.81 mm, 0.21 % of the way. What it leaves looks like noise: nothing is "
+        "missing (p = 0.42)."
+    )
+
+
+def test_what_is_not_determined_is_said_and_is_given_no_value():
+    known = result(
+        m1=entry(0.4, 0.1, "kg", False),
+        k1=entry(0.1, 0.01),
+        m2=entry(0.3, 0.1, "kg", False),
+        k2=entry(0.2, 0.01, identified=False),
+        derived={"mass_ratio": entry(1.5, 0.02), "phi": entry(0.2, 0.01)},
+    )
+    said = paragraph(known, CHECK, None, ["box", "box"])
+    assert "The block slid with a friction coefficient of 0.100 ± 0.010. " in said
+    assert "The block is 1.500 ± 0.020 times as heavy as object 2. " in said
+    assert (
+        "This clip does not determine the mass of object 1, the mass of object 2 and the friction "
+        "coefficient of object 2. "
+    ) in said
+    assert "0.2 ±" not in said and "0.3 ±" not in said
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        (
+            {"gravity": entry(9.79, 0.03, "m/s^2")},
+            "The acceleration of free fall is 9.790 ± 0.030 m/s². ",
+        ),
+        (
+            {"start_velocity_x": entry(2.0, 0.1, "m/s"), "period": entry(1.0, 0.01, "s")},
+            "The velocity in the first frame, along the travel, is 2.00 ± 0.10 m/s; the period of "
+            "the swing without damping is 1.000 ± 0.010 s. ",
+        ),
+        ({}, "The model follows "),
+    ],
+)
+def test_other_quantities_are_called_by_their_meaning(parameters, said):
+    assert paragraph(result(**parameters), CHECK, None, ["sphere"]).startswith(said)
+
+
+def test_an_effect_that_is_named_has_its_strength_and_others_their_limits():
+    known = result(
+        "air_drag",
+        k1=entry(0.148, 0.001),
+        air_drag=entry(0.9, 0.5, "kg/m", False),
+        derived={"air_drag_per_mass": entry(2.02, 0.02, "1/m")},
+    )
+    unseen = {
+        "rolling": {"strength": None, "unit": "1"},
+        "table_tilt": {"strength": 0.011, "unit": "rad"},
+        "magnus": {"strength": 0.0502, "unit": "1/m"},
+        "stribeck": {"strength": 0.2, "unit": "1"},
+    }
+    found = diagnosis("named", ["air_drag"], "air_drag explains the data (p < 1e-12).", unseen)
+    said = paragraph(known, BAD, found, ["box"])
+    assert "The air drag over the mass is 2.020 ± 0.020 /m. " in said
+    assert "The model with air drag follows" in said
+    assert "does not determine" not in said, "it is known per mass"
+    assert said.endswith(
+        "Table tilt below 0.011 rad, magnus below 0.05 /m and stribeck below 0.2 could not have "
+        "been seen."
+    )
+    assert "rolling" not in said, "no strength of it would have shown"
+
+
+def test_of_several_explanations_the_values_are_those_with_one_of_them():
+    known = result("rolling", k1=entry(0.1, 0.01), rolling=entry(0.2, 0.05))
+    unseen = {name: {"strength": 1.0, "unit": "1"} for name in ("air_drag", "table_tilt")}
+    effects = ["rolling", "table_tilt+air_drag"]
+    found = diagnosis("ambiguous", effects, "This clip cannot distinguish between them.", unseen)
+    said = paragraph(known, BAD, found, ["box"])
+    assert "All values are those with rolling." in said
+    assert "could not have been seen" not in said, "both are in question themselves"
+
+
+def test_a_law_has_its_constants_in_its_formula():
+    known = result("law_t", k1=entry(0.1, 0.01), law_t=entry(0.2, 0.05))
+    found = diagnosis("law", ["law_t"], "No known effect explains it; a law does: a = 0.2 t.", {})
+    said = paragraph(known, BAD, found, ["box"])
+    assert "The model with a law follows" in said and "0.20 ±" not in said
+    assert said.endswith("a = 0.2 t.")
+
+
+@pytest.mark.parametrize(
+    ("check", "more", "said"),
+    [
+        (BAD, {}, "The data contradict the model (p < 1e-12)."),
+        (CHECK | {"adequate": None}, {"no_verdict": "a.yaml: only 5 frames"}, "only 5 frames."),
+        (
+            CHECK | {"noise_misstated": True, "noise_scale": [3.04]},
+            {},
+            "The tracking errors are 3.0 times as large as stated.",
+        ),
+    ],
+)
+def test_the_end_says_whether_the_model_will_do(check, more, said):
+    assert paragraph(result(k1=entry(0.1, 0.01)) | more, check, None, ["box"]).endswith(said)
+
+
+def test_a_distance_that_nobody_knows_is_not_told():
+    known = result(k1=entry(0.1, 0.01)) | {"error": {"rms_mm": None, "rms_percent_of_way": None}}
+    assert "follows" not in paragraph(known, CHECK, None, ["torus"])
+    assert paragraph(known, CHECK, None, ["torus"]).startswith("The ring moved with a friction")
