@@ -30,6 +30,7 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
+from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
@@ -188,6 +189,7 @@ class Diagnosis:
             self.problem.problems[0].engine.name,
             tuple(effect for effect in effects if effect.name in chosen.effects),
         )
+        part = part.with_sizes(whole.sizes)
         gradient = restricted_fit(chosen.fit, whole, part)
         notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
         notes["status"] = gradient.code.value
@@ -199,6 +201,8 @@ class Diagnosis:
             notes["discrepancy"] = wide.summary
         else:
             posterior = fit_posterior(part, gradient, seed)
+        if gradient.sizes is not None:
+            notes["imperfections"] = imperfections(part, gradient.sizes, posterior)
         return make_fit(
             self.measurements,
             part,

@@ -73,7 +73,7 @@ def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
             value += f" ({row[name]['mean'] - rows[-2][name]['mean']:+.4f})"
         frictions += f"  {value:<28}"
     return (
-        f"{diagnosis_text.effects_text(row['effects']):<26}{row['rmse']:>9.4f}"
+        f"{diagnosis_text.round_text(row):<26}{row['rmse']:>9.4f}"
         f"{row['chi2_per_dof']:>10.2f}{diagnosis_text.p_text(row['p_value']):>9}{frictions}".rstrip()
     )
 

@@ -171,7 +171,9 @@ def diagnose(
     if rough is not None:
         candidates = rough.with_the_rest(candidates)
         first = Round(rough.base, rough.comparison)
-        rounds = [first] if verdict.status == "none" else rounds
+        if verdict.status == "none":
+            rounds = [first]
+            on_round(first)
     verdict = with_known_constants(trials, verdict, candidates, seed)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     if rough is not None and verdict.effects in UNEVEN:

@@ -17,6 +17,7 @@ from galileo_jax.diagnosis.law_verdict import best_formula
 from galileo_jax.diagnosis.verdict import explains
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.per_mass import SUFFIX
@@ -65,6 +66,11 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
         "could_not_see": could_not_see(trials, diagnosis, seed),
         "history": [_history_row(one, entries) for one, (entries, _) in rounds],
     }
+    last = diagnosis.rounds[-1].hypothesis
+    if last.fit.sizes is not None:
+        whose = last.of(trials)
+        posterior = laplace_posterior(whose, last.fit, seed)
+        document["imperfections"] = imperfections(whose, last.fit.sizes, posterior)
     if diagnosis.missing is not None:
         document["missing_force"] = _missing_force(diagnosis, diagnosis.missing, named)
     if diagnosis.left_one_out:
@@ -100,6 +106,7 @@ def _history_row(one: Round, entries: Entries) -> dict[str, Any]:
     error = one.comparison.error
     return {
         "effects": list(one.effects),
+        "imperfect": one.hypothesis.fit.sizes is not None,
         "rmse": error["rmse"],
         "noise": error["noise"],
         "chi2_per_dof": error["chi2_per_dof"],
@@ -162,6 +169,7 @@ def _candidate(candidate: Candidate, entries: tuple[Entries, Entries]) -> dict[s
         "probability": candidate.probability,
         "p_value": candidate.p_value,
         "confounded_with": list(candidate.confounded_with),
+        "unusual": list(candidate.unusual),
     }
 
 

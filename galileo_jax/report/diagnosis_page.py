@@ -125,7 +125,7 @@ def _rounds(rounds: Sequence[Round], history: Sequence[Mapping[str, Any]]) -> st
     for row in history:
         rows.append(
             [
-                escape(diagnosis_text.effects_text(row["effects"])),
+                escape(diagnosis_text.round_text(row)),
                 f"{row['rmse']:.4f}",
                 f"{row['chi2_per_dof']:.2f}",
                 escape(diagnosis_text.p_text(row["p_value"])),

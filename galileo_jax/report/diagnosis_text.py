@@ -6,15 +6,19 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.comparison.compare import Comparison
+from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Reason
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
+from galileo_jax.diagnosis.verdict import UNEVEN
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.results.shown_digits import shown
+from galileo_jax.statespace.term import TERMS
 
 NO_EFFECTS = "no effects"
+ROUGHNESS = "friction_roughness"
 MOST_APART = 2  # that are said one by one
 PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis: a formula that explains the data
 
@@ -22,6 +26,12 @@ PROPOSED = "proposed_effect.py"  # in the folder of a diagnosis: a formula that 
 def effects_text(effects: Sequence[str]) -> str:
     """The effects of a model."""
     return ", ".join(effects) or NO_EFFECTS
+
+
+def round_text(row: Mapping[str, Any]) -> str:
+    """What the model of a round has, of a row of `history` in diagnosis.json."""
+    text = effects_text(row["effects"])
+    return f"{text}, imperfect" if row.get("imperfect") and not row["effects"] else text
 
 
 def value_text(entry: Mapping[str, Any]) -> str:
@@ -67,6 +77,14 @@ def verdict(diagnosis: Diagnosis) -> str:
         noise = [why.sentence for why in found.reasons if why.rule == "noise_misstated"]
         adequate = f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."
         return " ".join([adequate, *noise])
+    if found.effects in UNEVEN:
+        last = diagnosis.rounds[-1]
+        return (
+            f"{found.effects[0]} explains the data: the friction coefficient varies by "
+            f"{roughness(last.hypothesis):.2g} along the way, more than on most surfaces "
+            f"({p_equals(diagnosis.base.p_value)} without, "
+            f"{p_equals(last.comparison.p_value)} with)."
+        )
     if found.status == "named":
         names = " and ".join(found.effects)
         verb = "explains" if len(found.effects) == 1 else "together explain"
@@ -85,6 +103,18 @@ def verdict(diagnosis: Diagnosis) -> str:
         )
     where = "; see the missing force" if diagnosis.missing is not None else ""
     return f"No known effect explains the data{where}."
+
+
+def roughness(hypothesis: Hypothesis) -> float:
+    """By how much friction varies along the way, as a coefficient, with a hypothesis.
+
+    Raises:
+      ValueError: it knows no such imperfection.
+    """
+    sizes, trials = hypothesis.fit.sizes, hypothesis.trials
+    if sizes is None or trials is None or ROUGHNESS not in sizes.by_name:
+        raise ValueError("a hypothesis without imperfections of friction")
+    return trials.problems[0].size(TERMS[ROUGHNESS], sizes.by_name[ROUGHNESS])
 
 
 def ambiguity(rivals: Sequence[str]) -> str:
@@ -203,7 +233,7 @@ def next_command(
     files = shlex.join(clips)
     more = "".join(f" --effects-from {shlex.quote(path)}" for path in effects_from)
     found = diagnosis.verdict
-    if found.status == "none":
+    if found.status == "none" or found.effects in UNEVEN:
         return f"galileo fit {files}"
     effects: Sequence[str] = found.effects
     if found.status == "ambiguous":
