@@ -1,10 +1,10 @@
-"""What an accelerator is worth: `python benchmarks/accelerator.py`.
+"""What an accelerator is worth: `python -m benchmarks accelerator`.
 
 Runs on whatever `jax.devices()` has. By size of the batch, rollouts of a ramp clip of 1.2 s per
 minute: the rigid engine and MJX on the device, and MuJoCo's C engine (`mujoco.batch`) on all cores
 of the machine beside it. Then simulated tracks one after the other: fits per second and diagnoses
 per minute, programs compiled; and fits per second of as many tracks at once, their batches merged
-(`galileo sweep --together`). The last line is JSON.
+(`galileo sweep --together`).
 """
 
 import argparse
@@ -16,12 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import rollouts
-import tables
 
 import galileo_jax as gx
-from galileo_jax.commands import command
-from galileo_jax.runtime import compilation_cache
+from benchmarks import rollouts, tables
 from galileo_jax.sweeping.engine_together import EngineTogether
 from galileo_jax.sweeping.task import Task
 
@@ -31,10 +28,8 @@ MOST_ON_CORES = 1024
 """Larger batches of the C engine only take longer: they are no faster per rollout."""
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    jax.config.update("jax_enable_x64", True)
-    compilation_cache.enable()
+def main(call: argparse.Namespace) -> dict[str, Any]:
+    # X64
     device = jax.devices()[0]
     figures: dict[str, Any] = {"device": f"{device.platform} {device.device_kind}"}
     figures["cores"] = os.cpu_count()
@@ -53,8 +48,7 @@ def main(argv: Sequence[str]) -> int | None:
     for name in figures:
         if name.startswith(("fits_per_s", "diagnoses_per_minute")):
             tables.row(name, [figures[name]])
-    tables.finish("accelerator", figures)
-    return None
+    return figures
 
 
 def _rollouts_per_minute(name: str, size: int, repeats: int) -> float | None:
@@ -96,9 +90,7 @@ def _fitted(path: Path) -> dict[str, Any]:
     return gx.fit(path).result["parameters"]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = command.Parser(prog="accelerator.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--engine", nargs="+", choices=ENGINES, default=list(ENGINES))
     parser.add_argument("--batch", nargs="+", type=int, default=list(SIZES))
     parser.add_argument("--repeats", type=int, default=3)
@@ -106,10 +98,3 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--diagnoses", type=int, default=5, help="tracks that are diagnosed")
     parser.add_argument("--together", nargs="*", type=int, default=[8, 64], metavar="N")
     parser.add_argument("--seed", type=int, default=7100, help="of the first track")
-    return parser
-
-
-if __name__ == "__main__":
-    import sys
-
-    raise SystemExit(command.run(main, sys.argv[1:]))

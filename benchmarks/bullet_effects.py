@@ -1,6 +1,6 @@
 """Are effects found that PyBullet has, and not our own formulas? Optional: `.[bullet]`.
 
-    python benchmarks/bullet_effects.py --out DIR --seeds 2 --first 0
+    python -m benchmarks bullet_effects --out DIR --seeds 2 --first 0
 
 Boxes slide, cross the foot and collide in PyBullet, which has its own idea of all that. In each
 case one effect is added to that world, by a force at the centres, a friction coefficient, a tilted
@@ -8,27 +8,23 @@ table or a wrong camera, written here as anybody would who had never read the li
 level, a rubber band pulls straight to where it is tied, a rough strip rubs whatever slides over it.
 The tracks, with white noise, go through the diagnosis. Right: the effect alone is named; covered:
 it is named or among those listed. What is finished stays in DIR/results.jsonl and is not done
-again. The last line is JSON.
+again.
 """
 
 import argparse
 import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-import bullet_scene
-import calibration
-import journal
 import numpy as np
 import pybullet  # pyright: ignore
-import tables
-import verdicts
-from bullet_scene import Hidden
 
+from benchmarks import bullet_scene, calibration, journal, tables, verdicts
+from benchmarks.bullet_scene import Hidden
 from galileo_jax.api.diagnose import diagnose
 from galileo_jax.commands import command
 from galileo_jax.model.effects.registry import effect_names
@@ -215,8 +211,7 @@ WORLDS: dict[str, Make] = {
 }
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     call.out.mkdir(parents=True, exist_ok=True)
     log = call.out / "results.jsonl"
     done = journal.finished(log)
@@ -238,8 +233,7 @@ def main(argv: Sequence[str]) -> int | None:
     figures = verdicts.summary(scores) | {"k1_worst_z_where_named": worst}
     for key, value in figures.items():
         tables.row(key, [value])
-    tables.finish("bullet_effects", figures | {"seeds": [call.first, call.seeds]})
-    return None
+    return figures | {"seeds": [call.first, call.seeds]}
 
 
 def k1_z(row: Mapping[str, Any]) -> float:
@@ -283,15 +277,8 @@ def film(truth: Truth, world: World, fps: float) -> np.ndarray:
     return (1 + world.longer) * seen
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="bullet_effects.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="results")
     parser.add_argument("--seeds", type=command.whole_number(1), default=2, help="of each effect")
     parser.add_argument("--first", type=command.whole_number(0), default=0, help="seed")
     parser.add_argument("--only", nargs="+", choices=tuple(WORLDS), help="effects")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

@@ -1,10 +1,10 @@
 """The frozen corpus: the same data through two commits, or two processors, and who differs.
 
-    python benchmarks/corpus.py run A.jsonl --num 300 [--task fit|mh|compare|diagnose] [--videos]
-    PYTHONPATH=../other python benchmarks/corpus.py run B.jsonl --num 300   # another checkout
+    python -m benchmarks corpus run A.jsonl --num 300 [--task fit|mh|compare|diagnose] [--videos]
+    PYTHONPATH=../other python -m benchmarks corpus run B.jsonl --num 300   # another checkout
     XLA_FLAGS=--xla_cpu_max_isa=SSE4_2 XDG_CACHE_HOME=build/sse \
-        python benchmarks/corpus.py run C.jsonl --num 300                   # another processor
-    python benchmarks/corpus.py differences A.jsonl B.jsonl
+        python -m benchmarks corpus run C.jsonl --num 300                   # another processor
+    python -m benchmarks corpus differences A.jsonl B.jsonl
 
 Cases are seeds, not files: scenarios in turn, two in three with an effect of the library hidden in
 them, noise and frame rate drawn. `run` makes each clip once in --clips, and appends its outcome to
@@ -21,11 +21,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import journal
 import numpy as np
-import tables
 
 import galileo_jax as gx
+from benchmarks import journal, tables
 from galileo_jax.runtime.errors import InputError
 
 SCENARIOS = (
@@ -174,7 +173,3 @@ def _difference(one: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float
         for name, own in one["log_evidence"].items()
     ]
     return max(means), max(ends), max(nats), float(one["verdict"] != other["verdict"])
-
-
-if __name__ == "__main__":
-    main()

@@ -1,18 +1,19 @@
 """Thrown cubes predicted by three simulators, each with the parameters that suit it best.
 
-    python benchmarks/cube_peers.py ../shared/data/real/cube_tosses
+    python -m benchmarks cube_peers ../shared/data/real/cube_tosses
 
 Every third toss is for learning: this program's joint fit (`galileo.fit_tosses`), and for MuJoCo
 (friction, the time constant and the damping of its contacts) and PyBullet (friction, restitution;
 optional: `pip install -e '.[bullet]'`) the parameters that predict these tosses best: of scattered
 ones the best, and Nelder-Mead from there. Then each predicts the tosses that none has learned from,
+from benchmarks import cube_tosses, tables
 from the same start: place, turning, velocity and spin at the last frame before the first impact, as
 the flight tells them. All have the edge, the inertia, the centre of mass, the floor and the gravity
 of this program's fit; its cube alone has rounded corners. "Even mass": the same without its centre
 of mass and its inertia, as anybody would simulate a cube.
 
 Errors are means over the frames from the first impact on, of the place over the edge and of the
-turning, and medians over the tosses. The last line is JSON.
+turning, and medians over the tosses.
 """
 # pyright: reportAttributeAccessIssue=false
 
@@ -21,12 +22,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cube_tosses
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-import tables
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
@@ -90,8 +89,7 @@ Simulator = Callable[[Thrown, Cube, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @in_float64
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     paths = sorted(call.folder.glob("*.csv"))
     thrown = [one for path in paths if (one := at_the_impact(path)) is not None]
     learned = {path.stem for path in paths[:: call.every]}
@@ -133,8 +131,7 @@ def main(argv: Sequence[str]) -> int | None:
             show(name + suffix, simulator, given, best)
             if simulator is by_bullet:
                 show(f"published{suffix}", by_bullet, given, np.array(list(PUBLISHED.values())))
-    tables.finish("cube_peers", figures)
-    return None
+    return figures
 
 
 def at_the_impact(path: Path) -> Thrown | None:
@@ -276,13 +273,6 @@ def by_bullet(one: Thrown, cube: Cube, parameters: np.ndarray) -> tuple[np.ndarr
 _motion = jax.jit(motion)
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="cube_peers.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--every", type=command.whole_number(2), default=3, help="are learned from")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

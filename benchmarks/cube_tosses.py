@@ -1,6 +1,6 @@
 """A cube that is thrown onto a board: why it falls at 9.63 m/s^2, and what its impacts tell.
 
-    python benchmarks/cube_tosses.py ../shared/data/real/cube_tosses [--fit] [--every 3]
+    python -m benchmarks cube_tosses ../shared/data/real/cube_tosses [--fit] [--every 3]
 
 FOLDER has one csv of poses per toss. Without --fit only what the poses say by themselves: gravity
 of parabolas through the flights, with what else might bend them, and how high the centre is where
@@ -186,7 +186,3 @@ def _across(time: np.ndarray, poses: Poses, flight: Flight) -> np.ndarray:
 
 def _jerk(time: np.ndarray, poses: Poses, flight: Flight) -> np.ndarray:
     return np.outer(time**3 / 6, [0, 0, 1])
-
-
-if __name__ == "__main__":
-    main()

@@ -1,33 +1,28 @@
 """Right and confidently wrong of `discover`, over labs that hide an effect, or a law.
 
-    python benchmarks/discover.py --out DIR --budget 16 --first 100 --seeds 1
-    python benchmarks/discover.py --out DIR --effects hidden_heating,hidden_gust
+    python -m benchmarks discover --out DIR --budget 16 --first 100 --seeds 1
+    python -m benchmarks discover --out DIR --effects hidden_heating,hidden_gust
 
 Each effect (and none) is hidden `--seeds` times in new objects; a lab can vary height and angle.
 `hidden_NAME` is a law of `hidden_laws.py`, right as in `laws.py`. What is interrupted goes on.
 `--noise speed`: a velocity is known to 7.5 % of the range of the speed (as in NewtonBench);
 `--noise px`: 0.3 px at 900 px/m. What is finished stays in DIR and is not done again. Seeds below
-100 were looked at during development. The last line is JSON.
+100 were looked at during development.
 """
 
 import argparse
 import json
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import hidden_cases
-import labs
-import tables
-
 import galileo_jax as gx
+from benchmarks import hidden_cases, labs, tables
 from galileo_jax.commands import command
 from galileo_jax.runtime.atomic_write import write_json
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     effects = call.effects.split(",") if call.effects else [labs.NONE, *hidden_cases.ramp_effects()]
     tables.row("lab", ("verdict", "experiments", "right", "wrong", "CPU s"))
     rows = []
@@ -39,8 +34,7 @@ def main(argv: Sequence[str]) -> int | None:
     count = len(rows)
     right, wrong = (sum(row[key] for row in rows) for key in ("is_right", "is_wrong"))
     tables.row(f"all {count}", ("", "", f"{right}/{count}", f"{wrong}/{count}", ""))
-    tables.finish("discover", {"noise": call.noise, "budget": call.budget, "labs": rows})
-    return None
+    return {"noise": call.noise, "budget": call.budget, "labs": rows}
 
 
 def _lab(call: argparse.Namespace, effect: str, seed: int) -> dict[str, Any]:
@@ -69,17 +63,10 @@ def _lab(call: argparse.Namespace, effect: str, seed: int) -> dict[str, Any]:
     return row
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="benchmarks/discover.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR")
     parser.add_argument("--effects", default="", help="names (default: none and all)")
     parser.add_argument("--noise", choices=labs.NOISES, default="px")
     parser.add_argument("--budget", type=command.whole_number(1), default=16)
     parser.add_argument("--seeds", type=command.whole_number(1), default=1)
     parser.add_argument("--first", type=command.whole_number(0), default=100, help="seed")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

@@ -1,7 +1,7 @@
 """The exam of the diagnosis: clips in which an effect is hidden, and what it says of them.
 
-    python benchmarks/hidden_effects.py --out DIR              our own grid, tracks only
-    python benchmarks/hidden_effects.py FOLDER --out DIR       clips made elsewhere
+    python -m benchmarks hidden_effects --out DIR              our own grid, tracks only
+    python -m benchmarks hidden_effects FOLDER --out DIR       clips made elsewhere
 
 The grid is effects x strengths x seeds, clips without an effect, and clips with effects that
 the library does not have. Its truths come from an integrator of their own, with the small
@@ -21,13 +21,10 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import hidden_cases
-import journal
 import numpy as np
-import tables
-import verdicts
-from hidden_cases import Case
 
+from benchmarks import hidden_cases, journal, tables, verdicts
+from benchmarks.hidden_cases import Case
 from galileo_jax.commands import command
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
@@ -37,8 +34,7 @@ COLUMNS = ("right", "covered", "size", "before", "after", "seconds")
 BY_COLUMNS = ("cases", "right", "covered", "size", "wrong", "missed", "unknown")
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     library = hidden_cases.ramp_effects()
     cases = _cases(call, library)
     kept = journal.finished(call.out / "results.jsonl")
@@ -79,8 +75,7 @@ def main(argv: Sequence[str]) -> int | None:
     _print(report)
     if call.json:
         write_text(call.json, json.dumps(report, indent=1))
-    tables.finish("hidden_effects", report)
-    return None
+    return report
 
 
 def run_diagnosis(yamls: Sequence[Path], out: Path, seed: int) -> dict[str, Any]:
@@ -184,9 +179,7 @@ def _print_row(name: str, entry: dict[str, Any]) -> None:
     tables.row(name, [cases, *values, entry["unknown_recognised"]])
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="hidden_effects.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("folder", type=Path, nargs="?", help="clips with truths; absent = our own grid")
     add("--out", type=Path, required=True, help="clips, runs and results are kept there")
@@ -204,8 +197,3 @@ def _parser() -> command.Parser:
     theirs = parser.add_argument_group("clips in FOLDER")
     theirs.add_argument("--only", default="*", help="glob over clip names")
     theirs.add_argument("--tracks", type=Path, help="keep tracks there; reuse what is there")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

@@ -1,11 +1,11 @@
-"""Are laws found that nobody wrote down before? `python benchmarks/laws.py --out DIR`.
+"""Are laws found that nobody wrote down before? `python -m benchmarks laws --out DIR`.
 
 Tracks with one of 24 hidden laws (`hidden_laws.py`), with an effect of the library, and with
 nothing, go through the diagnosis, one clip or several. Right: the verdict is a law with the right
 variables, and an exponent within 0.25 where the truth is a power. PySINDy, where it is installed,
 gets the same missing accelerations with powers of t, q and v to choose from. With `--candidates`
 only these of the library (and the forms) stand against the laws, which takes less time. What is
-finished stays in DIR/results.jsonl. The last line is JSON.
+finished stays in DIR/results.jsonl.
 """
 
 import argparse
@@ -14,12 +14,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import journal
 import numpy as np
-import tables
-from hidden_cases import ANGLES_DEG
-from hidden_laws import LAWS
 
+from benchmarks import journal
+from benchmarks.hidden_cases import ANGLES_DEG
+from benchmarks.hidden_laws import LAWS
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
@@ -37,8 +36,7 @@ NOISE_M = 0.3 / 900.0
 EXPONENT = 0.25
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     call.out.mkdir(parents=True, exist_ok=True)
     log = call.out / "results.jsonl"
     done = journal.finished(log)
@@ -73,8 +71,7 @@ def main(argv: Sequence[str]) -> int | None:
         "seed": call.seed,
         "candidates": call.candidates or "library",
     }
-    tables.finish("laws", report)
-    return None
+    return report
 
 
 def _share(values: Any) -> float | None:
@@ -197,16 +194,9 @@ def _show(row: dict[str, Any]) -> None:
     )
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="laws.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--clips", type=command.whole_number(1), default=1, help="of each law")
     parser.add_argument("--seed", type=command.whole_number(0), default=0, help="of the first")
     parser.add_argument("--only", nargs="+", help="laws, library effects, none")
     parser.add_argument("--candidates", nargs="+", help="of the library (default: all)")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

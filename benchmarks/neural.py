@@ -1,41 +1,28 @@
-"""The neural estimators: `python benchmarks/neural.py [FOLDER --tracks DIR] [--network FILE]`.
+"""How good is the network on simulated samples?
 
-Three tables for the network that ships with the package (or FILE):
+    python -m benchmarks neural [--network FILE]
 
-    thesis   1,000 new samples of the thesis's setting, at several noise levels: mean absolute
-             errors, coverage of 90 % intervals, and KS p-values of the truths' ranks
-    clips    the same on 2,000 new samples of all scenes
-    FOLDER   clips with a truth and no hidden effect, through `fit --method cnn` after tracking
-
-The last line is JSON.
+Two tables for the network that ships with the package (or FILE): 1,000 new samples of the thesis's
+setting, at several noise levels; 2,000 new samples of all scenes. Mean absolute errors, coverage of
+90 % intervals, and KS p-values of the truths' ranks. On clips: `accuracy FOLDER --method cnn`.
 """
 
 import argparse
-import json
-import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import jax
 import numpy as np
-import scoring
-import tables
 from scipy import stats
 
-from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
-from galileo_jax.commands import command
-from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.result import make_result
-from galileo_jax.measurement.measure import measure
+from benchmarks import tables
 from galileo_jax.neural.config import load_config
 from galileo_jax.neural.dataset import make_samples
-from galileo_jax.neural.estimate import TRAINED, cnn_posterior, trained_network
+from galileo_jax.neural.estimate import TRAINED, trained_network
 from galileo_jax.neural.galileo_task import GalileoTask, estimate
 from galileo_jax.neural.posterior_network import PosteriorNetwork
 from galileo_jax.neural.task import Arrays
-from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime.precision import in_float64
 from galileo_jax.thesis.clips import thesis_clips
 
 NUM_THESIS, NUM_CLIPS, NUM_DRAWS = 1000, 2000, 1000
@@ -44,10 +31,8 @@ LEAST_NOISE_M = 1e-5  # what the network is told where there is none
 SHARD = 2**30 + 1
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    jax.config.update("jax_enable_x64", True)
-    compilation_cache.enable()
+@in_float64
+def main(call: argparse.Namespace) -> dict[str, Any]:
     network = trained_network(call.network)
     columns = ("quantity", "count", "MAE", "median", "closed form", "in 90%", "KS p")
     tables.row("setting", columns)
@@ -61,11 +46,7 @@ def main(argv: Sequence[str]) -> int | None:
     for label, ideal in (("clips", 0), ("ideal", 1)):
         some = {name: values[clips["is_ideal"] == ideal] for name, values in clips.items()}
         found[label] = _score(label, network, some)
-    if call.folder:
-        print()
-        found["real"] = _real(call, network)
-    tables.finish("neural", found)
-    return None
+    return found
 
 
 def _score(label: str, network: PosteriorNetwork, clips: Arrays) -> dict[str, Any]:
@@ -106,60 +87,6 @@ def _phi(ratio: np.ndarray) -> np.ndarray:
     return (ratio - 1) / (ratio + 1)
 
 
-def _real(call: argparse.Namespace, network: PosteriorNetwork) -> dict[str, Any]:
-    columns = ("k1 err", "in 95%", "k2 err", "in 95%", "ratio err", "in 95%", "usual", "seconds")
-    tables.row("clip", columns)
-    scores, seconds = [], []
-    for path in sorted(call.folder.glob("*.truth.json")):
-        truth = json.loads(path.read_text())
-        if truth["effect"] != call.set and call.set != "all":
-            continue
-        name = path.name.removesuffix(".truth.json")
-        clip = load_clip(path.with_name(f"{name}.yaml"))
-        kept = call.tracks / f"{name}.csv" if call.tracks else None
-        if kept and kept.is_file():
-            observation = read_observation_csv(kept)
-        else:
-            observation = measure(clip).observation
-            if kept:
-                write_observation_csv(kept, observation)
-        trials = make_joint_problem([clip], [observation])
-        cnn_posterior(trials, call.seed, network)
-        began = time.perf_counter()
-        posterior, z, notes = cnn_posterior(trials, call.seed, network)
-        seconds.append(time.perf_counter() - began)
-        result = make_result(
-            trials, posterior, z, clips=[name], method="cnn", seed=0, timings_s={}, notes=notes
-        )
-        moves = truth["events_s"]["foot"] is not None
-        entry = scoring.score(
-            scoring.of_result(result), truth, truth["events_s"]["hit"] is not None, moves
-        )
-        scores.append(entry)
-        cells: list[Any] = []
-        for one in entry.values():
-            if one.is_scored:
-                cells += [one.error, one.is_covered]
-            else:
-                said = "MISSED" if one.is_expected else "not told"
-                cells += ["CLAIMED" if one.is_identified and not one.is_expected else said, None]
-        tables.row(name, [*cells, posterior.is_converged, seconds[-1]])
-    table: dict[str, Any] = scoring.summary(scores)
-    for name, entry in table.items():
-        tables.row(name, [f"{key} {value:.4g}" for key, value in entry.items()])
-    return table | {"seconds_median": float(np.median(seconds)), "seconds_worst": max(seconds)}
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="neural.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("folder", type=Path, nargs="?")
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--network", type=Path, default=TRAINED)
-    parser.add_argument("--set", default="none", help="an effect in the truth, or all")
-    parser.add_argument("--tracks", type=Path, help="keep tracks there; reuse what is there")
     parser.add_argument("--seed", type=int, default=0)
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

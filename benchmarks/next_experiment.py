@@ -1,13 +1,13 @@
 """Clips until `named`: settings that `next` chooses against settings at random.
 
-    python benchmarks/next_experiment.py --out DIR --most 6 --first 100
+    python -m benchmarks next_experiment --out DIR --most 6 --first 100
 
 For every pair of docs/reference/effects.md that is easily confused, the first effect is hidden in a
 lab. Both ways begin with the same clip (the middle of what the lab allows); then one asks
 `next_experiment`, the other draws a setting, and all clips are diagnosed together until the effect
 is named, or `--most` clips are made. A lab whose first clip names the effect already says nothing
 here and is left out. What is finished stays in DIR, every clip and verdict for itself, so that what
-is interrupted goes on. The last line is JSON.
+is interrupted goes on.
 
 With `--pairs` only no effect and the two of a pair are hypotheses, for each of the pairs: a step
 then takes seconds. Named is what is ahead of the other two by the margin of a verdict.
@@ -20,11 +20,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import labs
 import numpy as np
-import tables
 
 import galileo_jax as gx
+from benchmarks import labs, tables
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
@@ -68,8 +67,7 @@ WAYS = ("next", "random")
 MOST_SETTINGS = 16  # that are rehearsed for a pair
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     hidden = call.effects.split(",") if call.effects else [first for first, _ in PAIRS]
     races: list[tuple[str, str]] = [(effect, "") for effect in dict.fromkeys(hidden)]
     if call.pairs:
@@ -85,8 +83,7 @@ def main(argv: Sequence[str]) -> int | None:
     told = [row for row in rows if row["next"] > 1]
     medians = {way: float(np.median([row[way] for row in told] or [0])) for way in WAYS}
     tables.row(f"median of {len(told)}", [medians[way] for way in WAYS])
-    tables.finish("next_experiment", {"most": call.most, "medians": medians, "labs": rows})
-    return None
+    return {"most": call.most, "medians": medians, "labs": rows}
 
 
 def _race(call: argparse.Namespace, effect: str, rival: str, seed: int) -> dict[str, Any]:
@@ -186,9 +183,7 @@ def _drawn(can: Can, seed: int, number: int) -> dict[str, Any]:
     }
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="benchmarks/next_experiment.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="DIR")
     parser.add_argument("--effects", default="", help="hidden ones (default: of all pairs)")
     parser.add_argument("--pairs", action="store_true", help="each pair by itself")
@@ -196,8 +191,3 @@ def _parser() -> command.Parser:
     parser.add_argument("--most", type=command.whole_number(2), default=6, help="clips")
     parser.add_argument("--seeds", type=command.whole_number(1), default=1)
     parser.add_argument("--first", type=command.whole_number(0), default=100, help="seed")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

@@ -1,7 +1,7 @@
 """Files as people have them: is each read right, or refused for the right reason?
 
-    python benchmarks/people.py run [--only WORD] [--journal FILE]    # goes on where it was
-    python benchmarks/people.py table [--journal FILE]                # the markdown of the docs
+    python -m benchmarks people run [--only WORD] [--journal FILE]    # goes on where it was
+    python -m benchmarks people table [--journal FILE]                # the markdown of the docs
 
 What is right for each file stands in people.yaml. Every case is a command of its own, as a user
 would type it. The journal is of one version: delete it to measure another.
@@ -22,7 +22,8 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from journal import add, finished
+
+from benchmarks.journal import add, finished
 
 FOLDER = Path(__file__).parents[1] / ".." / "shared" / "data" / "people"
 JOURNAL = Path("/tmp/people.jsonl")
@@ -188,7 +189,3 @@ def _line(row: Mapping[str, Any]) -> str:
     """What was said, where no number is asked for."""
     said = [line for line in row["said"] if "galileo: error" in line or "warning:" in line]
     return (said[-1] if row["code"] and said else "-").replace("|", "/")[:160]
-
-
-if __name__ == "__main__":
-    main()

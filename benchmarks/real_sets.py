@@ -1,6 +1,6 @@
 """All rows of docs/explanation/real_data.md, from the real measurements in one folder.
 
-    python benchmarks/real_sets.py FOLDER [--set NAME ...] [--first 0] [--flights 60] [--out OUT]
+    python -m benchmarks real_sets FOLDER [--set NAME ...] [--first 0] [--flights 60] [--out OUT]
 
 FOLDER: falling_balls.csv, ball_toss.yaml, slide_r1.yaml, slide_r2.yaml, projectile_45.mp4,
 spin_flights/, puck_head_on.mp4, cube_tosses/. A set that is absent, or that the program has no
@@ -372,7 +372,3 @@ def _verdict(found: gx.Diagnosis) -> str:
         f"{verdict['status']} {', '.join(verdict['effects'])}; chi2 per degree of freedom "
         f"{history[0]['chi2_per_dof']:.2f} -> {history[-1]['chi2_per_dof']:.2f}"
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,6 @@
 """Are the probabilities of a diagnosis right? Hidden effects, half of them outside the library.
 
-    python benchmarks/reliability.py --out DIR --num 300
+    python -m benchmarks reliability --out DIR --num 300
 
 Draws tracks (ramp angle, objects, strength, noise and frame rate at random, the truth from an
 integrator of its own with the small faults of real clips): of four, two hide an effect that the
@@ -11,7 +11,7 @@ for each hypothesis; the reliability curve compares the probabilities with how o
 was the truth. All figures are given twice: with every effect counted that leaves any trace, and
 with only those that must be said (by more than 3 nats, the factor of 20 that a name needs), where a
 weaker one may be said or not. What is finished stays in DIR/results.jsonl and is not done again.
-The last line is JSON.
+
 """
 
 import argparse
@@ -24,13 +24,9 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import hidden_cases
-import hidden_effects
-import journal
 import numpy as np
-import tables
-import verdicts
 
+from benchmarks import hidden_cases, hidden_effects, journal, tables, verdicts
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
 from galileo_jax.comparison.compare import ADEQUATE_P
@@ -54,8 +50,7 @@ TRIES = 8  # not every effect has a place in every scene
 NUM_DRAWN = 1000  # of the claims, for the error that right ones have
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     library = effect_names()
     call.out.mkdir(parents=True, exist_ok=True)
     done = journal.finished(call.out / "results.jsonl")
@@ -85,8 +80,7 @@ def main(argv: Sequence[str]) -> int | None:
     _print(figures["if_it_shows"])
     figures["tracebacks"] = [entry["error"] for entry in entries if not entry["diagnosis"]]
     print(*figures["tracebacks"], sep="\n")
-    tables.finish("reliability", figures)
-    return None
+    return figures
 
 
 def draw(folder: Path, name: str, kind: str, library: Sequence[str], attempt: int) -> dict:
@@ -382,14 +376,7 @@ def _print(figures: Mapping[str, Any]) -> None:
     print(figures["statuses"])
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="reliability.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="tracks, runs and results")
     parser.add_argument("--num", type=command.whole_number(1), default=300, help="tracks")
     parser.add_argument("--first", type=command.whole_number(0), default=0, help="number of case")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

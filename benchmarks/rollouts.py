@@ -1,10 +1,10 @@
-"""How fast the engines are: `python benchmarks/rollouts.py`.
+"""How fast the engines are: `python -m benchmarks rollouts`.
 
 Environment steps per second (one step of one scene; 1/960 s for MuJoCo's, 1/240 s for the rigid
 engine and PyBullet), seconds of experiment simulated per second, and what the first batch costs
 in a new process where the engine is compiled: without, and with, JAX's persistent cache. No
 object comes to rest within the rollouts, so that no engine stops early. PyBullet builds its
-world anew for every rollout, as the thesis did, on one core. The last line is JSON.
+world anew for every rollout, as the thesis did, on one core.
 """
 
 import argparse
@@ -13,14 +13,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import jax
 import numpy as np
-import tables
 
-from galileo_jax.commands import command
+from benchmarks import tables
 from galileo_jax.model.model import SUBSTEPS, Model
 from galileo_jax.model.parameters import absent
 from galileo_jax.model.scene.scene import compile_scene
@@ -34,8 +33,7 @@ SIZES = (1, 8, 64, 256)
 GIVEN = {"m1": 0.5, "k1": 0.05, "m2": 0.3, "k2": 0.08}
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     jax.config.update("jax_enable_x64", True)
     if call.time_compile:
         return _print_first_seconds(call.time_compile)
@@ -55,8 +53,7 @@ def main(argv: Sequence[str]) -> int | None:
     if not call.no_compile:
         for name in ("rigid", "mjx"):
             figures[f"{name}_first_batch_s"] = _first_seconds(name)
-    tables.finish("rollouts", figures)
-    return None
+    return figures
 
 
 def rigid_batch(size: int) -> Callable[[], object]:
@@ -150,15 +147,8 @@ def _print_first_seconds(name: str) -> None:
     print(time.perf_counter() - began)
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="rollouts.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--mjx-batch", type=int, nargs="*", default=list(SIZES))
     parser.add_argument("--no-compile", action="store_true", help="leave out compile times")
     parser.add_argument("--time-compile", metavar="ENGINE", help="print one first batch only")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

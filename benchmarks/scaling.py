@@ -1,4 +1,4 @@
-"""What a sweep costs: `python benchmarks/scaling.py [--only clips,workers,rollouts,memory,video]`.
+"""What a sweep costs: `python -m benchmarks scaling [--only clips,workers,rollouts,memory,video]`.
 
     clips     seconds per clip of `grad` against the number of clips, in one process, and what the
               clips after the first of their shape cost (the marginal cost); how often each program
@@ -10,14 +10,13 @@
 
 Clips are csv tracks by `galileo simulate`. A shape is what programs are compiled for: numbers of
 objects, frames (in steps of 64) and recorded instants (in steps of 128). Seconds are wall clock:
-run it on a quiet machine. The last line is JSON.
+run it on a quiet machine.
 """
 
 import argparse
 import contextlib
 import json
 import logging
-import os
 import re
 import subprocess
 import sys
@@ -29,8 +28,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tables
 
+from benchmarks import tables
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
@@ -46,8 +45,7 @@ LOGGING = ("dispatch", "compiler", "interpreters.pxla")  # JAX's modules that te
 PARTS = ("clips", "workers", "rollouts", "memory", "video")
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     parts = call.only.split(",")
     if unknown := set(parts) - set(PARTS):
         raise InputError(f"--only: unknown {sorted(unknown)}; known: {', '.join(PARTS)}")
@@ -65,8 +63,7 @@ def main(argv: Sequence[str]) -> int | None:
             figures["memory"] = memory_of_cells(folder, call.method, call.cells)
         if "video" in parts:
             figures["video_s"] = cost_of_tracking(folder)
-    tables.finish("scaling", figures)
-    return None
+    return figures
 
 
 def make_tracks(folder: Path, count: int) -> list[Path]:
@@ -196,9 +193,9 @@ def speed_of_rollouts(largest: int) -> dict[str, float]:
 
     jax.config.update("jax_enable_x64", True)
     import jax.numpy as jnp
-    import synthetic_tracks
+    import tracks
 
-    problem = synthetic_tracks.make_case(0, "engine", 1e-4).problem
+    problem = tracks.make_case(0, "engine", 1e-4).problem
     engine, prior = problem.engine, problem.parameters
     from galileo_jax.model.parameters import forward
 
@@ -293,10 +290,7 @@ def cost_of_tracking(folder: Path) -> float:
     return seconds
 
 
-def _parser() -> command.Parser:
-    parser = command.Parser(
-        prog="scaling.py", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
+def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--only", default=",".join(PARTS))
     parser.add_argument("--clips", type=command.whole_number(2), default=CLIPS[-1])
     parser.add_argument("--largest-batch", type=command.whole_number(1), default=BATCHES[-1])
@@ -305,9 +299,3 @@ def _parser() -> command.Parser:
         "--cells", type=command.whole_number(1), nargs="+", default=CELLS, help="of the memory"
     )
     parser.add_argument("--folder", help="for clips and sweeps, kept there")
-    return parser
-
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    raise SystemExit(command.run(main))

@@ -4,7 +4,7 @@ import json
 import math
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -58,3 +58,17 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(f"{value:.4g}") if math.isfinite(value) else None
     return int(value) if isinstance(value, np.integer) else value
+
+
+def summary(figures: Mapping[str, Any]) -> None:
+    """Prints every figure that is a single number, a row each."""
+    for name, value in figures.items():
+        if isinstance(value, int | float):
+            row(name, [value])
+
+
+def missed(bars: Iterable[str]) -> list[str]:
+    """Prints the bars that were missed, and returns them."""
+    found = list(bars)
+    print("bars missed: " + ("; ".join(found) or "none"))
+    return found

@@ -1,4 +1,4 @@
-"""Where the CPU seconds of `fit` and `diagnose` go: `python benchmarks/where_time_goes.py`.
+"""Where the CPU seconds of `fit` and `diagnose` go: `python -m benchmarks where_time_goes`.
 
 Every call runs in a process of its own, with compiled programs in the cache: of `--repeats` runs
 the one with the fewest seconds counts. Five csv tracks that `simulate` makes (nothing hidden,
@@ -25,7 +25,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import tables
+from benchmarks import tables
 
 SCRIPT = Path(__file__)
 EXOTIC_FILE = SCRIPT.with_name("exotic_effects.py")
@@ -86,8 +86,7 @@ class StageClock:
             self.begin(stage)
 
 
-def main(argv: Sequence[str] | None = None) -> None:
-    call = _parser().parse_args(argv)
+def main(call: argparse.Namespace) -> dict[str, Any]:
     if call.one:
         return _print_one(*call.one)
     help_call = [sys.executable, "-m", "galileo_jax", "fit", "--help"]
@@ -109,8 +108,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     figures["fixed_after"] = fixed_calculation()
     for name in ("python", "fit_help", "fixed_before", "fixed_after"):
         tables.row(name, [figures[name]])
-    tables.finish("where_time_goes", figures)
-    return None
+    return figures
 
 
 def fixed_calculation() -> float:
@@ -209,7 +207,3 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--repeats", type=int, default=2)
     parser.add_argument("--one", nargs=2, metavar=("VERB", "CLIP"), help=argparse.SUPPRESS)
     return parser
-
-
-if __name__ == "__main__":
-    main()
