@@ -1,4 +1,6 @@
-"""What an accelerator is worth: `python -m benchmarks accelerator`.
+"""What is an accelerator worth?
+
+    python benchmarks/accelerator.py
 
 Runs on whatever `jax.devices()` has. By size of the batch, rollouts of a ramp clip of 1.2 s per
 minute: the rigid engine and MJX on the device, and MuJoCo's C engine (`mujoco.batch`) on all cores
@@ -9,6 +11,7 @@ per minute, programs compiled; and fits per second of as many tracks at once, th
 
 import argparse
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -17,8 +20,11 @@ from typing import Any
 
 import jax
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # it is called as a script, too
 import galileo_jax as gx
 from benchmarks import rollouts, tables
+from galileo_jax.commands import command
+from galileo_jax.runtime.precision import in_float64
 from galileo_jax.sweeping.engine_together import EngineTogether
 from galileo_jax.sweeping.task import Task
 
@@ -28,8 +34,8 @@ MOST_ON_CORES = 1024
 """Larger batches of the C engine only take longer: they are no faster per rollout."""
 
 
+@in_float64
 def main(call: argparse.Namespace) -> dict[str, Any]:
-    # X64
     device = jax.devices()[0]
     figures: dict[str, Any] = {"device": f"{device.platform} {device.device_kind}"}
     figures["cores"] = os.cpu_count()
@@ -98,3 +104,9 @@ def options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--diagnoses", type=int, default=5, help="tracks that are diagnosed")
     parser.add_argument("--together", nargs="*", type=int, default=[8, 64], metavar="N")
     parser.add_argument("--seed", type=int, default=7100, help="of the first track")
+
+
+if __name__ == "__main__":
+    from benchmarks.__main__ import main as run
+
+    raise SystemExit(command.run(run, ["accelerator", *sys.argv[1:]]))

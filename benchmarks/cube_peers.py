@@ -1,4 +1,4 @@
-"""Thrown cubes predicted by three simulators, each with the parameters that suit it best.
+"""How well do three simulators predict thrown cubes, each with parameters that suit it best?
 
     python -m benchmarks cube_peers ../shared/data/real/cube_tosses
 
@@ -6,7 +6,6 @@ Every third toss is for learning: this program's joint fit (`galileo.fit_tosses`
 (friction, the time constant and the damping of its contacts) and PyBullet (friction, restitution;
 optional: `pip install -e '.[bullet]'`) the parameters that predict these tosses best: of scattered
 ones the best, and Nelder-Mead from there. Then each predicts the tosses that none has learned from,
-from benchmarks import cube_tosses, tables
 from the same start: place, turning, velocity and spin at the last frame before the first impact, as
 the flight tells them. All have the edge, the inertia, the centre of mass, the floor and the gravity
 of this program's fit; its cube alone has rounded corners. "Even mass": the same without its centre
@@ -29,6 +28,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from benchmarks import tables
+from benchmarks.real_sets import joint_fit
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.commands import command
 from galileo_jax.inference.toss.residuals import CENTRE, COMMON, Start, forward, motion
@@ -36,7 +37,7 @@ from galileo_jax.measurement.toss_flight import flight_of
 from galileo_jax.runtime.precision import in_float64
 
 STEP_S = 5e-4
-MASS_KG = 0.37
+EDGE_M, MASS_KG = 0.1048, 0.37  # as published
 SAME_ERROR_RAD = 0.5  # a turning that counts as much as a whole edge
 NUM_SCATTERED, SCATTERED_LOG, MOST_EVALUATIONS = 100, 1.5, 100
 LONGEST = 256  # frames: all tosses share one program
@@ -93,7 +94,7 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
     paths = sorted(call.folder.glob("*.csv"))
     thrown = [one for path in paths if (one := at_the_impact(path)) is not None]
     learned = {path.stem for path in paths[:: call.every]}
-    common = cube_tosses.joint_fit(paths[:: call.every]).solution.solution.common
+    common = joint_fit(paths[:: call.every]).solution.solution.common
     value = dict(zip(COMMON, np.asarray(forward(jnp.asarray(common))).tolist(), strict=True))
     cube = Cube(
         edge=value["edge"],
@@ -136,8 +137,8 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
 
 def at_the_impact(path: Path) -> Thrown | None:
     """A toss from its last free frame on; None where it does not fly for long enough."""
-    poses = read_poses_csv(path, "z", cube_tosses.EDGE_M)
-    flight = flight_of(poses, np.full(3, cube_tosses.EDGE_M))
+    poses = read_poses_csv(path, "z", EDGE_M)
+    flight = flight_of(poses, np.full(3, EDGE_M))
     if flight is None or flight.last >= len(poses.times_s) - 2:
         return None
     flown_s = poses.times_s[flight.last] - poses.times_s[0]

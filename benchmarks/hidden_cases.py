@@ -2,9 +2,11 @@
 
 import itertools
 import json
+import multiprocessing
 import tempfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -105,9 +107,26 @@ def grid(
         yield Case(name, yamls, effect, strength, recipe)
 
 
-def make_clips(recipe: Mapping[str, Any]) -> None:
-    """Runs `simulate`, in a process of its own: exotic effects stay out of the diagnosis's."""
-    simulate(**recipe)
+def make_clips(case: Case) -> None:
+    """Simulates the clips of a case that are not there."""
+    if case.recipe is not None and not all(path.is_file() for path in case.yamls):
+        simulate(**case.recipe)
+
+
+def made_meanwhile(
+    make: Callable[..., Any], arguments: Mapping[str, tuple[Any, ...] | None]
+) -> Iterator[tuple[str, Any]]:
+    """Names, and what `make` made of their arguments (None: nothing); the next are made meanwhile.
+
+    In a process of its own, so that exotic effects stay unknown to the diagnosis in this one.
+    """
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        made = {name: pool.submit(make, *given) for name, given in arguments.items() if given}
+        try:
+            for name in arguments:
+                yield name, made[name].result() if name in made else None
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def folder_cases(folder: Path, series: int | None, only: str) -> list[Case]:

@@ -1,4 +1,6 @@
-"""How fast the engines are: `python -m benchmarks rollouts`.
+"""How fast are the engines?
+
+    python -m benchmarks rollouts [--mjx-batch 1 8 64]
 
 Environment steps per second (one step of one scene; 1/960 s for MuJoCo's, 1/240 s for the rigid
 engine and PyBullet), seconds of experiment simulated per second, and what the first batch costs
@@ -15,6 +17,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
@@ -24,8 +27,8 @@ from galileo_jax.model.model import SUBSTEPS, Model
 from galileo_jax.model.parameters import absent
 from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.rollout import Engine
 from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime.precision import in_float64
 from galileo_jax.simulation.truth import Truth, draw_truth
 
 DURATION_S = 1.2
@@ -33,37 +36,38 @@ SIZES = (1, 8, 64, 256)
 GIVEN = {"m1": 0.5, "k1": 0.05, "m2": 0.3, "k2": 0.08}
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
-    jax.config.update("jax_enable_x64", True)
+@in_float64
+def main(call: argparse.Namespace) -> dict[str, Any] | None:
     if call.time_compile:
-        return _print_first_seconds(call.time_compile)
-    compilation_cache.enable()
-    truth = _truth()
-    model = _model(truth)
+        run = batch_of(call.time_compile, 8)
+        began = time.perf_counter()
+        run()
+        print(time.perf_counter() - began)
+        return None
     tables.row("engine, batch", ("steps/s", "sim s/s", "ms/rollout"))
-    figures: dict[str, object] = {"backend": jax.default_backend(), "repeats": call.repeats}
-    sizes_of = {"rigid": SIZES, "c": SIZES, "mjx": call.mjx_batch}
-    for name, sizes in sizes_of.items():
-        engine = make_engine(name, model)
+    figures: dict[str, Any] = {"backend": jax.default_backend(), "repeats": call.repeats}
+    model = _model(_truth())
+    for name, sizes in {"rigid": SIZES, "c": SIZES, "mjx": call.mjx_batch}.items():
         steps = model.num_records * (1 if name == "rigid" else SUBSTEPS)
         for size in sizes:
-            taken = seconds(_simulation(engine, size), call.repeats)
+            taken = seconds(batch_of(name, size), call.repeats)
             figures[f"{name}_{size}"] = _report(f"{name} {size}", size, steps, taken)
-    figures["pybullet_1"] = _pybullet(truth, call.repeats)
+    figures["pybullet_1"] = _pybullet(_truth(), call.repeats)
     if not call.no_compile:
         for name in ("rigid", "mjx"):
             figures[f"{name}_first_batch_s"] = _first_seconds(name)
     return figures
 
 
-def rigid_batch(size: int) -> Callable[[], object]:
-    """A batch of rollouts with the rigid engine."""
-    return batch_of("rigid", size)
-
-
 def batch_of(name: str, size: int) -> Callable[[], object]:
-    """A batch of rollouts with an engine."""
-    return _simulation(make_engine(name, _model(_truth())), size)
+    """A batch of rollouts with an engine, which differ by a per cent in every parameter."""
+    engine = make_engine(name, _model(_truth()))
+    theta = absent(engine.model.parameters)
+    for parameter, value in GIVEN.items():
+        theta[engine.model.index(parameter)] = value
+    rng = np.random.default_rng(1)
+    batch = theta * (1 + 0.01 * rng.uniform(-1, 1, (size, len(theta))))
+    return lambda: engine.simulate(batch)
 
 
 def _truth() -> Truth:
@@ -73,16 +77,6 @@ def _truth() -> Truth:
 def _model(truth: Truth) -> Model:
     scene = compile_scene(truth.surroundings, ["box", "box"], truth.objects)
     return Model(scene, DURATION_S)
-
-
-def _simulation(engine: Engine, size: int) -> Callable[[], object]:
-    """A batch of rollouts that differ by a per cent in every parameter."""
-    theta = absent(engine.model.parameters)
-    for name, value in GIVEN.items():
-        theta[engine.model.index(name)] = value
-    rng = np.random.default_rng(1)
-    batch = theta * (1 + 0.01 * rng.uniform(-1, 1, (size, len(theta))))
-    return lambda: engine.simulate(batch)
 
 
 def seconds(run: Callable[[], object], repeats: int) -> float:
@@ -108,8 +102,9 @@ def _report(label: str, size: int, steps: int, seconds: float) -> dict[str, floa
 
 def _pybullet(truth: Truth, repeats: int) -> dict[str, float] | None:
     try:
-        import bullet_scene
         import pybullet  # pyright: ignore
+
+        from benchmarks import bullet_scene
     except ImportError:
         tables.row("pybullet", ("not installed",))
         return None
@@ -128,7 +123,8 @@ def _first_seconds(name: str) -> dict[str, float]:
         environment.pop("JAX_COMPILATION_CACHE_DIR", None)
         for what in ("cold", "cached"):
             done = subprocess.run(
-                [sys.executable, str(Path(__file__).resolve()), "--time-compile", name],
+                [sys.executable, "-m", "benchmarks", "rollouts", "--time-compile", name],
+                cwd=Path(__file__).resolve().parents[1],
                 env=environment,
                 capture_output=True,
                 text=True,
@@ -137,14 +133,6 @@ def _first_seconds(name: str) -> dict[str, float]:
             found[what] = float(done.stdout.split()[-1])
             tables.row(f"{name} first batch {what}", (f"{found[what]:.1f} s",))
     return found
-
-
-def _print_first_seconds(name: str) -> None:
-    compilation_cache.enable()
-    simulate = _simulation(make_engine(name, _model(_truth())), 8)
-    began = time.perf_counter()
-    simulate()
-    print(time.perf_counter() - began)
 
 
 def options(parser: argparse.ArgumentParser) -> None:

@@ -1,22 +1,23 @@
-"""What a sweep costs: `python -m benchmarks scaling [--only clips,workers,rollouts,memory,video]`.
+"""What does a sweep cost?
+
+    python -m benchmarks scaling [--only clips workers memory]
 
     clips     seconds per clip of `grad` against the number of clips, in one process, and what the
               clips after the first of their shape cost (the marginal cost); how often each program
               was compiled, which is once for each shape
     workers   seconds per clip of a sweep against its workers
-    rollouts  rollouts per second against the rollouts in a batch, on whatever device JAX takes
     memory    peak memory of a sweep of 100 cells and of 1,000, of the parent and of the worker
-    video     seconds per clip of tracking, a second of 960 x 540 at 30 fps
 
 Clips are csv tracks by `galileo simulate`. A shape is what programs are compiled for: numbers of
 objects, frames (in steps of 64) and recorded instants (in steps of 128). Seconds are wall clock:
-run it on a quiet machine.
+run it on a quiet machine. Rollouts per second are in `accelerator`.
 """
 
 import argparse
 import contextlib
 import json
 import logging
+import os
 import re
 import subprocess
 import sys
@@ -34,35 +35,28 @@ from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.commands import command
 from galileo_jax.measurement.measure import measure
-from galileo_jax.runtime.errors import InputError
 
 CLIPS = (1, 2, 4, 8, 16, 32, 64)
 CELLS = (100, 1000)
-BATCHES = (1, 4, 16, 64, 256, 1024, 4096)
 BARS = {"marginal_s": 3.0, "memory_ratio": 1.2}
 HEAVY = ("_roll_out_batch", "seen_slopes_batch", "solve", "white_batch", "_seen_batch")
 LOGGING = ("dispatch", "compiler", "interpreters.pxla")  # JAX's modules that tell of compilations
-PARTS = ("clips", "workers", "rollouts", "memory", "video")
+PARTS = ("clips", "workers", "memory")
 
 
 def main(call: argparse.Namespace) -> dict[str, Any]:
-    parts = call.only.split(",")
-    if unknown := set(parts) - set(PARTS):
-        raise InputError(f"--only: unknown {sorted(unknown)}; known: {', '.join(PARTS)}")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of the sweeps' processes
     figures: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(call.folder or temporary)
-        paths = make_tracks(folder, call.clips) if {"clips", "workers"} & set(parts) else []
-        if "clips" in parts:
-            figures["clips"] = cost_of_clips(paths)
-        if "workers" in parts:
-            figures["workers"] = cost_with_workers(folder, paths[: call.clips // 2])
-        if "rollouts" in parts:
-            figures["rollouts_per_s"] = speed_of_rollouts(call.largest_batch)
-        if "memory" in parts:
+        if {"clips", "workers"} & set(call.only):
+            paths = make_tracks(folder, call.clips)
+            if "clips" in call.only:
+                figures["clips"] = cost_of_clips(paths)
+            if "workers" in call.only:
+                figures["workers"] = cost_with_workers(folder, paths[: call.clips // 2])
+        if "memory" in call.only:
             figures["memory"] = memory_of_cells(folder, call.method, call.cells)
-        if "video" in parts:
-            figures["video_s"] = cost_of_tracking(folder)
     return figures
 
 
@@ -76,23 +70,8 @@ def make_tracks(folder: Path, count: int) -> list[Path]:
 
 def make_short_track(folder: Path) -> Path:
     """A block on a slope for 0.4 s at 30 fps: the cheapest of cells."""
-    rng = np.random.default_rng(0)
-    times = np.arange(13) / 30
-    angle, friction, noise_m = np.radians(22.0), 0.3, 2e-4
-    along = 0.5 * 9.81 * (np.sin(angle) - friction * np.cos(angle)) * times**2 - 0.5
-    x, y = along * np.cos(angle), -along * np.sin(angle)
-    x, y = (values + noise_m * rng.standard_normal(len(times)) for values in (x, y))
-    rows = [
-        f"{t!r},{a!r},{b!r},{noise_m}"
-        for t, a, b in zip(times.tolist(), x.tolist(), y.tolist(), strict=True)
-    ]
-    (folder / "short.csv").write_text(
-        "\n".join(["time_s,object1_x_m,object1_y_m,object1_sd_m", *rows]) + "\n"
-    )
-    clip = {"track": "short.csv", "scenario": "incline", "fps": 30.0, "ramp_angle_deg": 22.0}
-    clip |= {"objects": [{"name": "object1", "shape": "box", "size_m": [0.06, 0.06, 0.06]}]}
-    path = folder / "short.yaml"
-    path.write_text(json.dumps(clip))  # YAML, too
+    path = folder / "short.csv"
+    simulate(path, track_only=True, scenario="incline", seconds=0.4, fps=30.0, seed=0)
     return path
 
 
@@ -188,33 +167,6 @@ def cost_with_workers(folder: Path, paths: Sequence[Path]) -> dict[str, float]:
     return found
 
 
-def speed_of_rollouts(largest: int) -> dict[str, float]:
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    import jax.numpy as jnp
-    import tracks
-
-    problem = tracks.make_case(0, "engine", 1e-4).problem
-    engine, prior = problem.engine, problem.parameters
-    from galileo_jax.model.parameters import forward
-
-    found: dict[str, float] = {}
-    tables.row(f"batch on {jax.default_backend()}", ("rollouts/s",))
-    for size in (batch for batch in BATCHES if batch <= largest):
-        z = np.random.default_rng(0).standard_normal((size, len(prior)))
-        theta = forward(prior, jnp.asarray(z))
-        roll = jax.jit(engine.traceable)  # pyright: ignore
-        jax.block_until_ready(roll(theta))
-        began, repeats = time.perf_counter(), 0
-        while time.perf_counter() - began < 1.0:
-            jax.block_until_ready(roll(theta))
-            repeats += 1
-        found[str(size)] = size * repeats / (time.perf_counter() - began)
-        tables.row(str(size), (found[str(size)],))
-    return found
-
-
 def memory_of_cells(folder: Path, method: str, cells: Sequence[int]) -> dict[str, Any]:
     """Peak resident memory of a sweep's processes, MB: one short track from many seeds."""
     path = make_short_track(folder)
@@ -278,22 +230,9 @@ def run_sweep(out: Path, config: dict[str, Any], workers: int) -> list[float]:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def cost_of_tracking(folder: Path) -> float:
-    path = folder / "film.mp4"
-    if not path.is_file():
-        simulate(path, seed=1, seconds=1.0)
-    clip = load_clip(path)
-    began = time.perf_counter()
-    measure(clip)
-    seconds = time.perf_counter() - began
-    tables.row("tracking one video", (seconds, clip.frame_count))
-    return seconds
-
-
 def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--only", default=",".join(PARTS))
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
     parser.add_argument("--clips", type=command.whole_number(2), default=CLIPS[-1])
-    parser.add_argument("--largest-batch", type=command.whole_number(1), default=BATCHES[-1])
     parser.add_argument("--method", default="grad", help="of the cells whose memory is measured")
     parser.add_argument(
         "--cells", type=command.whole_number(1), nargs="+", default=CELLS, help="of the memory"

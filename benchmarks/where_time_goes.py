@@ -1,4 +1,6 @@
-"""Where the CPU seconds of `fit` and `diagnose` go: `python -m benchmarks where_time_goes`.
+"""Where do the CPU seconds of `fit` and `diagnose` go?
+
+    python -m benchmarks where_time_goes
 
 Every call runs in a process of its own, with compiled programs in the cache: of `--repeats` runs
 the one with the fewest seconds counts. Five csv tracks that `simulate` makes (nothing hidden,
@@ -26,9 +28,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import tables
+from galileo_jax.runtime.precision import in_float64
 
-SCRIPT = Path(__file__)
-EXOTIC_FILE = SCRIPT.with_name("exotic_effects.py")
+ROOT = Path(__file__).resolve().parents[1]
+EXOTIC_FILE = ROOT / "benchmarks" / "exotic_effects.py"
 TRACKS = {
     "none": (),
     "air_drag": ("air_drag",),
@@ -86,7 +89,7 @@ class StageClock:
             self.begin(stage)
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(call: argparse.Namespace) -> dict[str, Any] | None:
     if call.one:
         return _print_one(*call.one)
     help_call = [sys.executable, "-m", "galileo_jax", "fit", "--help"]
@@ -111,13 +114,12 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
     return figures
 
 
+@in_float64
 def fixed_calculation() -> float:
     """CPU seconds of `FIXED_ROLLOUTS` rollouts with the rigid engine, once it is compiled."""
-    import jax
-    import rollouts
+    from benchmarks import rollouts
 
-    jax.config.update("jax_enable_x64", True)
-    run = rollouts.rigid_batch(FIXED_BATCH)
+    run = rollouts.batch_of("rigid", FIXED_BATCH)
     run()
     began = time.process_time()
     for _ in range(FIXED_ROLLOUTS // FIXED_BATCH):
@@ -142,10 +144,10 @@ def _simulated(folder: Path, case: str, seed: int) -> Path:
 
 def _measured(verb: str, clip: Path, repeats: int) -> dict[str, Any]:
     """What `_print_one` says of the run with the fewest seconds."""
-    words = [sys.executable, str(SCRIPT), "--one", verb, str(clip)]
+    words = [sys.executable, "-m", "benchmarks", "where_time_goes", "--one", verb, str(clip)]
     runs = []
     for _ in range(repeats):
-        done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
+        done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True, cwd=ROOT)
         runs.append(json.loads(done.stdout.splitlines()[-1]))
     return min(runs, key=lambda run: sum(run["cpu_s"].values()))
 
@@ -196,8 +198,7 @@ def _print_row(case: str, measured: dict[str, Any]) -> None:
     print(f"    {' '.join(measured['result'])}", flush=True)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__)
+def options(parser: argparse.ArgumentParser) -> None:
     cases = (*TRACKS, VIDEO)
     parser.add_argument("--case", nargs="+", choices=cases, default=list(cases))
     parser.add_argument(
@@ -206,4 +207,3 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--seed", type=int, default=7001, help="of the clips")
     parser.add_argument("--repeats", type=int, default=2)
     parser.add_argument("--one", nargs=2, metavar=("VERB", "CLIP"), help=argparse.SUPPRESS)
-    return parser
