@@ -1,14 +1,17 @@
 """The runner: `python -m benchmarks NAME [arguments]`; without a name, a line about each.
 
-A benchmark is a module here with `options(parser)`, which declares its arguments, and `main(call)`,
-which prints a table and returns the figures of the last line, one of JSON.
+A benchmark is a module here with a `main`, which prints a table and returns the figures of the last
+line, one of JSON. Its parameters are the arguments: keyword-only ones are options.
 """
 
 import argparse
 import ast
 import importlib
-from collections.abc import Sequence
+import inspect
+import types
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
 
 from benchmarks import tables
 from galileo_jax.commands import command
@@ -24,14 +27,17 @@ def main(argv: Sequence[str]) -> int | None:
     name, *arguments = argv
     if name not in summaries():
         raise InputError(f"unknown benchmark {name!r}; known: {', '.join(summaries())}")
-    module = importlib.import_module(f"benchmarks.{name}")
+    try:
+        module = importlib.import_module(f"benchmarks.{name}")
+    except ModuleNotFoundError as error:
+        raise InputError(f"{name} needs the package {error.name}") from error
     parser = command.Parser(
         prog=f"python -m benchmarks {name}",
         description=module.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    module.options(parser)
-    figures = module.main(parser.parse_args(arguments))
+    declare(parser, module.main)
+    figures = call(module.main, vars(parser.parse_args(arguments)))
     if figures is not None:
         tables.finish(name, figures)
     return None
@@ -45,6 +51,44 @@ def summaries() -> dict[str, str]:
         if any(isinstance(one, ast.FunctionDef) and one.name == "main" for one in tree.body):
             found[path.stem] = (ast.get_docstring(tree) or "").split("\n")[0]
     return found
+
+
+def declare(parser: argparse.ArgumentParser, function: Callable[..., Any]) -> None:
+    """Declares the parameters of a function; of a tuple of words the default has all choices."""
+    for name, one in inspect.signature(function).parameters.items():
+        has_default = one.default is not one.empty
+        given = _kind(one.annotation)
+        if has_default:
+            given |= {"default": one.default, "help": f"default: {one.default}"}
+        if given.get("nargs") and given["type"] is str and one.default:
+            given.setdefault("choices", one.default)
+        if one.kind is one.KEYWORD_ONLY:
+            given |= {} if has_default else {"required": True}
+            parser.add_argument(f"--{name.replace('_', '-')}", **given)
+        else:
+            given |= {"nargs": "*" if given.get("nargs") else "?"} if has_default else {}
+            parser.add_argument(name, **given)
+
+
+def call(function: Callable[..., Any], given: dict[str, Any]) -> Any:
+    """Calls a function with all its parameters, by position or name."""
+    bound = inspect.signature(function).bind_partial()
+    bound.arguments.update(
+        {name: tuple(each) if isinstance(each, list) else each for name, each in given.items()}
+    )
+    return function(*bound.args, **bound.kwargs)
+
+
+def _kind(annotation: Any) -> dict[str, Any]:
+    """What argparse is told of a type."""
+    arguments = [one for one in get_args(annotation) if one not in (type(None), Ellipsis)]
+    if get_origin(annotation) is types.UnionType:
+        return _kind(arguments[0])
+    if get_origin(annotation) is Literal:
+        return {"choices": arguments, "type": type(arguments[0])}
+    if get_origin(annotation) is tuple:
+        return {"nargs": "+"} | _kind(arguments[0])
+    return {"action": "store_true"} if annotation is bool else {"type": annotation}
 
 
 if __name__ == "__main__":

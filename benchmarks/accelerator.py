@@ -9,8 +9,6 @@ per minute, programs compiled; and fits per second of as many tracks at once, th
 (`galileo sweep --together`).
 """
 
-import argparse
-import os
 import sys
 import tempfile
 import time
@@ -23,7 +21,6 @@ import jax
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # it is called as a script, too
 import galileo_jax as gx
 from benchmarks import rollouts, tables
-from galileo_jax.commands import command
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.sweeping.engine_together import EngineTogether
 from galileo_jax.sweeping.task import Task
@@ -35,25 +32,31 @@ MOST_ON_CORES = 1024
 
 
 @in_float64
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(
+    *,
+    engine: tuple[str, ...] = ENGINES,
+    batch: tuple[int, ...] = SIZES,
+    repeats: int = 3,
+    fits: int = 20,
+    diagnoses: int = 5,
+    together: tuple[int, ...] = (8, 64),
+    seed: int = 7100,
+) -> dict[str, Any]:
     device = jax.devices()[0]
     figures: dict[str, Any] = {"device": f"{device.platform} {device.device_kind}"}
-    figures["cores"] = os.cpu_count()
-    tables.row("rollouts per minute", [*call.engine])
-    for size in call.batch:
-        found = {name: _rollouts_per_minute(name, size, call.repeats) for name in call.engine}
+    tables.row("rollouts per minute", engine)
+    for size in batch:
+        found = {name: _rollouts_per_minute(name, size, repeats) for name in engine}
         figures[f"rollouts_per_minute_{size}"] = found
         tables.row(f"  batch {size}", list(found.values()))
     with tempfile.TemporaryDirectory() as folder:
-        most = max(call.fits, call.diagnoses)
-        clips = [_track(Path(folder), call.seed + i) for i in range(most + (most > 0))]
-        figures["fits_per_s"] = _rate(gx.fit, clips[: call.fits + 1])
-        figures["diagnoses_per_minute"] = 60 * _rate(gx.diagnose, clips[: call.diagnoses + 1])
-        for num in call.together:
-            figures[f"fits_per_s_together_{num}"] = _rate_together(Path(folder), call.seed, num)
-    for name in figures:
-        if name.startswith(("fits_per_s", "diagnoses_per_minute")):
-            tables.row(name, [figures[name]])
+        most = max(fits, diagnoses)
+        clips = [_track(Path(folder), seed + i) for i in range(most + (most > 0))]
+        figures["fits_per_s"] = _rate(gx.fit, clips[: fits + 1])
+        figures["diagnoses_per_minute"] = 60 * _rate(gx.diagnose, clips[: diagnoses + 1])
+        for num in together:
+            figures[f"fits_per_s_together_{num}"] = _rate_together(Path(folder), seed, num)
+    tables.summary(figures)
     return figures
 
 
@@ -94,19 +97,3 @@ def _rate_together(folder: Path, seed: int, num: int) -> float:
 
 def _fitted(path: Path) -> dict[str, Any]:
     return gx.fit(path).result["parameters"]
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--engine", nargs="+", choices=ENGINES, default=list(ENGINES))
-    parser.add_argument("--batch", nargs="+", type=int, default=list(SIZES))
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--fits", type=int, default=20, help="tracks that are fitted")
-    parser.add_argument("--diagnoses", type=int, default=5, help="tracks that are diagnosed")
-    parser.add_argument("--together", nargs="*", type=int, default=[8, 64], metavar="N")
-    parser.add_argument("--seed", type=int, default=7100, help="of the first track")
-
-
-if __name__ == "__main__":
-    from benchmarks.__main__ import main as run
-
-    raise SystemExit(command.run(run, ["accelerator", *sys.argv[1:]]))

@@ -7,13 +7,12 @@ included. Where the truth says that nothing can be told (object 2 never hit, not
 fit has to say so, too. The mass ratio's errors are relative.
 """
 
-import argparse
 import json
 import time
 from collections.abc import Iterator, Mapping
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -33,13 +32,20 @@ COLUMNS = (
 )
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(
+    folder: Path,
+    *,
+    method: Literal["grad", "mh", "cnn"] = "grad",
+    only: str = "",
+    set: str = "none",
+    seed: int = 0,
+) -> dict[str, Any]:
     scores, chi2, seconds, failures = [], [], [], {}
     tables.row("clip", COLUMNS)
-    for path, truth in clips_with_truth(call.folder, call.only, call.set):
+    for path, truth in clips_with_truth(folder, only, set):
         began = time.perf_counter()
         try:
-            result = fit(path, method=call.method, seed=call.seed).result
+            result = fit(path, method=method, seed=seed).result
         except InputError as error:
             failures[path.stem] = str(error)
             print(f"{path.stem:<28} {error}", flush=True)
@@ -51,14 +57,14 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
         noise = result["nuisances"].get("noise_scale", {}).get("mean")
         tables.row(path.stem, [*cells, chi2[-1], noise, result["converged"], seconds[-1]])
     if not scores:
-        raise InputError(f"{call.folder}: no clip could be fitted")
+        raise InputError(f"{folder}: no clip could be fitted")
     table = scoring.summary(scores)
     print()
     tables.row("quantity", [*table["k1"]])
     for name, entry in table.items():
         tables.row(name, list(entry.values()))
     return {
-        "method": call.method,
+        "method": method,
         "clips": len(scores),
         "failures": failures,
         **table,
@@ -111,11 +117,3 @@ def _missed(table: Mapping[str, Mapping[str, Any]], chi2: list[float]) -> Iterat
                 yield f"{name} wrongly {what} in {table[name][what]}"
     if outside := sum(not CHI2[0] <= value <= CHI2[1] for value in chi2):
         yield f"chi2/dof outside {CHI2} in {outside}"
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--method", choices=("grad", "mh", "cnn"), default="grad")
-    parser.add_argument("--only", default="", help="how clips' names begin")
-    parser.add_argument("--set", default="none", help="an effect in the truth, or all")
-    parser.add_argument("--seed", type=int, default=0)

@@ -1,6 +1,6 @@
 """Do intervals hold, and for which truths?
 
-    python -m benchmarks calibration --sort bullet --num 200
+    python -m benchmarks calibration --sort bullet [--method mh] [--p]
 
 Random ramp experiments (10 to 30 degrees; boxes, masses, frictions and distances as `simulate`
 draws them), moved by one of four engines, seen with the noise of `simulate`'s tracks or another at
@@ -18,15 +18,14 @@ Bars, per quantity: rms of error / sd in 0.85 to 1.15, 92 to 98 % of truths in t
 They are for tracks that the model describes: chi2 per degree of freedom below 1.5; how many those
 are is said. Of `cnn` all count. A quantity that the fit calls not determined does not count: where
 a box of Bullet's tips over, the track ends before anything is hit.
-Of videos chi2 per degree of freedom should lie in 0.7 to 1.5.
+Of videos chi2 per degree of freedom should lie in 0.7 to 1.5. With `--p`, that of each is asked.
 """
 
-import argparse
 import math
 import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -36,7 +35,6 @@ from galileo_jax.api.compare import compare
 from galileo_jax.api.fit import fit
 from galileo_jax.api.fit_result import Fit
 from galileo_jax.api.track import Track, track
-from galileo_jax.commands import command
 from galileo_jax.measurement.cuts import cut, to_last_cut
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.model import Model
@@ -52,42 +50,49 @@ NOISE_M = 2e-4
 FRAME_RATES = (30.0, 60.0)
 LONGEST_S, AFTER_REST_S = 3.0, 0.1
 BARS = {"rms_z": (0.85, 1.15), "coverage": (0.92, 0.98)}
-QUANTITIES = ("k1", "k2", "log ratio")
-NUM = 200
 UNLIKELY = 0.01  # a p below it is an alarm
 DESCRIBED = 1.5  # chi2 per degree of freedom
 CHI2 = (0.7, DESCRIBED)
-RENDERED = (rendered_clips.IDEAL, rendered_clips.FAULTY, rendered_clips.MEASURED)
-SORTS = ("exact", "fine", "mujoco", "bullet", *RENDERED)
+Sort = Literal[
+    "exact", "fine", "mujoco", "bullet", "rendered", "rendered-faults", "rendered-measured"
+]
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(
+    *,
+    sort: Sort = "exact",
+    method: Literal["grad", "mh", "cnn"] = "grad",
+    num: int = 200,
+    seed: int = 0,
+    noise_mm: float = 1000 * NOISE_M,
+    p: bool = False,
+) -> dict[str, Any]:
     tables.row("track", ("k1 z", "k2 z", "ratio z", "chi2/dof", "p"))
     scores, chi2, p_values = [], [], []
-    for seed in range(call.seed, call.seed + call.num):
-        truth, tracked = make_track(call.sort, seed, call.noise_mm / 1000)
-        found = fit(tracked, method=call.method, seed=seed)
+    for each in range(seed, seed + num):
+        truth, tracked = make_track(sort, each, noise_mm / 1000)
+        found = fit(tracked, method=method, seed=each)
         scores.append(scored(found, truth))
         chi2.append(found.result["error"]["chi2_per_dof"])
-        p_values.append(compare(found).p_value if call.compare else math.nan)
-        tables.row(str(seed), [*(one.z for one in scores[-1].values()), chi2[-1], p_values[-1]])
+        p_values.append(compare(found).p_value if p else math.nan)
+        tables.row(str(each), [*(one.z for one in scores[-1].values()), chi2[-1], p_values[-1]])
     # The chi2 of the network's mean, which is no best fit, tells nothing about the model.
-    is_described = [value < DESCRIBED or call.method == "cnn" for value in chi2]
+    is_described = [value < DESCRIBED or method == "cnn" for value in chi2]
     table = summary([one for one, is_told in zip(scores, is_described, strict=True) if is_told])
     print()
-    tables.row(f"{sum(is_described)} of {call.num}, {call.sort}", [*table["k1"]])
+    tables.row(f"{sum(is_described)} of {num}, {sort}", [*table["k1"]])
     for name, entry in table.items():
         tables.row(name, list(entry.values()))
-    outside = [value for value in chi2 if not CHI2[0] <= value <= CHI2[1]]
     figures: dict[str, Any] = {
         "chi2": float(np.median(chi2)),
         "described": float(np.mean(is_described)),
-        "chi2_outside": len(outside) / call.num,
-        "alarms": float(np.mean(np.array(p_values) < UNLIKELY)) if call.compare else math.nan,
+        "chi2_outside": float(np.mean([not CHI2[0] <= value <= CHI2[1] for value in chi2])),
+        "alarms": float(np.mean(np.array(p_values) < UNLIKELY)) if p else math.nan,
     }
     tables.summary(figures)
-    given = {key: getattr(call, key) for key in ("sort", "method", "num", "seed", "noise_mm")}
-    return given | table | figures | {"bars_missed": tables.missed(_missed(table))}
+    return {"sort": sort, "method": method, "num": num, "seed": seed, "noise_mm": noise_mm} | (
+        table | figures | {"bars_missed": tables.missed(_missed(table))}
+    )
 
 
 def _missed(table: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
@@ -99,7 +104,7 @@ def _missed(table: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
 
 def make_track(sort: str, seed: int, noise_m: float = NOISE_M) -> tuple[Truth, Track]:
     """One experiment and what a tracker sees of it."""
-    if sort in RENDERED:
+    if sort in rendered_clips.SORTS:
         return filmed(sort, seed)
     rng = np.random.default_rng([seed, 91])
     angle = float(rng.uniform(*ANGLES_DEG))
@@ -153,15 +158,10 @@ def in_mujoco(truth: Truth, times_s: np.ndarray) -> np.ndarray:
 
 def in_bullet(truth: Truth, times_s: np.ndarray) -> np.ndarray:
     """The centres of boxes in PyBullet, `[object, 2, frame]`, m."""
-    import pybullet  # pyright: ignore
-
     from benchmarks import bullet_scene
 
-    client = pybullet.connect(pybullet.DIRECT)
-    steps = math.ceil(times_s[-1] / bullet_scene.FINE_STEP_S)
-    path = bullet_scene.roll_out(truth, steps, client, is_fine=True)
-    pybullet.disconnect(client)
-    return between(np.moveaxis(path, 0, -1), bullet_scene.FINE_STEP_S, times_s)
+    path = bullet_scene.roll_out(truth, math.ceil(times_s[-1] / bullet_scene.STEP_S))
+    return between(path, bullet_scene.STEP_S, times_s)
 
 
 def between(position_m: np.ndarray, step_s: float, times_s: np.ndarray) -> np.ndarray:
@@ -189,12 +189,3 @@ def _score(values: np.ndarray, true: float, entry: Mapping[str, Any]) -> Score:
     low, high = np.quantile(values, (0.025, 0.975))
     error, sd = float(values.mean() - true), float(values.std())
     return Score(error, sd, bool(low <= true <= high), bool(entry["identified"]))
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--sort", choices=SORTS, default="exact")
-    parser.add_argument("--method", choices=("grad", "mh", "cnn"), default="grad")
-    parser.add_argument("--num", type=command.whole_number(1), default=NUM, help="tracks")
-    parser.add_argument("--seed", type=command.whole_number(0), default=0, help="of the first")
-    parser.add_argument("--noise-mm", type=float, default=1000 * NOISE_M, help="of a coordinate")
-    parser.add_argument("--compare", action="store_true", help="p of each, too (takes longer)")

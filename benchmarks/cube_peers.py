@@ -16,7 +16,6 @@ turning, and medians over the tosses.
 """
 # pyright: reportAttributeAccessIssue=false
 
-import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,7 +30,6 @@ from scipy.spatial.transform import Rotation
 from benchmarks import tables
 from benchmarks.real_sets import joint_fit
 from galileo_jax.clip.poses_csv import read_poses_csv
-from galileo_jax.commands import command
 from galileo_jax.inference.toss.residuals import CENTRE, COMMON, Start, forward, motion
 from galileo_jax.measurement.toss_flight import flight_of
 from galileo_jax.runtime.precision import in_float64
@@ -90,11 +88,11 @@ Simulator = Callable[[Thrown, Cube, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @in_float64
-def main(call: argparse.Namespace) -> dict[str, Any]:
-    paths = sorted(call.folder.glob("*.csv"))
+def main(folder: Path, *, every: int = 3) -> dict[str, Any]:
+    paths = sorted(folder.glob("*.csv"))
     thrown = [one for path in paths if (one := at_the_impact(path)) is not None]
-    learned = {path.stem for path in paths[:: call.every]}
-    common = joint_fit(paths[:: call.every]).solution.solution.common
+    learned = {path.stem for path in paths[::every]}
+    common = joint_fit(paths[::every]).solution.solution.common
     value = dict(zip(COMMON, np.asarray(forward(jnp.asarray(common))).tolist(), strict=True))
     cube = Cube(
         edge=value["edge"],
@@ -272,8 +270,3 @@ def by_bullet(one: Thrown, cube: Cube, parameters: np.ndarray) -> tuple[np.ndarr
 
 
 _motion = jax.jit(motion)
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--every", type=command.whole_number(2), default=3, help="are learned from")

@@ -7,10 +7,10 @@ The grid is effects x strengths x seeds, clips without an effect, and clips with
 the library does not have. Its truths come from an integrator of their own, with the small
 faults of real clips. Every case goes through `galileo diagnose`; of those with an effect only
 the ones count in which it shows (chi2 per degree of freedom of the base model above
---least-chi2). What is finished stays in DIR/results.jsonl and is not done again.
+--least-chi2: 3, of clips made elsewhere 0). `--series N` diagnoses N clips together; `--tracks DIR`
+keeps the tracks of videos. What is finished stays in DIR/results.jsonl and is not done again.
 """
 
-import argparse
 import json
 import math
 import time
@@ -23,7 +23,6 @@ import numpy as np
 from benchmarks import hidden_cases, tables, verdicts
 from benchmarks.hidden_cases import Case
 from benchmarks.journal import Journal
-from galileo_jax.commands import command
 from galileo_jax.runtime.errors import InputError
 
 PIXELS_PER_METRE = 900.0
@@ -33,20 +32,41 @@ BY_COLUMNS = ("cases", "right", "covered", "size", "wrong", "missed", "unknown")
 Scored = Sequence[tuple[Case, verdicts.Score]]
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(
+    folder: Path | None = None,
+    *,
+    out: Path,
+    series: int | None = None,
+    least_chi2: float | None = None,
+    seed: int = 0,
+    effects: str | None = None,
+    strengths: tuple[float, ...] = (0.2, 0.5, 0.8),
+    seeds: int = 2,
+    none: int = 20,
+    noise_px: float = 0.3,
+    fps: float = 30.0,
+    only: str = "*",
+    tracks: Path | None = None,
+) -> dict[str, Any]:
     library = hidden_cases.ramp_effects()
-    cases = {case.name: case for case in _cases(call, library)}
-    journal = Journal(call.out / "results.jsonl")
-    least = LEAST_CHI2 * (call.folder is None) if call.least_chi2 is None else call.least_chi2
+    if folder:
+        listed = hidden_cases.folder_cases(folder, series, only)
+    else:
+        asked = known(effects.split(","), library) if effects else library
+        grid = (asked, strengths, seeds, none, noise_px / PIXELS_PER_METRE, fps, series)
+        listed = list(hidden_cases.grid(out / "clips", *grid))
+    cases = {case.name: case for case in listed}
+    journal = Journal(out / "results.jsonl")
+    least = LEAST_CHI2 * (folder is None) if least_chi2 is None else least_chi2
     tables.row("case", COLUMNS)
     told: list[tuple[Case, verdicts.Score]] = []
     seconds, failures = [], {}
     unmade = {name: None if name in journal.rows else (case,) for name, case in cases.items()}
-    if call.folder:
+    if folder:
         unmade = dict.fromkeys(cases)
     for name, _ in hidden_cases.made_meanwhile(hidden_cases.make_clips, unmade):
         case = cases[name]
-        entry = journal.tried(name, lambda case=case: _examined(case, call))
+        entry = journal.tried(name, lambda case=case: _examined(case, out, seed, tracks))
         if entry["error"]:
             failures[name] = entry["error"]
             print(f"{name:<28} {entry['error']}", flush=True)
@@ -57,7 +77,7 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
     weak = [(c, s) for c, s in told if s.kind != "none" and s.before**2 < least]
     scores = [one for one in told if one not in weak]
     if not scores:
-        raise InputError(f"{call.out}: no case could be diagnosed in which the effect shows")
+        raise InputError(f"{out}: no case could be diagnosed in which the effect shows")
     figures = verdicts.summary([score for _, score in scores])
     report = {
         "cases": len(cases),
@@ -72,7 +92,7 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
         "confusion": verdicts.confusion([score for _, score in scores]),
     }
     _print(report)
-    missed = verdicts.missed_bars(figures, bool(call.series))
+    missed = verdicts.missed_bars(figures, bool(series))
     missed += [f"{name} cannot be diagnosed" for name in failures]
     return report | {"bars_missed": tables.missed(missed)}
 
@@ -85,25 +105,18 @@ def run_diagnosis(yamls: Sequence[Path], out: Path, seed: int) -> dict[str, Any]
     return json.loads((out / "diagnosis.json").read_text())
 
 
-def _cases(call: argparse.Namespace, library: Sequence[str]) -> list[Case]:
-    if call.folder:
-        return hidden_cases.folder_cases(call.folder, call.series, call.only)
-    asked = call.effects.split(",") if call.effects else list(library)
-    unknown = [name for name in asked if name not in library]
-    if unknown:
+def known(asked: Sequence[str], library: Sequence[str]) -> Sequence[str]:
+    """The names that are asked for, all of them in the library."""
+    if unknown := [name for name in asked if name not in library]:
         raise InputError(f"--effects: unknown {unknown[0]!r}; known: {', '.join(library)}")
-    noise_m = call.noise_px / PIXELS_PER_METRE
-    grid = (asked, call.strengths, call.seeds, call.none, noise_m, call.fps, call.series)
-    return list(hidden_cases.grid(call.out / "clips", *grid))
+    return asked
 
 
-def _examined(case: Case, call: argparse.Namespace) -> dict[str, Any]:
+def _examined(case: Case, out: Path, seed: int, tracks: Path | None) -> dict[str, Any]:
     """What a diagnosis says of a case, and the seconds it took, tracking apart."""
-    yamls = case.yamls
-    if call.tracks:
-        yamls = [hidden_cases.tracked(path, call.tracks) for path in yamls]
+    yamls = [hidden_cases.tracked(path, tracks) if tracks else path for path in case.yamls]
     began = time.perf_counter()
-    said = run_diagnosis(yamls, call.out / "runs" / case.name, call.seed)
+    said = run_diagnosis(yamls, out / "runs" / case.name, seed)
     return {"diagnosis": said, "seconds": round(time.perf_counter() - began, 2)}
 
 
@@ -146,22 +159,3 @@ def _cells(entry: Mapping[str, float]) -> list[float]:
         wrong = entry["confident_wrong_exotic"]
     values = (right, entry["covered"], entry["mean_set_size"], wrong, entry["missed"])
     return [cases, *values, entry["unknown_recognised"]]
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("folder", type=Path, nargs="?", help="clips with truths; absent = our own grid")
-    add("--out", type=Path, required=True, help="clips, runs and results are kept there")
-    add("--series", type=command.whole_number(2), help="so many clips are diagnosed together")
-    add("--least-chi2", type=float, help="of the base model (3 for the grid, 0 for FOLDER)")
-    add("--seed", type=command.whole_number(0), default=0, help="of the diagnosis")
-    ours = parser.add_argument_group("our own grid")
-    ours.add_argument("--effects", help="a,b (default: the whole library)")
-    ours.add_argument("--strengths", type=float, nargs="+", default=[0.2, 0.5, 0.8])
-    ours.add_argument("--seeds", type=command.whole_number(0), default=2)
-    ours.add_argument("--none", type=command.whole_number(0), default=20, help="clips without")
-    ours.add_argument("--noise-px", type=float, default=0.3, help="at 900 px/m")
-    ours.add_argument("--fps", type=float, default=30.0)
-    theirs = parser.add_argument_group("clips in FOLDER")
-    theirs.add_argument("--only", default="*", help="glob over clip names")
-    theirs.add_argument("--tracks", type=Path, help="keep tracks there; reuse what is there")

@@ -2,14 +2,13 @@
 
     python -m benchmarks laws --out DIR
 
-Tracks with one of 24 hidden laws (`hidden_laws.py`), with an effect of the library, and with
+Tracks with one of 24 hidden laws (`exotic_effects.py`), with an effect of the library, and with
 nothing, go through the diagnosis, one clip or several. Right: the verdict is a law with the right
-variables, and an exponent within 0.25 where the truth is a power. With `--candidates` only these of
-the library (and the forms) stand against the laws, which takes less time. What is finished stays in
-DIR/results.jsonl.
+variables, and an exponent within 0.25 where the truth is a power. With `--candidates a,b` only
+these of the library (and the forms) stand against the laws, which takes less time. What is finished
+stays in DIR/results.jsonl.
 """
 
-import argparse
 import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
@@ -19,13 +18,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks import tables
+from benchmarks.exotic_effects import LAWS
 from benchmarks.hidden_cases import ANGLES_DEG
-from benchmarks.hidden_laws import LAWS
 from benchmarks.journal import Journal
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
-from galileo_jax.commands import command
 from galileo_jax.diagnosis.diagnose import diagnose
 from galileo_jax.diagnosis.diagnosis import Law
 from galileo_jax.inference.build_problem import make_joint_problem
@@ -42,17 +40,31 @@ EXPONENT = 0.25
 
 
 @in_float64
-def main(call: argparse.Namespace) -> dict[str, Any]:
-    journal = Journal(call.out / "results.jsonl")
+def main(
+    *,
+    out: Path,
+    clips: int = 1,
+    seed: int = 0,
+    only: tuple[str, ...] = (*LAWS, *LIBRARY, NO_LAW),
+    candidates: str = "",
+) -> dict[str, Any]:
+    out.mkdir(parents=True, exist_ok=True)
+    journal = Journal(out / "results.jsonl")
     tables.row("case", ("chi2", "after", "cpu s", "says"))
+    library = [
+        each for each in effect_names() if not each.startswith(("exotic_", "hidden_", "law_"))
+    ]
+    chosen = candidates.split(",") if candidates else library
     rows = []
-    for i, name in enumerate(call.only or [*LAWS, *LIBRARY, NO_LAW]):
-        seed = call.seed + i
-        case = f"{name}_{call.clips}_{seed}"
-        row = journal.row(case, lambda name=name, seed=seed: _one(call, name, seed))
+    for own, name in enumerate(only, seed):
+        case = f"{name}_{clips}_{own}"
+
+        def diagnosed(name: str = name, own: int = own, case: str = case) -> dict[str, Any]:
+            return _diagnosed(name, _clips(out / f"{case}.csv", name, own, clips), chosen)
+
+        rows.append(row := journal.row(case, diagnosed))
         says = f" {row['status']} {'right ' * row['right']}{row['formulas'][:1]}"
         tables.row(case, (row["chi2_before"], row["chi2_after"], row["cpu_s"], says))
-        rows.append(row)
     hidden = [row for row in rows if row["name"] in LAWS]
     others = [row for row in rows if row["name"] not in LAWS]
     seen = [row for row in hidden if row["chi2_before"] > 1.5]
@@ -69,8 +81,8 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
         "cpu_s": float(np.median([row["cpu_s"] for row in rows])),
     }
     tables.summary(figures)
-    given = {"clips": call.clips, "seed": call.seed, "candidates": call.candidates or "library"}
-    return figures | given | {"chi2_after": [row["chi2_after"] for row in laws if row["right"]]}
+    after = [row["chi2_after"] for row in laws if row["right"]]
+    return figures | {"clips": clips, "seed": seed, "candidates": chosen, "chi2_after": after}
 
 
 def _share(values: Iterable[bool]) -> float:
@@ -78,11 +90,11 @@ def _share(values: Iterable[bool]) -> float:
     return float(np.mean(found)) if found else math.nan
 
 
-def _clips(call: argparse.Namespace, name: str, seed: int) -> list[Clip]:
+def _clips(path: Path, name: str, seed: int, count: int) -> list[Clip]:
     """Simulated clips in which that is hidden."""
     effect = f"hidden_{name}" if name in LAWS else name
     made = simulate(
-        call.out / f"{name}_{call.clips}_{seed}.csv",
+        path,
         effects={} if name == NO_LAW else {effect: {}},
         strength=None if name == NO_LAW else 0.5,
         seed=seed,
@@ -92,15 +104,13 @@ def _clips(call: argparse.Namespace, name: str, seed: int) -> list[Clip]:
         fps=30.0,
         solver="fine",
         faults=True,
-        series=call.clips if call.clips > 1 else None,
+        series=count if count > 1 else None,
     )
-    return [load_clip(path.with_suffix(".yaml")) for path in made.clips]
+    return [load_clip(one.with_suffix(".yaml")) for one in made.clips]
 
 
-def _one(call: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:
-    clips = _clips(call, name, seed)
-    library = [each for each in effect_names() if not each.startswith(("hidden_", "law_"))]
-    chosen = [each for each in library if each in (call.candidates or library)]
+def _diagnosed(name: str, clips: Sequence[Clip], chosen: Sequence[str]) -> dict[str, Any]:
+    """What a diagnosis says, which knows these effects of the library, and whether it is right."""
 
     def problem_with(names: Sequence[str]) -> JointProblem:
         seen = [measure(clip).observation for clip in clips]
@@ -148,11 +158,3 @@ def is_right(name: str, family_name: str, constants: Mapping[str, Any]) -> bool:
         return False
     power = constants.get("n", constants.get("p"))
     return abs(float(power) - truth.power) <= EXPONENT
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--clips", type=command.whole_number(1), default=1, help="of each law")
-    parser.add_argument("--seed", type=command.whole_number(0), default=0, help="of the first")
-    parser.add_argument("--only", nargs="+", help="laws, library effects, none")
-    parser.add_argument("--candidates", nargs="+", help="of the library (default: all)")

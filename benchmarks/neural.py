@@ -7,7 +7,6 @@ setting, at several noise levels; 2,000 new samples of all scenes. Mean absolute
 90 % intervals, and KS p-values of the truths' ranks. On clips: `accuracy FOLDER --method cnn`.
 """
 
-import argparse
 from pathlib import Path
 from typing import Any
 
@@ -32,21 +31,20 @@ SHARD = 2**30 + 1
 
 
 @in_float64
-def main(call: argparse.Namespace) -> dict[str, Any]:
-    network = trained_network(call.network)
-    columns = ("quantity", "count", "MAE", "median", "closed form", "in 90%", "KS p")
-    tables.row("setting", columns)
-    found: dict[str, Any] = {}
-    for noise in NOISES_M:
-        key = jax.random.key(call.seed)
-        clips = thesis_clips(key, NUM_THESIS, noise, stated_noise_m=max(noise, LEAST_NOISE_M))
-        found[f"thesis {noise:g} m"] = _score(f"thesis {noise:g} m", network, clips)
+def main(*, network: Path = TRAINED, seed: int = 0) -> dict[str, Any]:
+    trained = trained_network(network)
+    tables.row("setting", ("quantity", "count", "MAE", "median", "closed form", "in 90%", "KS p"))
+    settings = {
+        f"thesis {noise:g} m": thesis_clips(
+            jax.random.key(seed), NUM_THESIS, noise, stated_noise_m=max(noise, LEAST_NOISE_M)
+        )
+        for noise in NOISES_M
+    }
     task = GalileoTask(load_config(Path("configs/train_galileo.yaml")))
-    clips = make_samples(task, call.seed, SHARD, NUM_CLIPS)
+    clips = make_samples(task, seed, SHARD, NUM_CLIPS)
     for label, ideal in (("clips", 0), ("ideal", 1)):
-        some = {name: values[clips["is_ideal"] == ideal] for name, values in clips.items()}
-        found[label] = _score(label, network, some)
-    return found
+        settings[label] = {key: each[clips["is_ideal"] == ideal] for key, each in clips.items()}
+    return {label: _score(label, trained, some) for label, some in settings.items()}
 
 
 def _score(label: str, network: PosteriorNetwork, clips: Arrays) -> dict[str, Any]:
@@ -85,8 +83,3 @@ def estimate_of_closed_form(clips: Arrays) -> dict[str, np.ndarray]:
 
 def _phi(ratio: np.ndarray) -> np.ndarray:
     return (ratio - 1) / (ratio + 1)
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--network", type=Path, default=TRAINED)
-    parser.add_argument("--seed", type=int, default=0)

@@ -6,7 +6,7 @@ Tracks of the rigid engine with the tracker's noise as stated; what the likeliho
 it (its modes, and the nuisances) is either not there ("centre") or drawn from its prior ("drawn").
 """
 
-import argparse
+import itertools
 import time
 from dataclasses import replace
 from typing import Any, get_args
@@ -34,20 +34,25 @@ CASES = ("centre", "drawn")
 
 
 @in_float64
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(
+    *,
+    num: int = 400,
+    trials: int = 1,
+    seed: int = 0,
+    noise: tuple[NoiseModel, ...] = get_args(NoiseModel),
+    case: tuple[str, ...] = CASES,
+) -> dict[str, Any]:
     figures = {}
     tables.row("noise, imperfections", COLUMNS)
-    for noise in call.noise or get_args(NoiseModel):
-        for case in call.case or CASES:
-            begin = time.process_time()
-            seeds = [[call.seed, i] for i in range(call.num)]
-            rows = [one(noise, case == "drawn", call.trials, seed) for seed in seeds]
-            p, chi2, scale = np.array(rows).T
-            below = [float(np.mean(p < level)) for level in LEVELS]
-            each = (time.process_time() - begin) / call.num
-            told = (stats.kstest(p, "uniform").pvalue, *below, chi2.mean(), np.median(scale), each)
-            figures[f"{noise} {case}"] = dict(zip(COLUMNS, told, strict=True))
-            tables.row(f"{noise}, {case}", told)
+    for sort, is_there in itertools.product(noise, case):
+        begin = time.process_time()
+        rows = [one(sort, is_there == "drawn", trials, [seed, i]) for i in range(num)]
+        p, chi2, scale = np.array(rows).T
+        below = [float(np.mean(p < level)) for level in LEVELS]
+        each = (time.process_time() - begin) / num
+        told = (stats.kstest(p, "uniform").pvalue, *below, chi2.mean(), np.median(scale), each)
+        figures[f"{sort} {is_there}"] = dict(zip(COLUMNS, told, strict=True))
+        tables.row(f"{sort}, {is_there}", told)
     return figures
 
 
@@ -116,11 +121,3 @@ def imperfect(
                 return position
             before = position
     raise RuntimeError(f"{problem.name}: no draw agrees with the patterns of its own track")
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--num", type=int, default=400)
-    parser.add_argument("--trials", type=int, default=1, help="clips of each problem")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--noise", choices=get_args(NoiseModel), action="append")
-    parser.add_argument("--case", choices=CASES, action="append")

@@ -4,10 +4,10 @@
     python -m benchmarks people table [--journal FILE]                # the markdown of the docs
 
 What is right for each file stands in people.yaml. Every case is a command of its own, as a user
-would type it. The journal is of one version: delete it to measure another.
+would type it; `--package` is the checkout that is tried. The journal is of one version: delete it
+to measure another.
 """
 
-import argparse
 import json
 import os
 import re
@@ -19,11 +19,11 @@ import time
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import yaml
 
-from benchmarks.journal import add, finished
+from benchmarks.journal import Journal
 
 FOLDER = Path(__file__).parents[1] / ".." / "shared" / "data" / "people"
 JOURNAL = Path("/tmp/people.jsonl")
@@ -35,27 +35,23 @@ IMPLIED = ("track", "video", "objects")
 """Keys that say nothing but which file, and that there is something in it."""
 
 
-def main() -> None:
-    """Runs cases, or prints their table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("do", choices=("run", "table"))
-    parser.add_argument("--folder", type=Path, default=FOLDER)
-    parser.add_argument("--journal", type=Path, default=JOURNAL)
-    parser.add_argument("--only", default="", help="part of the file's name")
-    parser.add_argument("--package", type=Path, default=PACKAGE, help="the checkout to be tried")
-    asked = parser.parse_args()
-    cases = [one for one in yaml.safe_load(CASES.read_text()) if asked.only in one["file"]]
-    if asked.do == "run":
-        for case in cases:
-            if name_of(case) not in finished(asked.journal):
-                row = tried(asked.folder, asked.package, case)
-                add(asked.journal, row)
-                print(f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}", flush=True)
-    rows = finished(asked.journal)
-    done = [rows[name_of(case)] for case in cases if name_of(case) in rows]
-    if asked.do == "table":
+def main(
+    do: Literal["run", "table"],
+    *,
+    folder: Path = FOLDER,
+    journal: Path = JOURNAL,
+    only: str = "",
+    package: Path = PACKAGE,
+) -> dict[str, int]:
+    cases = [one for one in yaml.safe_load(CASES.read_text()) if only in one["file"]]
+    kept = Journal(journal)
+    for case in cases if do == "run" else ():
+        row = kept.row(name_of(case), lambda case=case: tried(folder, package, case))
+        print(f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}", flush=True)
+    done = [kept.rows[name_of(case)] for case in cases if name_of(case) in kept.rows]
+    if do == "table":
         print("\n".join(markdown(done)))
-    print(dict(Counter(row["judged"] for row in done)), file=sys.stderr)
+    return dict(Counter(row["judged"] for row in done))
 
 
 def name_of(case: Mapping[str, Any]) -> str:
@@ -79,7 +75,7 @@ def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any
         wall_s = time.monotonic() - began
         result = Path(scratch) / "out" / "result.json"
         values = _values(json.loads(result.read_text())) if result.is_file() else {}
-    row = {"case": name_of(case), "file": case["file"], "what": case["what"], "code": code,
+    row = {"file": case["file"], "what": case["what"], "code": code,
            "values": {name: values[name] for name in case.get("right", {}) if name in values},
            "right": _right(case), "wall_s": round(wall_s, 1), "cpu_s": round(cpu_s, 1),
            "keys": _num_keys(declared), "said": said.strip().splitlines()[-25:]}  # fmt: skip

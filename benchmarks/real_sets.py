@@ -7,7 +7,6 @@ spin_flights/, puck_head_on.mp4, cube_tosses/. A set that is absent is skipped, 
 What is made goes into OUT (default: thrown away).
 """
 
-import argparse
 import csv
 import math
 import shutil
@@ -62,19 +61,26 @@ SHOWN = 6  # candidates
 BESIDE_HIT = 14  # frames on either side of a hit through which velocities are laid
 
 
-def main(call: argparse.Namespace) -> dict[str, str]:
+def main(
+    folder: Path,
+    *,
+    set: tuple[str, ...] = (),
+    first: int = 0,
+    flights: int = EVERY_FLIGHT,
+    out: Path | None = None,
+) -> dict[str, str]:
     found = {}
     with tempfile.TemporaryDirectory() as scratch:
-        out = call.out or Path(scratch)
-        flights = slice(call.first, call.first + call.flights)
-        for name in call.set:
+        out = out or Path(scratch)
+        chosen = slice(first, first + flights)
+        for name in set or SETS:
             needed, row = SETS[name]
-            if missing := [one for one in needed if not (call.folder / one).exists()]:
-                found[name] = f"skipped; {', '.join(missing)} not in {call.folder}"
+            if missing := [one for one in needed if not (folder / one).exists()]:
+                found[name] = f"skipped; {', '.join(missing)} not in {folder}"
             else:
                 (out / name).mkdir(parents=True, exist_ok=True)
                 try:
-                    found[name] = row(call.folder, out / name, flights)
+                    found[name] = row(folder, out / name, chosen)
                 except InputError as error:  # the other rows are made all the same
                     found[name] = f"refused; {error}"
             print(f"{name}: {found[name]}", flush=True)
@@ -194,7 +200,8 @@ def cube_tosses(folder: Path, out: Path, _: slice) -> str:
     return (
         f"{len(found.solution.names)} tosses; {'; '.join(told)}; rms of whitened residuals (1 mm, "
         f"1 degree) {', '.join(map(str, rms))} (quartiles, largest); second half off by "
-        f"{second['median_place_over_edge']:.1%} of the edge, {second['median_turn_deg']:.1f} degrees"
+        f"{second['median_place_over_edge']:.1%} of the edge and "
+        f"{second['median_turn_deg']:.1f} degrees"
     )
 
 
@@ -356,11 +363,3 @@ def _verdict(found: gx.Diagnosis) -> str:
         f"{verdict['status']} {', '.join(verdict['effects'])}; chi2 per degree of freedom "
         f"{history[0]['chi2_per_dof']:.2f} -> {history[-1]['chi2_per_dof']:.2f}"
     )
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--set", choices=SETS, nargs="+", default=list(SETS))
-    parser.add_argument("--first", type=int, default=0, help="flight of spin_flights")
-    parser.add_argument("--flights", type=int, default=EVERY_FLIGHT)
-    parser.add_argument("--out", type=Path)

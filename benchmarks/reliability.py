@@ -14,7 +14,6 @@ weaker one may be said or not. What is finished stays in DIR/results.jsonl and i
 
 """
 
-import argparse
 import itertools
 import json
 import math
@@ -30,7 +29,6 @@ from benchmarks import hidden_cases, hidden_effects, tables, verdicts
 from benchmarks.journal import Journal
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.commands import command
 from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
@@ -52,18 +50,18 @@ TRIES = 8  # not every effect has a place in every scene
 NUM_DRAWN = 1000  # of the claims, for the error that right ones have
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(*, out: Path, num: int = 300, first: int = 0) -> dict[str, Any]:
     library = effect_names()
-    journal = Journal(call.out / "results.jsonl")
+    journal = Journal(out / "results.jsonl")
     tables.row("case", ("kind", "truth", "says"))
     entries = []
-    kinds = {f"case{i}": KINDS[i % len(KINDS)] for i in range(call.first, call.first + call.num)}
-    asked = {name: (call.out / "clips", name, kind, library) for name, kind in kinds.items()}
+    kinds = {f"case{i}": KINDS[i % len(KINDS)] for i in range(first, first + num)}
+    asked = {name: (out / "clips", name, kind, library) for name, kind in kinds.items()}
     for name, is_made in hidden_cases.made_meanwhile(make_clip, asked):
         if not is_made:
             tables.row(name, (kinds[name], "", "not made: none of the effects drawn has a place"))
             continue
-        entry = journal.tried(name, lambda name=name: _examined(call.out, name, kinds[name]))
+        entry = journal.tried(name, lambda name=name: _examined(out, name, kinds[name]))
         entries.append(entry)
         says = entry["diagnosis"]["verdict"] if not entry["error"] else {"status": entry["error"]}
         words = f"{says['status']} {' | '.join(says.get('effects', ()))}"
@@ -349,9 +347,3 @@ def _print(figures: Mapping[str, Any]) -> None:
     for key in ("named_wrong", "ambiguous_without_truth"):
         print(f"{key}:", *figures[key], sep="\n  ")
     print(figures["statuses"])
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--out", type=Path, required=True, help="tracks, runs and results")
-    parser.add_argument("--num", type=command.whole_number(1), default=300, help="tracks")
-    parser.add_argument("--first", type=command.whole_number(0), default=0, help="number of case")

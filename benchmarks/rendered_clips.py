@@ -12,6 +12,7 @@ from galileo_jax.similarity.discrepancy import SCALE_SD
 ANGLES_DEG, EXPOSURES_S = (10.0, 28.0), (0.001, 0.012)
 FRAME_RATES, SIZES_PX = (30.0, 60.0), ((640, 360), (1280, 720))
 IDEAL, FAULTY, MEASURED = "rendered", "rendered-faults", "rendered-measured"
+SORTS = (IDEAL, FAULTY, MEASURED)
 FAULTS: dict[str, Any] = {"faults": True, "camera_fault": ("keystone",), "solver": "fine"}
 
 

@@ -7,7 +7,6 @@ CLIP: clips with their yaml; `--together`: one joint fit of all. Without clips: 
 ramps that this program draws. Where a truth is known, each error is counted in the stated sds.
 """
 
-import argparse
 import json
 import re
 import tempfile
@@ -24,15 +23,16 @@ WAYS = ("none", "rough")
 COLUMNS = ("way", "k1", "k2", "off, sds", "chi2 or p", "larger than usual")
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(
+    clips: tuple[Path, ...] = (), *, together: bool = False, num: int = 20, seed: int = 700_000
+) -> dict[str, Any]:
     off: dict[str, list[float]] = {way: [] for way in WAYS}
     tables.row("clip", COLUMNS)
     with tempfile.TemporaryDirectory() as scratch:
-        seeds = range(call.seed, call.seed + call.num)
-        each = [[path] for path in call.clips] or [[_drawn(Path(scratch), i)] for i in seeds]
-        for clips in [call.clips] if call.together else each:
+        drawn = () if clips else [_drawn(Path(scratch), each) for each in range(seed, seed + num)]
+        for group in [clips] if together else [(path,) for path in (*clips, *drawn)]:
             for way in WAYS:
-                off[way] += _row(clips, way)
+                off[way] += _row(group, way)
     return {
         way: {"rms": float(np.std(values)), "inside": float(np.mean(np.abs(values) < 1.96))}
         for way, values in off.items()
@@ -81,10 +81,3 @@ def _truth(clip: Path) -> dict[str, Any]:
     if {"m1", "m2"} <= set(truth):
         truth["mass_ratio"] = truth["m1"] / truth["m2"]
     return truth
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("clips", type=Path, nargs="*")
-    parser.add_argument("--together", action="store_true")
-    parser.add_argument("--num", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=700_000)

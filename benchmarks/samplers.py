@@ -7,7 +7,6 @@
     thesis    the thesis's 16 chains x 75 steps on our rollouts; the best sample wins
     sysid     as mujoco.sysid does: 256 random rollouts of MuJoCo's C engine, the best 3 refined
               by its optimiser, m1, k1, m2, k2 free, no nuisances (peers.py)
-    bullet    the thesis's sampler on PyBullet's rollouts, if PyBullet is there (peers.py)
 
 The first method named runs on all `--num` tracks, the others on the first `--num-shared`. Noise:
 0.01 m/s on the velocities, that is 0.01 / (fps sqrt 2) m on positions. Tracks of `--source exact`
@@ -24,13 +23,13 @@ root mean square. With `--keep FILE` a run that was cut off goes on, and methods
 stand in one table.
 """
 
-import argparse
+import itertools
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -49,8 +48,6 @@ from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.result import make_result
 from galileo_jax.neural.estimate import cnn_posterior
 from galileo_jax.neural.start import start_from_network
-from galileo_jax.rollout.engine_names import ENGINES
-from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 from galileo_jax.simulation.truth import Truth
@@ -59,7 +56,8 @@ from galileo_jax.thesis.estimate import thesis_posterior
 NOISE_M_S = 0.01
 NOISE_M = NOISE_M_S / (tracks.FPS * math.sqrt(2))
 STUCK, MOST_STUCK, COVERAGE = 1.5, 0.02, (0.90, 0.99)
-PRIOR = "prior"
+Source = Literal["exact", "engine", "prior"]
+Method = Literal["grad", "mh", "mh-cnn", "cnn", "thesis", "sysid"]
 SIZE_M, RELEASE_M, OBJECT2_M, DRIVEN_M = (0.06, 0.06, 0.06), 0.5, 0.25, 0.01
 COLUMNS = (
     *("k1 err", "in 95%", "k2 err", "in 95%", "ratio err", "in 95%"),
@@ -89,30 +87,36 @@ class Answer(NamedTuple):
 
 
 @in_float64
-def main(call: argparse.Namespace) -> dict[str, Any]:
-    methods = call.methods.split(",")
-    if unknown := set(methods) - set(METHODS):
-        raise InputError(f"--methods: unknown {sorted(unknown)}; known: {', '.join(METHODS)}")
-    journal, warm = Journal(call.keep), set[str]()
+def main(
+    *,
+    methods: tuple[Method, ...] = ("grad", "sysid"),
+    num: int = 100,
+    num_shared: int = 10,
+    seed: int = 0,
+    source: Source = "exact",
+    noise: NoiseModel = "tracker",
+    keep: Path | None = None,
+) -> dict[str, Any]:
+    journal, warm = Journal(keep), set[str]()
     rows: dict[str, list[dict[str, Any]]] = {name: [] for name in methods}
     tables.row("track, method", COLUMNS)
-    for number, case in enumerate(_cases(call)):
-        seed = call.seed + number
-        for name in methods if number < call.num_shared else methods[:1]:
+    for number, case in enumerate(_cases(source, seed, num, noise)):
+        for name in methods if number < num_shared else methods[:1]:
 
-            def answered(name: str = name, case: Case = case, seed: int = seed) -> dict[str, Any]:
+            def answered(name: str = name, case: Case = case, own: int = seed + number):
                 if name not in warm:
-                    METHODS[name](case, seed)
+                    METHODS[name](case, own)
                     warm.add(name)
                 began = time.perf_counter()
-                answer = METHODS[name](case, seed)
+                answer = METHODS[name](case, own)
                 return _row(case, answer, time.perf_counter() - began)
 
-            key = f"{call.source} {call.noise} {call.engine} {call.seed} {number} {name}"
-            rows[name].append(row := journal.row(key, answered))
+            rows[name].append(
+                row := journal.row(f"{source} {noise} {seed} {number} {name}", answered)
+            )
             cells = [row[q][what] for q in scoring.QUANTITIES for what in ("error", "is_covered")]
             cells += [row[what] for what in ("chi2", "rollouts", "seconds", "ess", "converged")]
-            tables.row(f"{seed} {name}", cells)
+            tables.row(f"{seed + number} {name}", cells)
     print()
     tables.row("method", SUMMARY)
     figures = {name: _summary(rows[name], rows.get("mh", ())) for name in methods}
@@ -120,19 +124,18 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
         tables.row(name, [figures[name][column] for column in SUMMARY])
     print()
     tables.row("method, quantity", [*figures[methods[0]]["k1"]])
-    for name in methods:
-        for quantity in scoring.QUANTITIES:
-            tables.row(f"{name} {quantity}", list(figures[name][quantity].values()))
+    for name, quantity in itertools.product(methods, scoring.QUANTITIES):
+        tables.row(f"{name} {quantity}", list(figures[name][quantity].values()))
     missed = [m for name in methods if name in ("grad", "mh") for m in _missed(name, figures[name])]
-    return figures | {"source": call.source, "bars_missed": tables.missed(missed)}
+    return figures | {"source": source, "bars_missed": tables.missed(missed)}
 
 
-def _cases(call: argparse.Namespace) -> Iterator[Case]:
-    if call.source == PRIOR:
-        yield from drawn_from_the_prior(call.seed, call.num, call.noise)
+def _cases(source: Source, seed: int, num: int, noise: NoiseModel) -> Iterator[Case]:
+    if source == "prior":
+        yield from drawn_from_the_prior(seed, num, noise)
     else:
-        for seed in range(call.seed, call.seed + call.num):
-            yield tracks.make_case(seed, call.source, NOISE_M, call.engine)
+        for own in range(seed, seed + num):
+            yield tracks.make_case(own, source, NOISE_M)
 
 
 def drawn_from_the_prior(seed: int, count: int, noise: NoiseModel) -> list[Case]:
@@ -195,10 +198,6 @@ def fit_sysid(case: Case, seed: int) -> Answer:
     return _of_peer(peers.sysid(case.problem, NOISE_M_S, seed))
 
 
-def fit_bullet(case: Case, seed: int) -> Answer:
-    return _of_peer(peers.thesis_on_bullet(case.problem, case.truth, seed))
-
-
 METHODS: dict[str, Callable[[Case, int], Answer]] = {
     "grad": fit_grad,
     "mh": fit_mh,
@@ -206,7 +205,6 @@ METHODS: dict[str, Callable[[Case, int], Answer]] = {
     "cnn": fit_cnn,
     "thesis": fit_thesis,
     "sysid": fit_sysid,
-    "bullet": fit_bullet,
 }
 
 
@@ -292,14 +290,3 @@ def _missed(method: str, figures: Mapping[str, Any]) -> Iterator[str]:
         coverage, (low, high) = figures[name]["coverage"], COVERAGE
         if not low <= coverage <= high:
             yield f"{method}: {name} coverage {coverage:.0%} outside {low:.0%} to {high:.0%}"
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--num", type=int, default=100, help="tracks")
-    parser.add_argument("--num-shared", type=int, default=10, help="of these, for all methods")
-    parser.add_argument("--seed", type=int, default=0, help="the first track's seed")
-    parser.add_argument("--source", choices=(*tracks.SOURCES, PRIOR), default="exact")
-    parser.add_argument("--noise", choices=get_args(NoiseModel), default="tracker", help="of prior")
-    parser.add_argument("--methods", default="grad,sysid", help=",".join(METHODS))
-    parser.add_argument("--engine", default="auto", choices=ENGINES)
-    parser.add_argument("--keep", type=Path, metavar="FILE", help="answers, to go on from")

@@ -3,28 +3,23 @@
     python -m benchmarks scaling [--only clips workers memory]
 
     clips     seconds per clip of `grad` against the number of clips, in one process, and what the
-              clips after the first of their shape cost (the marginal cost); how often each program
-              was compiled, which is once for each shape
+              clips after the first of their shape cost (the marginal cost, bar 3 s)
     workers   seconds per clip of a sweep against its workers
     memory    peak memory of a sweep of 100 cells and of 1,000, of the parent and of the worker
+              (bar: 1.2 times as much)
 
 Clips are csv tracks by `galileo simulate`. A shape is what programs are compiled for: numbers of
 objects, frames (in steps of 64) and recorded instants (in steps of 128). Seconds are wall clock:
 run it on a quiet machine. Rollouts per second are in `accelerator`.
 """
 
-import argparse
-import contextlib
 import json
-import logging
 import os
-import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,30 +28,29 @@ import numpy as np
 from benchmarks import tables
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.commands import command
-from galileo_jax.measurement.measure import measure
+from galileo_jax.measurement.measure import Measurement, measure
 
 CLIPS = (1, 2, 4, 8, 16, 32, 64)
-CELLS = (100, 1000)
-BARS = {"marginal_s": 3.0, "memory_ratio": 1.2}
-HEAVY = ("_roll_out_batch", "seen_slopes_batch", "solve", "white_batch", "_seen_batch")
-LOGGING = ("dispatch", "compiler", "interpreters.pxla")  # JAX's modules that tell of compilations
-PARTS = ("clips", "workers", "memory")
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(
+    *,
+    only: tuple[str, ...] = ("clips", "workers", "memory"),
+    clips: int = CLIPS[-1],
+    method: str = "grad",
+    cells: tuple[int, ...] = (100, 1000),
+) -> dict[str, Any]:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of the sweeps' processes
     figures: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(call.folder or temporary)
-        if {"clips", "workers"} & set(call.only):
-            paths = make_tracks(folder, call.clips)
-            if "clips" in call.only:
-                figures["clips"] = cost_of_clips(paths)
-            if "workers" in call.only:
-                figures["workers"] = cost_with_workers(folder, paths[: call.clips // 2])
-        if "memory" in call.only:
-            figures["memory"] = memory_of_cells(folder, call.method, call.cells)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        paths = make_tracks(folder, clips if {"clips", "workers"} & {*only} else 0)
+        if "clips" in only:
+            figures["clips"] = cost_of_clips(paths)
+        if "workers" in only:
+            figures["workers"] = cost_with_workers(folder, paths[: clips // 2])
+        if "memory" in only:
+            figures["memory"] = memory_of_cells(folder, method, cells)
     return figures
 
 
@@ -68,55 +62,35 @@ def make_tracks(folder: Path, count: int) -> list[Path]:
     return paths
 
 
-def make_short_track(folder: Path) -> Path:
-    """A block on a slope for 0.4 s at 30 fps: the cheapest of cells."""
-    path = folder / "short.csv"
-    simulate(path, track_only=True, scenario="incline", seconds=0.4, fps=30.0, seed=0)
-    return path
-
-
 def cost_of_clips(paths: Sequence[Path]) -> dict[str, Any]:
+    """Seconds per clip, of all and of those whose shape another had before."""
     from galileo_jax.sweeping.settings import Grad
     from galileo_jax.sweeping.work import run_cell
 
-    seconds, compiled = [], []
-    shapes: Counter[tuple[int, ...]] = Counter()
-    is_first = []
-    tables.row("clips", ("s per clip", "shapes", "programs", "small ones"))
-    total: Counter[str] = Counter()
-    for i, path in enumerate(paths, 1):
-        with compilations() as names:
-            began = time.perf_counter()
-            measured = measure(load_clip(path))
-            run_cell(Grad(), (measured,))
-            seconds.append(time.perf_counter() - began)
-        shape = shape_of(measured)
-        is_first.append(shape not in shapes)
-        shapes[shape] += 1
-        total.update(names)
-        compiled.append(sum(names[name] for name in HEAVY))
-        if i in CLIPS:
-            heavy = sum(total[name] for name in HEAVY)
-            small = sum(total.values()) - heavy
-            tables.row(str(i), (float(np.mean(seconds)), len(shapes), heavy, small))
-    if missing := [name for name in HEAVY if not total[name]]:
-        raise RuntimeError(f"JAX logs no compilation of {missing}: HEAVY has other names")
-    later = ~np.array(is_first)
-    marginal = float(np.mean(np.array(seconds)[later]))
-    surplus = int(np.array(compiled)[later].sum())
-    print(f"marginal {marginal:.2f} s per clip (bar {BARS['marginal_s']:g}); "
-          f"programs compiled by clips of a shape seen before: {surplus}")  # fmt: skip
-    return {
+    shapes = set[tuple[int, ...]]()
+    seconds, later = [], []
+    tables.row("clips", ("s per clip", "shapes"))
+    for count, path in enumerate(paths, 1):
+        began = time.perf_counter()
+        measured = measure(load_clip(path))
+        run_cell(Grad(), (measured,))
+        seconds.append(time.perf_counter() - began)
+        if (shape := shape_of(measured)) in shapes:
+            later.append(seconds[-1])
+        shapes.add(shape)
+        if count in CLIPS:
+            tables.row(str(count), (float(np.mean(seconds)), len(shapes)))
+    figures = {
         "seconds_per_clip": float(np.mean(seconds)),
-        "marginal_s": marginal,
-        "marginal_largest_s": float(np.max(np.array(seconds)[later])),
+        "marginal_s": float(np.mean(later)),
+        "marginal_largest_s": max(later),
         "shapes": len(shapes),
-        "programs": {name: total[name] for name in HEAVY},
-        "programs_compiled_again": surplus,
     }
+    tables.summary(figures)
+    return figures
 
 
-def shape_of(measured: Any) -> tuple[int, ...]:
+def shape_of(measured: Measurement) -> tuple[int, ...]:
     """What programs are compiled for: objects, frames, recorded instants."""
     from galileo_jax.inference.build_problem import make_problem
     from galileo_jax.rollout.engine_jax import RECORDS
@@ -125,33 +99,6 @@ def shape_of(measured: Any) -> tuple[int, ...]:
     problem = make_problem(measured.clip, measured.observation)
     count, _, frames = measured.observation.position_m.shape
     return count, rounded_up(frames, FRAMES), rounded_up(problem.model.num_records + 1, RECORDS)
-
-
-@contextlib.contextmanager
-def compilations() -> Iterator[Counter[str]]:
-    """Counts what JAX compiles (or reads from its cache on disk) inside, by name."""
-    import jax
-
-    names: Counter[str] = Counter()
-
-    class Count(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            if found := re.match(r"Finished XLA compilation of jit\((\w+)\)", record.getMessage()):
-                names[found[1]] += 1
-
-    handler = Count()
-    loggers = [logging.getLogger(f"jax._src.{name}") for name in LOGGING]
-    jax.config.update("jax_log_compiles", True)
-    for logger in loggers:
-        logger.propagate = False  # nothing is printed
-        logger.addHandler(handler)
-    try:
-        yield names
-    finally:
-        for logger in loggers:
-            logger.removeHandler(handler)
-            logger.propagate = True
-        jax.config.update("jax_log_compiles", False)
 
 
 def cost_with_workers(folder: Path, paths: Sequence[Path]) -> dict[str, float]:
@@ -169,7 +116,8 @@ def cost_with_workers(folder: Path, paths: Sequence[Path]) -> dict[str, float]:
 
 def memory_of_cells(folder: Path, method: str, cells: Sequence[int]) -> dict[str, Any]:
     """Peak resident memory of a sweep's processes, MB: one short track from many seeds."""
-    path = make_short_track(folder)
+    path = folder / "short.csv"  # the cheapest of cells
+    simulate(path, track_only=True, scenario="incline", seconds=0.4, fps=30.0, seed=0)
     found: dict[str, Any] = {"method": method}
     config: dict[str, Any] = {"clips": [str(path)], "common": {"method": method}}
     run_sweep(folder / "cells_first", config, 1)  # compiles, which takes memory of its own
@@ -184,9 +132,7 @@ def memory_of_cells(folder: Path, method: str, cells: Sequence[int]) -> dict[str
         found[str(count)] = {"parent_mb": parent, "worker_mb": worker, "s_per_cell": each}
     few, many = (found[str(count)] for count in (cells[0], cells[-1]))
     found["ratio"] = {key: many[key] / few[key] for key in ("parent_mb", "worker_mb")}
-    print(f"{cells[-1]} cells against {cells[0]}: " + ", ".join(
-        f"{key} {value:.3f}" for key, value in found["ratio"].items()
-    ) + f" (bar {BARS['memory_ratio']:g})")  # fmt: skip
+    tables.row(f"{cells[-1]} over {cells[0]}", list(found["ratio"].values()))
     return found
 
 
@@ -228,13 +174,3 @@ def run_sweep(out: Path, config: dict[str, Any], workers: int) -> list[float]:
         [sys.executable, "-c", PEAKS, *words], check=True, stdout=subprocess.PIPE, text=True
     )
     return json.loads(done.stdout.splitlines()[-1])
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS))
-    parser.add_argument("--clips", type=command.whole_number(2), default=CLIPS[-1])
-    parser.add_argument("--method", default="grad", help="of the cells whose memory is measured")
-    parser.add_argument(
-        "--cells", type=command.whole_number(1), nargs="+", default=CELLS, help="of the memory"
-    )
-    parser.add_argument("--folder", help="for clips and sweeps, kept there")

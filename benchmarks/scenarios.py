@@ -10,7 +10,6 @@ declared, floors inferred; `unscaled`: lengths in pixels of unknown size. On ram
 and more than two objects: 30 frames/s, 0.2 mm.
 """
 
-import argparse
 import tempfile
 import time
 from collections.abc import Mapping
@@ -99,12 +98,12 @@ CASES: dict[str, Free | OnRamp] = {
 
 
 @in_float64
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(*, seeds: int = 20, case: tuple[str, ...] = tuple(CASES)) -> dict[str, Any]:
     figures: dict[str, Any] = {}
-    for name in call.case or CASES:
+    for name in case:
         began = time.perf_counter()
-        fits = [_fitted(*CASES[name].make(seed), seed) for seed in range(call.seeds)]
-        seconds = (time.perf_counter() - began) / call.seeds
+        fits = [_fitted(*CASES[name].make(seed), seed) for seed in range(seeds)]
+        seconds = (time.perf_counter() - began) / seeds
         scores, results = zip(*fits, strict=True)
         tables.row(name, [*COLUMNS.values(), "told"])
         found: dict[str, Any] = {}
@@ -155,8 +154,3 @@ def _in_pixels(seen: Observation, scale: float) -> Observation:
         position_m=factor * seen.position_m,
         covariance_m2=factor**2 * seen.covariance_m2,
     )
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--case", action="append", choices=list(CASES))

@@ -8,19 +8,16 @@ ideal ones and with the small faults of real clips, tracks of 0.05 to 1 mm noise
 `galileo fit --method grad` does, and from the truth. A fit is in a side valley where the fit from
 the truth has more evidence by more than 3 nats: it was there to be found and was not.
 
-With `--chains N`, the N worst fits are also sampled as `--method mh` does: what it says of k1 and
-k2 beside what the fit says.
-
-CPU seconds are of the whole process per fit, compilation apart.
+CPU seconds are of the whole process per fit, compilation apart. With `--out FILE` a run that was
+cut off goes on.
 """
 
-import argparse
 import math
 import time
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 import jax.numpy as jnp
 import numpy as np
@@ -32,7 +29,6 @@ from galileo_jax.clip.schema import ClipObject
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.metropolis import metropolis_posterior
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
@@ -74,50 +70,18 @@ class Scene:
         return f"{self.seed}: {shapes}, {values}, object 2 at {it.object2_x_m:.2f} m"
 
 
-class Ended(NamedTuple):
-    """How the fit of one scene ended.
-
-    Attributes:
-      scene: that was fitted.
-      fit: of it.
-      behind: nats of evidence behind the fit from the truth.
-      cpu_s: of the fit.
-    """
-
-    scene: Scene
-    fit: GradientFit
-    behind: float
-    cpu_s: float
-
-    def __str__(self) -> str:
-        """The scene, and what was found in it."""
-        trials = self.scene.trials
-        found = dict(zip(trials.names, trials.theta(self.fit.z), strict=True))
-        ratio = found["m1"] / found["m2"]
-        values = f"k1 {found['k1']:.3f}, k2 {found['k2']:.3f}, ratio {ratio:.2f}"
-        chi2 = self.fit.chi2 / self.fit.num_values
-        ended = f"chi2 {chi2:.2f}, {self.fit.code.name}, {self.behind:.1f} nats behind"
-        return f"{self.scene}; found {values}, {ended}"
-
-
 @in_float64
-def main(call: argparse.Namespace) -> dict[str, Any]:
-    seeds = call.seeds or range(call.first, call.first + call.num)
-    journal, ends, rows = Journal(call.out), [], []
-    for seed in seeds:
-
-        def ended(seed: int = seed) -> dict[str, Any]:
-            ends.append(end := fit_scene(draw_scene(seed), call.seed))
-            return {"seed": seed, "behind": end.behind, "code": end.fit.code.name, "cpu_s": end.cpu_s,
-                    "rollouts": end.fit.stats["num_rollouts"], "says": str(end)}  # fmt: skip
-
-        rows.append(journal.row(f"scene {seed}", ended))
-        if rows[-1]["behind"] > SIDE_VALLEY_NATS:
-            print(rows[-1]["says"], flush=True)
+def main(
+    *, num: int = 300, first: int = 0, seed: int = 0, out: Path | None = None
+) -> dict[str, Any]:
+    journal, rows = Journal(out), []
+    for own in range(first, first + num):
+        row = journal.row(f"scene {own}", lambda own=own: fitted(draw_scene(own), seed))
+        if row["behind"] > SIDE_VALLEY_NATS:
+            print(row["says"], flush=True)
+        rows.append(row)
     stuck = [row for row in rows if row["behind"] > SIDE_VALLEY_NATS]
     cpu = np.array([row["cpu_s"] for row in rows])
-    for end in sorted(ends, key=lambda end: -end.behind)[: call.chains]:
-        _print_chains(end, call.seed)
     figures = {
         "scenes": len(rows),
         "stuck": len(stuck),
@@ -163,15 +127,26 @@ def draw_scene(seed: int) -> Scene:
     return Scene(seed, truth, make_joint_problem([clip], [seen]))
 
 
-def fit_scene(scene: Scene, seed: int) -> Ended:
-    """Fits it as users do and from the truth."""
+def fitted(scene: Scene, seed: int) -> dict[str, Any]:
+    """How the fit of a scene as users do it ends, and how far behind the fit from the truth."""
     fitter = GradientFitter(scene.trials)
     fitter.compile()
     began = time.process_time()
     fit = fitter.fit(seed)
     cpu_s = time.process_time() - began
     behind = from_truth(scene, fitter).log_evidence - fit.log_evidence
-    return Ended(scene, fit, behind, cpu_s)
+    found = dict(zip(scene.trials.names, scene.trials.theta(fit.z), strict=True))
+    ratio = found["m1"] / found["m2"]
+    values = f"k1 {found['k1']:.3f}, k2 {found['k2']:.3f}, ratio {ratio:.2f}"
+    ended = f"chi2 {fit.chi2 / fit.num_values:.2f}, {fit.code.name}, {behind:.1f} nats behind"
+    return {
+        "seed": scene.seed,
+        "behind": behind,
+        "code": fit.code.name,
+        "cpu_s": cpu_s,
+        "rollouts": fit.stats["num_rollouts"],
+        "says": f"{scene}; found {values}, {ended}",
+    }
 
 
 def from_truth(scene: Scene, fitter: GradientFitter) -> GradientFit:
@@ -216,26 +191,3 @@ def _with_faults(truth: Truth, rng: np.random.Generator) -> Truth:
 
 def _log_uniform(rng: np.random.Generator, span: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(*np.log(span))))
-
-
-def _print_chains(end: Ended, seed: int) -> None:
-    """Of one scene, what the fit and `mh` say: truth, mean and sd by each."""
-    names, trials = end.scene.trials.names, end.scene.trials
-    posterior = metropolis_posterior(trials, end.fit, seed)
-    print(f"\n{end}\n  mh: {posterior.status.name}")
-    z = np.random.default_rng(seed).multivariate_normal(end.fit.z, end.fit.covariance, 2000)
-    theta = trials.theta(z)
-    for name in ("k1", "k2"):
-        drawn, i = posterior[name], names.index(name)
-        print(f"  {name}: true {end.scene.truth.known[name]:.4f}; "
-              f"grad {theta[:, i].mean():.4f} +- {theta[:, i].std():.4f}; "
-              f"mh {drawn.mean():.4f} +- {drawn.std():.4f}")  # fmt: skip
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--num", type=int, default=300, help="scenes")
-    parser.add_argument("--first", type=int, default=0, help="seed of the first scene")
-    parser.add_argument("--seeds", type=int, nargs="*", help="of the scenes, in place of these")
-    parser.add_argument("--seed", type=int, default=0, help="of the fits")
-    parser.add_argument("--chains", type=int, default=0, help="so many of the worst are sampled")
-    parser.add_argument("--out", type=Path, help="finished scenes, to go on from")

@@ -10,7 +10,6 @@ it is visible, and lost (invisible though no hand is near). The followed point i
 one, or the centre without it (`--find`).
 """
 
-import argparse
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -105,13 +104,13 @@ def _mean(values: np.ndarray) -> float:
     return float(values.mean()) if len(values) else float("nan")
 
 
-def main(call: argparse.Namespace) -> dict[str, Any]:
+def main(folder: Path, *, find: bool = False) -> dict[str, Any]:
     rows: list[Row] = []
     failures: dict[str, str] = {}
     tables.row("clip", Row._fields[1:])
-    for path, truth in clips_with_truth(call.folder, "", "all"):
+    for path, truth in clips_with_truth(folder, "", "all"):
         clip = load_clip(path)
-        if call.find:
+        if find:
             blind = [item.model_copy(update={"point_px": None}) for item in clip.objects]
             clip = clip.model_copy(update={"objects": tuple(blind)})
         began = time.process_time()
@@ -141,8 +140,3 @@ def main(call: argparse.Namespace) -> dict[str, Any]:
         "cpu_seconds_median": float(np.median([r.seconds for r in rows])),
         "cpu_seconds_worst": max(r.seconds for r in rows),
     }
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--find", action="store_true", help="leave out the declared points")

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -19,7 +20,6 @@ from galileo_jax.simulation.truth import Truth, draw_truth
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.reference_ramp import Experiment, solve
 
-SOURCES = ("exact", "engine")
 FPS, NUM_FRAMES, RAMP_ANGLE_DEG = 30.0, 61, 20.0
 
 
@@ -47,14 +47,13 @@ class Case:
         return {"m1": m1, "k1": k1, "m2": m2, "k2": k2}
 
 
-def make_case(seed: int, source: str, noise_m: float, engine: str = "auto") -> Case:
+def make_case(seed: int, source: Literal["exact", "engine"], noise_m: float) -> Case:
     """A random experiment in which object 2 is hit, seen for two seconds at 30 fps.
 
     Args:
       seed: same seed, same case.
       source: "exact": closed form; "engine": the project's own rollouts.
       noise_m: standard deviation of each coordinate in each frame, declared as it is.
-      engine: which the trials use.
     """
     rng = np.random.default_rng([seed, 2])
     truth = draw_truth(rng, RAMP_ANGLE_DEG, {})
@@ -63,7 +62,7 @@ def make_case(seed: int, source: str, noise_m: float, engine: str = "auto") -> C
     centres = motion.position_m
     seen = observed(centres + noise_m * rng.standard_normal(centres.shape), FPS, noise_m)
     clip = declared(truth.objects, RAMP_ANGLE_DEG, FPS, NUM_FRAMES)
-    return Case(truth, make_joint_problem([clip], [seen], engine))
+    return Case(truth, make_joint_problem([clip], [seen]))
 
 
 def observed(position_m: np.ndarray, fps: float, noise_m: float) -> Observation:

@@ -15,7 +15,6 @@ a name are among the `candidates`; `replicates` of all comparisons, those of pai
 whether a clip like this would tell what is named from its rivals; `force`: the missing force.
 """
 
-import argparse
 import json
 import os
 import resource
@@ -39,7 +38,7 @@ TRACKS = {
     "pair": ("air_drag", "friction_patch"),
     "unknown": ("exotic_bump",),
 }
-VIDEO = "video"
+VIDEO, VERBS = "video", ("fit", "diagnose")
 ANGLE_DEG, STRENGTH = 20.0, 0.7
 FIXED_ROLLOUTS, FIXED_BATCH = 10_000, 200
 
@@ -89,28 +88,34 @@ class StageClock:
             self.begin(stage)
 
 
-def main(call: argparse.Namespace) -> dict[str, Any] | None:
-    if call.one:
-        return _print_one(*call.one)
-    help_call = [sys.executable, "-m", "galileo_jax", "fit", "--help"]
+def main(
+    *,
+    case: tuple[str, ...] = (*TRACKS, VIDEO),
+    verb: tuple[str, ...] = VERBS,
+    seed: int = 7001,
+    repeats: int = 2,
+    one: tuple[str, ...] = (),
+) -> dict[str, Any] | None:
+    if one:
+        return _print_one(*one)
     figures: dict[str, Any] = {
-        "seed": call.seed,
         "python": _least([sys.executable, "-c", "pass"]),
-        "fit_help": _least(help_call),
+        "fit_help": _least([sys.executable, "-m", "galileo_jax", "fit", "--help"]),
         "fixed_before": fixed_calculation(),
     }
     with tempfile.TemporaryDirectory() as folder:
-        clips = {case: _simulated(Path(folder), case, call.seed) for case in call.case}
-        for verb in call.verb:
-            tables.row(f"{verb}, CPU s", [*COLUMNS, "whole"])
-            figures[verb] = {}
-            for case in clips:
-                if verb == "fit" or case != VIDEO:
-                    figures[verb][case] = _measured(verb, clips[case], call.repeats)
-                    _print_row(case, figures[verb][case])
+        clips = {name: _simulated(Path(folder), name, seed) for name in case}
+        for asked in verb:
+            tables.row(f"{asked}, CPU s", [*COLUMNS, "whole"])
+            figures[asked] = {}
+            for name, clip in clips.items():
+                if asked == "fit" or name != VIDEO:
+                    figures[asked][name] = measured = _measured(asked, clip, repeats)
+                    spent = measured["cpu_s"]
+                    tables.row(f"  {name}", [*map(spent.get, COLUMNS), sum(spent.values())])
+                    print(f"    {' '.join(measured['result'])}", flush=True)
     figures["fixed_after"] = fixed_calculation()
-    for name in ("python", "fit_help", "fixed_before", "fixed_after"):
-        tables.row(name, [figures[name]])
+    tables.summary(figures)
     return figures
 
 
@@ -190,20 +195,3 @@ def _least(words: Sequence[str], repeats: int = 5) -> float:
         return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
     return min(once() for _ in range(repeats))
-
-
-def _print_row(case: str, measured: dict[str, Any]) -> None:
-    seconds = measured["cpu_s"]
-    tables.row(f"  {case}", [*(seconds.get(stage) for stage in COLUMNS), sum(seconds.values())])
-    print(f"    {' '.join(measured['result'])}", flush=True)
-
-
-def options(parser: argparse.ArgumentParser) -> None:
-    cases = (*TRACKS, VIDEO)
-    parser.add_argument("--case", nargs="+", choices=cases, default=list(cases))
-    parser.add_argument(
-        "--verb", nargs="+", choices=("fit", "diagnose"), default=["fit", "diagnose"]
-    )
-    parser.add_argument("--seed", type=int, default=7001, help="of the clips")
-    parser.add_argument("--repeats", type=int, default=2)
-    parser.add_argument("--one", nargs=2, metavar=("VERB", "CLIP"), help=argparse.SUPPRESS)
