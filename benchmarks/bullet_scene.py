@@ -45,7 +45,10 @@ class World(NamedTuple):
     slower: float = 0.0
 
 
-def roll_out(truth: Truth, num_steps: int, hidden: World = World()) -> np.ndarray:
+NOTHING = World()
+
+
+def roll_out(truth: Truth, num_steps: int, hidden: World = NOTHING) -> np.ndarray:
     """Builds the world and steps it.
 
     Friction is multiplied in Bullet: with 1 on ramp and table the boxes' own counts.

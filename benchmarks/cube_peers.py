@@ -1,15 +1,14 @@
-"""How well do three simulators predict thrown cubes, each with parameters that suit it best?
+"""How well is a thrown cube predicted, by this program and by MuJoCo as it suits it best?
 
     python -m benchmarks cube_peers ../shared/data/real/cube_tosses
 
 Every third toss is for learning: this program's joint fit (`galileo.fit_tosses`), and for MuJoCo
-(friction, the time constant and the damping of its contacts) and PyBullet (friction, restitution;
-optional: `pip install -e '.[bullet]'`) the parameters that predict these tosses best: of scattered
-ones the best, and Nelder-Mead from there. Then each predicts the tosses that none has learned from,
-from the same start: place, turning, velocity and spin at the last frame before the first impact, as
-the flight tells them. All have the edge, the inertia, the centre of mass, the floor and the gravity
-of this program's fit; its cube alone has rounded corners. "Even mass": the same without its centre
-of mass and its inertia, as anybody would simulate a cube.
+the friction, the time constant and the damping of its contacts that predict these tosses best: of
+scattered ones the best, and Nelder-Mead from there. Then each predicts the tosses that none has
+learned from, from the same start: place, turning, velocity and spin at the last frame before the
+first impact, as the flight tells them. Both have the edge, the inertia, the centre of mass, the
+floor and the gravity of this program's fit; its cube alone has rounded corners. "Even mass": the
+same without its centre of mass and its inertia, as anybody would simulate a cube.
 
 Errors are means over the frames from the first impact on, of the place over the edge and of the
 turning, and medians over the tosses.
@@ -40,7 +39,7 @@ SAME_ERROR_RAD = 0.5  # a turning that counts as much as a whole edge
 NUM_SCATTERED, SCATTERED_LOG, MOST_EVALUATIONS = 100, 1.5, 100
 LONGEST = 256  # frames: all tosses share one program
 SOLID = 1 / 6  # inertia of an even cube, in its mass times edge squared
-PUBLISHED = {"friction": 0.18, "restitution": 0.125}
+FIRST_TRIED = (0.2, 0.01, 0.5)  # MuJoCo's: friction, time constant and damping of a contact
 
 
 class Thrown(NamedTuple):
@@ -117,19 +116,8 @@ def main(folder: Path, *, every: int = 3) -> dict[str, Any]:
         tables.row(name, flat)
 
     show("galileo_jax", by_galileo, cube, common)
-    peers = {"mujoco": (by_mujoco, [0.2, 0.01, 0.5])}
-    try:
-        import pybullet  # pyright: ignore  # noqa: F401
-
-        peers["pybullet"] = (by_bullet, [0.2, 0.3])
-    except ImportError:
-        print("pybullet is not installed: left out")
-    for name, (simulator, begin) in peers.items():
-        for suffix, given in (("", cube), (", even mass", middle)):
-            best = best_for(simulator, old, given, np.array(begin))
-            show(name + suffix, simulator, given, best)
-            if simulator is by_bullet:
-                show(f"published{suffix}", by_bullet, given, np.array(list(PUBLISHED.values())))
+    for name, given in (("mujoco", cube), ("mujoco, even mass", middle)):
+        show(name, by_mujoco, given, best_for(by_mujoco, old, given, np.array(FIRST_TRIED)))
     return figures
 
 
@@ -221,52 +209,6 @@ def by_mujoco(one: Thrown, cube: Cube, parameters: np.ndarray) -> tuple[np.ndarr
         found.append(data.qpos.copy())
     poses = np.array(found)
     return poses[:, :3], poses[:, 3:]
-
-
-def by_bullet(one: Thrown, cube: Cube, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """PyBullet; parameters: friction and restitution of the contact."""
-    import pybullet  # pyright: ignore
-
-    friction, restitution = (float(number) for number in np.sqrt(parameters))  # it multiplies both
-    client = pybullet.connect(pybullet.DIRECT)
-    try:
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP_S, numSubSteps=0)
-        pybullet.setGravity(0, 0, -cube.gravity)
-        floor = pybullet.createMultiBody(
-            0,
-            pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[5, 5, 0.5]),
-            basePosition=[0, 0, cube.floor - 0.5],
-        )
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX,
-            halfExtents=[cube.edge / 2] * 3,
-            collisionFramePosition=(-cube.centre).tolist(),
-        )
-        turned = Rotation.from_quat(np.asarray(one.start.quaternion), scalar_first=True)
-        lever = turned.apply(cube.centre)  # PyBullet's place and velocity are the centre of mass's
-        place = one.start.position_m + lever
-        body = pybullet.createMultiBody(
-            MASS_KG, shape, -1, np.asarray(place).tolist(), turned.as_quat().tolist()
-        )
-        pybullet.changeDynamics(body, -1, localInertiaDiagonal=[cube.moment_kg_m2] * 3)
-        for thing in (floor, body):
-            pybullet.changeDynamics(
-                thing, -1, lateralFriction=friction, restitution=restitution, linearDamping=0,
-                angularDamping=0, rollingFriction=0, spinningFriction=0,
-            )  # fmt: skip
-        spin = np.asarray(one.start.spin_rad_s)
-        velocity = one.start.velocity_m_s + np.cross(spin, lever)
-        pybullet.resetBaseVelocity(body, np.asarray(velocity).tolist(), spin.tolist())
-        found = [pybullet.getBasePositionAndOrientation(body)]
-        for count in np.diff(np.rint(one.times_s / STEP_S).astype(int)):
-            for _ in range(count):
-                pybullet.stepSimulation()
-            found.append(pybullet.getBasePositionAndOrientation(body))
-    finally:
-        pybullet.disconnect(client)
-    turned = Rotation.from_quat([quaternion for _, quaternion in found])
-    places = np.array([place for place, _ in found]) - turned.apply(cube.centre)
-    return places, turned.as_quat(scalar_first=True)
 
 
 _motion = jax.jit(motion)

@@ -14,7 +14,7 @@ keeps the tracks of videos. What is finished stays in DIR/results.jsonl and is n
 import json
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,6 @@ from galileo_jax.runtime.errors import InputError
 PIXELS_PER_METRE = 900.0
 LEAST_CHI2 = 3.0  # of our own grid; clips from elsewhere all count
 COLUMNS = ("right", "covered", "size", "before", "after", "seconds")
-BY_COLUMNS = ("cases", "right", "covered", "size", "wrong", "missed", "unknown")
 Scored = Sequence[tuple[Case, verdicts.Score]]
 
 
@@ -91,7 +90,10 @@ def main(
         "by_strength": _by(scores, lambda case: case.strength),
         "confusion": verdicts.confusion([score for _, score in scores]),
     }
-    _print(report)
+    print("\nconfusion: truth, and what was said")
+    for truth, row in report["confusion"].items():
+        print(f"{truth:<28}  " + ", ".join(f"{label} {count}" for label, count in row.items()))
+    tables.summary(report)
     missed = verdicts.missed_bars(figures, bool(series))
     missed += [f"{name} cannot be diagnosed" for name in failures]
     return report | {"bars_missed": tables.missed(missed)}
@@ -136,26 +138,3 @@ def _by(scores: Scored, key: Callable[[Case], Any]) -> dict[str, dict[str, float
         if key(case) is not None:
             groups.setdefault(str(key(case)), []).append(score)
     return {name: verdicts.summary(group) for name, group in groups.items()}
-
-
-def _print(report: Mapping[str, Any]) -> None:
-    for title in ("by_effect", "by_strength", "too_weak_by_effect"):
-        print()
-        tables.row(title.replace("_", " "), BY_COLUMNS)
-        for name, entry in report[title].items():
-            tables.row(name, _cells(entry))
-    print("\nconfusion: truth, and what was said")
-    for truth, row in report["confusion"].items():
-        print(f"{truth:<28}  " + ", ".join(f"{label} {count}" for label, count in row.items()))
-    print()
-    tables.summary(report)
-
-
-def _cells(entry: Mapping[str, float]) -> list[float]:
-    cases = entry["none"] + entry["known"] + entry["exotic"]
-    right = 1 - entry["false_alarms"] if entry["none"] else entry["named_right"]
-    wrong = entry["false_alarms"] if entry["none"] else entry["confident_wrong"]
-    if entry["exotic"] and not entry["known"]:
-        wrong = entry["confident_wrong_exotic"]
-    values = (right, entry["covered"], entry["mean_set_size"], wrong, entry["missed"])
-    return [cases, *values, entry["unknown_recognised"]]

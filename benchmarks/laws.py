@@ -19,7 +19,7 @@ import numpy as np
 
 from benchmarks import tables
 from benchmarks.exotic_effects import LAWS
-from benchmarks.hidden_cases import ANGLES_DEG
+from benchmarks.hidden_cases import ANGLES_DEG, TRACK
 from benchmarks.journal import Journal
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
@@ -99,11 +99,9 @@ def _clips(path: Path, name: str, seed: int, count: int) -> list[Clip]:
         strength=None if name == NO_LAW else 0.5,
         seed=seed,
         angle=ANGLES_DEG[seed % 3],
-        track_only=True,
         track_noise=NOISE_M,
         fps=30.0,
-        solver="fine",
-        faults=True,
+        **TRACK,
         series=count if count > 1 else None,
     )
     return [load_clip(one.with_suffix(".yaml")) for one in made.clips]

@@ -71,13 +71,16 @@ def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any
         call = [sys.executable, "-m", f"galileo_jax.{ask}", str(path), "--out", f"{scratch}/out"]
         call += ["--free", case["free"]] if "free" in case else []
         began = time.monotonic()
-        code, said, cpu_s = _run(call, package)
+        code, said = _run(call, package)
         wall_s = time.monotonic() - began
         result = Path(scratch) / "out" / "result.json"
-        values = _values(json.loads(result.read_text())) if result.is_file() else {}
+        document = json.loads(result.read_text()) if result.is_file() else {}
+    values: dict[str, Any] = {}
+    for part in ("nuisances", "derived", "parameters"):
+        values |= document.get(part, {})
     row = {"file": case["file"], "what": case["what"], "code": code,
            "values": {name: values[name] for name in case.get("right", {}) if name in values},
-           "right": _right(case), "wall_s": round(wall_s, 1), "cpu_s": round(cpu_s, 1),
+           "right": _right(case), "wall_s": round(wall_s, 1),
            "keys": _num_keys(declared), "said": said.strip().splitlines()[-25:]}  # fmt: skip
     return row | {"judged": judged(case, row, values, said)}
 
@@ -128,25 +131,16 @@ def _declared(path: Path, case: Mapping[str, Any]) -> dict[str, Any]:
     return declared | case.get("set", {})
 
 
-def _run(call: list[str], package: Path) -> tuple[int, str, float]:
-    """(exit code, what it printed, processor seconds)."""
-    before = os.times()
+def _run(call: list[str], package: Path) -> tuple[int, str]:
+    """The exit code, and what was printed."""
     try:
         done = subprocess.run(
             call, capture_output=True, text=True, timeout=4 * TOO_LONG_S, check=False, cwd=package,
             env={**os.environ, "PYTHONPATH": str(package)},
         )  # fmt: skip
-        code, said = done.returncode, f"{done.stdout}\n{done.stderr}"
     except subprocess.TimeoutExpired:
-        code, said = 124, "stopped by the benchmark"
-    after = os.times()
-    used = after.children_user + after.children_system
-    return code, said, used - before.children_user - before.children_system
-
-
-def _values(document: Mapping[str, Any]) -> dict[str, Any]:
-    """All that a result states, by name."""
-    return {**document["nuisances"], **document["derived"], **document["parameters"]}
+        return 124, "stopped by the benchmark"
+    return done.returncode, f"{done.stdout}\n{done.stderr}"
 
 
 def _is_near(found: Mapping[str, Any] | None, goal: Any) -> bool:

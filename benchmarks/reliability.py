@@ -82,9 +82,7 @@ def draw(folder: Path, name: str, kind: str, library: Sequence[str], attempt: in
     effects = rng.choice(pool, 2 if kind == "two" else 1, replace=False)
     return {
         "out": folder / f"{name}.csv",
-        "track_only": True,
-        "solver": "fine",
-        "faults": True,
+        **hidden_cases.TRACK,
         "seed": int(rng.integers(2**31)),
         "angle": float(rng.uniform(*ANGLES_DEG)),
         "track_noise": float(rng.uniform(*NOISE_M)),

@@ -1,12 +1,10 @@
 """What does a sweep cost?
 
-    python -m benchmarks scaling [--only clips workers memory]
+    python -m benchmarks scaling [--only clips workers] [--clips 64]
 
     clips     seconds per clip of `grad` against the number of clips, in one process, and what the
               clips after the first of their shape cost (the marginal cost, bar 3 s)
     workers   seconds per clip of a sweep against its workers
-    memory    peak memory of a sweep of 100 cells and of 1,000, of the parent and of the worker
-              (bar: 1.2 times as much)
 
 Clips are csv tracks by `galileo simulate`. A shape is what programs are compiled for: numbers of
 objects, frames (in steps of 64) and recorded instants (in steps of 128). Seconds are wall clock:
@@ -33,24 +31,15 @@ from galileo_jax.measurement.measure import Measurement, measure
 CLIPS = (1, 2, 4, 8, 16, 32, 64)
 
 
-def main(
-    *,
-    only: tuple[str, ...] = ("clips", "workers", "memory"),
-    clips: int = CLIPS[-1],
-    method: str = "grad",
-    cells: tuple[int, ...] = (100, 1000),
-) -> dict[str, Any]:
+def main(*, only: tuple[str, ...] = ("clips", "workers"), clips: int = CLIPS[-1]) -> dict[str, Any]:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of the sweeps' processes
     figures: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        paths = make_tracks(folder, clips if {"clips", "workers"} & {*only} else 0)
+    with tempfile.TemporaryDirectory() as folder:
+        paths = make_tracks(Path(folder), clips)
         if "clips" in only:
             figures["clips"] = cost_of_clips(paths)
         if "workers" in only:
-            figures["workers"] = cost_with_workers(folder, paths[: clips // 2])
-        if "memory" in only:
-            figures["memory"] = memory_of_cells(folder, method, cells)
+            figures["workers"] = cost_with_workers(Path(folder), paths[: clips // 2])
     return figures
 
 
@@ -108,69 +97,19 @@ def cost_with_workers(folder: Path, paths: Sequence[Path]) -> dict[str, float]:
     found: dict[str, float] = {}
     for count in range(1, num_workers(Resources()) + 1):
         began = time.perf_counter()
-        run_sweep(folder / f"workers_{count}", {"clips": [str(path) for path in paths]}, count)
+        run_sweep(folder / f"workers_{count}", paths, count)
         found[str(count)] = (time.perf_counter() - began) / len(paths)
         tables.row(str(count), (found[str(count)], found["1"] / found[str(count)]))
     return found
 
 
-def memory_of_cells(folder: Path, method: str, cells: Sequence[int]) -> dict[str, Any]:
-    """Peak resident memory of a sweep's processes, MB: one short track from many seeds."""
-    path = folder / "short.csv"  # the cheapest of cells
-    simulate(path, track_only=True, scenario="incline", seconds=0.4, fps=30.0, seed=0)
-    found: dict[str, Any] = {"method": method}
-    config: dict[str, Any] = {"clips": [str(path)], "common": {"method": method}}
-    run_sweep(folder / "cells_first", config, 1)  # compiles, which takes memory of its own
-    tables.row("cells", ("parent MB", "worker MB", "s per cell"))
-    for count in cells:
-        began = time.perf_counter()
-        parent, worker = run_sweep(
-            folder / f"cells_{count}", config | {"grid": {"seed": list(range(count))}}, 1
-        )
-        each = (time.perf_counter() - began) / count
-        tables.row(str(count), (parent, worker, each))
-        found[str(count)] = {"parent_mb": parent, "worker_mb": worker, "s_per_cell": each}
-    few, many = (found[str(count)] for count in (cells[0], cells[-1]))
-    found["ratio"] = {key: many[key] / few[key] for key in ("parent_mb", "worker_mb")}
-    tables.row(f"{cells[-1]} over {cells[0]}", list(found["ratio"].values()))
-    return found
-
-
-# Peaks by /proc: getrusage counts what a process was before it became another program.
-PEAKS = """
-import json, os, sys, threading, time
-from pathlib import Path
-from galileo_jax.commands import command
-from galileo_jax.commands import sweep
-
-def peak_mb(process):
-    lines = Path(f"/proc/{process}/status").read_text().splitlines()
-    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
-
-def watch():
-    while True:
-        for path in Path("/proc/self/task").glob("*/children"):
-            for child in path.read_text().split():
-                try:
-                    peaks[1] = max(peaks[1], peak_mb(child))
-                except (OSError, StopIteration):
-                    continue
-        time.sleep(0.1)
-
-peaks = [0.0, 0.0]
-threading.Thread(target=watch, daemon=True).start()
-code = command.run(sweep.main, sys.argv[1:])
-print(json.dumps([peak_mb("self"), peaks[1]]))
-sys.exit(code)
-"""
-
-
-def run_sweep(out: Path, config: dict[str, Any], workers: int) -> list[float]:
-    """Runs a sweep; returns the peak memory of its parent and of its largest worker, MB."""
+def run_sweep(out: Path, clips: Sequence[Path], workers: int) -> None:
     out.mkdir(parents=True)
-    (out / "config.yaml").write_text(json.dumps(config))  # YAML, too
-    words = [str(out / "config.yaml"), "--out", str(out), "--workers", str(workers)]
-    done = subprocess.run(
-        [sys.executable, "-c", PEAKS, *words], check=True, stdout=subprocess.PIPE, text=True
+    config = out / "config.yaml"
+    config.write_text(json.dumps({"clips": [str(path) for path in clips]}))  # YAML, too
+    words = [str(config), "--out", str(out), "--workers", str(workers)]
+    subprocess.run(
+        [sys.executable, "-m", "galileo_jax", "sweep", *words],
+        check=True,
+        stdout=subprocess.DEVNULL,
     )
-    return json.loads(done.stdout.splitlines()[-1])

@@ -124,19 +124,12 @@ def main(folder: Path, *, find: bool = False) -> dict[str, Any]:
         rows += new
         for row in new:
             tables.row(row.clip, row[1:])
-    rms, nse = np.array([r.rms for r in rows]), np.array([r.nse for r in rows])
-    return {
-        "failures": failures,
-        "rms_px_median": float(np.median(rms)),
-        "rms_px_worst": float(rms.max()),
-        "rms_shifted_px_median": float(np.median([r.rms_shifted for r in rows])),
-        "nse_median": float(np.median(nse)),
-        "nse_mean": float(nse.mean()),
-        "nse_resting_mean": float(np.nanmean([r.nse_resting for r in rows])),
-        "nse_moving_mean": float(np.nanmean([r.nse_moving for r in rows])),
-        "nse_within_half_to_two": float(np.mean((nse >= 0.5) & (nse <= 2))),
-        "correlation_median": float(np.nanmedian([r.correlation for r in rows])),
-        "lost_frames": sum(r.lost for r in rows),
-        "cpu_seconds_median": float(np.median([r.seconds for r in rows])),
-        "cpu_seconds_worst": max(r.seconds for r in rows),
-    }
+    columns = {name: np.array([getattr(r, name) for r in rows]) for name in Row._fields[2:]}
+    figures: dict[str, Any] = {}
+    for name, values in columns.items():
+        figures[f"{name}_mean"] = float(np.nanmean(values))
+        figures[f"{name}_median"] = float(np.nanmedian(values))
+        figures[f"{name}_worst"] = float(np.nanmax(values))
+    figures["nse_within_half_to_two"] = float(np.mean(abs(np.log2(columns["nse"])) <= 1))
+    tables.summary(figures)
+    return figures | {"failures": failures}

@@ -5,9 +5,8 @@
 Every call runs in a process of its own, with compiled programs in the cache: of `--repeats` runs
 the one with the fewest seconds counts. Five csv tracks that `simulate` makes (nothing hidden,
 one effect, another, a pair, one that the library has not), and one 640x360 video for `fit`, which
-is tracked anew each time. Seconds are those of all threads of the process. Beside them: Python and
-`galileo fit --help` alone, and a fixed calculation, so that hosts can be compared. The last line
-is JSON.
+is tracked anew each time. Seconds are those of all threads of the process. Beside them a fixed
+calculation, so that hosts can be compared.
 
 Columns: `reading` decodes a video once to check it; `programs` reads or makes compiled code (in a
 diagnosis it is part of the base fit); `second` is the second search of the base fit; forms without
@@ -17,12 +16,11 @@ whether a clip like this would tell what is named from its rivals; `force`: the 
 
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -98,11 +96,7 @@ def main(
 ) -> dict[str, Any] | None:
     if one:
         return _print_one(*one)
-    figures: dict[str, Any] = {
-        "python": _least([sys.executable, "-c", "pass"]),
-        "fit_help": _least([sys.executable, "-m", "galileo_jax", "fit", "--help"]),
-        "fixed_before": fixed_calculation(),
-    }
+    figures: dict[str, Any] = {"fixed_before": fixed_calculation()}
     with tempfile.TemporaryDirectory() as folder:
         clips = {name: _simulated(Path(folder), name, seed) for name in case}
         for asked in verb:
@@ -183,15 +177,3 @@ def _print_one(verb: str, path: str) -> None:
     said = found.verdict if verb == "diagnose" else None
     result = [said.status, *said.effects] if said else [found.result["status"]]
     print(json.dumps({"cpu_s": clock.seconds, "result": result}))
-
-
-def _least(words: Sequence[str], repeats: int = 5) -> float:
-    """The fewest CPU seconds of a call."""
-
-    def once() -> float:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(words, stdout=subprocess.DEVNULL, check=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-    return min(once() for _ in range(repeats))
