@@ -11,8 +11,8 @@ draws them), moved by one of four engines, seen with the noise of `simulate`'s t
     mujoco   the scene in MuJoCo (`--engine c`), whose contacts are soft
     bullet   boxes in PyBullet, in small steps (optional: `pip install -e '.[bullet]'`)
     rendered, rendered-faults, rendered-measured
-             videos, tracked: all as declared; another solver, bodies that are not ideal and a camera
-             held askew; besides, a scale that is off, and nothing said about how well it is known
+             videos, tracked: all as declared; another solver, bodies that are not ideal and a
+             camera held askew; besides, a scale that is off, and not said how well it is known
 
 Bars, per quantity: rms of error / sd in 0.85 to 1.15, 92 to 98 % of truths in the 95 % interval.
 They are for tracks that the model describes: chi2 per degree of freedom below 1.5; how many those
@@ -23,7 +23,7 @@ Of videos chi2 per degree of freedom should lie in 0.7 to 1.5. With `--p`, that 
 
 import math
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -31,7 +31,7 @@ import numpy as np
 import yaml
 
 from benchmarks import tables, tracks
-from benchmarks.scoring import Score, summary
+from benchmarks.scoring import Score, missed, summary
 from galileo_jax.api.compare import compare
 from galileo_jax.api.fit import fit
 from galileo_jax.api.fit_result import Fit
@@ -85,9 +85,7 @@ def main(
     is_described = [value < DESCRIBED or method == "cnn" for value in chi2]
     table = summary([one for one, is_told in zip(scores, is_described, strict=True) if is_told])
     print()
-    tables.row(f"{sum(is_described)} of {num}, {sort}", [*table["k1"]])
-    for name, entry in table.items():
-        tables.row(name, list(entry.values()))
+    tables.by_name(f"{sum(is_described)} of {num}, {sort}", table)
     figures: dict[str, Any] = {
         "chi2": float(np.median(chi2)),
         "described": float(np.mean(is_described)),
@@ -96,15 +94,8 @@ def main(
     }
     tables.summary(figures)
     return {"sort": sort, "method": method, "num": num, "seed": seed, "noise_mm": noise_mm} | (
-        table | figures | {"bars_missed": tables.missed(_missed(table))}
+        table | figures | {"bars_missed": tables.missed(missed(table, dict.fromkeys(table, BARS)))}
     )
-
-
-def _missed(table: Mapping[str, Mapping[str, float]]) -> Iterator[str]:
-    for name, entry in table.items():
-        for what, (low, high) in BARS.items():
-            if not low <= entry[what] <= high:
-                yield f"{name} {what} {entry[what]:.3g} not in {low} to {high}"
 
 
 def make_track(sort: str, seed: int, noise_m: float = NOISE_M) -> tuple[Truth, Track]:

@@ -53,7 +53,7 @@ def main(
         name = f"{'video' if videos else 'track'}{index}"
         path, recipe = _clip(clips / f"{name}.{'mp4' if videos else 'csv'}", index)
         row = journal.row(f"{task} {name}", lambda path=path: _timed(path, task))
-        tables.row(row["case"], (recipe["scenario"], *recipe["effects"], row["cpu_s"]))
+        tables.row(row["case"], (recipe["scenario"], *recipe.get("effects", ()), row["cpu_s"]))
     return None
 
 
@@ -65,7 +65,6 @@ def recipes(index: int, is_video: bool) -> Iterator[dict[str, Any]]:
         "seed": 600_000 + index,
         "scenario": scenario,
         "track_only": not is_video,
-        "effects": {},
         "fps": float(generator.choice(FRAME_RATES)),
     }
     if is_video:

@@ -11,15 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects.forms import FORM_NAMES
-from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 
 EXOTIC_FILE = Path(__file__).with_name("exotic_effects.py")
@@ -149,20 +145,3 @@ def folder_cases(folder: Path, series: int | None, only: str) -> list[Case]:
     if not cases:
         raise InputError(f"{folder}: no {only}.truth.json there" + (" of a series" * bool(series)))
     return cases
-
-
-def tracked(path: Path, cache: Path) -> Path:
-    """The yaml of the clip's csv track in the cache; a video is tracked where there is none."""
-    kept = cache / path.name
-    if not kept.is_file():
-        clip = load_clip(path)
-        if clip.video is None:
-            return path
-        write_observation_csv(kept.with_suffix(".csv"), measure(clip).whole)
-        content = yaml.safe_load(path.read_text())
-        del content["video"]
-        for item in content["objects"]:
-            item.pop("point_px", None)  # it is where the track begins
-        content["track"] = f"{kept.stem}.csv"
-        write_text(kept, yaml.safe_dump(content, sort_keys=False))
-    return kept

@@ -7,8 +7,8 @@ The grid is effects x strengths x seeds, clips without an effect, and clips with
 the library does not have. Its truths come from an integrator of their own, with the small
 faults of real clips. Every case goes through `galileo diagnose`; of those with an effect only
 the ones count in which it shows (chi2 per degree of freedom of the base model above
---least-chi2: 3, of clips made elsewhere 0). `--series N` diagnoses N clips together; `--tracks DIR`
-keeps the tracks of videos. What is finished stays in DIR/results.jsonl and is not done again.
+--least-chi2: 3, of clips made elsewhere 0). `--series N` diagnoses N clips together.
+What is finished stays in DIR/results.jsonl and is not done again.
 """
 
 import json
@@ -45,7 +45,6 @@ def main(
     noise_px: float = 0.3,
     fps: float = 30.0,
     only: str = "*",
-    tracks: Path | None = None,
 ) -> dict[str, Any]:
     library = hidden_cases.ramp_effects()
     if folder:
@@ -65,7 +64,7 @@ def main(
         unmade = dict.fromkeys(cases)
     for name, _ in hidden_cases.made_meanwhile(hidden_cases.make_clips, unmade):
         case = cases[name]
-        entry = journal.tried(name, lambda case=case: _examined(case, out, seed, tracks))
+        entry = journal.tried(name, lambda case=case: _examined(case, out, seed))
         if entry["error"]:
             failures[name] = entry["error"]
             print(f"{name:<28} {entry['error']}", flush=True)
@@ -114,11 +113,10 @@ def known(asked: Sequence[str], library: Sequence[str]) -> Sequence[str]:
     return asked
 
 
-def _examined(case: Case, out: Path, seed: int, tracks: Path | None) -> dict[str, Any]:
-    """What a diagnosis says of a case, and the seconds it took, tracking apart."""
-    yamls = [hidden_cases.tracked(path, tracks) if tracks else path for path in case.yamls]
+def _examined(case: Case, out: Path, seed: int) -> dict[str, Any]:
+    """What a diagnosis says of a case, and the seconds it took."""
     began = time.perf_counter()
-    said = run_diagnosis(yamls, out / "runs" / case.name, seed)
+    said = run_diagnosis(case.yamls, out / "runs" / case.name, seed)
     return {"diagnosis": said, "seconds": round(time.perf_counter() - began, 2)}
 
 

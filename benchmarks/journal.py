@@ -16,19 +16,16 @@ class Journal:
     def row(self, case: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
         """The row of a case, which is made and added unless it is there."""
         if case not in self.rows:
-            self._add({"case": case, **make()})
+            self.rows[case] = {"case": case, **make()}
+            if self.path is not None:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                with self.path.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(self.rows[case]) + "\n")
         return self.rows[case]
 
     def tried(self, case: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
         """As `row`; whatever `make` raises does not end hours of work, but is the row's `error`."""
         return self.row(case, lambda: _tried(make))
-
-    def _add(self, row: dict[str, Any]) -> None:
-        self.rows[row["case"]] = row
-        if self.path is not None:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            with self.path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
 
 
 def finished(path: Path) -> dict[str, dict[str, Any]]:

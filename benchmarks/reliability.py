@@ -14,6 +14,7 @@ weaker one may be said or not. What is finished stays in DIR/results.jsonl and i
 
 """
 
+import contextlib
 import itertools
 import json
 import math
@@ -97,27 +98,13 @@ def make_clip(folder: Path, name: str, kind: str, library: Sequence[str]) -> boo
     """Simulates a case unless it is there; an effect without a place in the scene is drawn again.
 
     Returns whether that came to a case; all else that `simulate` raises is raised.
-
-    Runs in a process of its own, so that effects from outside stay unknown to the diagnosis.
     """
-    for attempt in range(TRIES):
-        if (folder / f"{name}.truth.json").is_file():
-            return True
-        try:
+    truth = folder / f"{name}.truth.json"
+    for attempt in range(0 if truth.is_file() else TRIES):
+        with contextlib.suppress(InputError):
             simulate(**draw(folder, name, kind, library, attempt))
-        except InputError:
-            continue
-    return (folder / f"{name}.truth.json").is_file()
-
-
-def seen_truth(traces: Mapping[str, float], least: float = 0.0) -> str:
-    """The hidden effects that leave a trace in a track, joined by +; none: "none".
-
-    Args:
-      traces: of each effect, by how many nats it shows.
-      least: nats that it must show by.
-    """
-    return "+".join(name for name, nats in traces.items() if nats > least) or "none"
+            break
+    return truth.is_file()
 
 
 def right_answers(entry: Mapping[str, Any], least: float) -> list[str]:
@@ -190,7 +177,7 @@ def _examined(out: Path, name: str, kind: str) -> dict[str, Any]:
     table = [{key: candidate[key] for key in brief} for candidate in run["candidates"]]
     return {
         "kind": kind,
-        "truth": seen_truth(found),
+        "truth": "+".join(name for name, nats in found.items() if nats > 0) or "none",
         "truth_nats": whole if np.isfinite(whole) else None,
         "traces_nats": {name: nats for name, nats in found.items() if np.isfinite(nats)},
         "diagnosis": {key: run.get(key) for key in keys} | {"candidates": table},
@@ -221,7 +208,6 @@ def summary(
         "curve": curve(probability, is_true),
         "expected_calibration_error": calibration_error(probability, is_true),
         "of_right_claims": _error_if_right(probability),
-        "brier": float(np.mean((probability - is_true) ** 2)) if claims else math.nan,
         "ambiguous": len(ambiguous),
         "ambiguous_inside": num_inside,
         "ambiguous_inside_holds_truth": 1 - len(unheld) / num_inside if num_inside else math.nan,

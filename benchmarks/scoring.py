@@ -110,3 +110,20 @@ def summary_of(entries: Sequence[Score]) -> dict[str, Any]:
         "missed": sum(entry.is_expected and not entry.is_identified for entry in entries),
         "claimed": sum(entry.is_identified and not entry.is_expected for entry in entries),
     }
+
+
+def missed(
+    table: Mapping[str, Mapping[str, float]], bars: Mapping[str, Mapping[str, tuple[float, float]]]
+) -> list[str]:
+    """What is outside its bars, in words.
+
+    Args:
+      table: by quantity, as `summary` has it.
+      bars: by quantity and figure, the least and the most.
+    """
+    return [
+        f"{name} {what} {table[name][what]:.4g} not in {low:g} to {high:g}"
+        for name, own in bars.items()
+        for what, (low, high) in own.items()
+        if not low <= table[name][what] <= high
+    ]

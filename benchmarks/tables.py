@@ -67,6 +67,13 @@ def summary(figures: Mapping[str, Any]) -> None:
             row(name, [value])
 
 
+def by_name(title: str, rows: Mapping[str, Mapping[str, Any]]) -> None:
+    """Prints a row for each name, and above them what their figures are called."""
+    row(title, [*next(iter(rows.values()))])
+    for name, figures in rows.items():
+        row(name, list(figures.values()))
+
+
 def missed(bars: Iterable[str]) -> list[str]:
     """Prints the bars that were missed, and returns them."""
     found = list(bars)

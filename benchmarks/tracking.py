@@ -27,6 +27,7 @@ from galileo_jax.tracking.track import Track
 
 MOVES_PX = 0.02
 """What goes farther than this from frame to frame moves."""
+HAND_FRAMES = 10  # within which a hand that leaves object 1 is gone
 
 
 class Row(NamedTuple):
@@ -61,19 +62,13 @@ def true_points(clip: Clip, truth: Mapping[str, Any], index: int) -> np.ndarray:
     return centre + np.stack([c * x - s * y, s * x + c * y], axis=1)
 
 
-def hand_is_near(truth: Mapping[str, Any], frames: int) -> np.ndarray:
-    """`[frame]`: the hand may cover object 1; it leaves within ten frames."""
-    hand = truth.get("hand")
-    return np.arange(frames) < (hand["leave"] + 10 if hand else 0)
-
-
 def rows_of(clip: Clip, truth: Mapping[str, Any], track: Track, seconds: float) -> list[Row]:
     rows = []
     for index, name in enumerate(track.names):
         expected = true_points(clip, truth, index)[: len(track.times_s)]
         error = track.position_px[index, : len(expected)] - expected
         seen = track.is_visible[index, : len(expected)]
-        hidden = hand_is_near(truth, len(expected)) if index == 0 else np.zeros_like(seen)
+        covered = HAND_FRAMES + hand["leave"] if (hand := truth.get("hand")) and index == 0 else 0
         error, covariance = error[seen], track.covariance_px2[index, : len(expected)][seen]
         step = np.linalg.norm(np.gradient(expected, axis=0), axis=1)[seen]
         shifted = error - error.mean(axis=0)
@@ -93,7 +88,7 @@ def rows_of(clip: Clip, truth: Mapping[str, Any], track: Track, seconds: float) 
                 _mean(squares[moves]),
                 float(pairs) if len(moving) > 4 else float("nan"),
                 float(seen.mean()),
-                int((~seen & ~hidden).sum()),
+                int((~seen[covered:]).sum()),
                 seconds,
             )
         )

@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 from benchmarks import tables
 from galileo_jax.runtime.precision import in_float64
@@ -163,13 +164,8 @@ def _print_one(verb: str, path: str) -> None:
     clock.begin("reading")
     clip = load(path)
     clock.begin("tracking")
-    setting = os.environ.get("GALILEO_JAX_CACHE")
-    os.environ["GALILEO_JAX_CACHE"] = "off"  # which would know the track
-    followed = track(clip)
-    if setting is None:
-        del os.environ["GALILEO_JAX_CACHE"]
-    else:
-        os.environ["GALILEO_JAX_CACHE"] = setting
+    with mock.patch.dict(os.environ, GALILEO_JAX_CACHE="off"):  # which would know the track
+        followed = track(clip)
     found = function(followed, on_progress=clock.on_progress)
     clock.begin("report")
     found.save(Path(path).with_suffix(f".{verb}"))
