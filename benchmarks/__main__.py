@@ -37,7 +37,8 @@ def main(argv: Sequence[str]) -> int | None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     declare(parser, module.main)
-    figures = call(module.main, vars(parser.parse_args(arguments)))
+    given = vars(parser.parse_args(arguments))
+    figures = module.main(**{k: tuple(v) if isinstance(v, list) else v for k, v in given.items()})
     if figures is not None:
         tables.finish(name, figures)
     return None
@@ -68,15 +69,6 @@ def declare(parser: argparse.ArgumentParser, function: Callable[..., Any]) -> No
         else:
             given |= {"nargs": "*" if given.get("nargs") else "?"} if has_default else {}
             parser.add_argument(name, **given)
-
-
-def call(function: Callable[..., Any], given: dict[str, Any]) -> Any:
-    """Calls a function with all its parameters, by position or name."""
-    bound = inspect.signature(function).bind_partial()
-    bound.arguments.update(
-        {name: tuple(each) if isinstance(each, list) else each for name, each in given.items()}
-    )
-    return function(*bound.args, **bound.kwargs)
 
 
 def _kind(annotation: Any) -> dict[str, Any]:

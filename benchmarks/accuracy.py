@@ -62,8 +62,9 @@ def main(
     table = scoring.summary(scores)
     print()
     tables.by_name("quantity", table)
-    outside = sum(not CHI2[0] <= value <= CHI2[1] for value in chi2)
-    missed = [*scoring.missed(table, BARS), *[f"chi2/dof outside {CHI2} in {outside}"][:outside]]
+    missed = scoring.missed(table, BARS)
+    if outside := sum(not CHI2[0] <= value <= CHI2[1] for value in chi2):
+        missed.append(f"chi2/dof outside {CHI2} in {outside}")
     return {
         "method": method,
         "clips": len(scores),

@@ -50,7 +50,9 @@ def main(
     if folder:
         listed = hidden_cases.folder_cases(folder, series, only)
     else:
-        asked = known(effects.split(","), library) if effects else library
+        asked = effects.split(",") if effects else library
+        if unknown := set(asked) - set(library):
+            raise InputError(f"--effects: unknown {unknown}; known: {', '.join(library)}")
         grid = (asked, strengths, seeds, none, noise_px / PIXELS_PER_METRE, fps, series)
         listed = list(hidden_cases.grid(out / "clips", *grid))
     cases = {case.name: case for case in listed}
@@ -104,13 +106,6 @@ def run_diagnosis(yamls: Sequence[Path], out: Path, seed: int) -> dict[str, Any]
 
     diagnose(list(yamls), seed=seed).save(out)
     return json.loads((out / "diagnosis.json").read_text())
-
-
-def known(asked: Sequence[str], library: Sequence[str]) -> Sequence[str]:
-    """The names that are asked for, all of them in the library."""
-    if unknown := [name for name in asked if name not in library]:
-        raise InputError(f"--effects: unknown {unknown[0]!r}; known: {', '.join(library)}")
-    return asked
 
 
 def _examined(case: Case, out: Path, seed: int) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """What a long benchmark has finished: a row of JSON for each case; it goes on where it was."""
 
+import contextlib
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -20,7 +21,7 @@ class Journal:
             if self.path is not None:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
                 with self.path.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(self.rows[case]) + "\n")
+                    file.write("\n" + json.dumps(self.rows[case]))
         return self.rows[case]
 
     def tried(self, case: str, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
@@ -31,7 +32,10 @@ class Journal:
 def finished(path: Path) -> dict[str, dict[str, Any]]:
     """The rows by case, the last of each, without failed cases and lines that were cut off."""
     lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    rows = [json.loads(line) for line in lines if line.endswith("}")]
+    rows = []
+    for line in lines:
+        with contextlib.suppress(json.JSONDecodeError):
+            rows.append(json.loads(line))
     return {row["case"]: row for row in rows if not row.get("error")}
 
 

@@ -128,13 +128,11 @@ def _step(
     return step
 
 
-Said = tuple[list[str], dict[str, Any] | None]
-"""The verdict, and where to measure next."""
-
-
 @in_float64
-def _of_two(lab: labs.SimulatedLab, rival: str, clips: Sequence[Path], may_ask: bool) -> Said:
-    """No effect, the hidden one and its rival being hypotheses."""
+def _of_two(
+    lab: labs.SimulatedLab, rival: str, clips: Sequence[Path], may_ask: bool
+) -> tuple[list[str], dict[str, Any] | None]:
+    """The verdict on no effect, the hidden one and its rival; and where to measure next."""
     declared = [load_clip(clip.with_suffix(".yaml")) for clip in clips]
     trials = with_library(declared, [measure(clip).observation for clip in declared], "auto")
     fitter = fitter_of(trials)

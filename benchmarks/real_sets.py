@@ -86,7 +86,12 @@ def main(
 
 def ball_toss(folder: Path, out: Path, _: slice) -> str:
     """What is wrong with the scale of the tossed ball?"""
-    return _verdict(gx.diagnose(folder / "ball_toss.yaml"))
+    document = gx.diagnose(folder / "ball_toss.yaml").document
+    verdict, chi2 = document["verdict"], [one["chi2_per_dof"] for one in document["history"]]
+    return (
+        f"{verdict['status']} {', '.join(verdict['effects'])}; chi2 per degree of freedom "
+        f"{chi2[0]:.2f} -> {chi2[-1]:.2f}"
+    )
 
 
 def slides(folder: Path, out: Path, _: slice) -> str:
@@ -260,11 +265,3 @@ def _error(found: gx.Fit) -> str:
 def _with_p(candidate: dict[str, Any]) -> str:
     p = candidate["p_value"]
     return f"{candidate['effect']} (p {'not asked' if p is None else format(p, '.2g')})"
-
-
-def _verdict(found: gx.Diagnosis) -> str:
-    verdict, history = found.document["verdict"], found.document["history"]
-    return (
-        f"{verdict['status']} {', '.join(verdict['effects'])}; chi2 per degree of freedom "
-        f"{history[0]['chi2_per_dof']:.2f} -> {history[-1]['chi2_per_dof']:.2f}"
-    )

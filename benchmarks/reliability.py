@@ -47,6 +47,7 @@ FRAME_RATES = (30.0, 60.0, 120.0)
 NOISE_M = (0.1e-3, 0.4e-3)
 ANGLES_DEG = (8.0, 30.0)
 STRENGTHS = (0.3, 1.0)
+SECOND = "second_possible"  # the rule: an effect may be there, too weak to be told
 TRIES = 8  # not every effect has a place in every scene
 NUM_DRAWN = 1000  # of the claims, for the error that right ones have
 
@@ -286,13 +287,15 @@ def _claims(
     named = [each for each in parts if each <= {*library}]
     left = _not_contradicted(diagnosis)
     odds = {frozenset(c["effect"].split("+")): c["probability"] / left for c in table}
-    seen = 1.0 if least else 1.0 - _second(diagnosis)
+    unseen = [w["probability"] for w in diagnosis.get("reasons", ()) if w["rule"] == SECOND]
+    seen = 1.0 if least or not unseen else 1.0 - unseen[0]
     claims = [(seen * odds.get(each, 0.0), each in truths) for each in named]
     if verdict["status"] == "law" or verdict.get("law") or len(named) < len(parts):
         unnamed = [
             c["probability"]
             for c in table
-            if _is_unnamed(c["effect"]) and (c.get("p_value") or 1.0) >= ADEQUATE_P
+            if (c["effect"].startswith("law_") or {*c["effect"].split("+")} & {*FORM_NAMES})
+            and (c.get("p_value") or 1.0) >= ADEQUATE_P
         ]
         claims.append((min(sum(unnamed) / left, 1.0), is_outside))
     return claims
@@ -303,19 +306,6 @@ def _not_contradicted(diagnosis: Mapping[str, Any]) -> float:
     p_values = [(c["probability"], c.get("p_value")) for c in diagnosis["candidates"]]
     p_values.append((diagnosis.get("probability_none", 0.0), diagnosis.get("p_value")))
     return 1.0 - sum(p for p, by_data in p_values if by_data is not None and by_data < ADEQUATE_P)
-
-
-def _second(diagnosis: Mapping[str, Any]) -> float:
-    """The probability that a second effect is there, too weak to be told, as far as it is said."""
-    said = [why for why in diagnosis.get("reasons", ()) if why["rule"] == "second_possible"]
-    return said[0]["probability"] if said else 0.0
-
-
-def _is_unnamed(hypothesis: str) -> bool:
-    """Whether it is a form without a name, or a law."""
-    return hypothesis.startswith("law_") or any(
-        part in FORM_NAMES for part in hypothesis.split("+")
-    )
 
 
 def _mean(values: Sequence[bool]) -> float:

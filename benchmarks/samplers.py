@@ -1,4 +1,6 @@
-"""Whatever estimates, on the same synthetic tracks: errors, intervals, calibration, cost.
+"""How do samplers, and other people's estimators, compare on the same synthetic tracks?
+
+    python -m benchmarks samplers --methods grad mh thesis --source prior --num 20 --num-shared 20
 
     grad      the multi-start gradient fit with its weighed Laplace posterior
     mh        Metropolis-Hastings from that fit (its time included)
@@ -56,8 +58,8 @@ from galileo_jax.thesis.estimate import thesis_posterior
 NOISE_M_S = 0.01
 NOISE_M = NOISE_M_S / (tracks.FPS * math.sqrt(2))
 STUCK = 1.5
-COVERAGE = dict.fromkeys(scoring.QUANTITIES, {"coverage": (0.90, 0.99)})
-BARS = {"all tracks": {"stuck": (0.0, 0.02)}, **COVERAGE}
+BARS = {name: {"coverage": (0.90, 0.99)} for name in scoring.QUANTITIES}
+BARS["all"] = {"stuck": (0.0, 0.02)}
 Source = Literal["exact", "engine", "prior"]
 Method = Literal["grad", "mh", "mh-cnn", "cnn", "thesis", "sysid"]
 SIZE_M, RELEASE_M, OBJECT2_M, DRIVEN_M = (0.06, 0.06, 0.06), 0.5, 0.25, 0.01
@@ -129,7 +131,7 @@ def main(
     tables.by_name("method, quantity", {f"{m} {q}": figures[m][q] for m, q in pairs})
     missed = []
     for name in set(methods) & {"grad", "mh"}:
-        table = {"all tracks": figures[name]} | {q: figures[name][q] for q in scoring.QUANTITIES}
+        table = {"all": figures[name]} | {q: figures[name][q] for q in scoring.QUANTITIES}
         missed += [f"{name}: {what}" for what in scoring.missed(table, BARS)]
     return figures | {"source": source, "bars_missed": tables.missed(missed)}
 
@@ -199,7 +201,9 @@ def fit_thesis(case: Case, seed: int) -> Answer:
 
 
 def fit_sysid(case: Case, seed: int) -> Answer:
-    return _of_peer(peers.sysid(case.problem, NOISE_M_S, seed))
+    found = peers.sysid(case.problem, NOISE_M_S, seed)
+    count = found.num_rollouts
+    return Answer(found.entries, found.centres_m, len(found.values), count, found.is_converged)
 
 
 METHODS: dict[str, Callable[[Case, int], Answer]] = {
@@ -229,11 +233,6 @@ def _of_draws(trials: JointProblem, posterior: Posterior, z: np.ndarray, rollout
         posterior.is_converged,
         np.stack([posterior["k1"], posterior["k2"], log_ratio]),
     )
-
-
-def _of_peer(found: peers.Estimate) -> Answer:
-    count = found.num_rollouts
-    return Answer(found.entries, found.centres_m, len(found.values), count, found.is_converged)
 
 
 def _row(case: Case, answer: Answer, seconds: float) -> dict[str, Any]:
