@@ -21,6 +21,7 @@ import jax
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # it is called as a script, too
 import galileo_jax as gx
 from benchmarks import rollouts, tables
+from galileo_jax.commands import command
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.sweeping.engine_together import EngineTogether
 from galileo_jax.sweeping.task import Task
@@ -97,3 +98,9 @@ def _rate_together(folder: Path, seed: int, num: int) -> float:
 
 def _fitted(path: Path) -> dict[str, Any]:
     return gx.fit(path).result["parameters"]
+
+
+if __name__ == "__main__":
+    from benchmarks.__main__ import main as run
+
+    raise SystemExit(command.run(run, ["accelerator", *sys.argv[1:]]))

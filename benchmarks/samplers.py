@@ -20,7 +20,7 @@ wrong, so that ranks of the truth among the draws must be uniform: simulation-ba
 
 Seconds are warm, for which the first track is run twice; those of `thesis` contain tracing. Stuck:
 velocity residuals of the method's own rollout at its best parameters above 1.5 per degree of
-freedom. `off`: distance of a method's means from those of `mh`, in posterior standard deviations,
+freedom (of `prior` that is the drawn noise). `off`: distance of means from those of `mh`, in sds,
 root mean square. With `--keep FILE` a run that was cut off goes on, and methods measured apart
 stand in one table.
 """
@@ -131,7 +131,8 @@ def main(
     tables.by_name("method, quantity", {f"{m} {q}": figures[m][q] for m, q in pairs})
     missed = []
     for name in set(methods) & {"grad", "mh"}:
-        table = {"all": figures[name]} | {q: figures[name][q] for q in scoring.QUANTITIES}
+        table = {quantity: figures[name][quantity] for quantity in scoring.QUANTITIES}
+        table |= {"all": figures[name]} if source != "prior" else {}
         missed += [f"{name}: {what}" for what in scoring.missed(table, BARS)]
     return figures | {"source": source, "bars_missed": tables.missed(missed)}
 

@@ -123,7 +123,7 @@ def missed(
     """
     return [
         f"{name} {what} {table[name][what]:.4g} not in {low:g} to {high:g}"
-        for name, own in bars.items()
-        for what, (low, high) in own.items()
+        for name in table
+        for what, (low, high) in bars.get(name, {}).items()
         if not low <= table[name][what] <= high
     ]
