@@ -28,8 +28,7 @@ from galileo_jax.sweeping.task import Task
 
 ENGINES = ("rigid", "mjx", "c")
 SIZES = (1, 16, 256, 4096, 65536)
-MOST_ON_CORES = 1024
-"""Larger batches of the C engine only take longer: they are no faster per rollout."""
+MOST_ON_CORES = 1024  # larger batches of the C engine are no faster per rollout
 
 
 @in_float64

@@ -37,6 +37,7 @@ from galileo_jax.api.fit import fit
 from galileo_jax.api.fit_result import Fit
 from galileo_jax.api.simulate import Simulated, simulate
 from galileo_jax.api.track import Track, track
+from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.measurement.cuts import cut, to_last_cut
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.model.model import Model
@@ -55,7 +56,6 @@ FILMED_ANGLES_DEG, EXPOSURES_S, SIZES_PX = (10.0, 28.0), (0.001, 0.012), ((640, 
 FAULTS: dict[str, Any] = {"faults": True, "camera_fault": ("keystone",), "solver": "fine"}
 LONGEST_S, AFTER_REST_S = 3.0, 0.1
 BARS = {"rms_z": (0.85, 1.15), "coverage": (0.92, 0.98)}
-UNLIKELY = 0.01  # a p below it is an alarm
 DESCRIBED = 1.5  # chi2 per degree of freedom
 CHI2 = (0.7, DESCRIBED)
 Sort = Literal[
@@ -90,7 +90,7 @@ def main(
         "chi2": float(np.median(chi2)),
         "described": float(np.mean(is_described)),
         "chi2_outside": float(np.mean([not CHI2[0] <= value <= CHI2[1] for value in chi2])),
-        "alarms": float(np.mean(np.array(p_values) < UNLIKELY)) if p else math.nan,
+        "alarms": float(np.mean(np.array(p_values) < ADEQUATE_P)) if p else math.nan,
     }
     tables.summary(figures)
     return {"sort": sort, "method": method, "num": num, "seed": seed, "noise_mm": noise_mm} | (

@@ -201,7 +201,7 @@ def by_mujoco(one: Thrown, cube: Cube, parameters: np.ndarray) -> tuple[np.ndarr
     data.qpos = np.concatenate([one.start.position_m, one.start.quaternion])
     # MuJoCo has spins along the body's own axes.
     turned = Rotation.from_quat(np.asarray(one.start.quaternion), scalar_first=True)
-    spin = turned.inv().apply(np.asarray(one.start.spin_rad_s))
+    spin = turned.inv().apply(np.array(one.start.spin_rad_s))
     data.qvel = np.concatenate([one.start.velocity_m_s, spin])
     found = [data.qpos.copy()]
     for count in np.diff(np.rint(one.times_s / STEP_S).astype(int)):

@@ -6,8 +6,7 @@
 Each effect (and none) is hidden `--seeds` times in new objects; a lab can vary height and angle.
 `hidden_NAME` is a law of `exotic_effects.py`, right as in `laws`. `--noise speed`: a velocity is
 known to 7.5 % of the range of the speed (as in NewtonBench); `--noise px`: 0.3 px at 900 px/m.
-What is finished stays in DIR and is not done again. Seeds below 100 were looked at during
-development.
+What is finished stays in DIR. Seeds below 100 were looked at during development.
 """
 
 import itertools

@@ -32,7 +32,6 @@ SPEED_SHARE = 0.075  # of the range of object 1's speed, as the noise of a veloc
 LEAST_NOISE_M = 1e-5  # where static friction holds all
 NONE = "none"
 HIDDEN = "hidden_"  # what the effects of `exotic_effects.py` are called before their names
-LAW_STRENGTH = 0.5  # as in laws.py
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class SimulatedLab:
         if not path.is_file():
             told: dict[str, Any] = {"effects": {} if self.effect == NONE else {self.effect: {}}}
             if self._is_law:
-                told["strength"] = LAW_STRENGTH
+                told["strength"] = 0.5  # as in laws.py
             self._simulate(
                 self.folder / "sealed.csv", seed=self._seed("objects"), track_only=True, **told
             )

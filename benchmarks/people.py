@@ -31,8 +31,7 @@ PACKAGE = Path(__file__).parents[1]
 CASES = Path(__file__).with_suffix(".yaml")
 TOO_LONG_S = 300.0
 DISTRUST = "do not trust"
-IMPLIED = ("track", "video", "objects")
-"""Keys that say nothing but which file, and that there is something in it."""
+IMPLIED = ("track", "video", "objects")  # keys that say nothing but which file
 
 
 def main(

@@ -24,7 +24,6 @@ FAST_RAD_S = 100.0  # spins that bend a flight
 MOST_RAD_S = 1000.0  # spins above were hardly measured: such flights do not curve
 POOR_CHI2 = 3.0  # per degree of freedom
 MOST_AMONG = 3  # effects that explain a flight equally well
-EVERY_FLIGHT = 10_000
 PROJECTILE = """video: {file}
 scenario: flight
 fps: 240.0
@@ -63,7 +62,7 @@ def main(
     *,
     set: tuple[str, ...] = (),
     first: int = 0,
-    flights: int = EVERY_FLIGHT,
+    flights: int = 10_000,
     out: Path | None = None,
 ) -> dict[str, str]:
     found = {}

@@ -67,7 +67,6 @@ COLUMNS = (
     *("k1 err", "in 95%", "k2 err", "in 95%", "ratio err", "in 95%"),
     *("chi2/dof", "rollouts", "seconds", "ess", "converged"),
 )
-SUMMARY = ("tracks", "stuck", "seconds", "worst s", "rollouts", "ess", "ess/s", "converged", "off")
 
 
 class Answer(NamedTuple):
@@ -122,10 +121,9 @@ def main(
             cells += [row[what] for what in ("chi2", "rollouts", "seconds", "ess", "converged")]
             tables.row(f"{seed + number} {name}", cells)
     print()
-    tables.row("method", SUMMARY)
     figures = {name: _summary(rows[name], rows.get("mh", ())) for name in methods}
-    for name in methods:
-        tables.row(name, [figures[name][column] for column in SUMMARY])
+    costs = {n: {k: v for k, v in one.items() if k not in BARS} for n, one in figures.items()}
+    tables.by_name("method", costs)
     print()
     pairs = itertools.product(methods, scoring.QUANTITIES)
     tables.by_name("method, quantity", {f"{m} {q}": figures[m][q] for m, q in pairs})

@@ -46,8 +46,7 @@ def main(*, only: tuple[str, ...] = ("clips", "workers"), clips: int = CLIPS[-1]
 def make_tracks(folder: Path, count: int) -> list[Path]:
     paths = [folder / f"track_{seed}.csv" for seed in range(count)]
     for seed, path in enumerate(paths):
-        if not path.is_file():
-            simulate(path, track_only=True, seed=seed)
+        simulate(path, track_only=True, seed=seed)
     return paths
 
 

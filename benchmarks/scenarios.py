@@ -37,7 +37,6 @@ from galileo_jax.simulation.free_clip import declared_content, noisy_track, samp
 
 FPS, NOISE_M = 60.0, 0.001
 SCALES_PX_PER_M = (250.0, 900.0)
-COLUMNS = {"median": "error", "median_sd": "sd", "rms_z": "rms z", "coverage": "covered"}
 
 Made = tuple[Clip, Observation, Mapping[str, float]]
 """A clip, what is seen of it, and the true values that the motion tells."""
@@ -105,14 +104,13 @@ def main(*, seeds: int = 20, case: tuple[str, ...] = tuple(CASES)) -> dict[str, 
         fits = [_fitted(*CASES[name].make(seed), seed) for seed in range(seeds)]
         seconds = (time.perf_counter() - began) / seeds
         scores, results = zip(*fits, strict=True)
-        tables.row(name, [*COLUMNS.values(), "told"])
         found: dict[str, Any] = {}
         for key in scores[0]:
             # What is not identified counts, too: its interval has to hold the truth.
             own = [one[key] for one in scores]
             found[key] = summary_of([one._replace(is_identified=True) for one in own])
             found[key]["told"] = float(np.mean([one.is_identified for one in own]))
-            tables.row(f"  {key}", [found[key][each] for each in (*COLUMNS, "told")])
+        tables.by_name(name, found)
         figures[name] = found | {
             "chi2_per_dof": float(np.median([one["error"]["chi2_per_dof"] for one in results])),
             "covered": float(np.mean([one["coverage"] for one in found.values()])),

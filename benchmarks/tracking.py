@@ -25,8 +25,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.clip import track_clip
 from galileo_jax.tracking.track import Track
 
-MOVES_PX = 0.02
-"""What goes farther than this from frame to frame moves."""
+MOVES_PX = 0.02  # what goes farther than this from frame to frame moves
 HAND_FRAMES = 10  # within which a hand that leaves object 1 is gone
 
 
