@@ -1,14 +1,15 @@
-"""What an accelerator is worth: `python benchmarks/accelerator.py`.
+"""What is an accelerator worth?
+
+    python benchmarks/accelerator.py
 
 Runs on whatever `jax.devices()` has. By size of the batch, rollouts of a ramp clip of 1.2 s per
 minute: the rigid engine and MJX on the device, and MuJoCo's C engine (`mujoco.batch`) on all cores
 of the machine beside it. Then simulated tracks one after the other: fits per second and diagnoses
 per minute, programs compiled; and fits per second of as many tracks at once, their batches merged
-(`galileo sweep --together`). The last line is JSON.
+(`galileo sweep --together`).
 """
 
-import argparse
-import os
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -16,45 +17,47 @@ from pathlib import Path
 from typing import Any
 
 import jax
-import rollouts
-import tables
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # it is called as a script, too
 import galileo_jax as gx
+from benchmarks import rollouts, tables
 from galileo_jax.commands import command
-from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime.precision import in_float64
 from galileo_jax.sweeping.engine_together import EngineTogether
 from galileo_jax.sweeping.task import Task
 
 ENGINES = ("rigid", "mjx", "c")
 SIZES = (1, 16, 256, 4096, 65536)
-MOST_ON_CORES = 1024
-"""Larger batches of the C engine only take longer: they are no faster per rollout."""
+MOST_ON_CORES = 1024  # larger batches of the C engine are no faster per rollout
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    jax.config.update("jax_enable_x64", True)
-    compilation_cache.enable()
+@in_float64
+def main(
+    *,
+    engine: tuple[str, ...] = ENGINES,
+    batch: tuple[int, ...] = SIZES,
+    repeats: int = 3,
+    fits: int = 20,
+    diagnoses: int = 5,
+    together: tuple[int, ...] = (8, 64),
+    seed: int = 7100,
+) -> dict[str, Any]:
     device = jax.devices()[0]
     figures: dict[str, Any] = {"device": f"{device.platform} {device.device_kind}"}
-    figures["cores"] = os.cpu_count()
-    tables.row("rollouts per minute", [*call.engine])
-    for size in call.batch:
-        found = {name: _rollouts_per_minute(name, size, call.repeats) for name in call.engine}
+    tables.row("rollouts per minute", engine)
+    for size in batch:
+        found = {name: _rollouts_per_minute(name, size, repeats) for name in engine}
         figures[f"rollouts_per_minute_{size}"] = found
         tables.row(f"  batch {size}", list(found.values()))
     with tempfile.TemporaryDirectory() as folder:
-        most = max(call.fits, call.diagnoses)
-        clips = [_track(Path(folder), call.seed + i) for i in range(most + (most > 0))]
-        figures["fits_per_s"] = _rate(gx.fit, clips[: call.fits + 1])
-        figures["diagnoses_per_minute"] = 60 * _rate(gx.diagnose, clips[: call.diagnoses + 1])
-        for num in call.together:
-            figures[f"fits_per_s_together_{num}"] = _rate_together(Path(folder), call.seed, num)
-    for name in figures:
-        if name.startswith(("fits_per_s", "diagnoses_per_minute")):
-            tables.row(name, [figures[name]])
-    tables.finish("accelerator", figures)
-    return None
+        most = max(fits, diagnoses)
+        clips = [_track(Path(folder), seed + i) for i in range(most + (most > 0))]
+        figures["fits_per_s"] = _rate(gx.fit, clips[: fits + 1])
+        figures["diagnoses_per_minute"] = 60 * _rate(gx.diagnose, clips[: diagnoses + 1])
+        for num in together:
+            figures[f"fits_per_s_together_{num}"] = _rate_together(Path(folder), seed, num)
+    tables.summary(figures)
+    return figures
 
 
 def _rollouts_per_minute(name: str, size: int, repeats: int) -> float | None:
@@ -96,20 +99,7 @@ def _fitted(path: Path) -> dict[str, Any]:
     return gx.fit(path).result["parameters"]
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = command.Parser(prog="accelerator.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--engine", nargs="+", choices=ENGINES, default=list(ENGINES))
-    parser.add_argument("--batch", nargs="+", type=int, default=list(SIZES))
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--fits", type=int, default=20, help="tracks that are fitted")
-    parser.add_argument("--diagnoses", type=int, default=5, help="tracks that are diagnosed")
-    parser.add_argument("--together", nargs="*", type=int, default=[8, 64], metavar="N")
-    parser.add_argument("--seed", type=int, default=7100, help="of the first track")
-    return parser
-
-
 if __name__ == "__main__":
-    import sys
+    from benchmarks.__main__ import main as run
 
-    raise SystemExit(command.run(main, sys.argv[1:]))
+    raise SystemExit(command.run(run, ["accelerator", *sys.argv[1:]]))

@@ -1,10 +1,10 @@
 """The frozen corpus: the same data through two commits, or two processors, and who differs.
 
-    python benchmarks/corpus.py run A.jsonl --num 300 [--task fit|mh|compare|diagnose] [--videos]
-    PYTHONPATH=../other python benchmarks/corpus.py run B.jsonl --num 300   # another checkout
+    python -m benchmarks corpus run A.jsonl --num 300 [--task fit|mh|compare|diagnose] [--videos]
+    PYTHONPATH=../other:. python -P -m benchmarks corpus run B.jsonl --num 300  # another checkout
     XLA_FLAGS=--xla_cpu_max_isa=SSE4_2 XDG_CACHE_HOME=build/sse \
-        python benchmarks/corpus.py run C.jsonl --num 300                   # another processor
-    python benchmarks/corpus.py differences A.jsonl B.jsonl
+        python -m benchmarks corpus run C.jsonl --num 300                       # another processor
+    python -m benchmarks corpus differences A.jsonl B.jsonl
 
 Cases are seeds, not files: scenarios in turn, two in three with an effect of the library hidden in
 them, noise and frame rate drawn. `run` makes each clip once in --clips, and appends its outcome to
@@ -13,19 +13,18 @@ standard deviations of the first file, log evidences against the best hypothesis
 and processor seconds. Only the public API is called, so that older commits run, too.
 """
 
-import argparse
 import json
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-import journal
 import numpy as np
-import tables
 
 import galileo_jax as gx
+from benchmarks import tables
+from benchmarks.journal import Journal, finished
 from galileo_jax.runtime.errors import InputError
 
 SCENARIOS = (
@@ -33,31 +32,29 @@ SCENARIOS = (
     *("ramp", "liquid", "ramp", "pendulum", "from_above"),
 )
 FRAME_RATES, NOISE_M, STRENGTHS = (30.0, 60.0, 120.0), (1e-4, 1e-3), (0.3, 1.0)
-TASKS = ("fit", "mh", "compare", "diagnose")
 ENDS = ("q025", "q975")
 SETTLED_SD = 0.02  # what differs by more is printed
 
 
-def main(argv: Sequence[str] | None = None) -> None:
-    """Runs the corpus, or prints the differences between two runs."""
-    parser = argparse.ArgumentParser(
-        description="Runs the frozen corpus, or prints how two runs differ."
-    )
-    commands = parser.add_subparsers(dest="command", required=True)
-    run = commands.add_parser("run")
-    run.add_argument("out", type=Path)
-    run.add_argument("--num", type=int, default=300)
-    run.add_argument("--first", type=int, default=0)
-    run.add_argument("--task", choices=TASKS, default="fit")
-    run.add_argument("--videos", action="store_true", help="rendered clips in place of tracks")
-    run.add_argument("--clips", type=Path, default=Path("build/corpus"))
-    differences = commands.add_parser("differences")
-    differences.add_argument("files", type=Path, nargs=2)
-    call = parser.parse_args(argv)
-    if call.command == "run":
-        _run(call)
-    else:
-        _print_differences(*(journal.finished(path) for path in call.files))
+def main(
+    do: Literal["run", "differences"],
+    files: tuple[Path, ...],
+    *,
+    num: int = 300,
+    first: int = 0,
+    task: Literal["fit", "mh", "compare", "diagnose"] = "fit",
+    videos: bool = False,
+    clips: Path = Path("build/corpus"),
+) -> dict[str, Any] | None:
+    if do == "differences":
+        return _differences(*(finished(path) for path in files))
+    journal = Journal(files[0])
+    for index in range(first, first + num):
+        name = f"{'video' if videos else 'track'}{index}"
+        path, recipe = _clip(clips / f"{name}.{'mp4' if videos else 'csv'}", index)
+        row = journal.row(f"{task} {name}", lambda path=path: _timed(path, task))
+        tables.row(row["case"], (recipe["scenario"], *recipe.get("effects", ()), row["cpu_s"]))
+    return None
 
 
 def recipes(index: int, is_video: bool) -> Iterator[dict[str, Any]]:
@@ -81,37 +78,29 @@ def recipes(index: int, is_video: bool) -> Iterator[dict[str, Any]]:
     yield plain
 
 
-def _clip(index: int, call: argparse.Namespace) -> tuple[Path, dict[str, Any]]:
-    name = f"{'video' if call.videos else 'track'}{index}"
-    kept = call.clips / f"{name}.recipe.json"
+def _clip(path: Path, index: int) -> tuple[Path, dict[str, Any]]:
+    """The yaml of a case and its recipe; what is not there is made."""
+    kept = path.with_suffix(".recipe.json")
     if not kept.is_file():
-        call.clips.mkdir(parents=True, exist_ok=True)
-        for recipe in recipes(index, call.videos):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for recipe in recipes(index, path.suffix == ".mp4"):
             try:
-                gx.simulate(call.clips / f"{name}.{'mp4' if call.videos else 'csv'}", **recipe)
+                gx.simulate(path, **recipe)
             except InputError:  # the effect has no place in this scene
                 continue
             kept.write_text(json.dumps(recipe))
             break
-    return call.clips / f"{name}.yaml", json.loads(kept.read_text())
+    return path.with_suffix(".yaml"), json.loads(kept.read_text())
 
 
-def _run(call: argparse.Namespace) -> None:
-    call.out.parent.mkdir(parents=True, exist_ok=True)
-    done = journal.finished(call.out)
-    for index in range(call.first, call.first + call.num):
-        case = f"{call.task} {'video' if call.videos else 'track'}{index}"
-        if case in done:
-            continue
-        path, recipe = _clip(index, call)
-        began = time.process_time()
-        try:
-            row = _outcome(path, call.task)
-        except Exception as error:
-            row = {"failed": f"{type(error).__name__}: {error}"}
-        row |= {"case": case, "recipe": recipe, "cpu_s": time.process_time() - began}
-        journal.add(call.out, row)
-        tables.row(case, (recipe["scenario"], *recipe.get("effects", ["none"]), row["cpu_s"]))
+def _timed(path: Path, task: str) -> dict[str, Any]:
+    """The outcome or the failure of a task, and its processor seconds."""
+    began = time.process_time()
+    try:
+        row = _outcome(path, task)
+    except Exception as error:
+        row = {"failed": f"{type(error).__name__}: {error}"}
+    return row | {"cpu_s": time.process_time() - began}
 
 
 def _outcome(path: Path, task: str) -> dict[str, Any]:
@@ -140,7 +129,7 @@ def _outcome(path: Path, task: str) -> dict[str, Any]:
     }
 
 
-def _print_differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> None:
+def _differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
     tables.row("case", ("mean, sd", "ends, sd", "nats", "verdicts"))
     both = [case for case in first if case in second]
     rows = np.array([_difference(first[case], second[case]) for case in both])
@@ -155,7 +144,7 @@ def _print_differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> N
         tables.row(f"quantile {name}", values)
     seconds = [sum(run[case]["cpu_s"] for case in both) for run in (first, second)]
     figures = {"cases": len(both), "other_verdicts": int(rows[:, 3].sum()), "cpu_s": seconds}
-    tables.finish("corpus", figures | {"quantiles": quantiles})
+    return figures | {"quantiles": quantiles}
 
 
 def _difference(one: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float, ...]:
@@ -174,7 +163,3 @@ def _difference(one: Mapping[str, Any], other: Mapping[str, Any]) -> tuple[float
         for name, own in one["log_evidence"].items()
     ]
     return max(means), max(ends), max(nats), float(one["verdict"] != other["verdict"])
-
-
-if __name__ == "__main__":
-    main()

@@ -1,48 +1,45 @@
-"""Thrown cubes predicted by three simulators, each with the parameters that suit it best.
+"""How well is a thrown cube predicted, by this program and by MuJoCo as it suits it best?
 
-    python benchmarks/cube_peers.py ../shared/data/real/cube_tosses
+    python -m benchmarks cube_peers ../shared/data/real/cube_tosses
 
 Every third toss is for learning: this program's joint fit (`galileo.fit_tosses`), and for MuJoCo
-(friction, the time constant and the damping of its contacts) and PyBullet (friction, restitution;
-optional: `pip install -e '.[bullet]'`) the parameters that predict these tosses best: of scattered
-ones the best, and Nelder-Mead from there. Then each predicts the tosses that none has learned from,
-from the same start: place, turning, velocity and spin at the last frame before the first impact, as
-the flight tells them. All have the edge, the inertia, the centre of mass, the floor and the gravity
-of this program's fit; its cube alone has rounded corners. "Even mass": the same without its centre
-of mass and its inertia, as anybody would simulate a cube.
+the friction, the time constant and the damping of its contacts that predict these tosses best: of
+scattered ones the best, and Nelder-Mead from there. Then each predicts the tosses that none has
+learned from, from the same start: place, turning, velocity and spin at the last frame before the
+first impact, as the flight tells them. Both have the edge, the inertia, the centre of mass, the
+floor and the gravity of this program's fit; its cube alone has rounded corners. "Even mass": the
+same without its centre of mass and its inertia, as anybody would simulate a cube.
 
 Errors are means over the frames from the first impact on, of the place over the edge and of the
-turning, and medians over the tosses. The last line is JSON.
+turning, and medians over the tosses.
 """
 # pyright: reportAttributeAccessIssue=false
 
-import argparse
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import cube_tosses
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-import tables
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from benchmarks import tables
+from benchmarks.real_sets import joint_fit
 from galileo_jax.clip.poses_csv import read_poses_csv
-from galileo_jax.commands import command
 from galileo_jax.inference.toss.residuals import CENTRE, COMMON, Start, forward, motion
 from galileo_jax.measurement.toss_flight import flight_of
 from galileo_jax.runtime.precision import in_float64
 
 STEP_S = 5e-4
-MASS_KG = 0.37
+EDGE_M, MASS_KG = 0.1048, 0.37  # as published
 SAME_ERROR_RAD = 0.5  # a turning that counts as much as a whole edge
 NUM_SCATTERED, SCATTERED_LOG, MOST_EVALUATIONS = 100, 1.5, 100
 LONGEST = 256  # frames: all tosses share one program
 SOLID = 1 / 6  # inertia of an even cube, in its mass times edge squared
-PUBLISHED = {"friction": 0.18, "restitution": 0.125}
+FIRST_TRIED = (0.2, 0.01, 0.5)  # MuJoCo's: friction, time constant and damping of a contact
 
 
 class Thrown(NamedTuple):
@@ -90,12 +87,11 @@ Simulator = Callable[[Thrown, Cube, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @in_float64
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    paths = sorted(call.folder.glob("*.csv"))
+def main(folder: Path, *, every: int = 3) -> dict[str, Any]:
+    paths = sorted(folder.glob("*.csv"))
     thrown = [one for path in paths if (one := at_the_impact(path)) is not None]
-    learned = {path.stem for path in paths[:: call.every]}
-    common = cube_tosses.joint_fit(paths[:: call.every]).solution.solution.common
+    learned = {path.stem for path in paths[::every]}
+    common = joint_fit(paths[::every]).solution.solution.common
     value = dict(zip(COMMON, np.asarray(forward(jnp.asarray(common))).tolist(), strict=True))
     cube = Cube(
         edge=value["edge"],
@@ -120,27 +116,15 @@ def main(argv: Sequence[str]) -> int | None:
         tables.row(name, flat)
 
     show("galileo_jax", by_galileo, cube, common)
-    peers = {"mujoco": (by_mujoco, [0.2, 0.01, 0.5])}
-    try:
-        import pybullet  # pyright: ignore  # noqa: F401
-
-        peers["pybullet"] = (by_bullet, [0.2, 0.3])
-    except ImportError:
-        print("pybullet is not installed: left out")
-    for name, (simulator, begin) in peers.items():
-        for suffix, given in (("", cube), (", even mass", middle)):
-            best = best_for(simulator, old, given, np.array(begin))
-            show(name + suffix, simulator, given, best)
-            if simulator is by_bullet:
-                show(f"published{suffix}", by_bullet, given, np.array(list(PUBLISHED.values())))
-    tables.finish("cube_peers", figures)
-    return None
+    for name, given in (("mujoco", cube), ("mujoco, even mass", middle)):
+        show(name, by_mujoco, given, best_for(by_mujoco, old, given, np.array(FIRST_TRIED)))
+    return figures
 
 
 def at_the_impact(path: Path) -> Thrown | None:
     """A toss from its last free frame on; None where it does not fly for long enough."""
-    poses = read_poses_csv(path, "z", cube_tosses.EDGE_M)
-    flight = flight_of(poses, np.full(3, cube_tosses.EDGE_M))
+    poses = read_poses_csv(path, "z", EDGE_M)
+    flight = flight_of(poses, np.full(3, EDGE_M))
     if flight is None or flight.last >= len(poses.times_s) - 2:
         return None
     flown_s = poses.times_s[flight.last] - poses.times_s[0]
@@ -217,7 +201,7 @@ def by_mujoco(one: Thrown, cube: Cube, parameters: np.ndarray) -> tuple[np.ndarr
     data.qpos = np.concatenate([one.start.position_m, one.start.quaternion])
     # MuJoCo has spins along the body's own axes.
     turned = Rotation.from_quat(np.asarray(one.start.quaternion), scalar_first=True)
-    spin = turned.inv().apply(np.asarray(one.start.spin_rad_s))
+    spin = turned.inv().apply(np.array(one.start.spin_rad_s))
     data.qvel = np.concatenate([one.start.velocity_m_s, spin])
     found = [data.qpos.copy()]
     for count in np.diff(np.rint(one.times_s / STEP_S).astype(int)):
@@ -227,62 +211,4 @@ def by_mujoco(one: Thrown, cube: Cube, parameters: np.ndarray) -> tuple[np.ndarr
     return poses[:, :3], poses[:, 3:]
 
 
-def by_bullet(one: Thrown, cube: Cube, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """PyBullet; parameters: friction and restitution of the contact."""
-    import pybullet  # pyright: ignore
-
-    friction, restitution = (float(number) for number in np.sqrt(parameters))  # it multiplies both
-    client = pybullet.connect(pybullet.DIRECT)
-    try:
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP_S, numSubSteps=0)
-        pybullet.setGravity(0, 0, -cube.gravity)
-        floor = pybullet.createMultiBody(
-            0,
-            pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[5, 5, 0.5]),
-            basePosition=[0, 0, cube.floor - 0.5],
-        )
-        shape = pybullet.createCollisionShape(
-            pybullet.GEOM_BOX,
-            halfExtents=[cube.edge / 2] * 3,
-            collisionFramePosition=(-cube.centre).tolist(),
-        )
-        turned = Rotation.from_quat(np.asarray(one.start.quaternion), scalar_first=True)
-        lever = turned.apply(cube.centre)  # PyBullet's place and velocity are the centre of mass's
-        place = one.start.position_m + lever
-        body = pybullet.createMultiBody(
-            MASS_KG, shape, -1, np.asarray(place).tolist(), turned.as_quat().tolist()
-        )
-        pybullet.changeDynamics(body, -1, localInertiaDiagonal=[cube.moment_kg_m2] * 3)
-        for thing in (floor, body):
-            pybullet.changeDynamics(
-                thing, -1, lateralFriction=friction, restitution=restitution, linearDamping=0,
-                angularDamping=0, rollingFriction=0, spinningFriction=0,
-            )  # fmt: skip
-        spin = np.asarray(one.start.spin_rad_s)
-        velocity = one.start.velocity_m_s + np.cross(spin, lever)
-        pybullet.resetBaseVelocity(body, np.asarray(velocity).tolist(), spin.tolist())
-        found = [pybullet.getBasePositionAndOrientation(body)]
-        for count in np.diff(np.rint(one.times_s / STEP_S).astype(int)):
-            for _ in range(count):
-                pybullet.stepSimulation()
-            found.append(pybullet.getBasePositionAndOrientation(body))
-    finally:
-        pybullet.disconnect(client)
-    turned = Rotation.from_quat([quaternion for _, quaternion in found])
-    places = np.array([place for place, _ in found]) - turned.apply(cube.centre)
-    return places, turned.as_quat(scalar_first=True)
-
-
 _motion = jax.jit(motion)
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="cube_peers.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--every", type=command.whole_number(2), default=3, help="are learned from")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

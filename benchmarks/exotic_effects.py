@@ -1,16 +1,17 @@
-"""Effects that the library does not have: a diagnosis should say `unknown`, or `ambiguous`.
+"""Effects and laws that neither the library nor its forms without a name have, made by hand.
 
     galileo simulate --effects-from benchmarks/exotic_effects.py --effect exotic_gust ...
 
-Ripple, gust and heating have the shape of one of the forms without a name (`effects/forms`); bump,
-drying, dying wind, growing force, magnet and root drag were written after these, and have not.
+Of `exotic_NAME`, a diagnosis should say `unknown`, or `ambiguous`. Ripple, gust and heating have
+the shape of one of the forms (`effects/forms`); the others were written after these, and have not.
+A sticky spot is not among them: any short stretch that brakes is a `friction_patch`, and naming it
+so is right. `hidden_NAME` are the laws that `laws` and `discover` are to find.
 
-A sticky spot is not among them: any short stretch that brakes is a `friction_patch`, and
-naming it so is right.
+All are one formula of the time t, the place q along the path and the speed v of an object.
 """
 
-import math
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from galileo_jax.model.effects.effect import (
     Array,
@@ -24,217 +25,155 @@ from galileo_jax.model.effects.effect import (
 from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter, Prior, Uniform
 
-
-def unknown(name: str, unit: str, prior: Prior, usual: float = 0.0) -> Parameter:
-    """A parameter of an effect; `usual` is where it is while nothing is there."""
-    return Parameter(name, unit, prior, usual, "effect")
-
-
-@register
-class Ripple(Effect):
-    """Friction that waves along the path: k (1 + d sin(2 pi q / w)), for all objects."""
-
-    name: ClassVar[str] = "exotic_ripple"
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Depth d and wavelength w."""
-        return (
-            unknown("exotic_ripple", "1", LogNormal(0.8, 0.15)),
-            unknown("exotic_ripple_length", "m", LogNormal(0.25, 0.15), 0.25),
-        )
-
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficients at the places."""
-        depth, length = theta["exotic_ripple"], theta["exotic_ripple_length"]
-
-        def law(state: State, k: Array) -> Array:
-            wave = k.__array_namespace__().sin(2 * math.pi * state.path_m / length)
-            return k * (1.0 + depth * wave)
-
-        return law
+Kind = Literal["force", "push", "drag", "friction"]
+"""N on object 1; m/s^2 of object 1; m/s^2 against the motion of all; k of all times 1 + f."""
+Formula = Callable[..., Any]
+"""Of t, q, v, the array module, and the parameters."""
 
 
-@register
-class Gust(Effect):
-    """A gust: a pulse of force on object 1, F exp(-((t - t0) / w)^2), w = 0.06 s."""
+def hide(effect: str, kind: Kind, formula: Formula, *unknowns: Parameter) -> None:
+    """Registers an effect; the first parameter is its strength."""
 
-    name: ClassVar[str] = "exotic_gust"
+    class Exotic(Effect):
+        __doc__ = f"The {kind} {effect}."
+        name: ClassVar[str] = effect
 
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Force and time."""
-        return (
-            unknown("exotic_gust", "N", LogNormal(1.0, 0.4)),
-            unknown("exotic_gust_time", "s", Uniform(0.25, 0.55), 0.4),
-        )
+        def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+            """The strength, then what places or shapes it."""
+            return unknowns
 
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force at the time."""
-        size = scene.only(theta["exotic_gust"], 0)
+        def _value(self, theta: Theta, state: State) -> Array:
+            place, xp = state.path_m, state.path_m.__array_namespace__()
+            time = state.time_s + 0.0 * place
+            values = [theta[one.name][..., None] for one in unknowns]
+            return formula(time, place, state.speed_m_s, xp, *values)
 
-        def pulse(state: State):
-            apart = (state.time_s - theta["exotic_gust_time"]) / 0.06
-            return size * size.__array_namespace__().exp(-(apart**2))
+        def force(self, theta: Theta, scene: Surroundings) -> Force | None:
+            """What acts on the objects, N."""
+            if kind == "friction":
+                return None
 
-        return pulse
+            def act(state: State) -> Array:
+                xp = state.path_m.__array_namespace__()
+                mass, value = xp.stack(scene.mass(theta), axis=-1), self._value(theta, state)
+                if kind == "drag":
+                    return -mass * xp.sign(state.speed_m_s) * value
+                first = xp.asarray([float(i == 0) for i in range(len(scene.names))])
+                return first * value * (mass if kind == "push" else 1.0)
+
+            return act
+
+        def friction(self, theta: Theta, scene: Surroundings) -> Friction | None:
+            """The coefficients, 0 or more."""
+            if kind != "friction":
+                return None
+
+            def changed(state: State, k: Array) -> Array:
+                xp = k.__array_namespace__()
+                return xp.maximum(k * (1.0 + self._value(theta, state)), 0.0 * k)
+
+            return changed
+
+    register(Exotic)
 
 
-@register
-class Bump(Effect):
-    """A bump in the way of object 1: it is slowed down going up and sped up coming down.
+def exotic(name: str, kind: Kind, formula: Formula, unit: str, prior: Prior, *more: Any) -> None:
+    """Registers `exotic_NAME`; `more`: name, unit and prior of another parameter."""
+    unknowns = [Parameter(f"exotic_{name}", unit, prior, 0.0, "effect")]
+    if more:
+        called, its_unit, its_prior, usual = more
+        unknowns.append(Parameter(f"exotic_{name}_{called}", its_unit, its_prior, usual, "effect"))
+    hide(f"exotic_{name}", kind, formula, *unknowns)
 
-    F = -m g dh/dq, h = height exp(-((q - place) / 0.03 m)^2)
+
+def _bell(u: Any, xp: Any) -> Any:
+    return xp.exp(-(u**2))
+
+
+def _slope(t: Any, q: Any, v: Any, xp: Any, height: Any, place: Any) -> Any:
+    """The push of a bump, g dh/dq with h = height exp(-((q - place) / 0.03 m)^2)."""
+    u = (q - place) / 0.03
+    return 9.81 * height * 2 * u / 0.03 * _bell(u, xp)
+
+
+exotic("ripple", "friction", lambda t, q, v, xp, d, w: d * xp.sin(2 * xp.pi * q / w),
+       "1", LogNormal(0.8, 0.15), "length", "m", LogNormal(0.25, 0.15), 0.25)  # fmt: skip
+exotic("gust", "force", lambda t, q, v, xp, f, t0: f * _bell((t - t0) / 0.06, xp),
+       "N", LogNormal(1.0, 0.4), "time", "s", Uniform(0.25, 0.55), 0.4)  # fmt: skip
+exotic("bump", "push", _slope,
+       "m", LogNormal(0.012, 0.2), "place", "m", Uniform(-0.25, -0.12), -0.2)  # fmt: skip
+exotic("heating", "friction", lambda t, q, v, xp, rate: rate * t, "1/s", Normal(1.0, 0.5))
+exotic("drying", "friction", lambda t, q, v, xp, d, t1: d * (1 + xp.tanh((t - t1) / 0.05)) / 2,
+       "1", LogNormal(0.5, 0.3), "time", "s", Uniform(0.3, 0.5), 0.4)  # fmt: skip
+exotic("dying_wind", "force", lambda t, q, v, xp, f: f * xp.exp(-t / 0.3),
+       "N", LogNormal(0.4, 0.4))  # fmt: skip
+exotic("root_drag", "drag", lambda t, q, v, xp, c: c * abs(v) / xp.sqrt(abs(v) + 1e-9),
+       "m^0.5 s^-1.5", LogNormal(0.6, 0.4))  # fmt: skip
+exotic("growing_force", "force", lambda t, q, v, xp, f: f * xp.sqrt(abs(t) + 1e-9),
+       "N", LogNormal(0.4, 0.4))  # fmt: skip
+exotic("magnet", "force",
+       lambda t, q, v, xp, f, at: -f * (q - at) / 0.04 / (1 + ((q - at) / 0.04) ** 2) ** 2,
+       "N", LogNormal(2.0, 0.3), "place", "m", Uniform(-0.2, 0.1), -0.05)  # fmt: skip
+
+
+class HiddenLaw(NamedTuple):
+    """A law and what counts as having found it.
+
+    Attributes:
+      kind: push, drag or friction.
+      formula: for a strength of one; of t, q, v and the array module.
+      size: of the strength, median.
+      variables: that it depends on.
+      power: of the only variable; None where it is no power.
     """
 
-    name: ClassVar[str] = "exotic_bump"
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Height and place."""
-        return (
-            unknown("exotic_bump", "m", LogNormal(0.012, 0.2)),
-            unknown("exotic_bump_place", "m", Uniform(-0.25, -0.12), -0.2),
-        )
-
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force at the place."""
-        weight = scene.only(theta["exotic_bump"] * theta["m1"] * scene.gravity, 0)
-
-        def slope(state: State):
-            away = (state.path_m - theta["exotic_bump_place"]) / 0.03
-            return weight * 2 * away / 0.03 * weight.__array_namespace__().exp(-(away**2))
-
-        return slope
+    kind: Kind
+    formula: Formula
+    size: float
+    variables: str
+    power: float | None = None
 
 
-@register
-class Heating(Effect):
-    """Friction that grows with time as surfaces warm up: k (1 + t / tau), for all objects."""
+LAWS = {
+    "root_of_time": HiddenLaw("push", lambda t, q, v, xp: xp.sqrt(t + 1e-9), 1.2, "t", 0.5),
+    "square_of_time": HiddenLaw("push", lambda t, q, v, xp: t**2, 2.0, "t", 2.0),
+    "drag_1_5": HiddenLaw("drag", lambda t, q, v, xp: abs(v) ** 1.5, 0.8, "v", 1.5),
+    "drag_3": HiddenLaw("drag", lambda t, q, v, xp: abs(v) ** 3, 0.8, "v", 3.0),
+    "drag_0_5": HiddenLaw("drag", lambda t, q, v, xp: xp.sqrt(abs(v) + 1e-9), 0.8, "v", 0.5),
+    "heating": HiddenLaw("friction", lambda t, q, v, xp: t, 1.0, "t", 1.0),
+    "cooling": HiddenLaw("friction", lambda t, q, v, xp: xp.exp(-t / 0.2), 1.5, "t"),
+    "gust": HiddenLaw("push", lambda t, q, v, xp: _bell((t - 0.4) / 0.06, xp), 3.0, "t"),
+    "slow_gust": HiddenLaw("push", lambda t, q, v, xp: _bell((t - 0.35) / 0.15, xp), 1.5, "t"),
+    "shaking": HiddenLaw("push", lambda t, q, v, xp: xp.sin(2 * xp.pi * t / 0.21), 1.5, "t"),
+    "dying_wind": HiddenLaw("push", lambda t, q, v, xp: xp.exp(-t / 0.25), 1.5, "t"),
+    "fan_switched_on": HiddenLaw("push", lambda t, q, v, xp: t > 0.4, 1.0, "t"),
+    "drying": HiddenLaw("friction", lambda t, q, v, xp: t > 0.45, 0.8, "t"),
+    "ripple": HiddenLaw("friction", lambda t, q, v, xp: xp.sin(2 * xp.pi * q / 0.17), 0.8, "q"),
+    "polished": HiddenLaw("friction", lambda t, q, v, xp: xp.exp(4.0 * q), 1.5, "q"),
+    "worn": HiddenLaw("friction", lambda t, q, v, xp: q, -1.5, "q", 1.0),
+    "magnet": HiddenLaw(
+        "push", lambda t, q, v, xp: -(q + 0.1) / 0.05 / (1 + ((q + 0.1) / 0.05) ** 2) ** 2, 4.0, "q"
+    ),
+    "far_magnet": HiddenLaw("push", lambda t, q, v, xp: 0.01 / (0.3 - q) ** 2, 2.0, "q"),
+    "bump": HiddenLaw(
+        "push", lambda t, q, v, xp: (q + 0.2) / 0.03 * _bell((q + 0.2) / 0.03, xp), 3.0, "q"
+    ),
+    "sticky_place": HiddenLaw("push", lambda t, q, v, xp: -_bell((q + 0.15) / 0.05, xp), 2.0, "q"),
+    "honey": HiddenLaw(
+        "drag", lambda t, q, v, xp: abs(v) ** 1.5 * _bell((q + 0.15) / 0.08, xp), 3.0, "qv"
+    ),
+    "thinning_oil": HiddenLaw("drag", lambda t, q, v, xp: abs(v) * xp.exp(-t / 0.3), 2.0, "tv"),
+    "slippery_when_fast": HiddenLaw(
+        "friction", lambda t, q, v, xp: xp.exp(-abs(v) / 0.3), 1.5, "v"
+    ),
+    "one_way_brush": HiddenLaw("friction", lambda t, q, v, xp: v > 0, 0.8, "v"),
+}
+"""The last, friction in one direction only, does not show where nothing turns back."""
 
-    name: ClassVar[str] = "exotic_heating"
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The rate 1 / tau."""
-        return (unknown("exotic_heating", "1/s", Normal(1.0, 0.5)),)
-
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficients at the time."""
-
-        def law(state: State, k: Array) -> Array:
-            return k * (1.0 + theta["exotic_heating"] * state.time_s)
-
-        return law
-
-
-@register
-class Drying(Effect):
-    """Friction that jumps at one moment: k (1 + d) after t1, within 0.05 s, for all objects."""
-
-    name: ClassVar[str] = "exotic_drying"
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Share d and time t1."""
-        return (
-            unknown("exotic_drying", "1", LogNormal(0.5, 0.3)),
-            unknown("exotic_drying_time", "s", Uniform(0.3, 0.5), 0.4),
-        )
-
-    def friction(self, theta: Theta, scene: Surroundings) -> Friction:
-        """The coefficients at the time."""
-
-        def law(state: State, k: Array) -> Array:
-            late = (state.time_s - theta["exotic_drying_time"]) / 0.05
-            share = 0.5 * (1.0 + k.__array_namespace__().tanh(late))
-            return k * (1.0 + theta["exotic_drying"] * share)
-
-        return law
-
-
-@register
-class DyingWind(Effect):
-    """Wind along the path that dies down: F exp(-t / 0.3 s) on object 1."""
-
-    name: ClassVar[str] = "exotic_dying_wind"
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Force at the release."""
-        return (unknown("exotic_dying_wind", "N", LogNormal(0.4, 0.4)),)
-
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force at the time."""
-        size = scene.only(theta["exotic_dying_wind"], 0)
-
-        def wind(state: State) -> Array:
-            time = state.time_s + 0.0 * size
-            return size * size.__array_namespace__().exp(-time / 0.3)
-
-        return wind
-
-
-@register
-class RootDrag(Effect):
-    """Drag that grows with the root of the speed, on all objects: F = -c m sqrt(|v|) sign(v)."""
-
-    name: ClassVar[str] = "exotic_root_drag"
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Coefficient c, m^0.5 s^-1.5."""
-        return (unknown("exotic_root_drag", "m^0.5 s^-1.5", LogNormal(0.6, 0.4)),)
-
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force at the speeds."""
-
-        def drag(state: State) -> Array:
-            speed = state.speed_m_s
-            xp = speed.__array_namespace__()
-            mass = xp.stack(scene.mass(theta), axis=-1)
-            root = xp.sqrt(abs(speed) + 1e-9)
-            return -theta["exotic_root_drag"][..., None] * mass * speed / root
-
-        return drag
-
-
-@register
-class GrowingForce(Effect):
-    """A force on object 1 that grows as the root of the time: F = F0 sqrt(t / 1 s)."""
-
-    name: ClassVar[str] = "exotic_growing_force"
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Force after a second."""
-        return (unknown("exotic_growing_force", "N", LogNormal(0.4, 0.4)),)
-
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force at the time."""
-        size = scene.only(theta["exotic_growing_force"], 0)
-
-        def growing(state: State) -> Array:
-            time = state.time_s + 0.0 * size
-            return size * size.__array_namespace__().sqrt(abs(time) + 1e-9)
-
-        return growing
-
-
-@register
-class Magnet(Effect):
-    """A magnet beside the way attracts object 1: F = -F0 u / (1 + u^2)^2, u = (q - place) / 4 cm.
-
-    It pulls forward before the place and back behind it.
-    """
-
-    name: ClassVar[str] = "exotic_magnet"
-
-    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """Force and place."""
-        return (
-            unknown("exotic_magnet", "N", LogNormal(2.0, 0.3)),
-            unknown("exotic_magnet_place", "m", Uniform(-0.2, 0.1), -0.05),
-        )
-
-    def force(self, theta: Theta, scene: Surroundings) -> Force:
-        """The force at the place."""
-        size = scene.only(theta["exotic_magnet"], 0)
-
-        def pull(state: State) -> Array:
-            away = (state.path_m - theta["exotic_magnet_place"][..., None]) / 0.04
-            return -size * away / (1.0 + away**2) ** 2
-
-        return pull
+for _name, _law in LAWS.items():
+    hide(
+        f"hidden_{_name}",
+        _law.kind,
+        lambda t, q, v, xp, strength, law=_law: law.size * strength * law.formula(t, q, v, xp),
+        Parameter(f"hidden_{_name}", "1", LogNormal(1.0, 0.25), 0.0, "effect"),
+    )

@@ -2,22 +2,20 @@
 
 import itertools
 import json
+import multiprocessing
 import tempfile
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects.forms import FORM_NAMES
-from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 
 EXOTIC_FILE = Path(__file__).with_name("exotic_effects.py")
@@ -34,6 +32,8 @@ EXOTICS = (
 )
 PAIRS = ("initial_push+restitution", "air_drag+friction_patch")
 ANGLES_DEG = (20.0, 10.0, 15.0)
+TRACK: dict[str, Any] = {"track_only": True, "solver": "fine", "faults": True}
+"""No video; by an integrator that the fit does not know, with the small faults of real clips."""
 
 
 @dataclass(frozen=True)
@@ -86,14 +86,12 @@ def grid(
         name = f"{effect}{level}_{seed}"
         recipe: dict[str, Any] = {
             "out": folder / f"{name}.csv",
-            "track_only": True,
-            "solver": "fine",
-            "faults": True,
             "seed": zlib.crc32(name.encode()),
             "angle": ANGLES_DEG[seed % 3],
             "track_noise": noise_m,
             "fps": fps,
             "series": series,
+            **TRACK,
         }
         if strength is not None:
             told = {each: {} for each in effect.split("+")}
@@ -105,9 +103,26 @@ def grid(
         yield Case(name, yamls, effect, strength, recipe)
 
 
-def make_clips(recipe: Mapping[str, Any]) -> None:
-    """Runs `simulate`, in a process of its own: exotic effects stay out of the diagnosis's."""
-    simulate(**recipe)
+def make_clips(case: Case) -> None:
+    """Simulates the clips of a case that are not there."""
+    if case.recipe is not None and not all(path.is_file() for path in case.yamls):
+        simulate(**case.recipe)
+
+
+def made_meanwhile(
+    make: Callable[..., Any], arguments: Mapping[str, tuple[Any, ...] | None]
+) -> Iterator[tuple[str, Any]]:
+    """Names, and what `make` made of their arguments (None: nothing); the next are made meanwhile.
+
+    In a process of its own, so that exotic effects stay unknown to the diagnosis in this one.
+    """
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        made = {name: pool.submit(make, *given) for name, given in arguments.items() if given}
+        try:
+            for name in arguments:
+                yield name, made[name].result() if name in made else None
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 def folder_cases(folder: Path, series: int | None, only: str) -> list[Case]:
@@ -130,20 +145,3 @@ def folder_cases(folder: Path, series: int | None, only: str) -> list[Case]:
     if not cases:
         raise InputError(f"{folder}: no {only}.truth.json there" + (" of a series" * bool(series)))
     return cases
-
-
-def tracked(path: Path, cache: Path) -> Path:
-    """The yaml of the clip's csv track in the cache; a video is tracked where there is none."""
-    kept = cache / path.name
-    if not kept.is_file():
-        clip = load_clip(path)
-        if clip.video is None:
-            return path
-        write_observation_csv(kept.with_suffix(".csv"), measure(clip).whole)
-        content = yaml.safe_load(path.read_text())
-        del content["video"]
-        for item in content["objects"]:
-            item.pop("point_px", None)  # it is where the track begins
-        content["track"] = f"{kept.stem}.csv"
-        write_text(kept, yaml.safe_dump(content, sort_keys=False))
-    return kept

@@ -1,86 +1,103 @@
 """The exam of the diagnosis: clips in which an effect is hidden, and what it says of them.
 
-    python benchmarks/hidden_effects.py --out DIR              our own grid, tracks only
-    python benchmarks/hidden_effects.py FOLDER --out DIR       clips made elsewhere
+    python -m benchmarks hidden_effects --out DIR              our own grid, tracks only
+    python -m benchmarks hidden_effects FOLDER --out DIR       clips made elsewhere
 
 The grid is effects x strengths x seeds, clips without an effect, and clips with effects that
 the library does not have. Its truths come from an integrator of their own, with the small
 faults of real clips. Every case goes through `galileo diagnose`; of those with an effect only
 the ones count in which it shows (chi2 per degree of freedom of the base model above
---least-chi2). What is finished stays in DIR/results.jsonl and is not done again. The last
-line is JSON.
+--least-chi2: 3, of clips made elsewhere 0). `--series N` diagnoses N clips together.
+What is finished stays in DIR/results.jsonl and is not done again.
 """
 
-import argparse
 import json
 import math
-import multiprocessing
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import hidden_cases
-import journal
 import numpy as np
-import tables
-import verdicts
-from hidden_cases import Case
 
-from galileo_jax.commands import command
-from galileo_jax.runtime.atomic_write import write_text
+from benchmarks import hidden_cases, tables, verdicts
+from benchmarks.hidden_cases import Case
+from benchmarks.journal import Journal
 from galileo_jax.runtime.errors import InputError
 
 PIXELS_PER_METRE = 900.0
+LEAST_CHI2 = 3.0  # of our own grid; clips from elsewhere all count
 COLUMNS = ("right", "covered", "size", "before", "after", "seconds")
-BY_COLUMNS = ("cases", "right", "covered", "size", "wrong", "missed", "unknown")
+Scored = Sequence[tuple[Case, verdicts.Score]]
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(
+    folder: Path | None = None,
+    *,
+    out: Path,
+    series: int | None = None,
+    least_chi2: float | None = None,
+    seed: int = 0,
+    effects: str | None = None,
+    strengths: tuple[float, ...] = (0.2, 0.5, 0.8),
+    seeds: int = 2,
+    none: int = 20,
+    noise_px: float = 0.3,
+    fps: float = 30.0,
+    only: str = "*",
+) -> dict[str, Any]:
     library = hidden_cases.ramp_effects()
-    cases = _cases(call, library)
-    kept = journal.finished(call.out / "results.jsonl")
-    least = call.least_chi2 if call.least_chi2 is not None else (0.0 if call.folder else 3.0)
+    if folder:
+        listed = hidden_cases.folder_cases(folder, series, only)
+    else:
+        asked = effects.split(",") if effects else library
+        if unknown := set(asked) - set(library):
+            raise InputError(f"--effects: unknown {unknown}; known: {', '.join(library)}")
+        grid = (asked, strengths, seeds, none, noise_px / PIXELS_PER_METRE, fps, series)
+        listed = list(hidden_cases.grid(out / "clips", *grid))
+    cases = {case.name: case for case in listed}
+    journal = Journal(out / "results.jsonl")
+    least = LEAST_CHI2 * (folder is None) if least_chi2 is None else least_chi2
     tables.row("case", COLUMNS)
-    scores: list[tuple[Case, verdicts.Score]] = []
-    weak: list[tuple[Case, verdicts.Score]] = []
+    told: list[tuple[Case, verdicts.Score]] = []
     seconds, failures = [], {}
-    for case in _with_clips(cases, kept):
-        entry = kept.get(case.name) or _examine(case, call)
+    unmade = {name: None if name in journal.rows else (case,) for name, case in cases.items()}
+    if folder:
+        unmade = dict.fromkeys(cases)
+    for name, _ in hidden_cases.made_meanwhile(hidden_cases.make_clips, unmade):
+        case = cases[name]
+        entry = journal.tried(name, lambda case=case: _examined(case, out, seed))
         if entry["error"]:
-            failures[case.name] = entry["error"]
-            print(f"{case.name:<28} {entry['error']}", flush=True)
+            failures[name] = entry["error"]
+            print(f"{name:<28} {entry['error']}", flush=True)
             continue
-        score = verdicts.judge(case.effect, library, entry["diagnosis"])
+        told.append((case, verdicts.judge(case.effect, library, entry["diagnosis"])))
         seconds.append(entry["seconds"])
-        _show(case, score, seconds[-1])
-        is_weak = score.kind != "none" and score.before**2 < least
-        (weak if is_weak else scores).append((case, score))
+        _show(*told[-1], seconds[-1])
+    weak = [(c, s) for c, s in told if s.kind != "none" and s.before**2 < least]
+    scores = [one for one in told if one not in weak]
     if not scores:
-        raise InputError(f"{call.out}: no case could be diagnosed in which the effect shows")
+        raise InputError(f"{out}: no case could be diagnosed in which the effect shows")
     figures = verdicts.summary([score for _, score in scores])
-    missed = verdicts.missed_bars(figures, bool(call.series))
-    missed += [f"{name} cannot be diagnosed" for name in failures]
     report = {
         "cases": len(cases),
         "too_weak": len(weak),
+        **figures,
+        "seconds_median": float(np.median(seconds)),
+        "seconds_worst": max(seconds),
         "too_weak_by_effect": _by(weak, lambda case: case.effect),
         "failures": failures,
-        **figures,
         "by_effect": _by(scores, lambda case: case.effect),
         "by_strength": _by(scores, lambda case: case.strength),
         "confusion": verdicts.confusion([score for _, score in scores]),
-        "seconds_median": float(np.median(seconds)),
-        "seconds_worst": max(seconds),
-        "bars_missed": missed,
     }
-    _print(report)
-    if call.json:
-        write_text(call.json, json.dumps(report, indent=1))
-    tables.finish("hidden_effects", report)
-    return None
+    print("\nconfusion: truth, and what was said")
+    for truth, row in report["confusion"].items():
+        print(f"{truth:<28}  " + ", ".join(f"{label} {count}" for label, count in row.items()))
+    tables.summary(report)
+    missed = verdicts.missed_bars(figures, bool(series))
+    missed += [f"{name} cannot be diagnosed" for name in failures]
+    return report | {"bars_missed": tables.missed(missed)}
 
 
 def run_diagnosis(yamls: Sequence[Path], out: Path, seed: int) -> dict[str, Any]:
@@ -91,53 +108,11 @@ def run_diagnosis(yamls: Sequence[Path], out: Path, seed: int) -> dict[str, Any]
     return json.loads((out / "diagnosis.json").read_text())
 
 
-def _cases(call: argparse.Namespace, library: Sequence[str]) -> list[Case]:
-    if call.folder:
-        return hidden_cases.folder_cases(call.folder, call.series, call.only)
-    asked = call.effects.split(",") if call.effects else list(library)
-    unknown = [name for name in asked if name not in library]
-    if unknown:
-        raise InputError(f"--effects: unknown {unknown[0]!r}; known: {', '.join(library)}")
-    noise_m = call.noise_px / PIXELS_PER_METRE
-    folder = call.out / "clips"
-    grid = (asked, call.strengths, call.seeds, call.none, noise_m, call.fps, call.series)
-    return list(hidden_cases.grid(folder, *grid))
-
-
-def _with_clips(cases: Sequence[Case], kept: dict[str, Any]) -> Iterator[Case]:
-    """The cases, each when its clips are there; the next ones are made meanwhile."""
-    wanted = [case for case in cases if case.recipe and case.name not in kept]
-    missing = [case for case in wanted if not all(path.is_file() for path in case.yamls)]
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        made: dict[str, Future[None]] = {
-            case.name: pool.submit(hidden_cases.make_clips, case.recipe)
-            for case in missing
-            if case.recipe is not None
-        }
-        try:
-            for case in cases:
-                if case.name in made:
-                    made[case.name].result()  # raises what `simulate` raised
-                yield case
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _examine(case: Case, call: argparse.Namespace) -> dict[str, Any]:
-    """Diagnoses a case and keeps the outcome, also that it was refused."""
-    yamls, began = case.yamls, time.perf_counter()
-    entry: dict[str, Any] = {"case": case.name, "error": None}
-    try:
-        if call.tracks:
-            yamls = [hidden_cases.tracked(path, call.tracks) for path in yamls]
-            began = time.perf_counter()
-        entry["diagnosis"] = run_diagnosis(yamls, call.out / "runs" / case.name, call.seed)
-    except Exception as error:  # one case must not end an exam of hours; it is told below
-        entry["error"] = f"{type(error).__name__}: {error}"
-    entry["seconds"] = round(time.perf_counter() - began, 2)
-    call.out.mkdir(parents=True, exist_ok=True)
-    journal.add(call.out / "results.jsonl", entry)
-    return entry
+def _examined(case: Case, out: Path, seed: int) -> dict[str, Any]:
+    """What a diagnosis says of a case, and the seconds it took."""
+    began = time.perf_counter()
+    said = run_diagnosis(case.yamls, out / "runs" / case.name, seed)
+    return {"diagnosis": said, "seconds": round(time.perf_counter() - began, 2)}
 
 
 def _show(case: Case, score: verdicts.Score, seconds: float) -> None:
@@ -149,63 +124,10 @@ def _show(case: Case, score: verdicts.Score, seconds: float) -> None:
     print(f"{'':<28}  says {score.label}", flush=True)
 
 
-def _by(scores: Sequence[tuple[Case, verdicts.Score]], key: Any) -> dict[str, dict[str, Any]]:
+def _by(scores: Scored, key: Callable[[Case], Any]) -> dict[str, dict[str, float]]:
     """The summary for every effect, or every strength."""
     groups: dict[str, list[verdicts.Score]] = {}
     for case, score in scores:
         if key(case) is not None:
             groups.setdefault(str(key(case)), []).append(score)
     return {name: verdicts.summary(group) for name, group in groups.items()}
-
-
-def _print(report: dict[str, Any]) -> None:
-    for title in ("by_effect", "by_strength", "too_weak_by_effect"):
-        print()
-        tables.row(title.replace("_", " "), BY_COLUMNS)
-        for name, entry in report[title].items():
-            _print_row(name, entry)
-    print("\nconfusion: truth, and what was said")
-    for truth, row in report["confusion"].items():
-        print(f"{truth:<28}  " + ", ".join(f"{label} {count}" for label, count in row.items()))
-    print()
-    for name, value in report.items():
-        if isinstance(value, int | float):
-            tables.row(name, [value])
-    print("bars missed: " + ("; ".join(report["bars_missed"]) or "none"))
-
-
-def _print_row(name: str, entry: dict[str, Any]) -> None:
-    cases = entry["none"] + entry["known"] + entry["exotic"]
-    right = 1 - entry["false_alarms"] if entry["none"] else entry["named_right"]
-    wrong = entry["false_alarms"] if entry["none"] else entry["confident_wrong"]
-    if entry["exotic"] and not entry["known"]:
-        wrong = entry["confident_wrong_exotic"]
-    values = (right, entry["covered"], entry["mean_set_size"], wrong, entry["missed"])
-    tables.row(name, [cases, *values, entry["unknown_recognised"]])
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="hidden_effects.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    add = parser.add_argument
-    add("folder", type=Path, nargs="?", help="clips with truths; absent = our own grid")
-    add("--out", type=Path, required=True, help="clips, runs and results are kept there")
-    add("--series", type=command.whole_number(2), help="so many clips are diagnosed together")
-    add("--least-chi2", type=float, help="of the base model (3 for the grid, 0 for FOLDER)")
-    add("--seed", type=command.whole_number(0), default=0, help="of the diagnosis")
-    add("--json", type=Path, help="the figures, also there")
-    ours = parser.add_argument_group("our own grid")
-    ours.add_argument("--effects", help="a,b (default: the whole library)")
-    ours.add_argument("--strengths", type=float, nargs="+", default=[0.2, 0.5, 0.8])
-    ours.add_argument("--seeds", type=command.whole_number(0), default=2)
-    ours.add_argument("--none", type=command.whole_number(0), default=20, help="clips without")
-    ours.add_argument("--noise-px", type=float, default=0.3, help="at 900 px/m")
-    ours.add_argument("--fps", type=float, default=30.0)
-    theirs = parser.add_argument_group("clips in FOLDER")
-    theirs.add_argument("--only", default="*", help="glob over clip names")
-    theirs.add_argument("--tracks", type=Path, help="keep tracks there; reuse what is there")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

@@ -1,7 +1,7 @@
 """Labs: objects with a sealed effect, or a sealed law, that can be measured at other settings.
 
-A law (`hidden_laws.py`) is simulated in a process of its own: what registers it there stays unknown
-to the diagnosis here.
+A law (`exotic_effects.py`) is simulated in a process of its own: what registers it there stays
+unknown to the diagnosis here.
 """
 
 import functools
@@ -13,11 +13,12 @@ from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 import galileo_jax as gx
+from benchmarks.hidden_cases import TRACK
 from galileo_jax.experiment.lab import Described, described
 
 SETTINGS = {
@@ -25,13 +26,12 @@ SETTINGS = {
     "angle_deg": {"low": 12.0, "high": 28.0},
     "fps": {"choices": [30]},
 }
-NOISES = ("px", "speed")
+Noise = Literal["px", "speed"]
 PIXEL_M = 0.3 / 900  # 0.3 px at 900 px/m
 SPEED_SHARE = 0.075  # of the range of object 1's speed, as the noise of a velocity
 LEAST_NOISE_M = 1e-5  # where static friction holds all
 NONE = "none"
-HIDDEN = "hidden_"  # what the effects of `hidden_laws.py` are called before their names
-LAW_STRENGTH = 0.5  # as in laws.py
+HIDDEN = "hidden_"  # what the effects of `exotic_effects.py` are called before their names
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class SimulatedLab:
     folder: Path
     effect: str
     seed: int
-    noise: str
+    noise: Noise
 
     @property
     def truth(self) -> Path:
@@ -57,7 +57,7 @@ class SimulatedLab:
         if not path.is_file():
             told: dict[str, Any] = {"effects": {} if self.effect == NONE else {self.effect: {}}}
             if self._is_law:
-                told["strength"] = LAW_STRENGTH
+                told["strength"] = 0.5  # as in laws.py
             self._simulate(
                 self.folder / "sealed.csv", seed=self._seed("objects"), track_only=True, **told
             )
@@ -83,9 +83,7 @@ class SimulatedLab:
             "angle": angle,
             "fps": float(settings["fps"]),
             "seed": self._seed(number),
-            "solver": "fine",
-            "faults": True,
-            "track_only": True,
+            **TRACK,
         }
         noise_m = PIXEL_M
         if self.noise == "speed":
@@ -122,12 +120,12 @@ def _process() -> ProcessPoolExecutor:
 
 
 def _with_laws(path: Path, options: Mapping[str, Any]) -> gx.Simulated:
-    import hidden_laws  # noqa: F401  registers them, for this process only
+    from benchmarks import exotic_effects  # noqa: F401  registers them, for this process only
 
     return gx.simulate(path, **options)
 
 
 def _judged(name: str, family: str, constants: Mapping[str, Any]) -> bool:
-    from laws import is_right
+    from benchmarks.laws import is_right
 
     return is_right(name, family, constants)

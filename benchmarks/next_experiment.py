@@ -1,33 +1,27 @@
-"""Clips until `named`: settings that `next` chooses against settings at random.
+"""How many clips until a name: settings that `next` chooses against settings at random.
 
-    python benchmarks/next_experiment.py --out DIR --most 6 --first 100
+    python -m benchmarks next_experiment --out DIR --most 6 --first 100
 
 For every pair of docs/reference/effects.md that is easily confused, the first effect is hidden in a
-lab. Both ways begin with the same clip (the middle of what the lab allows); then one asks
-`next_experiment`, the other draws a setting, and all clips are diagnosed together until the effect
-is named, or `--most` clips are made. A lab whose first clip names the effect already says nothing
-here and is left out. What is finished stays in DIR, every clip and verdict for itself, so that what
-is interrupted goes on. The last line is JSON.
-
-With `--pairs` only no effect and the two of a pair are hypotheses, for each of the pairs: a step
-then takes seconds. Named is what is ahead of the other two by the margin of a verdict.
+lab; no effect and the two of the pair are the hypotheses. Both ways begin with the same clip (the
+middle of what the lab allows); then one asks `next_experiment`, the other draws a setting, until
+the effect is named (ahead of the other two by the margin of a verdict), or `--most` clips are made.
+A lab whose first clip names the effect already says nothing here and is left out. What is finished
+stays in DIR, every clip and verdict for itself, so that what is interrupted goes on.
 """
 
-import argparse
+import itertools
 import json
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import labs
 import numpy as np
-import tables
 
-import galileo_jax as gx
+from benchmarks import labs, tables
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.clip.load import load_clip
-from galileo_jax.commands import command
 from galileo_jax.comparison.compare import compare
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnose import fitter_of
@@ -68,51 +62,46 @@ WAYS = ("next", "random")
 MOST_SETTINGS = 16  # that are rehearsed for a pair
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    hidden = call.effects.split(",") if call.effects else [first for first, _ in PAIRS]
-    races: list[tuple[str, str]] = [(effect, "") for effect in dict.fromkeys(hidden)]
-    if call.pairs:
-        races = [pair for pair in PAIRS if pair[0] in hidden]
-    tables.row("hidden", ("next", "random"))
+def main(
+    *,
+    out: Path,
+    effects: str = "",
+    noise: labs.Noise = "px",
+    most: int = 6,
+    seeds: int = 1,
+    first: int = 100,
+) -> dict[str, Any]:
+    pairs = [pair for pair in PAIRS if not effects or pair[0] in effects.split(",")]
+    tables.row("hidden", WAYS)
     rows = []
-    for seed in range(call.first, call.first + call.seeds):
-        for effect, rival in races:
-            row = _race(call, effect, rival, seed)
-            title = f"{effect} ({rival})" if rival else effect
-            tables.row(f"{title} {seed}", [row["next"], row["random"]])
-            rows.append(row)
+    for seed, (effect, rival) in itertools.product(range(first, first + seeds), pairs):
+        folder = out / f"{effect}_{rival}_{seed}"
+        (folder / "lab").mkdir(parents=True, exist_ok=True)
+        lab = labs.SimulatedLab(folder / "lab", effect, seed, noise)
+        rows.append({"hidden": effect, "rival": rival, "seed": seed, **_race(lab, rival, most)})
+        tables.row(f"{effect} ({rival}) {seed}", [rows[-1][way] for way in WAYS])
     told = [row for row in rows if row["next"] > 1]
     medians = {way: float(np.median([row[way] for row in told] or [0])) for way in WAYS}
     tables.row(f"median of {len(told)}", [medians[way] for way in WAYS])
-    tables.finish("next_experiment", {"most": call.most, "medians": medians, "labs": rows})
-    return None
+    return {"most": most, "medians": medians, "labs": rows}
 
 
-def _race(call: argparse.Namespace, effect: str, rival: str, seed: int) -> dict[str, Any]:
-    folder: Path = call.out / "_".join([effect, *([rival] if rival else []), str(seed)])
-    (folder / "lab").mkdir(parents=True, exist_ok=True)
-    lab = labs.SimulatedLab(folder / "lab", effect, seed, call.noise)
-    first = _step(folder, lab, rival, (), middle(lab.describe().can), call.most)
-    row: dict[str, Any] = {"hidden": effect, "rival": rival, "seed": seed, "first": first["says"]}
+def _race(lab: labs.SimulatedLab, rival: str, most: int) -> dict[str, Any]:
+    """Clips until the effect is named, by way; one more than allowed: not within them."""
+    named, can = ["named", lab.effect], lab.describe().can
+    first = _step(lab, rival, (), middle(can), most)
+    row: dict[str, Any] = {"first": first["says"]}
     for way in WAYS:
         steps = [first]
-        # One more than allowed stands for "not named within them".
-        while steps[-1]["says"] != ["named", effect] and len(steps) < call.most:
-            setting = steps[-1]["next"]
-            if way == "random":
-                setting = _drawn(lab.describe().can, seed, len(steps))
-            steps.append(
-                _step(folder, lab, rival, [one["clip"] for one in steps], setting, call.most)
-            )
-        is_named = steps[-1]["says"] == ["named", effect]
-        row[way] = len(steps) if is_named else call.most + 1
+        while steps[-1]["says"] != named and len(steps) < most:
+            setting = steps[-1]["next"] if way == "next" else _drawn(can, lab.seed, len(steps))
+            steps.append(_step(lab, rival, [one["clip"] for one in steps], setting, most))
+        row[way] = len(steps) if steps[-1]["says"] == named else most + 1
         row[f"{way}_says"] = steps[-1]["says"]
     return row
 
 
 def _step(
-    folder: Path,
     lab: labs.SimulatedLab,
     rival: str,
     before: Sequence[str],
@@ -123,6 +112,7 @@ def _step(
 
     The same clips are the same step, whichever way asks for it.
     """
+    folder = lab.folder.parent
     text = json.dumps([*before, setting], sort_keys=True)
     name = f"c{len(before) + 1}_{zlib.crc32(text.encode()):08x}"
     done = folder / f"{name}.json"
@@ -132,29 +122,17 @@ def _step(
     if not clip.is_file():
         write_clip(clip, lab.measure(setting), lab.describe().clip, setting)
     clips = [folder / each for each in (*before, clip.name)]
-    may_ask = len(clips) < most
-    says, ahead = _of_two(lab, rival, clips, may_ask) if rival else _of_all(lab, clips, may_ask)
+    says, ahead = _of_two(lab, rival, clips, len(clips) < most)
     step = {"clip": clip.name, "setting": dict(setting), "says": says, "next": ahead}
     write_json(done, step)
     return step
 
 
-Said = tuple[list[str], dict[str, Any] | None]
-"""The verdict, and where to measure next."""
-
-
-def _of_all(lab: labs.SimulatedLab, clips: Sequence[Path], may_ask: bool) -> Said:
-    """By the diagnosis, all effects and forms being hypotheses."""
-    found = gx.diagnose(clips, seed=lab.seed, add="none")
-    says = [found.verdict.status, *found.verdict.effects]
-    if says == ["named", lab.effect] or not may_ask:
-        return says, None
-    return says, dict(gx.next_experiment(found, can=labs.SETTINGS, seed=lab.seed).best)
-
-
 @in_float64
-def _of_two(lab: labs.SimulatedLab, rival: str, clips: Sequence[Path], may_ask: bool) -> Said:
-    """No effect, the hidden one and its rival being hypotheses."""
+def _of_two(
+    lab: labs.SimulatedLab, rival: str, clips: Sequence[Path], may_ask: bool
+) -> tuple[list[str], dict[str, Any] | None]:
+    """The verdict on no effect, the hidden one and its rival; and where to measure next."""
     declared = [load_clip(clip.with_suffix(".yaml")) for clip in clips]
     trials = with_library(declared, [measure(clip).observation for clip in declared], "auto")
     fitter = fitter_of(trials)
@@ -184,20 +162,3 @@ def _drawn(can: Can, seed: int, number: int) -> dict[str, Any]:
         else kind.values[int(generator.integers(len(kind.values)))]
         for name, kind in can.items()
     }
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="benchmarks/next_experiment.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR")
-    parser.add_argument("--effects", default="", help="hidden ones (default: of all pairs)")
-    parser.add_argument("--pairs", action="store_true", help="each pair by itself")
-    parser.add_argument("--noise", choices=labs.NOISES, default="px")
-    parser.add_argument("--most", type=command.whole_number(2), default=6, help="clips")
-    parser.add_argument("--seeds", type=command.whole_number(1), default=1)
-    parser.add_argument("--first", type=command.whole_number(0), default=100, help="seed")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

@@ -1,27 +1,27 @@
 """Are the p-values of `compare` uniform under the model? And is the noise scale right?
 
-    python benchmarks/p_values.py [--num 400] [--trials 1] [--seed 0]
-                                  [--noise camera] [--case drawn]
+    python -m benchmarks p_values --num 400 --noise camera --case drawn [--trials 3]
 
 Tracks of the rigid engine with the tracker's noise as stated; what the likelihood allows for beside
 it (its modes, and the nuisances) is either not there ("centre") or drawn from its prior ("drawn").
 """
 
-import argparse
+import itertools
 import time
 from dataclasses import replace
-from typing import get_args
+from typing import Any, get_args
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from scipy import stats
-from synthetic_tracks import make_case
 
+from benchmarks import tables
+from benchmarks.tracks import make_case
 from galileo_jax.comparison.compare import compare
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem, with_shared_parameters
+from galileo_jax.runtime.precision import in_float64
 from galileo_jax.similarity.discrepancy import crossings, modes
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
@@ -29,33 +29,31 @@ NOISE_M = 5e-5  # a twentieth of a pixel at 1000 px/m
 NUM_ROUNDS, NUM_DRAWS, MOST_MODES = 12, 100, 1000
 SAME_M = 1e-7  # far below the noise
 LEVELS = (0.01, 0.05, 0.5)
+COLUMNS = ("KS p", *(f"p < {level:g}" for level in LEVELS), "chi2/dof", "scale", "CPU s")
 CASES = ("centre", "drawn")
 
 
-def main() -> None:
-    """Prints a row per case."""
-    jax.config.update("jax_enable_x64", True)
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--num", type=int, default=400)
-    parser.add_argument("--trials", type=int, default=1, help="clips of each problem")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--noise", choices=get_args(NoiseModel), action="append")
-    parser.add_argument("--case", choices=CASES, action="append")
-    args = parser.parse_args()
-    print(f"{'noise':<8} {'modes':<7} {'KS p':>6} {'<.01':>6} {'<.05':>6} {'<.5':>6}"
-          f" {'chi2':>6} {'scale':>6} {'CPU s':>6}")  # fmt: skip
-    for noise in args.noise or get_args(NoiseModel):
-        for case in args.case or CASES:
-            begin = time.process_time()
-            rows = [
-                one(noise, case == "drawn", args.trials, [args.seed, i]) for i in range(args.num)
-            ]
-            p, chi2, scale = np.array(rows).T
-            below = " ".join(f"{np.mean(p < level):6.3f}" for level in LEVELS)
-            each = (time.process_time() - begin) / args.num
-            print(f"{noise:<8} {case:<7} "
-                  f"{stats.kstest(p, 'uniform').pvalue:6.3f} {below} {np.mean(chi2):6.3f} "
-                  f"{np.median(scale):6.3f} {each:6.2f}", flush=True)  # fmt: skip
+@in_float64
+def main(
+    *,
+    num: int = 400,
+    trials: int = 1,
+    seed: int = 0,
+    noise: tuple[NoiseModel, ...] = get_args(NoiseModel),
+    case: tuple[str, ...] = CASES,
+) -> dict[str, Any]:
+    figures = {}
+    tables.row("noise, imperfections", COLUMNS)
+    for sort, is_there in itertools.product(noise, case):
+        begin = time.process_time()
+        rows = [one(sort, is_there == "drawn", trials, [seed, i]) for i in range(num)]
+        p, chi2, scale = np.array(rows).T
+        below = [float(np.mean(p < level)) for level in LEVELS]
+        each = (time.process_time() - begin) / num
+        told = (stats.kstest(p, "uniform").pvalue, *below, chi2.mean(), np.median(scale), each)
+        figures[f"{sort} {is_there}"] = dict(zip(COLUMNS, told, strict=True))
+        tables.row(f"{sort}, {is_there}", told)
+    return figures
 
 
 def one(noise: NoiseModel, is_drawn: bool, num_clips: int, seed: list[int]) -> tuple[float, ...]:
@@ -123,7 +121,3 @@ def imperfect(
                 return position
             before = position
     raise RuntimeError(f"{problem.name}: no draw agrees with the patterns of its own track")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,9 +1,8 @@
-"""Other people's estimators on the tracks of samplers.py: mujoco.sysid, and the thesis's.
+"""mujoco.sysid on the tracks of `samplers`.
 
-Starting points: mujoco.sysid's optimiser is mujoco.minimize.least_squares; it gets a plain
-mujoco.batch of the scene with m1, k1, m2, k2 free, 256 random starts and the best three refined,
-without which it is stuck in nine of ten cases. The thesis's sampler is ours (it is the same
-algorithm), with PyBullet's rollouts.
+Its optimiser is mujoco.minimize.least_squares; it gets a plain mujoco.batch of the scene with m1,
+k1, m2, k2 free, 256 random starts and the best three refined, without which it is stuck in nine of
+ten cases.
 """
 
 import io
@@ -12,8 +11,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.problem import Problem
@@ -21,9 +18,6 @@ from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_c import EngineC
 from galileo_jax.rollout.motion import dynamics
 from galileo_jax.rollout.mujoco_fields import make_fields, rigid_motion
-from galileo_jax.simulation.truth import Truth
-from galileo_jax.thesis import sampler as thesis
-from galileo_jax.thesis.similarities.thesis_gaussian import GaussianSimilarity
 
 MAIN = ("m1", "k1", "m2", "k2")
 STEP_S = 1 / 480  # agrees with g (sin - k cos) to 0.2 %, and is what others take
@@ -85,45 +79,6 @@ def sysid(problem: Problem, noise_m_s: float, seed: int) -> Estimate:
     chi2, x, last = min(refined, key=lambda entry: entry[0])
     sd = _sysid_sd(x, np.asarray(last.jacobian), np.ravel(last.residual))
     return Estimate(x, _intervals(x, sd), roll_out(x[None])[0], count, chi2 <= SUFFICIENT)
-
-
-def thesis_on_bullet(problem: Problem, truth: Truth, seed: int) -> Estimate:
-    """The thesis as it was: its sampler, its similarity and PyBullet at 240 Hz.
-
-    Raises:
-      ImportError: no PyBullet; `pip install -e '.[bullet]'`.
-    """
-    import bullet_scene
-    import pybullet  # pyright: ignore
-
-    observation = problem.observation
-    dt = np.diff(observation.times_s)
-    every = round(float(dt[0]) / bullet_scene.STEP_S)
-    shape = (len(observation.names), 2, len(observation.times_s))
-    client = pybullet.connect(pybullet.DIRECT)
-
-    def centres(theta: np.ndarray) -> np.ndarray:
-        m1, k1, m2, k2 = map(float, theta)
-        there = replace(truth, mass_kg=(m1, m2), friction=(k1, k2))
-        path = bullet_scene.roll_out(there, every * (shape[2] - 1), client)
-        return np.moveaxis(path[::every], 0, -1)
-
-    def log_similarity(theta: jax.Array) -> jax.Array:
-        result = jax.ShapeDtypeStruct(shape, theta.dtype)
-        there = jax.pure_callback(centres, result, theta, vmap_method="sequential")
-        velocity = jnp.diff(there, axis=-1) / dt
-        return GaussianSimilarity()(
-            velocity, observation.velocity_m_s, np.ones((shape[0], shape[2] - 1), bool)
-        )
-
-    try:
-        found = thesis.infer(jax.random.key(seed), log_similarity, MAIN)
-        predicted = centres(found.estimate)
-    finally:
-        pybullet.disconnect(client)
-    x = found.estimate
-    count = int(found.posterior.stats["num_evaluations"])
-    return Estimate(x, point(x), predicted, count, False)
 
 
 def point(x: np.ndarray) -> dict[str, dict[str, Any]]:

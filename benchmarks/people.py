@@ -1,13 +1,13 @@
 """Files as people have them: is each read right, or refused for the right reason?
 
-    python benchmarks/people.py run [--only WORD] [--journal FILE]    # goes on where it was
-    python benchmarks/people.py table [--journal FILE]                # the markdown of the docs
+    python -m benchmarks people run [--only WORD] [--journal FILE]    # goes on where it was
+    python -m benchmarks people table [--journal FILE]                # the markdown of the docs
 
 What is right for each file stands in people.yaml. Every case is a command of its own, as a user
-would type it. The journal is of one version: delete it to measure another.
+would type it; `--package` is the checkout that is tried. The journal is of one version: delete it
+to measure another.
 """
 
-import argparse
 import json
 import os
 import re
@@ -19,10 +19,11 @@ import time
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import yaml
-from journal import add, finished
+
+from benchmarks.journal import Journal
 
 FOLDER = Path(__file__).parents[1] / ".." / "shared" / "data" / "people"
 JOURNAL = Path("/tmp/people.jsonl")
@@ -30,31 +31,26 @@ PACKAGE = Path(__file__).parents[1]
 CASES = Path(__file__).with_suffix(".yaml")
 TOO_LONG_S = 300.0
 DISTRUST = "See where it fails"
-IMPLIED = ("track", "video", "objects")
-"""Keys that say nothing but which file, and that there is something in it."""
+IMPLIED = ("track", "video", "objects")  # keys that say nothing but which file
 
 
-def main() -> None:
-    """Runs cases, or prints their table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("do", choices=("run", "table"))
-    parser.add_argument("--folder", type=Path, default=FOLDER)
-    parser.add_argument("--journal", type=Path, default=JOURNAL)
-    parser.add_argument("--only", default="", help="part of the file's name")
-    parser.add_argument("--package", type=Path, default=PACKAGE, help="the checkout to be tried")
-    asked = parser.parse_args()
-    cases = [one for one in yaml.safe_load(CASES.read_text()) if asked.only in one["file"]]
-    if asked.do == "run":
-        for case in cases:
-            if name_of(case) not in finished(asked.journal):
-                row = tried(asked.folder, asked.package, case)
-                add(asked.journal, row)
-                print(f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}", flush=True)
-    rows = finished(asked.journal)
-    done = [rows[name_of(case)] for case in cases if name_of(case) in rows]
-    if asked.do == "table":
+def main(
+    do: Literal["run", "table"],
+    *,
+    folder: Path = FOLDER,
+    journal: Path = JOURNAL,
+    only: str = "",
+    package: Path = PACKAGE,
+) -> dict[str, int]:
+    cases = [one for one in yaml.safe_load(CASES.read_text()) if only in one["file"]]
+    kept = Journal(journal)
+    for case in cases if do == "run" else ():
+        row = kept.row(name_of(case), lambda case=case: tried(folder, package, case))
+        print(f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}", flush=True)
+    done = [kept.rows[name_of(case)] for case in cases if name_of(case) in kept.rows]
+    if do == "table":
         print("\n".join(markdown(done)))
-    print(dict(Counter(row["judged"] for row in done)), file=sys.stderr)
+    return dict(Counter(row["judged"] for row in done))
 
 
 def name_of(case: Mapping[str, Any]) -> str:
@@ -74,13 +70,16 @@ def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any
         call = [sys.executable, "-m", f"galileo_jax.{ask}", str(path), "--out", f"{scratch}/out"]
         call += ["--free", case["free"]] if "free" in case else []
         began = time.monotonic()
-        code, said, cpu_s = _run(call, package)
+        code, said = _run(call, package)
         wall_s = time.monotonic() - began
         result = Path(scratch) / "out" / "result.json"
-        values = _values(json.loads(result.read_text())) if result.is_file() else {}
-    row = {"case": name_of(case), "file": case["file"], "what": case["what"], "code": code,
+        document = json.loads(result.read_text()) if result.is_file() else {}
+    values: dict[str, Any] = {}
+    for part in ("nuisances", "derived", "parameters"):
+        values |= document.get(part, {})
+    row = {"file": case["file"], "what": case["what"], "code": code,
            "values": {name: values[name] for name in case.get("right", {}) if name in values},
-           "right": _right(case), "wall_s": round(wall_s, 1), "cpu_s": round(cpu_s, 1),
+           "right": _right(case), "wall_s": round(wall_s, 1),
            "keys": _num_keys(declared), "said": said.strip().splitlines()[-25:]}  # fmt: skip
     return row | {"judged": judged(case, row, values, said)}
 
@@ -131,25 +130,16 @@ def _declared(path: Path, case: Mapping[str, Any]) -> dict[str, Any]:
     return declared | case.get("set", {})
 
 
-def _run(call: list[str], package: Path) -> tuple[int, str, float]:
-    """(exit code, what it printed, processor seconds)."""
-    before = os.times()
+def _run(call: list[str], package: Path) -> tuple[int, str]:
+    """The exit code, and what was printed."""
     try:
         done = subprocess.run(
             call, capture_output=True, text=True, timeout=4 * TOO_LONG_S, check=False, cwd=package,
             env={**os.environ, "PYTHONPATH": str(package)},
         )  # fmt: skip
-        code, said = done.returncode, f"{done.stdout}\n{done.stderr}"
     except subprocess.TimeoutExpired:
-        code, said = 124, "stopped by the benchmark"
-    after = os.times()
-    used = after.children_user + after.children_system
-    return code, said, used - before.children_user - before.children_system
-
-
-def _values(document: Mapping[str, Any]) -> dict[str, Any]:
-    """All that a result states, by name."""
-    return {**document["nuisances"], **document["derived"], **document["parameters"]}
+        return 124, "stopped by the benchmark"
+    return done.returncode, f"{done.stdout}\n{done.stderr}"
 
 
 def _is_near(found: Mapping[str, Any] | None, goal: Any) -> bool:
@@ -188,7 +178,3 @@ def _line(row: Mapping[str, Any]) -> str:
     """What was said, where no number is asked for."""
     said = [line for line in row["said"] if "galileo: error" in line or "warning:" in line]
     return (said[-1] if row["code"] and said else "-").replace("|", "/")[:160]
-
-
-if __name__ == "__main__":
-    main()

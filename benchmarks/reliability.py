@@ -1,6 +1,6 @@
 """Are the probabilities of a diagnosis right? Hidden effects, half of them outside the library.
 
-    python benchmarks/reliability.py --out DIR --num 300
+    python -m benchmarks reliability --out DIR --num 300
 
 Draws tracks (ramp angle, objects, strength, noise and frame rate at random, the truth from an
 integrator of its own with the small faults of real clips): of four, two hide an effect that the
@@ -11,28 +11,25 @@ for each hypothesis; the reliability curve compares the probabilities with how o
 was the truth. All figures are given twice: with every effect counted that leaves any trace, and
 with only those that must be said (by more than 3 nats, the factor of 20 that a name needs), where a
 weaker one may be said or not. What is finished stays in DIR/results.jsonl and is not done again.
-The last line is JSON.
+
 """
 
-import argparse
+import contextlib
 import itertools
 import json
-import multiprocessing
+import math
 import zlib
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import hidden_cases
-import hidden_effects
-import journal
 import numpy as np
-import tables
-import verdicts
 
+from benchmarks import hidden_cases, hidden_effects, tables, verdicts
+from benchmarks.journal import Journal
+from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.commands import command
 from galileo_jax.comparison.compare import ADEQUATE_P
 from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
@@ -50,43 +47,34 @@ FRAME_RATES = (30.0, 60.0, 120.0)
 NOISE_M = (0.1e-3, 0.4e-3)
 ANGLES_DEG = (8.0, 30.0)
 STRENGTHS = (0.3, 1.0)
+SECOND = "second_possible"  # the rule: an effect may be there, too weak to be told
 TRIES = 8  # not every effect has a place in every scene
 NUM_DRAWN = 1000  # of the claims, for the error that right ones have
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
+def main(*, out: Path, num: int = 300, first: int = 0) -> dict[str, Any]:
     library = effect_names()
-    call.out.mkdir(parents=True, exist_ok=True)
-    done = journal.finished(call.out / "results.jsonl")
+    journal = Journal(out / "results.jsonl")
     tables.row("case", ("kind", "truth", "says"))
     entries = []
-    cases = {f"case{i}": KINDS[i % len(KINDS)] for i in range(call.first, call.first + call.num)}
-    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-        made = {
-            name: pool.submit(make_clip, call.out / "clips", name, kind, library)
-            for name, kind in cases.items()
-        }
-        for name, kind in cases.items():
-            if not made[name].result():
-                tables.row(name, (kind, "", "not made: none of the effects drawn has a place"))
-                continue
-            if name not in done:
-                done[name] = _examine(call.out, name, kind)
-            entries.append(done[name])
-            says = done[name]["diagnosis"]["verdict"] if done[name]["diagnosis"] else {}
-            words = f"{says.get('status')} {' | '.join(says.get('effects', ()))}"
-            tables.row(name, (done[name]["kind"], done[name]["truth"], words))
-    said = [entry for entry in entries if entry["diagnosis"]]
+    kinds = {f"case{i}": KINDS[i % len(KINDS)] for i in range(first, first + num)}
+    asked = {name: (out / "clips", name, kind, library) for name, kind in kinds.items()}
+    for name, is_made in hidden_cases.made_meanwhile(make_clip, asked):
+        if not is_made:
+            tables.row(name, (kinds[name], "", "not made: none of the effects drawn has a place"))
+            continue
+        entry = journal.tried(name, lambda name=name: _examined(out, name, kinds[name]))
+        entries.append(entry)
+        says = entry["diagnosis"]["verdict"] if not entry["error"] else {"status": entry["error"]}
+        words = f"{says['status']} {' | '.join(says.get('effects', ()))}"
+        tables.row(name, (kinds[name], entry.get("truth", ""), words))
+    said = [entry for entry in entries if not entry["error"]]
     figures = summary(said, library)
     _print(figures)
     print(f"\nWhat shows by more than {DECISIVE:g} nats must be said, weaker effects may be:")
     figures["if_it_shows"] = summary(said, library, DECISIVE)
     _print(figures["if_it_shows"])
-    figures["tracebacks"] = [entry["error"] for entry in entries if not entry["diagnosis"]]
-    print(*figures["tracebacks"], sep="\n")
-    tables.finish("reliability", figures)
-    return None
+    return figures | {"failed": [entry["error"] for entry in entries if entry["error"]]}
 
 
 def draw(folder: Path, name: str, kind: str, library: Sequence[str], attempt: int) -> dict:
@@ -96,9 +84,7 @@ def draw(folder: Path, name: str, kind: str, library: Sequence[str], attempt: in
     effects = rng.choice(pool, 2 if kind == "two" else 1, replace=False)
     return {
         "out": folder / f"{name}.csv",
-        "track_only": True,
-        "solver": "fine",
-        "faults": True,
+        **hidden_cases.TRACK,
         "seed": int(rng.integers(2**31)),
         "angle": float(rng.uniform(*ANGLES_DEG)),
         "track_noise": float(rng.uniform(*NOISE_M)),
@@ -113,27 +99,13 @@ def make_clip(folder: Path, name: str, kind: str, library: Sequence[str]) -> boo
     """Simulates a case unless it is there; an effect without a place in the scene is drawn again.
 
     Returns whether that came to a case; all else that `simulate` raises is raised.
-
-    Runs in a process of its own, so that effects from outside stay unknown to the diagnosis.
     """
-    for attempt in range(TRIES):
-        if (folder / f"{name}.truth.json").is_file():
-            return True
-        try:
-            hidden_cases.make_clips(draw(folder, name, kind, library, attempt))
-        except InputError:
-            continue
-    return (folder / f"{name}.truth.json").is_file()
-
-
-def seen_truth(traces: Mapping[str, float], least: float = 0.0) -> str:
-    """The hidden effects that leave a trace in a track, joined by +; none: "none".
-
-    Args:
-      traces: of each effect, by how many nats it shows.
-      least: nats that it must show by.
-    """
-    return "+".join(name for name, nats in traces.items() if nats > least) or "none"
+    truth = folder / f"{name}.truth.json"
+    for attempt in range(0 if truth.is_file() else TRIES):
+        with contextlib.suppress(InputError):
+            simulate(**draw(folder, name, kind, library, attempt))
+            break
+    return truth.is_file()
 
 
 def right_answers(entry: Mapping[str, Any], least: float) -> list[str]:
@@ -157,7 +129,7 @@ def right_answers(entry: Mapping[str, Any], least: float) -> list[str]:
 def judged(entry: Mapping[str, Any], library: Sequence[str], least: float) -> verdicts.Score:
     """The score of a case, by that of its right answers that is nearest to what was said."""
     scores = [verdicts.judge(t, library, entry["diagnosis"]) for t in right_answers(entry, least)]
-    return max(scores, key=lambda s: (s.is_named_right, s.set_size == s.set_size))
+    return max(scores, key=lambda s: (s.is_named_right, not math.isnan(s.set_size)))
 
 
 @in_float64
@@ -196,25 +168,21 @@ def traces(yaml: Path, kind: str) -> tuple[dict[str, float], float]:
     return {name: whole - less[name] for name in hidden}, whole - evidence[()]
 
 
-def _examine(out: Path, name: str, kind: str) -> dict[str, Any]:
-    entry: dict[str, Any] = {"case": name, "kind": kind, "diagnosis": None, "error": None}
+def _examined(out: Path, name: str, kind: str) -> dict[str, Any]:
+    """What is hidden in a case and shows, and what a diagnosis says of it."""
     yaml = out / "clips" / f"{name}.yaml"
     found, whole = traces(yaml, kind)
-    entry["truth"] = seen_truth(found)
-    entry["truth_nats"] = whole if np.isfinite(whole) else None
-    entry["traces_nats"] = {name: nats for name, nats in found.items() if np.isfinite(nats)}
-    try:
-        run = hidden_effects.run_diagnosis([yaml], out / "runs" / name, 0)
-        keys = ("verdict", "reasons", "probability_none", "history", "p_value")
-        brief = ("effect", "law", "probability", "log_evidence", "log_prior", "p_value")
-        entry["diagnosis"] = {key: run.get(key) for key in keys}
-        entry["diagnosis"]["candidates"] = [
-            {key: candidate[key] for key in brief} for candidate in run["candidates"]
-        ]
-    except Exception as error:  # one case must not end hours of others; it is reported
-        entry["error"] = f"{type(error).__name__}: {error}"
-    journal.add(out / "results.jsonl", entry)
-    return entry
+    run = hidden_effects.run_diagnosis([yaml], out / "runs" / name, 0)
+    keys = ("verdict", "reasons", "probability_none", "history", "p_value")
+    brief = ("effect", "law", "probability", "log_evidence", "log_prior", "p_value")
+    table = [{key: candidate[key] for key in brief} for candidate in run["candidates"]]
+    return {
+        "kind": kind,
+        "truth": "+".join(name for name, nats in found.items() if nats > 0) or "none",
+        "truth_nats": whole if np.isfinite(whole) else None,
+        "traces_nats": {name: nats for name, nats in found.items() if np.isfinite(nats)},
+        "diagnosis": {key: run.get(key) for key in keys} | {"candidates": table},
+    }
 
 
 def summary(
@@ -233,38 +201,37 @@ def summary(
     ambiguous = [(e, s) for e, s in scored if e["diagnosis"]["verdict"]["status"] == "ambiguous"]
     inside = [s for e, s in scored if e["kind"] != "outside"]
     outside = [s for e, s in scored if e["kind"] == "outside"]
+    unheld = [(e, s) for e, s in ambiguous if e["kind"] != "outside" and math.isnan(s.set_size)]
+    num_inside = sum(e["kind"] != "outside" for e, _ in ambiguous)
     return {
         "cases": len(scored),
         "claims": len(claims),
         "curve": curve(probability, is_true),
         "expected_calibration_error": calibration_error(probability, is_true),
         "of_right_claims": _error_if_right(probability),
-        "brier": float(np.mean((probability - is_true) ** 2)) if claims else float("nan"),
         "ambiguous": len(ambiguous),
-        "ambiguous_inside": sum(e["kind"] != "outside" for e, _ in ambiguous),
-        "ambiguous_inside_holds_truth": _mean(
-            [s.set_size == s.set_size for e, s in ambiguous if e["kind"] != "outside"]
-        ),
+        "ambiguous_inside": num_inside,
+        "ambiguous_inside_holds_truth": 1 - len(unheld) / num_inside if num_inside else math.nan,
         "named_right_inside": _mean([s.is_named_right for s in inside]),
         "wrong_inside": _mean([s.is_confident_wrong for s in inside]),
         "wrong_outside": _mean([s.is_confident_wrong for s in outside]),
         "statuses": {
-            kind: _counts(
-                [e["diagnosis"]["verdict"]["status"] for e in entries if e["kind"] == kind]
+            kind: dict(
+                Counter(e["diagnosis"]["verdict"]["status"] for e in entries if e["kind"] == kind)
             )
             for kind in sorted(set(KINDS))
         },
-        "named_wrong": [
-            f"{e['case']}: {e['truth']} named {s.label}; {_weakest(e)}"
-            for e, s in scored
-            if s.is_confident_wrong
-        ],
-        "ambiguous_without_truth": [
-            f"{e['case']}: {e['truth']} said {s.label}; {_weakest(e)}"
-            for e, s in ambiguous
-            if e["kind"] != "outside" and s.set_size != s.set_size
-        ],
+        "named_wrong": [_told(e, s) for e, s in scored if s.is_confident_wrong],
+        "ambiguous_without_truth": [_told(e, s) for e, s in unheld],
     }
+
+
+def _told(entry: Mapping[str, Any], score: verdicts.Score) -> str:
+    """A case in a line: truth, verdict, and by how much the weakest effect shows."""
+    shown = {n: x for n, x in entry.get("traces_nats", {}).items() if n in entry["truth"]}
+    least = min(shown, key=shown.__getitem__) if shown else None
+    weakest = f"{least} shows by {shown[least]:.1f} nats" if least else "outside the library"
+    return f"{entry['case']}: {entry['truth']}, said {score.label}; {weakest}"
 
 
 def curve(probability: np.ndarray, is_true: np.ndarray) -> list[tuple[float, float, int]]:
@@ -320,13 +287,15 @@ def _claims(
     named = [each for each in parts if each <= {*library}]
     left = _not_contradicted(diagnosis)
     odds = {frozenset(c["effect"].split("+")): c["probability"] / left for c in table}
-    seen = 1.0 if least else 1.0 - _second(diagnosis)
+    unseen = [w["probability"] for w in diagnosis.get("reasons", ()) if w["rule"] == SECOND]
+    seen = 1.0 if least or not unseen else 1.0 - unseen[0]
     claims = [(seen * odds.get(each, 0.0), each in truths) for each in named]
     if verdict["status"] == "law" or verdict.get("law") or len(named) < len(parts):
         unnamed = [
             c["probability"]
             for c in table
-            if _is_unnamed(c["effect"]) and (c.get("p_value") or 1.0) >= ADEQUATE_P
+            if (c["effect"].startswith("law_") or {*c["effect"].split("+")} & {*FORM_NAMES})
+            and (c.get("p_value") or 1.0) >= ADEQUATE_P
         ]
         claims.append((min(sum(unnamed) / left, 1.0), is_outside))
     return claims
@@ -339,57 +308,16 @@ def _not_contradicted(diagnosis: Mapping[str, Any]) -> float:
     return 1.0 - sum(p for p, by_data in p_values if by_data is not None and by_data < ADEQUATE_P)
 
 
-def _second(diagnosis: Mapping[str, Any]) -> float:
-    """The probability that a second effect is there, too weak to be told, as far as it is said."""
-    said = [why for why in diagnosis.get("reasons", ()) if why["rule"] == "second_possible"]
-    return said[0]["probability"] if said else 0.0
-
-
-def _is_unnamed(hypothesis: str) -> bool:
-    """Whether it is a form without a name, or a law."""
-    return hypothesis.startswith("law_") or any(
-        part in FORM_NAMES for part in hypothesis.split("+")
-    )
-
-
-def _weakest(entry: Mapping[str, Any]) -> str:
-    """Of the effects that are there the one that shows least."""
-    shown = {n: x for n, x in entry.get("traces_nats", {}).items() if n in entry["truth"]}
-    if not shown:
-        return "outside the library"
-    least = min(shown, key=shown.__getitem__)
-    return f"{least} shows by {shown[least]:.1f} nats"
-
-
-def _counts(statuses: Sequence[str]) -> dict[str, int]:
-    return {status: statuses.count(status) for status in sorted(set(statuses))}
-
-
 def _mean(values: Sequence[bool]) -> float:
-    return float(np.mean(values)) if values else float("nan")
+    return float(np.mean(values)) if values else math.nan
 
 
 def _print(figures: Mapping[str, Any]) -> None:
     tables.row("claimed probability", ("true", "claims"))
     for probability, share, count in figures["curve"]:
         tables.row(f"{probability:.3f}", (share, count))
-    for name, value in figures.items():
-        if isinstance(value, int | float):
-            tables.row(name, [value])
+    tables.summary(figures)
     tables.row("of_right_claims", figures["of_right_claims"])
     for key in ("named_wrong", "ambiguous_without_truth"):
         print(f"{key}:", *figures[key], sep="\n  ")
     print(figures["statuses"])
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="reliability.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--out", type=Path, required=True, help="tracks, runs and results")
-    parser.add_argument("--num", type=command.whole_number(1), default=300, help="tracks")
-    parser.add_argument("--first", type=command.whole_number(0), default=0, help="number of case")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

@@ -1,88 +1,54 @@
-"""How fast the engines are: `python benchmarks/rollouts.py`.
+"""How fast are the engines?
+
+    python -m benchmarks rollouts [--mjx-batch 1 8 64]
 
 Environment steps per second (one step of one scene; 1/960 s for MuJoCo's, 1/240 s for the rigid
-engine and PyBullet), seconds of experiment simulated per second, and what the first batch costs
-in a new process where the engine is compiled: without, and with, JAX's persistent cache. No
-object comes to rest within the rollouts, so that no engine stops early. PyBullet builds its
-world anew for every rollout, as the thesis did, on one core. The last line is JSON.
+engine), seconds of experiment simulated per second, and ms for one rollout. No object comes to rest
+within the rollouts, so that no engine stops early.
 """
 
-import argparse
-import os
-import subprocess
-import sys
-import tempfile
 import time
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
+from typing import Any
 
 import jax
 import numpy as np
-import tables
 
-from galileo_jax.commands import command
+from benchmarks import tables
 from galileo_jax.model.model import SUBSTEPS, Model
 from galileo_jax.model.parameters import absent
 from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.rollout.engines import make_engine
-from galileo_jax.rollout.rollout import Engine
-from galileo_jax.runtime import compilation_cache
-from galileo_jax.simulation.truth import Truth, draw_truth
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.simulation.truth import draw_truth
 
 DURATION_S = 1.2
 SIZES = (1, 8, 64, 256)
 GIVEN = {"m1": 0.5, "k1": 0.05, "m2": 0.3, "k2": 0.08}
+COLUMNS = ("steps/s", "sim s/s", "ms/rollout")
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    jax.config.update("jax_enable_x64", True)
-    if call.time_compile:
-        return _print_first_seconds(call.time_compile)
-    compilation_cache.enable()
-    truth = _truth()
-    model = _model(truth)
-    tables.row("engine, batch", ("steps/s", "sim s/s", "ms/rollout"))
-    figures: dict[str, object] = {"backend": jax.default_backend(), "repeats": call.repeats}
-    sizes_of = {"rigid": SIZES, "c": SIZES, "mjx": call.mjx_batch}
-    for name, sizes in sizes_of.items():
-        engine = make_engine(name, model)
-        steps = model.num_records * (1 if name == "rigid" else SUBSTEPS)
+@in_float64
+def main(*, repeats: int = 3, mjx_batch: tuple[int, ...] = SIZES) -> dict[str, Any]:
+    tables.row("engine, batch", COLUMNS)
+    figures: dict[str, Any] = {"backend": jax.default_backend(), "repeats": repeats}
+    num_records = _model().num_records
+    for name, sizes in {"rigid": SIZES, "c": SIZES, "mjx": mjx_batch}.items():
+        steps = num_records * (1 if name == "rigid" else SUBSTEPS)
         for size in sizes:
-            taken = seconds(_simulation(engine, size), call.repeats)
-            figures[f"{name}_{size}"] = _report(f"{name} {size}", size, steps, taken)
-    figures["pybullet_1"] = _pybullet(truth, call.repeats)
-    if not call.no_compile:
-        for name in ("rigid", "mjx"):
-            figures[f"{name}_first_batch_s"] = _first_seconds(name)
-    tables.finish("rollouts", figures)
-    return None
-
-
-def rigid_batch(size: int) -> Callable[[], object]:
-    """A batch of rollouts with the rigid engine."""
-    return batch_of("rigid", size)
+            per_s = size / seconds(batch_of(name, size), repeats)
+            told = (steps * per_s, DURATION_S * per_s, 1e3 / per_s)
+            figures[f"{name}_{size}"] = dict(zip(COLUMNS, told, strict=True))
+            tables.row(f"{name} {size}", told)
+    return figures
 
 
 def batch_of(name: str, size: int) -> Callable[[], object]:
-    """A batch of rollouts with an engine."""
-    return _simulation(make_engine(name, _model(_truth())), size)
-
-
-def _truth() -> Truth:
-    return draw_truth(np.random.default_rng(0), 20.0, GIVEN)
-
-
-def _model(truth: Truth) -> Model:
-    scene = compile_scene(truth.surroundings, ["box", "box"], truth.objects)
-    return Model(scene, DURATION_S)
-
-
-def _simulation(engine: Engine, size: int) -> Callable[[], object]:
-    """A batch of rollouts that differ by a per cent in every parameter."""
+    """A batch of rollouts with an engine, which differ by a per cent in every parameter."""
+    engine = make_engine(name, _model())
     theta = absent(engine.model.parameters)
-    for name, value in GIVEN.items():
-        theta[engine.model.index(name)] = value
+    for parameter, value in GIVEN.items():
+        theta[engine.model.index(parameter)] = value
     rng = np.random.default_rng(1)
     batch = theta * (1 + 0.01 * rng.uniform(-1, 1, (size, len(theta))))
     return lambda: engine.simulate(batch)
@@ -99,66 +65,6 @@ def seconds(run: Callable[[], object], repeats: int) -> float:
     return float(np.median(taken))
 
 
-def _report(label: str, size: int, steps: int, seconds: float) -> dict[str, float]:
-    figures = {
-        "steps_per_s": size * steps / seconds,
-        "simulated_s_per_s": size * DURATION_S / seconds,
-        "ms_per_rollout": 1e3 * seconds / size,
-    }
-    tables.row(label, list(figures.values()))
-    return figures
-
-
-def _pybullet(truth: Truth, repeats: int) -> dict[str, float] | None:
-    try:
-        import bullet_scene
-        import pybullet  # pyright: ignore
-    except ImportError:
-        tables.row("pybullet", ("not installed",))
-        return None
-    client = pybullet.connect(pybullet.DIRECT)
-    steps = round(DURATION_S / bullet_scene.STEP_S)
-    taken = seconds(lambda: bullet_scene.roll_out(truth, steps, client), repeats)
-    pybullet.disconnect(client)
-    return _report("pybullet 1", 1, steps, taken)
-
-
-def _first_seconds(name: str) -> dict[str, float]:
-    """The first batch in new processes: compiled without a cache, then from the cache."""
-    found = {}
-    with tempfile.TemporaryDirectory() as folder:
-        environment = {**os.environ, compilation_cache.SWITCH: folder}
-        environment.pop("JAX_COMPILATION_CACHE_DIR", None)
-        for what in ("cold", "cached"):
-            done = subprocess.run(
-                [sys.executable, str(Path(__file__).resolve()), "--time-compile", name],
-                env=environment,
-                capture_output=True,
-                text=True,
-                check=True,
-            )
-            found[what] = float(done.stdout.split()[-1])
-            tables.row(f"{name} first batch {what}", (f"{found[what]:.1f} s",))
-    return found
-
-
-def _print_first_seconds(name: str) -> None:
-    compilation_cache.enable()
-    simulate = _simulation(make_engine(name, _model(_truth())), 8)
-    began = time.perf_counter()
-    simulate()
-    print(time.perf_counter() - began)
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="rollouts.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--mjx-batch", type=int, nargs="*", default=list(SIZES))
-    parser.add_argument("--no-compile", action="store_true", help="leave out compile times")
-    parser.add_argument("--time-compile", metavar="ENGINE", help="print one first batch only")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))
+def _model() -> Model:
+    truth = draw_truth(np.random.default_rng(0), 20.0, GIVEN)
+    return Model(compile_scene(truth.surroundings, ["box", "box"], truth.objects), DURATION_S)

@@ -1,12 +1,12 @@
-"""Friction with imperfections of fixed sizes, and with sizes that are inferred, side by side.
+"""Is friction right with imperfections of fixed sizes, and with sizes that are inferred?
 
-    python benchmarks/rough.py CLIP ... [--together] [--num 20 --seed 700000]
+    python -m benchmarks rough CLIP ... [--together]
+    python -m benchmarks rough --num 20 --seed 700000
 
 CLIP: clips with their yaml; `--together`: one joint fit of all. Without clips: `--num` tracks of
 ramps that this program draws. Where a truth is known, each error is counted in the stated sds.
 """
 
-import argparse
 import json
 import re
 import tempfile
@@ -15,35 +15,29 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tables
 
 import galileo_jax as gx
+from benchmarks import scoring, tables
 
 WAYS = ("none", "rough")
-COLUMNS = ("clip", "way", "k1", "k2", "off, sds", "chi2 or p", "larger than usual")
+COLUMNS = ("way", "k1", "k2", "off, sds", "chi2 or p", "larger than usual")
 
 
-def main() -> None:
-    """Prints a row for each fit, and how well the stated sds are kept."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("clips", type=Path, nargs="*")
-    parser.add_argument("--together", action="store_true")
-    parser.add_argument("--num", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=700_000)
-    asked = parser.parse_args()
+def main(
+    clips: tuple[Path, ...] = (), *, together: bool = False, num: int = 20, seed: int = 700_000
+) -> dict[str, Any]:
+    off: dict[str, list[float]] = {way: [] for way in WAYS}
+    tables.row("clip", COLUMNS)
     with tempfile.TemporaryDirectory() as scratch:
-        each = [[path] for path in asked.clips] or [
-            [_drawn(Path(scratch), asked.seed + i)] for i in range(asked.num)
-        ]
-        tables.row(COLUMNS[0], COLUMNS[1:])
-        off: dict[str, list[float]] = {way: [] for way in WAYS}
-        for clips in [asked.clips] if asked.together else each:
+        drawn = () if clips else [_drawn(Path(scratch), each) for each in range(seed, seed + num)]
+        for group in [clips] if together else [(path,) for path in (*clips, *drawn)]:
             for way in WAYS:
-                off[way] += _row(clips, way)
-    for way, values in off.items():
-        if values:
-            inside = float(np.mean(np.abs(values) < 1.96))
-            tables.finish(f"rough {way}", {"rms": float(np.std(values)), "inside": inside})
+                off[way] += _row(group, way)
+    return {
+        way: {"rms": float(np.std(values)), "inside": float(np.mean(np.abs(values) < 1.96))}
+        for way, values in off.items()
+        if values
+    }
 
 
 def _drawn(folder: Path, seed: int) -> Path:
@@ -53,33 +47,37 @@ def _drawn(folder: Path, seed: int) -> Path:
 
 
 def _row(clips: Sequence[Path], way: str) -> list[float]:
-    """Fits and prints; by how many sds k1, k2 and the ratio's logarithm are off."""
+    """Fits and prints; by how many sds k1, k2 and the mass ratio are off."""
     fit = gx.fit(list(clips), discrepancy=way)  # pyright: ignore[reportArgumentType]
-    known = {n: e for n, e in fit.parameters.items() if re.fullmatch(r"k\d", n)}
-    shown = [
-        f"{e['mean']:.4f} +- {e['sd']:.4f}" if e["identified"] else "open" for e in known.values()
+    entries = scoring.of_result(fit.result)
+    frictions = [name for name in fit.parameters if re.fullmatch(r"k\d", name)]
+    told = [name for name in (*frictions, "mass_ratio") if name in entries]
+    truth = _truth(clips[0])
+    off = [
+        scoring.of_entry(entries[name], truth[name]).z
+        for name in told
+        if entries[name]["identified"] and name in truth
     ]
-    truth, off = _truth(clips[0]), {}
-    for name, entry in known.items():
-        if entry["identified"] and name in truth:
-            off[name] = (entry["mean"] - truth[name]) / entry["sd"]
-    ratio = fit.result["derived"].get("mass_ratio")
-    if ratio and ratio["identified"] and {"m1", "m2"} <= set(truth):
-        off["ratio"] = (ratio["mean"] - truth["m1"] / truth["m2"]) / ratio["sd"]
+    shown = [
+        f"{entries[name]['mean']:.4f} +- {entries[name]['sd']:.4f}"
+        if entries[name]["identified"]
+        else "open"
+        for name in frictions
+    ]
     sizes = fit.result.get("imperfections", {})
     judged = f"chi2 {fit.result['error']['chi2_per_dof']:.2f}"
     if sizes:
         judged = f"p {gx.compare(fit).p_value:.2g}"
     larger = " ".join(f"{n} {e['mean']:.2g}" for n, e in sizes.items() if not e["ordinary"])
-    told = " ".join(f"{value:+.1f}" for value in off.values())
-    tables.row(clips[0].stem, (way, *[*shown, "", ""][:2], told, judged, larger))
-    return list(off.values())
+    sds = " ".join(f"{value:+.1f}" for value in off)
+    tables.row(clips[0].stem, (way, *[*shown, "", ""][:2], sds, judged, larger))
+    return off
 
 
 def _truth(clip: Path) -> dict[str, Any]:
+    """The true values, if they are known."""
     path = clip.with_suffix(".truth.json")
-    return json.loads(path.read_text()) if path.is_file() else {}
-
-
-if __name__ == "__main__":
-    main()
+    truth = json.loads(path.read_text()) if path.is_file() else {}
+    if {"m1", "m2"} <= set(truth):
+        truth["mass_ratio"] = truth["m1"] / truth["m2"]
+    return truth

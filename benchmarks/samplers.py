@@ -1,294 +1,285 @@
-"""Inference alone, on synthetic tracks with random truths: `python benchmarks/samplers.py`.
+"""How do samplers, and other people's estimators, compare on the same synthetic tracks?
 
-Methods on the same tracks, one after the other; the first named on all `--num` tracks, the others
-on the first `--num-shared`, because they take longer:
+    python -m benchmarks samplers --methods grad mh thesis --source prior --num 20 --num-shared 20
 
-    grad      the multi-start gradient fit with its Laplace posterior
-    mh        Metropolis-Hastings, started from the gradient fit (its time included)
+    grad      the multi-start gradient fit with its weighed Laplace posterior
+    mh        Metropolis-Hastings from that fit (its time included)
+    mh-cnn    the same, started from the network
+    cnn       the network
     thesis    the thesis's 16 chains x 75 steps on our rollouts; the best sample wins
     sysid     as mujoco.sysid does: 256 random rollouts of MuJoCo's C engine, the best 3 refined
               by its optimiser, m1, k1, m2, k2 free, no nuisances (peers.py)
-    bullet    the thesis's sampler on PyBullet's rollouts, if PyBullet is there (peers.py)
 
-Noise: 0.01 m/s on the velocities, that is 0.01 / (fps sqrt 2) m on positions. `--source exact`
-makes the tracks in closed form (a model error for all but the rigid engine), `--source engine`
-with our own rollouts. Seconds of grad are warm, those of mh and thesis contain tracing and
-compiling, which each call does anew. Stuck: velocity residuals of the method's own rollout at
-its best parameters above 1.5 per degree of freedom. With `--keep FILE` a run that was cut off
-goes on, and methods measured apart stand in one table. The last line is JSON.
+The first method named runs on all `--num` tracks, the others on the first `--num-shared`. Noise:
+0.01 m/s on the velocities, that is 0.01 / (fps sqrt 2) m on positions. Tracks of `--source exact`
+are made in closed form (a model error for all but the rigid engine), of `engine` by our rollouts,
+of `prior` with all parameters, nuisances and the noise scale drawn from their priors (kept where
+object 2 is driven by a centimetre or more). Of the last, with `--noise tracker`, nothing else is
+wrong, so that ranks of the truth among the draws must be uniform: simulation-based calibration
+(Talts et al. 2018, arXiv 1804.06788); KS p tells.
+
+Seconds are warm, for which the first track is run twice; those of `thesis` contain tracing. Stuck:
+velocity residuals of the method's own rollout at its best parameters above 1.5 per degree of
+freedom (of `prior` that is the drawn noise). `off`: distance of means from those of `mh`, in sds,
+root mean square. With `--keep FILE` a run that was cut off goes on, and methods measured apart
+stand in one table.
 """
 
-import argparse
-import json
+import itertools
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
-import jax
 import numpy as np
-import peers
-import scoring
-import synthetic_tracks
-import tables
+from scipy import stats
 
-from galileo_jax.commands import command
+from benchmarks import peers, scoring, tables, tracks
+from benchmarks.journal import Journal
+from benchmarks.tracks import Case
+from galileo_jax.clip.schema import ClipObject
+from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.convergence import convergence
+from galileo_jax.inference.fit_posterior import fit_posterior
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.rollout.engine_names import ENGINES
-from galileo_jax.runtime import compilation_cache
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
+from galileo_jax.inference.posterior import Posterior
+from galileo_jax.inference.result import make_result
+from galileo_jax.neural.estimate import cnn_posterior
+from galileo_jax.neural.start import start_from_network
+from galileo_jax.runtime.precision import in_float64
+from galileo_jax.similarity.gaussian_likelihood import NoiseModel
+from galileo_jax.simulation.truth import Truth
+from galileo_jax.thesis.estimate import thesis_posterior
 
 NOISE_M_S = 0.01
+NOISE_M = NOISE_M_S / (tracks.FPS * math.sqrt(2))
 STUCK = 1.5
-BARS = {"stuck": 0.02, "coverage": (0.90, 0.99)}
+BARS = {name: {"coverage": (0.90, 0.99)} for name in scoring.QUANTITIES}
+BARS["all"] = {"stuck": (0.0, 0.02)}
+Source = Literal["exact", "engine", "prior"]
+Method = Literal["grad", "mh", "mh-cnn", "cnn", "thesis", "sysid"]
+SIZE_M, RELEASE_M, OBJECT2_M, DRIVEN_M = (0.06, 0.06, 0.06), 0.5, 0.25, 0.01
 COLUMNS = (
     *("k1 err", "in 95%", "k2 err", "in 95%", "ratio err", "in 95%"),
     *("chi2/dof", "rollouts", "seconds", "ess", "converged"),
 )
-SUMMARY = ("tracks", "stuck", "s median", "s worst", "rollouts", "ess/s", "unconverged")
 
 
-@dataclass(frozen=True)
-class Answer:
+class Answer(NamedTuple):
     """What one method says about one track.
 
     Attributes:
       estimates: k1, k2 and mass_ratio as `scoring.score` takes them.
-      chi2_per_dof: of the velocities, at the best parameters.
-      seconds: of inference alone.
+      predicted_m: centres `[object, 2, frame]` of its own rollout at its best parameters.
+      num_free: parameters.
       num_rollouts: it took.
-      ess: smallest effective sample size of k1, k2 and the mass ratio; NaN: no draws.
       is_converged: by its own account.
+      draws: k1, k2 and the log mass ratio `[quantity, chain, draw]`, if it draws from a posterior.
     """
 
-    estimates: dict[str, Any]
-    chi2_per_dof: float
-    seconds: float
+    estimates: Mapping[str, Any]
+    predicted_m: np.ndarray
+    num_free: int
     num_rollouts: float
-    ess: float
     is_converged: bool
+    draws: np.ndarray | None = None
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    jax.config.update("jax_enable_x64", True)
-    compilation_cache.enable()
-    methods = call.methods.split(",")
-    if unknown := set(methods) - set(METHODS):
-        raise InputError(f"--methods: unknown {sorted(unknown)}; known: {', '.join(METHODS)}")
-    kept = _read(call.keep)
-    noise_m = NOISE_M_S / (synthetic_tracks.FPS * math.sqrt(2))
+@in_float64
+def main(
+    *,
+    methods: tuple[Method, ...] = ("grad", "sysid"),
+    num: int = 100,
+    num_shared: int = 10,
+    seed: int = 0,
+    source: Source = "exact",
+    noise: NoiseModel = "tracker",
+    keep: Path | None = None,
+) -> dict[str, Any]:
+    journal, warm = Journal(keep), set[str]()
+    rows: dict[str, list[dict[str, Any]]] = {name: [] for name in methods}
     tables.row("track, method", COLUMNS)
-    answers: dict[str, list[Answer]] = {name: [] for name in methods}
-    scores: dict[str, list[dict[str, scoring.Score]]] = {name: [] for name in methods}
-    for seed in range(call.seed, call.seed + call.num):
-        is_shared = seed < call.seed + call.num_shared
-        case = synthetic_tracks.make_case(seed, call.source, noise_m, call.engine)
-        for name in methods if is_shared else methods[:1]:
-            key = f"{call.source} {call.engine} {seed} {name}"
-            if key not in kept:
-                kept[key] = METHODS[name](case, seed)
-                _append(call.keep, key, kept[key])
-            answer = kept[key]
-            answers[name].append(answer)
-            scores[name].append(scoring.score(answer.estimates, case.values, True, True))
-            cells: list[Any] = []
-            for entry in scores[name][-1].values():
-                cells += [entry.error, entry.is_covered]
-            told = [answer.chi2_per_dof, int(answer.num_rollouts), answer.seconds, answer.ess]
-            tables.row(f"{seed} {name}", [*cells, *told, answer.is_converged])
-    figures: dict[str, Any] = {}
-    missed: list[str] = []
+    for number, case in enumerate(_cases(source, seed, num, noise)):
+        for name in methods if number < num_shared else methods[:1]:
+
+            def answered(name: str = name, case: Case = case, own: int = seed + number):
+                if name not in warm:
+                    METHODS[name](case, own)
+                    warm.add(name)
+                began = time.perf_counter()
+                answer = METHODS[name](case, own)
+                return _row(case, answer, time.perf_counter() - began)
+
+            rows[name].append(
+                row := journal.row(f"{source} {noise} {seed} {number} {name}", answered)
+            )
+            cells = [row[q][what] for q in scoring.QUANTITIES for what in ("error", "is_covered")]
+            cells += [row[what] for what in ("chi2", "rollouts", "seconds", "ess", "converged")]
+            tables.row(f"{seed + number} {name}", cells)
     print()
-    tables.row("method", SUMMARY)
-    for name in methods:
-        figures[name] = _figures(answers[name], scores[name])
-        tables.row(name, list(figures[name].values())[: len(SUMMARY)])
-        if name in ("grad", "mh"):
-            missed += [f"{name}: {what}" for what in _missed_bars(figures[name])]
-    if {"grad", "sysid"} <= set(methods):
-        count = len(answers["sysid"])
-        ours, theirs = (
-            float(np.median([answer.seconds for answer in answers[name][:count]]))
-            for name in ("grad", "sysid")
-        )
-        if ours > theirs:
-            missed.append(f"grad takes {ours:.2g} s, sysid {theirs:.2g} s")
+    figures = {name: _summary(rows[name], rows.get("mh", ())) for name in methods}
+    costs = {n: {k: v for k, v in one.items() if k not in BARS} for n, one in figures.items()}
+    tables.by_name("method", costs)
     print()
-    tables.row("method, quantity", list(figures[methods[0]]["k1"]))
-    for name in methods:
-        for quantity in scoring.QUANTITIES:
-            tables.row(f"{name} {quantity}", list(figures[name][quantity].values()))
-    print("bars missed: " + ("; ".join(missed) or "none"))
-    figures |= {"source": call.source, "engine": call.engine, "bars_missed": missed}
-    tables.finish("samplers", figures)
-    return None
+    pairs = itertools.product(methods, scoring.QUANTITIES)
+    tables.by_name("method, quantity", {f"{m} {q}": figures[m][q] for m, q in pairs})
+    missed = []
+    for name in set(methods) & {"grad", "mh"}:
+        table = {quantity: figures[name][quantity] for quantity in scoring.QUANTITIES}
+        table |= {"all": figures[name]} if source != "prior" else {}
+        missed += [f"{name}: {what}" for what in scoring.missed(table, BARS)]
+    return figures | {"source": source, "bars_missed": tables.missed(missed)}
 
 
-def fit_grad(case: synthetic_tracks.Case, seed: int) -> Answer:
-    from galileo_jax.inference.fit_posterior import fit_posterior
+def _cases(source: Source, seed: int, num: int, noise: NoiseModel) -> Iterator[Case]:
+    if source == "prior":
+        yield from drawn_from_the_prior(seed, num, noise)
+    else:
+        for own in range(seed, seed + num):
+            yield tracks.make_case(own, source, NOISE_M)
 
-    fit, began = _warm_fit(case.trials, seed)
+
+def drawn_from_the_prior(seed: int, count: int, noise: NoiseModel) -> list[Case]:
+    """Truths from the priors, observed as the model says."""
+    objects = tuple(ClipObject(name=f"object{i}", shape="box", size_m=SIZE_M) for i in (1, 2))
+    angle = tracks.RAMP_ANGLE_DEG
+    setting = Truth((0.4, 0.4), (0.1, 0.1), angle, objects, RELEASE_M, OBJECT2_M)
+    start = np.array(setting.surroundings.start_m)[..., None]
+    seen = tracks.observed(np.tile(start, tracks.NUM_FRAMES), tracks.FPS, NOISE_M)
+    clip = tracks.declared(objects, angle, tracks.FPS, tracks.NUM_FRAMES)
+    trials = make_joint_problem([clip], [seen], noise=noise)
+    (problem,), names = trials.problems, trials.names
+    generator = np.random.default_rng([seed, 9])
+    cases: list[Case] = []
+    while len(cases) < count:
+        theta = trials.theta(generator.standard_normal((64, len(names))))
+        predicted = problem.simulate_batch(theta[:, :-1])
+        driven = np.ptp(predicted[:, 1, 0], axis=-1) > DRIVEN_M
+        for row, clean in zip(theta[driven], predicted[driven], strict=True):
+            noisy = clean + row[-1] * NOISE_M * generator.standard_normal(clean.shape)
+            own = replace(problem, observation=tracks.observed(noisy, tracks.FPS, NOISE_M))
+            m1, k1, m2, k2 = (float(row[names.index(name)]) for name in peers.MAIN)
+            truth = replace(setting, mass_kg=(m1, m2), friction=(k1, k2))
+            cases.append(Case(truth, JointProblem((own,))))
+    return cases[:count]
+
+
+def fit_grad(case: Case, seed: int) -> Answer:
+    fit = GradientFitter(case.trials).fit(seed)
     posterior = fit_posterior(case.trials, fit, seed)
-    seconds = time.perf_counter() - began
-    return _of_draws(case.trials, fit, posterior, seconds, posterior.stats["num_rollouts"])
+    return _of_draws(case.trials, posterior, fit.z, posterior.stats["num_rollouts"])
 
 
-def fit_mh(case: synthetic_tracks.Case, seed: int) -> Answer:
-    from galileo_jax.inference.metropolis import metropolis_posterior
-
-    fit, began = _warm_fit(case.trials, seed)
-    posterior = metropolis_posterior(case.trials, fit, seed)
-    seconds = time.perf_counter() - began
-    rollouts = fit.stats["num_rollouts"] + posterior.stats["num_evaluations"]
-    return _of_draws(case.trials, fit, posterior, seconds, rollouts)
+def fit_mh(case: Case, seed: int) -> Answer:
+    return _chains(case.trials, GradientFitter(case.trials).fit(seed), None, seed)
 
 
-def fit_thesis(case: synthetic_tracks.Case, seed: int) -> Answer:
-    from galileo_jax.thesis.estimate import thesis_posterior
+def fit_mh_cnn(case: Case, seed: int) -> Answer:
+    start = start_from_network(case.trials, seed, NUM_CHAINS)
+    return _chains(case.trials, start.fit, start.z, seed)
 
+
+def fit_cnn(case: Case, seed: int) -> Answer:
+    posterior, z, _ = cnn_posterior(case.trials, seed)
+    return _of_draws(case.trials, posterior, z, 0)
+
+
+def fit_thesis(case: Case, seed: int) -> Answer:
     trials = case.trials
-    began = time.perf_counter()
     posterior, best = thesis_posterior(trials, seed, "thesis_gaussian", "coin", "best")
-    seconds = time.perf_counter() - began
     theta = trials.of_clip(trials.theta(np.zeros(len(trials.names))), 0)
     for name, value in best.items():
         theta[trials.names.index(name)] = value
-    chi2 = _velocity_chi2(trials, case.problem.simulate(theta), len(best))
     estimates = peers.point(np.array([best[name] for name in peers.MAIN]))
-    count = posterior.stats["num_evaluations"]
-    return Answer(estimates, chi2, seconds, count, math.nan, posterior.is_converged)
+    count, predicted = posterior.stats["num_evaluations"], case.problem.simulate(theta)
+    return Answer(estimates, predicted, len(best), count, posterior.is_converged)
 
 
-def fit_sysid(case: synthetic_tracks.Case, seed: int) -> Answer:
-    began = time.perf_counter()
+def fit_sysid(case: Case, seed: int) -> Answer:
     found = peers.sysid(case.problem, NOISE_M_S, seed)
-    return _of_peer(case.trials, found, time.perf_counter() - began)
+    count = found.num_rollouts
+    return Answer(found.entries, found.centres_m, len(found.values), count, found.is_converged)
 
 
-def fit_bullet(case: synthetic_tracks.Case, seed: int) -> Answer:
-    began = time.perf_counter()
-    found = peers.thesis_on_bullet(case.problem, case.truth, seed)
-    return _of_peer(case.trials, found, time.perf_counter() - began)
-
-
-METHODS: dict[str, Callable[[synthetic_tracks.Case, int], Answer]] = {
+METHODS: dict[str, Callable[[Case, int], Answer]] = {
     "grad": fit_grad,
     "mh": fit_mh,
+    "mh-cnn": fit_mh_cnn,
+    "cnn": fit_cnn,
     "thesis": fit_thesis,
     "sysid": fit_sysid,
-    "bullet": fit_bullet,
 }
 
 
-def _warm_fit(trials: JointProblem, seed: int):
-    """The gradient fit, and when it began, compiled."""
-    from galileo_jax.inference.fits.gradient import GradientFitter
-
-    fitter = GradientFitter(trials)
-    fitter.compile()
-    began = time.perf_counter()
-    return fitter.fit(seed), began
+def _chains(trials: JointProblem, fit: GradientFit, starts: np.ndarray | None, seed: int) -> Answer:
+    posterior = metropolis_posterior(trials, fit, seed, starts=starts)
+    rollouts = fit.stats["num_rollouts"] + posterior.stats["num_evaluations"]
+    return _of_draws(trials, posterior, fit.z, rollouts)
 
 
-def _of_draws(trials: JointProblem, fit, posterior, seconds: float, rollouts: float) -> Answer:
-    from galileo_jax.inference.convergence import convergence
-    from galileo_jax.inference.result import make_result
-
-    result = make_result(
-        trials, posterior, fit.z, clips=[], method="", seed=0, timings_s={}, notes={}
-    )
-    estimates = scoring.of_result(result)
-    ratio = posterior["m1"] / posterior["m2"]
-    ess = math.nan
-    if ratio.shape[0] > 1:
-        draws = (posterior["k1"], posterior["k2"], ratio)
-        ess = min(convergence(values).ess_bulk for values in draws)
-    predicted = trials.problems[0].simulate(trials.of_clip(trials.theta(fit.z), 0))
+def _of_draws(trials: JointProblem, posterior: Posterior, z: np.ndarray, rollouts: float) -> Answer:
+    result = make_result(trials, posterior, z, clips=[], method="", seed=0, timings_s={}, notes={})
+    log_ratio = np.log(posterior["m1"] / posterior["m2"])
     return Answer(
-        {name: dict(estimates[name]) for name in scoring.QUANTITIES},
-        _velocity_chi2(trials, predicted, len(trials.model_parameters)),
-        seconds,
+        scoring.of_result(result),
+        trials.problems[0].simulate(trials.of_clip(trials.theta(np.asarray(z)), 0)),
+        len(trials.model_parameters),
         rollouts,
-        ess,
         posterior.is_converged,
+        np.stack([posterior["k1"], posterior["k2"], log_ratio]),
     )
 
 
-def _of_peer(trials: JointProblem, found: peers.Estimate, seconds: float) -> Answer:
-    chi2 = _velocity_chi2(trials, found.centres_m, len(found.values))
-    count = found.num_rollouts
-    return Answer(found.entries, chi2, seconds, count, math.nan, found.is_converged)
+def _row(case: Case, answer: Answer, seconds: float) -> dict[str, Any]:
+    """What is kept of an answer."""
+    scores = scoring.score(answer.estimates, case.values, True, True)
+    row: dict[str, Any] = {name: one._asdict() for name, one in scores.items()}
+    velocity = np.diff(answer.predicted_m, axis=-1) * tracks.FPS
+    white = (velocity - case.problem.observation.velocity_m_s) / NOISE_M_S
+    row["chi2"] = float(np.sum(white**2) / (white.size - answer.num_free))
+    row |= {"rollouts": float(answer.num_rollouts), "seconds": seconds, "ess": math.nan}
+    row["converged"] = bool(answer.is_converged)
+    if answer.draws is not None:
+        values = case.values
+        true = [values["k1"], values["k2"], math.log(values["m1"] / values["m2"])]
+        flat = answer.draws.reshape(len(true), -1)
+        row["rank"] = [float(np.mean(one < t)) for one, t in zip(flat, true, strict=True)]
+        row["mean"], row["sd"] = flat.mean(1).tolist(), flat.std(1).tolist()
+        is_independent = answer.draws.shape[1] == 1
+        row["ess"] = (
+            float(flat.shape[1])
+            if is_independent
+            else float(np.nanmin([convergence(values).ess_bulk for values in answer.draws]))
+        )
+    return row
 
 
-def _velocity_chi2(trials: JointProblem, predicted_m: np.ndarray, num_free: int) -> float:
-    """Squared velocity residuals of predicted centres per degree of freedom."""
-    velocity = np.diff(predicted_m, axis=-1) * synthetic_tracks.FPS
-    white = (velocity - trials.problems[0].observation.velocity_m_s) / NOISE_M_S
-    return float(np.sum(white**2) / (white.size - num_free))
-
-
-def _figures(
-    answers: Sequence[Answer], scores: Sequence[dict[str, scoring.Score]]
+def _summary(
+    rows: Sequence[Mapping[str, Any]], reference: Sequence[Mapping[str, Any]]
 ) -> dict[str, Any]:
-    seconds = np.array([answer.seconds for answer in answers])
-    ess = np.array([answer.ess for answer in answers])
-    return {
-        "tracks": len(answers),
-        "stuck": float(np.mean([answer.chi2_per_dof > STUCK for answer in answers])),
-        "seconds_median": float(np.median(seconds)),
-        "seconds_worst": float(seconds.max()),
-        "rollouts_median": float(np.median([answer.num_rollouts for answer in answers])),
-        "ess_per_s_median": float(np.median(ess / seconds)),
-        "unconverged": sum(not answer.is_converged for answer in answers),
-        **scoring.summary(scores),
+    """Costs, errors, coverage and calibration of one method over all tracks."""
+    seconds, ess, off = (np.array([row[key] for row in rows]) for key in ("seconds", "ess", "chi2"))
+    stuck = float(np.mean(off > STUCK))
+    drawn = [pair for pair in zip(rows, reference, strict=False) if "mean" in pair[0]]
+    apart = [(np.subtract(a["mean"], b["mean"]) / b["sd"]) ** 2 for a, b in drawn]
+    figures: dict[str, Any] = {
+        "tracks": len(rows),
+        "stuck": stuck,
+        "seconds": float(np.median(seconds)),
+        "worst s": float(seconds.max()),
+        "rollouts": float(np.median([row["rollouts"] for row in rows])),
+        "ess": float(np.median(ess)),
+        "ess/s": float(np.median(ess / seconds)),
+        "converged": float(np.mean([row["converged"] for row in rows])),
+        "off": float(np.sqrt(np.mean(apart))) if apart else math.nan,
     }
-
-
-def _missed_bars(figures: dict[str, Any]) -> list[str]:
-    missed = []
-    if figures["stuck"] > BARS["stuck"]:
-        missed.append(f"stuck {figures['stuck']:.0%} > {BARS['stuck']:.0%}")
-    low, high = BARS["coverage"]
-    for name in scoring.QUANTITIES:
-        coverage = figures[name]["coverage"]
-        if not low <= coverage <= high:
-            missed.append(f"{name} coverage {coverage:.0%} outside {low:.0%} to {high:.0%}")
-        if figures[name]["missed"]:
-            missed.append(f"{name} called undetermined in {figures[name]['missed']}")
-    return missed
-
-
-def _read(path: Path | None) -> dict[str, Answer]:
-    """The answers that an earlier run kept, by source, engine, track and method."""
-    if path is None or not path.is_file():
-        return {}
-    lines = (json.loads(line) for line in path.read_text(encoding="utf-8").splitlines())
-    return {line.pop("key"): Answer(**line) for line in lines}
-
-
-def _append(path: Path | None, key: str, answer: Answer) -> None:
-    if path is None:
-        return
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps({"key": key, **asdict(answer)}) + "\n")
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="samplers.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--num", type=int, default=100, help="tracks")
-    parser.add_argument("--num-shared", type=int, default=10, help="of these, for all methods")
-    parser.add_argument("--seed", type=int, default=0, help="the first track's seed")
-    parser.add_argument("--source", choices=synthetic_tracks.SOURCES, default="exact")
-    parser.add_argument("--methods", default="grad,sysid", help=",".join(METHODS))
-    parser.add_argument("--engine", default="auto", choices=ENGINES)
-    parser.add_argument("--keep", type=Path, metavar="FILE", help="answers, to go on from")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))
+    scores = [{q: scoring.Score(**row[q]) for q in scoring.QUANTITIES} for row in rows]
+    for i, (name, entry) in enumerate(scoring.summary(scores).items()):
+        ranks = [row["rank"][i] for row in rows if "rank" in row]
+        entry["KS p"] = float(stats.kstest(ranks, "uniform").pvalue) if ranks else math.nan
+        figures[name] = entry
+    return figures

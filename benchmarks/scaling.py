@@ -1,181 +1,71 @@
-"""What a sweep costs: `python benchmarks/scaling.py [--only clips,workers,rollouts,memory,video]`.
+"""What does a sweep cost?
+
+    python -m benchmarks scaling [--only clips workers] [--clips 64]
 
     clips     seconds per clip of `grad` against the number of clips, in one process, and what the
-              clips after the first of their shape cost (the marginal cost); how often each program
-              was compiled, which is once for each shape
+              same clips cost once more, when their programs are compiled (the marginal cost, bar
+              3 s)
     workers   seconds per clip of a sweep against its workers
-    rollouts  rollouts per second against the rollouts in a batch, on whatever device JAX takes
-    memory    peak memory of a sweep of 100 cells and of 1,000, of the parent and of the worker
-    video     seconds per clip of tracking, a second of 960 x 540 at 30 fps
 
-Clips are csv tracks by `galileo simulate`. A shape is what programs are compiled for: numbers of
-objects, frames (in steps of 64) and recorded instants (in steps of 128). Seconds are wall clock:
-run it on a quiet machine. The last line is JSON.
+Clips are csv tracks by `galileo simulate`. Seconds are wall clock: run it on a quiet machine.
+Rollouts per second are in `accelerator`.
 """
 
-import argparse
-import contextlib
 import json
-import logging
 import os
-import re
 import subprocess
 import sys
 import tempfile
 import time
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tables
 
+from benchmarks import tables
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
-from galileo_jax.commands import command
 from galileo_jax.measurement.measure import measure
-from galileo_jax.runtime.errors import InputError
 
 CLIPS = (1, 2, 4, 8, 16, 32, 64)
-CELLS = (100, 1000)
-BATCHES = (1, 4, 16, 64, 256, 1024, 4096)
-BARS = {"marginal_s": 3.0, "memory_ratio": 1.2}
-HEAVY = ("_roll_out_batch", "seen_slopes_batch", "solve", "white_batch", "_seen_batch")
-LOGGING = ("dispatch", "compiler", "interpreters.pxla")  # JAX's modules that tell of compilations
-PARTS = ("clips", "workers", "rollouts", "memory", "video")
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    parts = call.only.split(",")
-    if unknown := set(parts) - set(PARTS):
-        raise InputError(f"--only: unknown {sorted(unknown)}; known: {', '.join(PARTS)}")
+def main(*, only: tuple[str, ...] = ("clips", "workers"), clips: int = CLIPS[-1]) -> dict[str, Any]:
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of the sweeps' processes
     figures: dict[str, Any] = {}
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(call.folder or temporary)
-        paths = make_tracks(folder, call.clips) if {"clips", "workers"} & set(parts) else []
-        if "clips" in parts:
+    with tempfile.TemporaryDirectory() as folder:
+        paths = make_tracks(Path(folder), clips)
+        if "clips" in only:
             figures["clips"] = cost_of_clips(paths)
-        if "workers" in parts:
-            figures["workers"] = cost_with_workers(folder, paths[: call.clips // 2])
-        if "rollouts" in parts:
-            figures["rollouts_per_s"] = speed_of_rollouts(call.largest_batch)
-        if "memory" in parts:
-            figures["memory"] = memory_of_cells(folder, call.method, call.cells)
-        if "video" in parts:
-            figures["video_s"] = cost_of_tracking(folder)
-    tables.finish("scaling", figures)
-    return None
+        if "workers" in only:
+            figures["workers"] = cost_with_workers(Path(folder), paths[: clips // 2])
+    return figures
 
 
 def make_tracks(folder: Path, count: int) -> list[Path]:
     paths = [folder / f"track_{seed}.csv" for seed in range(count)]
     for seed, path in enumerate(paths):
-        if not path.is_file():
-            simulate(path, track_only=True, seed=seed)
+        simulate(path, track_only=True, seed=seed)
     return paths
 
 
-def make_short_track(folder: Path) -> Path:
-    """A block on a slope for 0.4 s at 30 fps: the cheapest of cells."""
-    rng = np.random.default_rng(0)
-    times = np.arange(13) / 30
-    angle, friction, noise_m = np.radians(22.0), 0.3, 2e-4
-    along = 0.5 * 9.81 * (np.sin(angle) - friction * np.cos(angle)) * times**2 - 0.5
-    x, y = along * np.cos(angle), -along * np.sin(angle)
-    x, y = (values + noise_m * rng.standard_normal(len(times)) for values in (x, y))
-    rows = [
-        f"{t!r},{a!r},{b!r},{noise_m}"
-        for t, a, b in zip(times.tolist(), x.tolist(), y.tolist(), strict=True)
-    ]
-    (folder / "short.csv").write_text(
-        "\n".join(["time_s,object1_x_m,object1_y_m,object1_sd_m", *rows]) + "\n"
-    )
-    clip = {"track": "short.csv", "scenario": "incline", "fps": 30.0, "ramp_angle_deg": 22.0}
-    clip |= {"objects": [{"name": "object1", "shape": "box", "size_m": [0.06, 0.06, 0.06]}]}
-    path = folder / "short.yaml"
-    path.write_text(json.dumps(clip))  # YAML, too
-    return path
-
-
-def cost_of_clips(paths: Sequence[Path]) -> dict[str, Any]:
+def cost_of_clips(paths: Sequence[Path]) -> dict[str, float]:
+    """Seconds per clip, and of the same clips once more, when all programs are there."""
     from galileo_jax.sweeping.settings import Grad
     from galileo_jax.sweeping.work import run_cell
 
-    seconds, compiled = [], []
-    shapes: Counter[tuple[int, ...]] = Counter()
-    is_first = []
-    tables.row("clips", ("s per clip", "shapes", "programs", "small ones"))
-    total: Counter[str] = Counter()
-    for i, path in enumerate(paths, 1):
-        with compilations() as names:
+    tables.row("clips", ("s per clip", "once more", "longest"))
+    first, again = [], []
+    for count, path in enumerate(paths, 1):
+        for seconds in (first, again):
             began = time.perf_counter()
-            measured = measure(load_clip(path))
-            run_cell(Grad(), (measured,))
+            run_cell(Grad(), (measure(load_clip(path)),))
             seconds.append(time.perf_counter() - began)
-        shape = shape_of(measured)
-        is_first.append(shape not in shapes)
-        shapes[shape] += 1
-        total.update(names)
-        compiled.append(sum(names[name] for name in HEAVY))
-        if i in CLIPS:
-            heavy = sum(total[name] for name in HEAVY)
-            small = sum(total.values()) - heavy
-            tables.row(str(i), (float(np.mean(seconds)), len(shapes), heavy, small))
-    if missing := [name for name in HEAVY if not total[name]]:
-        raise RuntimeError(f"JAX logs no compilation of {missing}: HEAVY has other names")
-    later = ~np.array(is_first)
-    marginal = float(np.mean(np.array(seconds)[later]))
-    surplus = int(np.array(compiled)[later].sum())
-    print(f"marginal {marginal:.2f} s per clip (bar {BARS['marginal_s']:g}); "
-          f"programs compiled by clips of a shape seen before: {surplus}")  # fmt: skip
-    return {
-        "seconds_per_clip": float(np.mean(seconds)),
-        "marginal_s": marginal,
-        "marginal_largest_s": float(np.max(np.array(seconds)[later])),
-        "shapes": len(shapes),
-        "programs": {name: total[name] for name in HEAVY},
-        "programs_compiled_again": surplus,
-    }
-
-
-def shape_of(measured: Any) -> tuple[int, ...]:
-    """What programs are compiled for: objects, frames, recorded instants."""
-    from galileo_jax.inference.build_problem import make_problem
-    from galileo_jax.rollout.engine_jax import RECORDS
-    from galileo_jax.runtime.batching import FRAMES, rounded_up
-
-    problem = make_problem(measured.clip, measured.observation)
-    count, _, frames = measured.observation.position_m.shape
-    return count, rounded_up(frames, FRAMES), rounded_up(problem.model.num_records + 1, RECORDS)
-
-
-@contextlib.contextmanager
-def compilations() -> Iterator[Counter[str]]:
-    """Counts what JAX compiles (or reads from its cache on disk) inside, by name."""
-    import jax
-
-    names: Counter[str] = Counter()
-
-    class Count(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            if found := re.match(r"Finished XLA compilation of jit\((\w+)\)", record.getMessage()):
-                names[found[1]] += 1
-
-    handler = Count()
-    loggers = [logging.getLogger(f"jax._src.{name}") for name in LOGGING]
-    jax.config.update("jax_log_compiles", True)
-    for logger in loggers:
-        logger.propagate = False  # nothing is printed
-        logger.addHandler(handler)
-    try:
-        yield names
-    finally:
-        for logger in loggers:
-            logger.removeHandler(handler)
-            logger.propagate = True
-        jax.config.update("jax_log_compiles", False)
+        if count in CLIPS:
+            tables.row(str(count), (np.mean(first), np.mean(again), max(again)))
+    means = {"s_per_clip": float(np.mean(first)), "marginal_s": float(np.mean(again))}
+    return means | {"longest_s": max(again)}
 
 
 def cost_with_workers(folder: Path, paths: Sequence[Path]) -> dict[str, float]:
@@ -185,129 +75,19 @@ def cost_with_workers(folder: Path, paths: Sequence[Path]) -> dict[str, float]:
     found: dict[str, float] = {}
     for count in range(1, num_workers(Resources()) + 1):
         began = time.perf_counter()
-        run_sweep(folder / f"workers_{count}", {"clips": [str(path) for path in paths]}, count)
+        run_sweep(folder / f"workers_{count}", paths, count)
         found[str(count)] = (time.perf_counter() - began) / len(paths)
         tables.row(str(count), (found[str(count)], found["1"] / found[str(count)]))
     return found
 
 
-def speed_of_rollouts(largest: int) -> dict[str, float]:
-    import jax
-
-    jax.config.update("jax_enable_x64", True)
-    import jax.numpy as jnp
-    import synthetic_tracks
-
-    problem = synthetic_tracks.make_case(0, "engine", 1e-4).problem
-    engine, prior = problem.engine, problem.parameters
-    from galileo_jax.model.parameters import forward
-
-    found: dict[str, float] = {}
-    tables.row(f"batch on {jax.default_backend()}", ("rollouts/s",))
-    for size in (batch for batch in BATCHES if batch <= largest):
-        z = np.random.default_rng(0).standard_normal((size, len(prior)))
-        theta = forward(prior, jnp.asarray(z))
-        roll = jax.jit(engine.traceable)  # pyright: ignore
-        jax.block_until_ready(roll(theta))
-        began, repeats = time.perf_counter(), 0
-        while time.perf_counter() - began < 1.0:
-            jax.block_until_ready(roll(theta))
-            repeats += 1
-        found[str(size)] = size * repeats / (time.perf_counter() - began)
-        tables.row(str(size), (found[str(size)],))
-    return found
-
-
-def memory_of_cells(folder: Path, method: str, cells: Sequence[int]) -> dict[str, Any]:
-    """Peak resident memory of a sweep's processes, MB: one short track from many seeds."""
-    path = make_short_track(folder)
-    found: dict[str, Any] = {"method": method}
-    config: dict[str, Any] = {"clips": [str(path)], "common": {"method": method}}
-    run_sweep(folder / "cells_first", config, 1)  # compiles, which takes memory of its own
-    tables.row("cells", ("parent MB", "worker MB", "s per cell"))
-    for count in cells:
-        began = time.perf_counter()
-        parent, worker = run_sweep(
-            folder / f"cells_{count}", config | {"grid": {"seed": list(range(count))}}, 1
-        )
-        each = (time.perf_counter() - began) / count
-        tables.row(str(count), (parent, worker, each))
-        found[str(count)] = {"parent_mb": parent, "worker_mb": worker, "s_per_cell": each}
-    few, many = (found[str(count)] for count in (cells[0], cells[-1]))
-    found["ratio"] = {key: many[key] / few[key] for key in ("parent_mb", "worker_mb")}
-    print(f"{cells[-1]} cells against {cells[0]}: " + ", ".join(
-        f"{key} {value:.3f}" for key, value in found["ratio"].items()
-    ) + f" (bar {BARS['memory_ratio']:g})")  # fmt: skip
-    return found
-
-
-# Peaks by /proc: getrusage counts what a process was before it became another program.
-PEAKS = """
-import json, os, sys, threading, time
-from pathlib import Path
-from galileo_jax.commands import command
-from galileo_jax.commands import sweep
-
-def peak_mb(process):
-    lines = Path(f"/proc/{process}/status").read_text().splitlines()
-    return next(int(line.split()[1]) / 1024 for line in lines if line.startswith("VmHWM"))
-
-def watch():
-    while True:
-        for path in Path("/proc/self/task").glob("*/children"):
-            for child in path.read_text().split():
-                try:
-                    peaks[1] = max(peaks[1], peak_mb(child))
-                except (OSError, StopIteration):
-                    continue
-        time.sleep(0.1)
-
-peaks = [0.0, 0.0]
-threading.Thread(target=watch, daemon=True).start()
-code = command.run(sweep.main, sys.argv[1:])
-print(json.dumps([peak_mb("self"), peaks[1]]))
-sys.exit(code)
-"""
-
-
-def run_sweep(out: Path, config: dict[str, Any], workers: int) -> list[float]:
-    """Runs a sweep; returns the peak memory of its parent and of its largest worker, MB."""
+def run_sweep(out: Path, clips: Sequence[Path], workers: int) -> None:
     out.mkdir(parents=True)
-    (out / "config.yaml").write_text(json.dumps(config))  # YAML, too
-    words = [str(out / "config.yaml"), "--out", str(out), "--workers", str(workers)]
-    done = subprocess.run(
-        [sys.executable, "-c", PEAKS, *words], check=True, stdout=subprocess.PIPE, text=True
+    config = out / "config.yaml"
+    config.write_text(json.dumps({"clips": [str(path) for path in clips]}))  # YAML, too
+    words = [str(config), "--out", str(out), "--workers", str(workers)]
+    subprocess.run(
+        [sys.executable, "-m", "galileo_jax", "sweep", *words],
+        check=True,
+        stdout=subprocess.DEVNULL,
     )
-    return json.loads(done.stdout.splitlines()[-1])
-
-
-def cost_of_tracking(folder: Path) -> float:
-    path = folder / "film.mp4"
-    if not path.is_file():
-        simulate(path, seed=1, seconds=1.0)
-    clip = load_clip(path)
-    began = time.perf_counter()
-    measure(clip)
-    seconds = time.perf_counter() - began
-    tables.row("tracking one video", (seconds, clip.frame_count))
-    return seconds
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(
-        prog="scaling.py", description=__doc__, formatter_class=argparse.RawTextHelpFormatter
-    )
-    parser.add_argument("--only", default=",".join(PARTS))
-    parser.add_argument("--clips", type=command.whole_number(2), default=CLIPS[-1])
-    parser.add_argument("--largest-batch", type=command.whole_number(1), default=BATCHES[-1])
-    parser.add_argument("--method", default="grad", help="of the cells whose memory is measured")
-    parser.add_argument(
-        "--cells", type=command.whole_number(1), nargs="+", default=CELLS, help="of the memory"
-    )
-    parser.add_argument("--folder", help="for clips and sweeps, kept there")
-    return parser
-
-
-if __name__ == "__main__":
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    raise SystemExit(command.run(main))

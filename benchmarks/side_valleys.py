@@ -1,4 +1,6 @@
-"""How often a fit ends in a side valley: `python benchmarks/side_valleys.py --num 300`.
+"""How often does a fit end in a side valley?
+
+    python -m benchmarks side_valleys --num 300
 
 Scenes are drawn widely: ramps of 5 to 35 degrees, all shapes, friction from 0.01 to nearly what
 holds an object, masses up to 16 times each other, objects close to the foot and far from it, both
@@ -6,39 +8,32 @@ ideal ones and with the small faults of real clips, tracks of 0.05 to 1 mm noise
 `galileo fit --method grad` does, and from the truth. A fit is in a side valley where the fit from
 the truth has more evidence by more than 3 nats: it was there to be found and was not.
 
-With `--chains N`, the N worst fits are also sampled as `--method mh` does: what it says of k1 and
-k2 beside what the fit says.
-
-CPU seconds are of the whole process per fit, compilation apart. The last line is JSON.
+CPU seconds are of the whole process per fit, compilation apart. With `--out FILE` a run that was
+cut off goes on.
 """
 
-import argparse
-import json
 import math
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-import tables
 
+from benchmarks import tables, tracks
+from benchmarks.journal import Journal
+from benchmarks.tracks import Case
 from galileo_jax.clip.fields import Shape
-from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.commands import command
+from galileo_jax.clip.schema import ClipObject
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
-from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.inference.metropolis import metropolis_posterior
 from galileo_jax.model.effects.nuisances.foot_transition import FootTransition
 from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitution
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.model.parameters import inverse
-from galileo_jax.observation.observation import Observation
-from galileo_jax.runtime import compilation_cache
+from galileo_jax.runtime.precision import in_float64
 from galileo_jax.simulation.motion import roll_out
 from galileo_jax.simulation.truth import Truth, extents
 
@@ -52,91 +47,36 @@ SIDE_VALLEY_NATS = 3.0
 BAR = 0.003
 
 
-@dataclass(frozen=True)
-class Scene:
-    """One drawn track.
-
-    Attributes:
-      seed: it was drawn with.
-      truth: what is in it.
-      trials: it, with the base model.
-    """
-
-    seed: int
-    truth: Truth
-    trials: JointProblem
-
-    def __str__(self) -> str:
-        """What is in it, in one line."""
-        it = self.truth
-        shapes = "-".join(each.shape for each in it.objects)
-        (m1, m2), (k1, k2) = it.mass_kg, it.friction
-        values = f"{it.ramp_angle_deg:.0f} deg, k1 {k1:.3f}, k2 {k2:.3f}, ratio {m1 / m2:.2f}"
-        return f"{self.seed}: {shapes}, {values}, object 2 at {it.object2_x_m:.2f} m"
-
-
-@dataclass(frozen=True)
-class Ended:
-    """How the fit of one scene ended.
-
-    Attributes:
-      behind: nats of evidence behind the fit from the truth.
-      cpu_s: of the fit.
-      num_rollouts: of the fit.
-      fit: itself.
-    """
-
-    scene: Scene
-    behind: float
-    cpu_s: float
-    num_rollouts: float
-    fit: GradientFit
+@in_float64
+def main(
+    *, num: int = 300, first: int = 0, seed: int = 0, out: Path | None = None
+) -> dict[str, Any]:
+    journal, rows = Journal(out), []
+    for own in range(first, first + num):
+        row = journal.row(f"scene {own}", lambda own=own: fitted(own, seed))
+        if row["behind"] > SIDE_VALLEY_NATS:
+            print(row["says"], flush=True)
+        rows.append(row)
+    stuck = [row for row in rows if row["behind"] > SIDE_VALLEY_NATS]
+    cpu = np.array([row["cpu_s"] for row in rows])
+    figures = {
+        "scenes": len(rows),
+        "stuck": len(stuck),
+        "share": len(stuck) / len(rows),
+        "unsaid": sum(row["code"] == "CONVERGED" for row in stuck),
+        "cpu_s_mean": float(cpu.mean()),
+        "cpu_s_median": float(np.median(cpu)),
+        "cpu_s_95": float(np.quantile(cpu, 0.95)),
+        "rollouts_mean": float(np.mean([row["rollouts"] for row in rows])),
+    }
+    tables.summary(figures)
+    figures["codes"] = dict(Counter(row["code"] for row in rows))
+    figures["stuck_seeds"] = [row["seed"] for row in stuck]
+    too_many = [f"{figures['share']:.2%} in a side valley > {BAR:.1%}"]
+    return figures | {"bars_missed": tables.missed(too_many if figures["share"] > BAR else [])}
 
 
-def main(argv: Sequence[str]) -> int | None:
-    call = _parser().parse_args(argv)
-    jax.config.update("jax_enable_x64", True)
-    compilation_cache.enable()
-    seeds = call.seeds or range(call.first, call.first + call.num)
-    ends = []
-    for seed in seeds:
-        ends.append(fit_scene(draw_scene(seed), call.seed))
-        if ends[-1].behind > SIDE_VALLEY_NATS:
-            print(_line(ends[-1]), flush=True)
-        if call.out:
-            with Path(call.out).open("a") as file:
-                file.write(json.dumps(_row(ends[-1])) + "\n")
-    stuck = [end for end in ends if end.behind > SIDE_VALLEY_NATS]
-    unsaid = [end for end in stuck if end.fit.code.name == "CONVERGED"]
-    codes = {name: 0 for name in sorted({end.fit.code.name for end in ends})}
-    for end in ends:
-        codes[end.fit.code.name] += 1
-    cpu = np.array([end.cpu_s for end in ends])
-    share = f"{100 * len(stuck) / len(ends):.2f} %; the bar: {100 * BAR} %"
-    print(f"\n{len(stuck)} of {len(ends)} in a side valley ({share}), "
-          f"{len(unsaid)} of them said to have converged; {codes}")  # fmt: skip
-    print(f"CPU s per fit: mean {cpu.mean():.2f}, median {np.median(cpu):.2f}, "
-          f"95 % below {np.quantile(cpu, 0.95):.2f}")  # fmt: skip
-    worst = sorted(ends, key=lambda end: -end.behind)
-    for end in worst[: call.chains]:
-        _print_chains(end, call.seed)
-    tables.finish(
-        "side_valleys",
-        {
-            "scenes": len(ends),
-            "stuck": len(stuck),
-            "stuck_seeds": [end.scene.seed for end in stuck],
-            "unsaid": len(unsaid),
-            "codes": codes,
-            "cpu_s_mean": cpu.mean(),
-            "cpu_s_median": np.median(cpu),
-            "rollouts_mean": np.mean([end.num_rollouts for end in ends]),
-        },
-    )
-    return None
-
-
-def draw_scene(seed: int) -> Scene:
+def draw_scene(seed: int) -> Case:
     """A scene in which object 1 slides or rolls; the same seed gives the same scene."""
     rng = np.random.default_rng([seed, 16])
     angle_deg = rng.uniform(*ANGLES_DEG)
@@ -159,32 +99,36 @@ def draw_scene(seed: int) -> Scene:
     times, noise = np.arange(num) / FPS, _log_uniform(rng, NOISES_M)
     taken = times - truth.effect_values.get("release_instant", 0.0)
     clean = motion.at(np.maximum(taken, 0.0)).position_m
-    observation = Observation(
-        names=tuple(each.name for each in objects),
-        times_s=times,
-        position_m=clean + noise * rng.standard_normal(clean.shape),
-        covariance_m2=np.broadcast_to(noise**2 * np.eye(2)[None, ..., None], (2, 2, 2, num)).copy(),
-        mask=np.ones((2, num), bool),
-    )
-    clip = Clip(
-        path=Path(f"scene_{seed}.yaml"), track=Path(f"scene_{seed}.csv"), scenario="ramp", fps=FPS,
-        ramp_angle_deg=angle_deg, objects=objects, frame_count=num,
-    )  # fmt: skip
-    return Scene(seed, truth, make_joint_problem([clip], [observation]))
+    seen = tracks.observed(clean + noise * rng.standard_normal(clean.shape), FPS, noise)
+    clip = tracks.declared(objects, angle_deg, FPS, num)
+    return Case(truth, make_joint_problem([clip], [seen]))
 
 
-def fit_scene(scene: Scene, seed: int) -> Ended:
-    """Fits it as users do and from the truth."""
+def fitted(scene_seed: int, seed: int) -> dict[str, Any]:
+    """How the fit of a scene as users do it ends, and how far behind the fit from the truth."""
+    scene = draw_scene(scene_seed)
     fitter = GradientFitter(scene.trials)
     fitter.compile()
     began = time.process_time()
     fit = fitter.fit(seed)
     cpu_s = time.process_time() - began
     behind = from_truth(scene, fitter).log_evidence - fit.log_evidence
-    return Ended(scene, behind, cpu_s, fit.stats["num_rollouts"], fit)
+    found = dict(zip(scene.trials.names, scene.trials.theta(fit.z), strict=True))
+    shapes = "-".join(each.shape for each in scene.truth.objects)
+    says = f"{scene_seed}: {shapes}, {scene.truth.ramp_angle_deg:.0f} deg; found (and true)"
+    for name in scene.values:
+        says += f" {name} {found[name]:.3f} ({scene.values[name]:.3f})"
+    return {
+        "seed": scene_seed,
+        "behind": behind,
+        "code": fit.code.name,
+        "cpu_s": cpu_s,
+        "rollouts": fit.stats["num_rollouts"],
+        "says": f"{says}; chi2 {fit.chi2 / fit.num_values:.2f}, {fit.code.name}, {behind:.1f} nats",
+    }
 
 
-def from_truth(scene: Scene, fitter: GradientFitter) -> GradientFit:
+def from_truth(scene: Case, fitter: GradientFitter) -> GradientFit:
     """The fit that is reached from the truth."""
     parameters = scene.trials.model_parameters
     known = scene.truth.theta
@@ -226,53 +170,3 @@ def _with_faults(truth: Truth, rng: np.random.Generator) -> Truth:
 
 def _log_uniform(rng: np.random.Generator, span: tuple[float, float]) -> float:
     return float(np.exp(rng.uniform(*np.log(span))))
-
-
-def _line(end: Ended) -> str:
-    found = dict(zip(end.scene.trials.names, end.scene.trials.theta(end.fit.z), strict=True))
-    values = f"k1 {found['k1']:.3f}, k2 {found['k2']:.3f}, ratio {found['m1'] / found['m2']:.2f}"
-    chi2 = end.fit.chi2 / end.fit.num_values
-    return (f"{end.scene}; found {values}, chi2 {chi2:.2f}, {end.fit.code.name}, "
-            f"{end.behind:.1f} nats behind")  # fmt: skip
-
-
-def _row(end: Ended) -> dict[str, float | str]:
-    """For `--out`."""
-    return {
-        "seed": end.scene.seed,
-        "behind": end.behind,
-        "code": end.fit.code.name,
-        "chi2_per_value": end.fit.chi2 / end.fit.num_values,
-        "cpu_s": end.cpu_s,
-        "rollouts": end.num_rollouts,
-    }
-
-
-def _print_chains(end: Ended, seed: int) -> None:
-    """Of one scene, what the fit and `mh` say: truth, mean and sd by each."""
-    names, trials = end.scene.trials.names, end.scene.trials
-    posterior = metropolis_posterior(trials, end.fit, seed)
-    print(f"\n{_line(end)}\n  mh: {posterior.status.name}")
-    z = np.random.default_rng(seed).multivariate_normal(end.fit.z, end.fit.covariance, 2000)
-    theta = trials.theta(z)
-    for name in ("k1", "k2"):
-        drawn, i = posterior[name], names.index(name)
-        print(f"  {name}: true {end.scene.truth.known[name]:.4f}; "
-              f"grad {theta[:, i].mean():.4f} +- {theta[:, i].std():.4f}; "
-              f"mh {drawn.mean():.4f} +- {drawn.std():.4f}")  # fmt: skip
-
-
-def _parser() -> command.Parser:
-    parser = command.Parser(prog="side_valleys.py", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--num", type=int, default=300, help="scenes")
-    parser.add_argument("--first", type=int, default=0, help="seed of the first scene")
-    parser.add_argument("--seeds", type=int, nargs="*", help="of the scenes, in place of these")
-    parser.add_argument("--seed", type=int, default=0, help="of the fits")
-    parser.add_argument("--chains", type=int, default=0, help="so many of the worst are sampled")
-    parser.add_argument("--out", help="a file to which a line of JSON per scene is added")
-    return parser
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main))

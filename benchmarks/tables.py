@@ -4,8 +4,8 @@ import json
 import math
 import os
 import platform
-from collections.abc import Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -25,16 +25,9 @@ def finish(name: str, figures: Mapping[str, Any]) -> None:
         "cores": os.cpu_count(),
         "load": round(os.getloadavg()[0], 1),
         "python": platform.python_version(),
-        **{package: _version(package) for package in PACKAGES},
+        **{package: version(package) for package in PACKAGES},
     }
     print(json.dumps({"benchmark": name, **_plain(figures), "machine": machine}))
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def _cell(value: Any) -> str:
@@ -58,3 +51,24 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(f"{value:.4g}") if math.isfinite(value) else None
     return int(value) if isinstance(value, np.integer) else value
+
+
+def summary(figures: Mapping[str, Any]) -> None:
+    """Prints every figure that is a single number, a row each."""
+    for name, value in figures.items():
+        if isinstance(value, int | float):
+            row(name, [value])
+
+
+def by_name(title: str, rows: Mapping[str, Mapping[str, Any]]) -> None:
+    """Prints a row for each name, and above them what their figures are called."""
+    row(title, [*next(iter(rows.values()))])
+    for name, figures in rows.items():
+        row(name, list(figures.values()))
+
+
+def missed(bars: Iterable[str]) -> list[str]:
+    """Prints the bars that were missed, and returns them."""
+    found = list(bars)
+    print("bars missed: " + ("; ".join(found) or "none"))
+    return found

@@ -1,4 +1,6 @@
-"""How well clips with known truth are tracked: `python benchmarks/tracking.py FOLDER`.
+"""How well are clips with a known truth tracked?
+
+    python -m benchmarks tracking FOLDER
 
 For every clip and object of FOLDER (NAME.yaml with NAME.truth.json): RMS distance from the
 truth in pixels, absolute and after taking out a constant offset; the normalised squared error
@@ -6,32 +8,28 @@ truth in pixels, absolute and after taking out a constant offset; the normalised
 moves; the correlation of neighbouring frames' errors while it moves; the share of frames in which
 it is visible, and lost (invisible though no hand is near). The followed point is the declared
 one, or the centre without it (`--find`).
-The last line is JSON.
 """
 
-import argparse
-import dataclasses
-import json
-import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks import tables
+from benchmarks.accuracy import clips_with_truth
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.schema import Clip
-from galileo_jax.commands import command
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.clip import track_clip
 from galileo_jax.tracking.track import Track
 
-MOVES_PX = 0.02
-"""What goes farther than this from frame to frame moves."""
+MOVES_PX = 0.02  # what goes farther than this from frame to frame moves
+HAND_FRAMES = 10  # within which a hand that leaves object 1 is gone
 
 
-@dataclasses.dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One object of one clip; px, except `nse...`, the shares, and `seconds` (of the clip)."""
 
     clip: str
@@ -48,7 +46,7 @@ class Row:
     seconds: float
 
 
-def true_points(clip: Clip, truth: dict, index: int) -> np.ndarray:
+def true_points(clip: Clip, truth: Mapping[str, Any], index: int) -> np.ndarray:
     """Where the followed point truly is, `[frame, 2]` px: rigid with the object's centre."""
     path = truth["trajectory"][f"object{index + 1}"]
     world = np.stack([path["y"], path["z"], np.ones(len(path["y"]))])
@@ -63,19 +61,13 @@ def true_points(clip: Clip, truth: dict, index: int) -> np.ndarray:
     return centre + np.stack([c * x - s * y, s * x + c * y], axis=1)
 
 
-def hand_is_near(truth: dict, frames: int) -> np.ndarray:
-    """`[frame]`: the hand may cover object 1; it leaves within ten frames."""
-    hand = truth.get("hand")
-    return np.arange(frames) < (hand["leave"] + 10 if hand else 0)
-
-
-def rows_of(clip: Clip, truth: dict, track: Track, seconds: float) -> list[Row]:
+def rows_of(clip: Clip, truth: Mapping[str, Any], track: Track, seconds: float) -> list[Row]:
     rows = []
     for index, name in enumerate(track.names):
         expected = true_points(clip, truth, index)[: len(track.times_s)]
         error = track.position_px[index, : len(expected)] - expected
         seen = track.is_visible[index, : len(expected)]
-        hidden = hand_is_near(truth, len(expected)) if index == 0 else np.zeros_like(seen)
+        covered = HAND_FRAMES + hand["leave"] if (hand := truth.get("hand")) and index == 0 else 0
         error, covariance = error[seen], track.covariance_px2[index, : len(expected)][seen]
         step = np.linalg.norm(np.gradient(expected, axis=0), axis=1)[seen]
         shifted = error - error.mean(axis=0)
@@ -95,7 +87,7 @@ def rows_of(clip: Clip, truth: dict, track: Track, seconds: float) -> list[Row]:
                 _mean(squares[moves]),
                 float(pairs) if len(moving) > 4 else float("nan"),
                 float(seen.mean()),
-                int((~seen & ~hidden).sum()),
+                int((~seen[covered:]).sum()),
                 seconds,
             )
         )
@@ -106,59 +98,32 @@ def _mean(values: np.ndarray) -> float:
     return float(values.mean()) if len(values) else float("nan")
 
 
-def main(argv: Sequence[str]) -> int | None:
-    parser = command.Parser(prog="tracking.py", description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--find", action="store_true", help="leave out the declared points")
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    arguments = parser.parse_args(argv)
-    paths = sorted(arguments.folder.glob("*.truth.json"))
-    if not paths:
-        raise InputError(f"{arguments.folder}: no *.truth.json there")
+def main(folder: Path, *, find: bool = False) -> dict[str, Any]:
     rows: list[Row] = []
     failures: dict[str, str] = {}
-    fields = [field.name for field in dataclasses.fields(Row)]
-    print(f"{fields[0]:<30}" + "".join(f"{field:>12}" for field in fields[1:]))
-    for path in paths:
-        name = path.name.removesuffix(".truth.json")
-        clip = load_clip(path.with_name(f"{name}.yaml"))
-        if arguments.find:
+    tables.row("clip", Row._fields[1:])
+    for path, truth in clips_with_truth(folder, "", "all"):
+        clip = load_clip(path)
+        if find:
             blind = [item.model_copy(update={"point_px": None}) for item in clip.objects]
             clip = clip.model_copy(update={"objects": tuple(blind)})
         began = time.process_time()
         try:
             track = track_clip(clip)
         except InputError as error:
-            failures[name] = str(error)
-            print(f"{name:<30}  {error}")
+            failures[path.stem] = str(error)
+            print(f"{path.stem:<28}  {error}")
             continue
-        seconds = time.process_time() - began
-        new = rows_of(clip, json.loads(path.read_text()), track, seconds)
+        new = rows_of(clip, truth, track, time.process_time() - began)
         rows += new
         for row in new:
-            values = [f"{v:.3f}" if isinstance(v, float) else str(v) for v in vars(row).values()]
-            print(f"{values[0]:<30}" + "".join(f"{v:>12}" for v in values[1:]), flush=True)
-    rms, nse = np.array([r.rms for r in rows]), np.array([r.nse for r in rows])
-    summary = {
-        "benchmark": "tracking",
-        "clips": len(paths),
-        "failures": failures,
-        "rms_px_median": float(np.median(rms)),
-        "rms_px_worst": float(rms.max()),
-        "rms_shifted_px_median": float(np.median([r.rms_shifted for r in rows])),
-        "nse_median": float(np.median(nse)),
-        "nse_mean": float(nse.mean()),
-        "nse_resting_mean": float(np.nanmean([r.nse_resting for r in rows])),
-        "nse_moving_mean": float(np.nanmean([r.nse_moving for r in rows])),
-        "nse_within_half_to_two": float(np.mean((nse >= 0.5) & (nse <= 2))),
-        "correlation_median": float(np.nanmedian([r.correlation for r in rows])),
-        "lost_frames": sum(r.lost for r in rows),
-        "cpu_seconds_median": float(np.median([r.seconds for r in rows])),
-        "cpu_seconds_worst": max(r.seconds for r in rows),
-    }
-    print(json.dumps(summary))
-    return None
-
-
-if __name__ == "__main__":
-    raise SystemExit(command.run(main, sys.argv[1:]))
+            tables.row(row.clip, row[1:])
+    columns = {name: np.array([getattr(r, name) for r in rows]) for name in Row._fields[2:]}
+    figures: dict[str, Any] = {}
+    for name, values in columns.items():
+        figures[f"{name}_mean"] = float(np.nanmean(values))
+        figures[f"{name}_median"] = float(np.nanmedian(values))
+        figures[f"{name}_worst"] = float(np.nanmax(values))
+    figures["nse_within_half_to_two"] = float(np.mean(abs(np.log2(columns["nse"])) <= 1))
+    tables.summary(figures)
+    return figures | {"failures": failures}

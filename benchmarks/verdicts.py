@@ -9,7 +9,6 @@ from typing import Any, Literal
 import numpy as np
 
 Kind = Literal["none", "library", "exotic"]
-Verdict = frozenset[str]
 
 LARGEST_SET = 3
 BARS = {
@@ -40,7 +39,7 @@ class Score:
       before, after: rms residual in units of the noise, without and with what was added.
     """
 
-    truth: Verdict
+    truth: frozenset[str]
     kind: Kind
     label: str
     is_named_right: bool

@@ -1,11 +1,12 @@
-"""Where the CPU seconds of `fit` and `diagnose` go: `python benchmarks/where_time_goes.py`.
+"""Where do the CPU seconds of `fit` and `diagnose` go?
+
+    python -m benchmarks where_time_goes
 
 Every call runs in a process of its own, with compiled programs in the cache: of `--repeats` runs
 the one with the fewest seconds counts. Five csv tracks that `simulate` makes (nothing hidden,
 one effect, another, a pair, one that the library has not), and one 640x360 video for `fit`, which
-is tracked anew each time. Seconds are those of all threads of the process. Beside them: Python and
-`galileo fit --help` alone, and a fixed calculation, so that hosts can be compared. The last line
-is JSON.
+is tracked anew each time. Seconds are those of all threads of the process. Beside them a fixed
+calculation, so that hosts can be compared.
 
 Columns: `reading` decodes a video once to check it; `programs` reads or makes compiled code (in a
 diagnosis it is part of the base fit); `second` is the second search of the base fit; forms without
@@ -13,22 +14,22 @@ a name are among the `candidates`; `replicates` of all comparisons, those of pai
 whether a clip like this would tell what is named from its rivals; `force`: the missing force.
 """
 
-import argparse
 import json
 import os
-import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
-import tables
+from benchmarks import tables
+from galileo_jax.runtime.precision import in_float64
 
-SCRIPT = Path(__file__)
-EXOTIC_FILE = SCRIPT.with_name("exotic_effects.py")
+ROOT = Path(__file__).resolve().parents[1]
+EXOTIC_FILE = ROOT / "benchmarks" / "exotic_effects.py"
 TRACKS = {
     "none": (),
     "air_drag": ("air_drag",),
@@ -36,7 +37,7 @@ TRACKS = {
     "pair": ("air_drag", "friction_patch"),
     "unknown": ("exotic_bump",),
 }
-VIDEO = "video"
+VIDEO, VERBS = "video", ("fit", "diagnose")
 ANGLE_DEG, STRENGTH = 20.0, 0.7
 FIXED_ROLLOUTS, FIXED_BATCH = 10_000, 200
 
@@ -86,40 +87,39 @@ class StageClock:
             self.begin(stage)
 
 
-def main(argv: Sequence[str] | None = None) -> None:
-    call = _parser().parse_args(argv)
-    if call.one:
-        return _print_one(*call.one)
-    help_call = [sys.executable, "-m", "galileo_jax", "fit", "--help"]
-    figures: dict[str, Any] = {
-        "seed": call.seed,
-        "python": _least([sys.executable, "-c", "pass"]),
-        "fit_help": _least(help_call),
-        "fixed_before": fixed_calculation(),
-    }
+def main(
+    *,
+    case: tuple[str, ...] = (*TRACKS, VIDEO),
+    verb: tuple[str, ...] = VERBS,
+    seed: int = 7001,
+    repeats: int = 2,
+    one: tuple[str, ...] = (),
+) -> dict[str, Any] | None:
+    if one:
+        return _print_one(*one)
+    figures: dict[str, Any] = {"fixed_before": fixed_calculation()}
     with tempfile.TemporaryDirectory() as folder:
-        clips = {case: _simulated(Path(folder), case, call.seed) for case in call.case}
-        for verb in call.verb:
-            tables.row(f"{verb}, CPU s", [*COLUMNS, "whole"])
-            figures[verb] = {}
-            for case in clips:
-                if verb == "fit" or case != VIDEO:
-                    figures[verb][case] = _measured(verb, clips[case], call.repeats)
-                    _print_row(case, figures[verb][case])
+        clips = {name: _simulated(Path(folder), name, seed) for name in case}
+        for asked in verb:
+            tables.row(f"{asked}, CPU s", [*COLUMNS, "whole"])
+            figures[asked] = {}
+            for name, clip in clips.items():
+                if asked == "fit" or name != VIDEO:
+                    figures[asked][name] = measured = _measured(asked, clip, repeats)
+                    spent = measured["cpu_s"]
+                    tables.row(f"  {name}", [*map(spent.get, COLUMNS), sum(spent.values())])
+                    print(f"    {' '.join(measured['result'])}", flush=True)
     figures["fixed_after"] = fixed_calculation()
-    for name in ("python", "fit_help", "fixed_before", "fixed_after"):
-        tables.row(name, [figures[name]])
-    tables.finish("where_time_goes", figures)
-    return None
+    tables.summary(figures)
+    return figures
 
 
+@in_float64
 def fixed_calculation() -> float:
     """CPU seconds of `FIXED_ROLLOUTS` rollouts with the rigid engine, once it is compiled."""
-    import jax
-    import rollouts
+    from benchmarks import rollouts
 
-    jax.config.update("jax_enable_x64", True)
-    run = rollouts.rigid_batch(FIXED_BATCH)
+    run = rollouts.batch_of("rigid", FIXED_BATCH)
     run()
     began = time.process_time()
     for _ in range(FIXED_ROLLOUTS // FIXED_BATCH):
@@ -144,10 +144,10 @@ def _simulated(folder: Path, case: str, seed: int) -> Path:
 
 def _measured(verb: str, clip: Path, repeats: int) -> dict[str, Any]:
     """What `_print_one` says of the run with the fewest seconds."""
-    words = [sys.executable, str(SCRIPT), "--one", verb, str(clip)]
+    words = [sys.executable, "-m", "benchmarks", "where_time_goes", "--one", verb, str(clip)]
     runs = []
     for _ in range(repeats):
-        done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
+        done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True, cwd=ROOT)
         runs.append(json.loads(done.stdout.splitlines()[-1]))
     return min(runs, key=lambda run: sum(run["cpu_s"].values()))
 
@@ -164,13 +164,8 @@ def _print_one(verb: str, path: str) -> None:
     clock.begin("reading")
     clip = load(path)
     clock.begin("tracking")
-    setting = os.environ.get("GALILEO_JAX_CACHE")
-    os.environ["GALILEO_JAX_CACHE"] = "off"  # which would know the track
-    followed = track(clip)
-    if setting is None:
-        del os.environ["GALILEO_JAX_CACHE"]
-    else:
-        os.environ["GALILEO_JAX_CACHE"] = setting
+    with mock.patch.dict(os.environ, GALILEO_JAX_CACHE="off"):  # which would know the track
+        followed = track(clip)
     found = function(followed, on_progress=clock.on_progress)
     clock.begin("report")
     found.save(Path(path).with_suffix(f".{verb}"))
@@ -178,38 +173,3 @@ def _print_one(verb: str, path: str) -> None:
     said = found.verdict if verb == "diagnose" else None
     result = [said.status, *said.effects] if said else [found.result["status"]]
     print(json.dumps({"cpu_s": clock.seconds, "result": result}))
-
-
-def _least(words: Sequence[str], repeats: int = 5) -> float:
-    """The fewest CPU seconds of a call."""
-
-    def once() -> float:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run(words, stdout=subprocess.DEVNULL, check=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-    return min(once() for _ in range(repeats))
-
-
-def _print_row(case: str, measured: dict[str, Any]) -> None:
-    seconds = measured["cpu_s"]
-    tables.row(f"  {case}", [*(seconds.get(stage) for stage in COLUMNS), sum(seconds.values())])
-    print(f"    {' '.join(measured['result'])}", flush=True)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description=__doc__)
-    cases = (*TRACKS, VIDEO)
-    parser.add_argument("--case", nargs="+", choices=cases, default=list(cases))
-    parser.add_argument(
-        "--verb", nargs="+", choices=("fit", "diagnose"), default=["fit", "diagnose"]
-    )
-    parser.add_argument("--seed", type=int, default=7001, help="of the clips")
-    parser.add_argument("--repeats", type=int, default=2)
-    parser.add_argument("--one", nargs=2, metavar=("VERB", "CLIP"), help=argparse.SUPPRESS)
-    return parser
-
-
-if __name__ == "__main__":
-    main()

@@ -11,7 +11,7 @@ def make_engine(name: str, model: Model) -> Engine:
     """The engine `name` for a model.
 
     `auto` takes the rigid engine: exact where MuJoCo's contacts are compliant, and many times
-    faster on every device (benchmarks/rollouts.py). MuJoCo's engines check it.
+    faster on every device (`python -m benchmarks rollouts`). MuJoCo's engines check it.
 
     Raises:
       InputError: unknown name (lists the known), or a scene that the engine does not have.

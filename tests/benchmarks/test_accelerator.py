@@ -1,26 +1,15 @@
 """benchmarks/accelerator.py on whatever there is, with small batches."""
 
-import importlib
 import json
-from pathlib import Path
 
-import jax
 import pytest
 
-SCRIPTS = Path(__file__).resolve().parents[2] / "benchmarks"
+from benchmarks.__main__ import main
 
 
-def test_it_times_rollouts_and_fits(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.syspath_prepend(SCRIPTS)
-    script = importlib.import_module("accelerator")
+def test_it_times_rollouts_and_fits(capsys: pytest.CaptureFixture[str]) -> None:
     few = ["--engine", "rigid", "c", "--batch", "2", "4", "--repeats", "1"]
-    was_64_bit = jax.config.jax_enable_x64  # pyright: ignore
-    try:
-        assert script.main([*few, "--fits", "1", "--diagnoses", "0", "--together", "2"]) is None
-    finally:
-        jax.config.update("jax_enable_x64", was_64_bit)
+    assert main(["accelerator", *few, "--fits", "1", "--diagnoses", "0", "--together", "2"]) is None
     said = json.loads(capsys.readouterr().out.splitlines()[-1])
     for size in (2, 4):
         rates = said[f"rollouts_per_minute_{size}"]

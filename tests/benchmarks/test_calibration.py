@@ -1,12 +1,11 @@
 """Tracks for the calibration of intervals are fitted at their best."""
 
-import importlib
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks import calibration
 from galileo_jax.api.fit import fit
 from galileo_jax.inference.fits.gradient import GradientFitter
 from tests.precision import in_64_bit
@@ -18,15 +17,8 @@ STARTS_Z = (-2.0, 0.0, 1.0)
 SAME_NATS = 0.5
 
 
-@pytest.fixture(scope="module")
-def calibration():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(Path(__file__).resolve().parents[2] / "benchmarks")
-        yield importlib.import_module("calibration")
-
-
 @pytest.mark.parametrize(("sort", "seed"), SIDE_VALLEYS)
-def test_no_rebound_and_gap_lead_to_a_better_fit(calibration, sort, seed):
+def test_no_rebound_and_gap_lead_to_a_better_fit(sort, seed):
     _, track = calibration.make_track(sort, seed, NOISE_M)
     found = fit(track, seed=seed)
     names, best = found.problem.names, found.gradient

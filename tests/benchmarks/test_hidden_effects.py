@@ -1,12 +1,12 @@
 """The exam's scoring, and its walk over cases with a diagnosis that is made up."""
 
-import importlib
 import json
 import math
-from pathlib import Path
 
 import pytest
 
+from benchmarks import hidden_cases, hidden_effects
+from benchmarks.__main__ import main
 from benchmarks.verdicts import confusion, judge, missed_bars, summary
 from galileo_jax.commands import command
 
@@ -115,9 +115,7 @@ def test_unknown_status_is_an_error():
 
 @pytest.fixture
 def exam(monkeypatch):
-    """The exam with a diagnosis that always names air drag, and the calls it got."""
-    monkeypatch.syspath_prepend(Path(__file__).resolve().parents[2] / "benchmarks")
-    module = importlib.import_module("hidden_effects")
+    """The calls that a diagnosis got which always names air drag."""
     calls = []
 
     def run_diagnosis(yamls, out, seed):
@@ -125,50 +123,54 @@ def exam(monkeypatch):
         assert all(path.is_file() for path in yamls)
         return diagnosis("named", "air_drag", before=4.0 if "_80" in yamls[0].name else 2.0)
 
-    monkeypatch.setattr(module, "run_diagnosis", run_diagnosis)
-    return module, calls
+    monkeypatch.setattr(hidden_effects, "run_diagnosis", run_diagnosis)
+    return calls
 
 
-def test_only_what_has_a_place_on_a_ramp_is_hidden_there(exam):
-    names = exam[0].hidden_cases.ramp_effects()
+def ran(*options):
+    return command.run(main, ["hidden_effects", *map(str, options)])
+
+
+def figures_of(capsys):
+    return json.loads(capsys.readouterr().out.splitlines()[-1])
+
+
+def test_only_what_has_a_place_on_a_ramp_is_hidden_there():
+    names = hidden_cases.ramp_effects()
     assert {"air_drag", "restitution"} < set(names)
     assert "added_mass" not in names and "force_at_a_time" not in names
 
 
 def test_grid_is_walked_once(exam, tmp_path, capsys, monkeypatch):
-    module, calls = exam
-    monkeypatch.setattr(module.hidden_cases, "EXOTICS", ())
-    monkeypatch.setattr(module.hidden_cases, "PAIRS", ())
-    folder = tmp_path / "exam"
+    monkeypatch.setattr(hidden_cases, "EXOTICS", ())
+    monkeypatch.setattr(hidden_cases, "PAIRS", ())
     options = ["--effects", "air_drag", "--strengths", "0.1", "0.8", "--seeds", "1", "--none", "1"]
-    options += ["--series", "2", "--json", str(tmp_path / "figures.json"), "--out", str(folder)]
-    assert command.run(module.main, options) == 0
-    assert calls == [
+    options += ["--series", "2", "--out", tmp_path / "exam"]
+    assert ran(*options) == 0
+    assert exam == [
         [f"{name}_1.yaml", f"{name}_2.yaml"]
         for name in ("air_drag_10_0", "air_drag_80_0", "none_0")
     ]
-    figures = json.loads((tmp_path / "figures.json").read_text())
+    figures = figures_of(capsys)
     assert figures["too_weak"] == 1
     assert figures["too_weak_by_effect"]["air_drag"]["known"] == 1
     assert (figures["known"], figures["named_right"], figures["false_alarms"]) == (1, 1, 1)
     assert figures["by_strength"].keys() == {"0.8"}
-    assert command.run(module.main, options) == 0
-    assert len(calls) == 3
-    last = capsys.readouterr().out.splitlines()[-1]
-    assert json.loads(last)["benchmark"] == "hidden_effects"
+    assert ran(*options) == 0
+    assert len(exam) == 3
+    assert figures_of(capsys)["benchmark"] == "hidden_effects"
 
 
-def test_folder_of_clips_made_elsewhere(exam, tmp_path):
-    module, calls = exam
+def test_folder_of_clips_made_elsewhere(exam, tmp_path, capsys):
     clips = tmp_path / "clips"
     clips.mkdir()
     for name, effect in (("a_1", "air_drag"), ("b_1", "none"), ("c_1", "exotic_ripple")):
         (clips / f"{name}.truth.json").write_text(json.dumps({"effect": effect, "series": None}))
         (clips / f"{name}.yaml").write_text("")
-    options = [str(clips), "--out", str(tmp_path / "exam"), "--json", str(tmp_path / "f.json")]
-    assert command.run(module.main, options) == 0
-    assert calls == [["a_1.yaml"], ["b_1.yaml"], ["c_1.yaml"]]
-    figures = json.loads((tmp_path / "f.json").read_text())
+    options = [clips, "--out", tmp_path / "exam"]
+    assert ran(*options) == 0
+    assert exam == [["a_1.yaml"], ["b_1.yaml"], ["c_1.yaml"]]
+    figures = figures_of(capsys)
     assert (figures["named_right"], figures["false_alarms"]) == (1, 1)
     assert figures["confident_wrong_exotic"] == 1
-    assert command.run(module.main, [*options, "--series", "2"]) == 2
+    assert ran(*options, "--series", 2) == 2

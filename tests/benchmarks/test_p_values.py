@@ -1,13 +1,13 @@
 """Tracks for the calibration of `compare`'s p are what the likelihood says, and are fitted well."""
 
 import functools
-import importlib
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
+from benchmarks import p_values
+from benchmarks.tracks import make_case
 from galileo_jax.similarity import gaussian_likelihood
 from galileo_jax.similarity.discrepancy import crossings, modes
 from tests.precision import in_64_bit
@@ -18,17 +18,16 @@ SIDE_VALLEY = [903, 20]  # its fit was once 39 nats behind the best, and p 2.5e-
 ADEQUATE_P = 0.01
 
 
-@pytest.fixture(scope="module")
-def p_values():
-    with in_64_bit(), pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(Path(__file__).resolve().parents[2] / "benchmarks")
-        yield importlib.import_module("p_values")
+@pytest.fixture(scope="module", autouse=True)
+def precision():
+    with in_64_bit():
+        yield
 
 
-def drawn(p_values, seed):
+def drawn(seed):
     """A track with imperfections, and what it would be without."""
     rng = np.random.default_rng([901, seed])
-    case = p_values.make_case(int(rng.integers(1 << 30)), "exact", p_values.NOISE_M)
+    case = make_case(int(rng.integers(1 << 30)), "exact", p_values.NOISE_M)
     problem = case.problem
     values = [case.values.get(p.name, p.absent) for p in problem.model.parameters]
     clean = problem.simulate(np.array(values))
@@ -37,7 +36,7 @@ def drawn(p_values, seed):
     return p_values.measured(problem, position, "camera"), clean, position - noisy
 
 
-def test_drawn_tracks_are_what_their_own_likelihood_says(p_values, monkeypatch):
+def test_drawn_tracks_are_what_their_own_likelihood_says(monkeypatch):
     """At the truth whitened residuals are unit normal, whatever the patterns moved.
 
     That is, if it allows for as much across the path as was drawn, and not for more.
@@ -47,15 +46,15 @@ def test_drawn_tracks_are_what_their_own_likelihood_says(p_values, monkeypatch):
     monkeypatch.setattr(gaussian_likelihood, "modes", as_drawn)
     chances = []
     for seed in range(NUM_TRACKS):
-        problem, clean, _ = drawn(p_values, seed)
+        problem, clean, _ = drawn(seed)
         white = problem.whiten(clean, 1.0)
         chances.append(stats.chi2.sf(np.sum(white**2), white.size))
     assert min(chances) > LEAST, np.sort(chances)[:4]
     assert stats.kstest(chances, "uniform").pvalue > ADEQUATE_P
 
 
-def test_imperfections_are_as_large_as_the_likelihood_says(p_values):
-    problem, _, away = drawn(p_values, 0)
+def test_imperfections_are_as_large_as_the_likelihood_says():
+    problem, _, away = drawn(0)
     scene, seen = problem.model.scene.surroundings, problem.observation
     allowed = modes(seen, scene, rough_sd_m=0.0)
     patterns = np.concatenate([allowed, crossings(seen, scene)])
@@ -66,7 +65,7 @@ def test_imperfections_are_as_large_as_the_likelihood_says(p_values):
     assert 0.3 * len(patterns) < np.sum(amplitude**2) < 2 * len(patterns)
 
 
-def test_a_right_model_is_not_rejected_for_a_side_valley_of_one_nuisance(p_values):
+def test_a_right_model_is_not_rejected_for_a_side_valley_of_one_nuisance():
     """No gap, but a rebound: neither both nuisances moved up nor both down lead there."""
     p, *_ = p_values.one("camera", True, 1, SIDE_VALLEY)
     assert p > ADEQUATE_P

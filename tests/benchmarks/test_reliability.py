@@ -1,18 +1,11 @@
 """What the reliability benchmark counts as right, and how it scores probabilities."""
 
-import importlib
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from benchmarks import reliability
+
 LIBRARY = ("air_drag", "restitution", "scale_error", "viscous_drag")
-
-
-@pytest.fixture
-def reliability(monkeypatch):
-    monkeypatch.syspath_prepend(Path(__file__).resolve().parents[2] / "benchmarks")
-    return importlib.import_module("reliability")
 
 
 def entry(shows: dict[str, float] | str, status: str, effects: str = "", **table: float) -> dict:
@@ -56,14 +49,14 @@ BOTH = {"air_drag": 40.0, "scale_error": 1.5}
     ],
 )
 def test_an_effect_that_hardly_shows_may_be_said_or_not(
-    reliability, shows, said, is_right, is_right_if_it_shows
+    shows, said, is_right, is_right_if_it_shows
 ):
     case = entry(shows, *said)
     assert reliability.judged(case, LIBRARY, 0.0).is_named_right is is_right
     assert reliability.judged(case, LIBRARY, 3.0).is_named_right is is_right_if_it_shows
 
 
-def test_ambiguous_holds_what_must_be_said(reliability):
+def test_ambiguous_holds_what_must_be_said():
     case = entry(BOTH, "ambiguous", "air_drag|viscous_drag")
     held = [
         reliability.summary([case], LIBRARY, least)["ambiguous_inside_holds_truth"]
@@ -72,7 +65,7 @@ def test_ambiguous_holds_what_must_be_said(reliability):
     assert held == [0, 1]
 
 
-def test_all_that_has_no_name_is_one_claim(reliability):
+def test_all_that_has_no_name_is_one_claim():
     table = {"air_drag": 0.5, "drag_of_a_power": 0.2, "force_at_a_time": 0.1, "law_drag_x": 0.15}
     case = entry("exotic_gust", "ambiguous", "air_drag|drag_of_a_power", **table)
     said = reliability._claims(case, LIBRARY, 0.0)
@@ -81,14 +74,14 @@ def test_all_that_has_no_name_is_one_claim(reliability):
     assert reliability._claims(case, LIBRARY, 0.0) == [(pytest.approx(0.45), False)]
 
 
-def test_a_second_effect_that_may_be_there_unseen_counts_where_every_effect_does(reliability):
+def test_a_second_effect_that_may_be_there_unseen_counts_where_every_effect_does():
     case = entry(BOTH, "named", "air_drag", air_drag=0.9)
     case["diagnosis"]["reasons"] = [{"rule": "second_possible", "probability": 0.2}]
     assert reliability._claims(case, LIBRARY, 0.0) == [(pytest.approx(0.72), False)]
     assert reliability._claims(case, LIBRARY, 3.0) == [(0.9, True)]
 
 
-def test_a_claim_is_among_what_the_data_do_not_contradict(reliability):
+def test_a_claim_is_among_what_the_data_do_not_contradict():
     table = {"viscous_drag": 0.6, "air_drag": 0.2, "force_at_a_time": 0.15}
     case = entry({"air_drag": 40.0}, "ambiguous", "air_drag|force_at_a_time", **table)
     case["diagnosis"]["candidates"][0]["p_value"] = 0.007
@@ -98,7 +91,7 @@ def test_a_claim_is_among_what_the_data_do_not_contradict(reliability):
     assert reliability._claims(case, LIBRARY, 0.0) == [(0.2, True), (0.15, False)]
 
 
-def test_calibration_error(reliability):
+def test_calibration_error():
     probability = np.array([0.92, 0.98, 0.25, 0.25])
     assert reliability.calibration_error(probability, np.ones(4)) == pytest.approx(0.4)
     drawn = np.random.default_rng(1).random(100_000)
@@ -109,7 +102,7 @@ def test_calibration_error(reliability):
     assert reliability.calibration_error(drawn, overconfident) == pytest.approx(1 / 6, abs=0.01)
 
 
-def test_error_of_right_claims_shrinks_with_their_number(reliability):
+def test_error_of_right_claims_shrinks_with_their_number():
     few, many = (reliability._error_if_right(np.full(count, 0.5)) for count in (10, 1000))
     # |share - 1/2| of n fair coins: sqrt(1 / (2 pi n))
     assert few[0] == pytest.approx(0.126, abs=0.01)

@@ -12,6 +12,7 @@ import pytest
 import yaml
 
 import galileo_jax
+from benchmarks.__main__ import summaries
 from galileo_jax.__main__ import VERBS
 from galileo_jax.clip.schema import ClipFile, ClipObject
 from tests.docs.pages import NOTEBOOKS, PAGES, ROOT
@@ -70,6 +71,16 @@ def test_every_benchmark_that_is_called_exists(page):
         assert (ROOT / script).is_file(), f"{page}: {script}"
     for module in re.findall(r"python -m (benchmarks|tests)\.([\w.]+)", page.read_text()):
         assert (ROOT / module[0] / f"{module[1].replace('.', '/')}.py").is_file(), f"{page}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=IDS)
+def test_every_benchmark_is_listed_or_in_the_history(page):
+    text = page.read_text()
+    for name in re.findall(r"python -m benchmarks (\w+)", text):
+        assert name in summaries(), f"{page}: {name}"
+    history = (ROOT / "docs" / "history" / "benchmarks.md").read_text()
+    for script in re.findall(r"861ea27:benchmarks/([\w/]+\.py|\w+/)", text):
+        assert f"`{script.replace('NAME.py', '')}" in history, f"{page}: {script}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=IDS)

@@ -1,12 +1,14 @@
-"""Tracks with known truth, without a video: what inference alone is judged on."""
+"""Tracks of ramps with known truth, without a video: what inference alone is judged on."""
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
-from galileo_jax.clip.schema import Clip
+from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
@@ -18,7 +20,6 @@ from galileo_jax.simulation.truth import Truth, draw_truth
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from tests.reference_ramp import Experiment, solve
 
-SOURCES = ("exact", "engine")
 FPS, NUM_FRAMES, RAMP_ANGLE_DEG = 30.0, 61, 20.0
 
 
@@ -29,12 +30,10 @@ class Case:
     Attributes:
       truth: what it was made with.
       trials: the observation alone, with the base model, ready for inference.
-      clean_m: `[object, 2, frame]`, the centres without noise.
     """
 
     truth: Truth
     trials: JointProblem
-    clean_m: np.ndarray
 
     @property
     def problem(self) -> Problem:
@@ -48,38 +47,48 @@ class Case:
         return {"m1": m1, "k1": k1, "m2": m2, "k2": k2}
 
 
-def make_case(seed: int, source: str, noise_m: float, engine: str = "auto") -> Case:
+def make_case(seed: int, source: Literal["exact", "engine"], noise_m: float) -> Case:
     """A random experiment in which object 2 is hit, seen for two seconds at 30 fps.
 
     Args:
       seed: same seed, same case.
       source: "exact": closed form; "engine": the project's own rollouts.
       noise_m: standard deviation of each coordinate in each frame, declared as it is.
-      engine: which the trials use.
     """
     rng = np.random.default_rng([seed, 2])
     truth = draw_truth(rng, RAMP_ANGLE_DEG, {})
     times = np.arange(NUM_FRAMES) / FPS
-    clean = _solve_exactly(truth, times) if source == "exact" else roll_out(truth).at(times)
-    centres = clean.position_m
-    shape = (2, 2, 2, NUM_FRAMES)
-    observation = Observation(
-        names=("object1", "object2"),
-        times_s=times,
-        position_m=centres + noise_m * rng.standard_normal(centres.shape),
-        covariance_m2=np.broadcast_to(noise_m**2 * np.eye(2)[None, ..., None], shape).copy(),
-        mask=np.ones((2, NUM_FRAMES), bool),
+    motion = _solve_exactly(truth, times) if source == "exact" else roll_out(truth).at(times)
+    centres = motion.position_m
+    seen = observed(centres + noise_m * rng.standard_normal(centres.shape), FPS, noise_m)
+    clip = declared(truth.objects, RAMP_ANGLE_DEG, FPS, NUM_FRAMES)
+    return Case(truth, make_joint_problem([clip], [seen]))
+
+
+def observed(position_m: np.ndarray, fps: float, noise_m: float) -> Observation:
+    """Positions `[object, 2, frame]`, m, all seen, with that standard deviation of a coordinate."""
+    count, _, frames = position_m.shape
+    covariance = np.broadcast_to(noise_m**2 * np.eye(2)[None, ..., None], (count, 2, 2, frames))
+    return Observation(
+        names=tuple(f"object{i + 1}" for i in range(count)),
+        times_s=np.arange(frames) / fps,
+        position_m=position_m,
+        covariance_m2=covariance.copy(),
+        mask=np.ones((count, frames), bool),
     )
-    clip = Clip(
-        path=Path(f"{source}_{seed}.yaml"),
-        track=Path(f"{source}_{seed}.csv"),
+
+
+def declared(objects: Sequence[ClipObject], angle_deg: float, fps: float, frames: int) -> Clip:
+    """The clip that declares a ramp experiment and has a track."""
+    return Clip(
+        path=Path("made.yaml"),
+        track=Path("made.csv"),
         scenario="ramp",
-        fps=FPS,
-        ramp_angle_deg=RAMP_ANGLE_DEG,
-        objects=truth.objects,
-        frame_count=NUM_FRAMES,
+        fps=fps,
+        ramp_angle_deg=angle_deg,
+        objects=tuple(objects),
+        frame_count=frames,
     )
-    return Case(truth, make_joint_problem([clip], [observation], engine), centres)
 
 
 def _solve_exactly(truth: Truth, times_s: np.ndarray):

@@ -1,0 +1,1 @@
+"""Benchmarks: how accurate, how honest and how fast the package is (`python -m benchmarks`)."""
