@@ -29,7 +29,7 @@ from galileo_jax.experiment.belief import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code
-from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
+from galileo_jax.inference.fits.imperfect import with_imperfections
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import Measurement, inferred
@@ -176,8 +176,8 @@ class Diagnosis:
     def best(self) -> Fit:
         """The fit of the last round's model, as `fit` with its effects gives it.
 
-        Where the verdict is unknown: that of the model without effects, with an acceleration of
-        any form allowed for, as `fit` with `discrepancy="gp"` gives it.
+        Where the verdict is unknown: that of the model without effects, with imperfections, as
+        `fit` with `discrepancy="rough"` gives it.
         """
         is_unknown, seed = self.verdict.status == "unknown", int(self.document["seed"])
         chosen = self.found.rounds[0 if is_unknown else -1].hypothesis
@@ -195,12 +195,10 @@ class Diagnosis:
         notes["status"] = gradient.code.value
         if self.effects_from:
             notes["effects_from"] = [str(Path(path).resolve()) for path in self.effects_from]
-        if is_unknown:
-            wide = fit_discrepancy(part, gradient.z, gradient.free, seed)
-            part, gradient, posterior = wide.free.trials, wide.free.gradient, wide.posterior
-            notes["discrepancy"] = wide.summary
-        else:
-            posterior = fit_posterior(part, gradient, seed)
+        if is_unknown and gradient.sizes is None:
+            rough = with_imperfections(part, gradient)
+            part, gradient = rough.trials, rough.fit
+        posterior = fit_posterior(part, gradient, seed)
         if gradient.sizes is not None:
             notes["imperfections"] = imperfections(part, gradient.sizes, posterior)
         return make_fit(

@@ -24,7 +24,6 @@ from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.fits.imperfect import World, Worlds, fit_worlds
-from galileo_jax.inference.free_force.discrepancy import fit_discrepancy
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior, two_solutions
@@ -83,8 +82,7 @@ def fit(
       free: declared quantities to infer instead, such as "gravity".
       discrepancy: "auto": what no surface, hit, trial or mark is free of may be there or not, and
         the evidence decides; "rough": it is there, by sizes that are inferred (`imperfections` of
-        the result); "none": it is not; "gp": an acceleration of unknown form is allowed for, whose
-        size and smoothness are inferred (method "grad").
+        the result); "none": it is not.
       motion: "planar", or "free": from the first hit on objects turn and tip (boxes by the
         rigid engine, cylinders by MuJoCo's C engine).
       engine: what simulates the motion: "auto" (rigid), "rigid", "c" or "mjx".
@@ -159,14 +157,11 @@ def _check(options: FitOptions) -> None:
 
     check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
     check_known("--discrepancy", "discrepancy", options.discrepancy, get_args(Discrepancy))
-    methods = {"rough": ("grad", "mh"), "gp": ("grad",)}.get(options.discrepancy)
-    if methods and (options.method not in methods or options.motion != "planar"):
+    if options.discrepancy == "rough" and not _has_imperfections(options):
         raise InputError(
-            f"--discrepancy {options.discrepancy}: of --method {' or '.join(methods)} and --motion "
-            f"planar, not of --method {options.method} and --motion {options.motion}"
+            "--discrepancy rough: of --method grad or mh, --motion planar, --init grad and "
+            f"--preset galileo, not of --method {options.method} and --motion {options.motion}"
         )
-    if options.discrepancy == "rough" and (options.init, options.preset) != ("grad", "galileo"):
-        raise InputError("--discrepancy rough: of --init grad and --preset galileo only")
     check_known("--engine", "engine", options.engine, ENGINES)
     check_known("--motion", "motion", options.motion, MOTIONS)
     check_known("--init", "init", options.init, ("grad", "cnn"))
@@ -287,17 +282,11 @@ def _fitted(
         problem, gradient = worlds.best.trials, worlds.best.fit
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
-        if options.discrepancy == "gp":
-            progress.report("fitting an acceleration of unknown form", FITTED)
-            found = fit_discrepancy(problem, gradient.z, gradient.free, options.seed)
-            problem, gradient, posterior = found.free.trials, found.free.gradient, found.posterior
-            extra |= {"discrepancy": found.summary}
-        else:
-            make = laplace_posterior if options.method == "mh" else fit_posterior
-            posterior = make(problem, gradient, options.seed)
-            if worlds.other is not None and options.method != "mh":
-                other = fit_posterior(worlds.other.trials, worlds.other.fit, options.seed)
-                posterior = posterior.mixed_with(other, worlds.share)
+        make = laplace_posterior if options.method == "mh" else fit_posterior
+        posterior = make(problem, gradient, options.seed)
+        if worlds.other is not None and options.method != "mh":
+            other = fit_posterior(worlds.other.trials, worlds.other.fit, options.seed)
+            posterior = posterior.mixed_with(other, worlds.share)
         z_best = gradient.z
         extra = {"status": gradient.code.value} | extra
         if options.method == "mh":

@@ -8,7 +8,7 @@ MAX_STEPS = 4000
 OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
 OF_THESIS = ("similarity", "acceptance", "selection")
 
-Discrepancy = Literal["auto", "none", "rough", "gp"]
+Discrepancy = Literal["auto", "none", "rough"]
 
 
 @dataclass(frozen=True)

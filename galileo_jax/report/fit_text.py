@@ -165,8 +165,6 @@ def fit_quality(result: Mapping[str, Any]) -> list[str]:
         said += imperfection_text(result["imperfections"])
     elif not result.get("no_verdict"):
         said.append(_of_chi2(result["error"]))
-    if found := result.get("discrepancy"):
-        said.append(discrepancy_text(found))
     said += map(pull_text, result.get("pulls", []))
     if result.get("no_verdict"):
         return [*said, f"{result['no_verdict']}."]
@@ -209,15 +207,6 @@ def _of_chi2(error: Mapping[str, Any]) -> str:
     return f"What it leaves has the size of noise, {size}; {PATTERNS}."
 
 
-def discrepancy_text(found: Mapping[str, Any]) -> str:
-    """What was allowed for besides the model (`discrepancy` of result.json), in a sentence."""
-    sizes = [f"{size:.1g} m/s² on {name}" for name, size in found["size_m_s2"].items()]
-    return (
-        "Besides the model, an acceleration of any form was allowed for, about "
-        f"{' and '.join(sizes)}; the intervals are so wide because it may stand in for friction."
-    )
-
-
 def pull_text(pull: Mapping[str, Any]) -> str:
     """What a nuisance outside its prior says of the clip, in a sentence."""
     name, value = str(pull["parameter"]), float(pull["value"])
@@ -230,7 +219,7 @@ def pull_text(pull: Mapping[str, Any]) -> str:
             text = phrase.format(*found.groups(), value=value, size=1e3 * abs(value), side=side)
     return (
         f"{text[0].upper()}{text[1:]}, {abs(pull['z']):.0f} standard deviations from the "
-        "expected value."
+        "expected value; galileo diagnose looks for the cause."
     )
 
 
@@ -240,7 +229,8 @@ def fits(result: Mapping[str, Any]) -> bool:
         return False
     if "imperfections" in result:
         return all(entry["ordinary"] for entry in result["imperfections"].values())
-    return bool(result["error"].get("explained_by_noise", True))
+    error = result["error"]
+    return bool(error.get("explained_by_noise", error["chi2_per_dof"] is not None))
 
 
 def convergence(run: Run) -> str:
@@ -274,9 +264,7 @@ def fit_command(run: Run) -> str:
     if result.get("free"):
         words.append(f"--free {','.join(result['free'])}")
     words += [f"--{key} {result[key]}" for key in ("preset", "sampler") if result.get(key)]
-    if result.get("discrepancy"):
-        words.append(f"--discrepancy {result['discrepancy']['kind']}")
-    elif result.get("discrepancy_asked", "auto") != "auto":
+    if result.get("discrepancy_asked", "auto") != "auto":
         words.append(f"--discrepancy {result['discrepancy_asked']}")
     if run.problem.model.motion != "planar":
         words.append(f"--motion {run.problem.model.motion}")

@@ -6,7 +6,7 @@ from typing import Any
 
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.report.fit_text import discrepancy_text, imperfection_text, meaning
+from galileo_jax.report.fit_text import imperfection_text, meaning
 from galileo_jax.results.shown_digits import shown
 from galileo_jax.results.shown_parameters import shown_parameters
 
@@ -151,9 +151,8 @@ def _is_size(value: Any) -> bool:
 
 
 def _imperfections(result: Mapping[str, Any]) -> list[str]:
-    if found := result.get("imperfections"):
-        return imperfection_text(found)
-    return [discrepancy_text(result["discrepancy"])] if result.get("discrepancy") else []
+    found = result.get("imperfections")
+    return imperfection_text(found) if found else []
 
 
 def _verdict(

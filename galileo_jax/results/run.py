@@ -20,7 +20,6 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import read_observation_csv, write_observation_csv
 from galileo_jax.inference.build_problem import make_problem
-from galileo_jax.inference.free_force.free_fit import with_free_acceleration
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
@@ -128,9 +127,6 @@ def load_run(folder: Path, engine: str = "auto") -> Run:
         free=free,
         trials_differ=TrialFriction.spread in posterior.names,
     )
-    if (discrepancy := result.get("discrepancy")) is not None:
-        spans = discrepancy["spans_s"][Path(result["clips"][0]).stem]
-        problem = with_free_acceleration(problem, spans)
     if (found := result.get("imperfections")) is not None:
         problem = problem.with_sizes(
             {name: entry["z"] for name, entry in found.items() if "z" in entry}

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
 from galileo_jax.diagnosis.pairs import crossed_pairs, most_alike, not_tried, pairs_to_try
@@ -30,6 +31,7 @@ from galileo_jax.diagnosis.verdict import (
     to_compare,
     verdict_of,
     within_luck,
+    without_a_name,
 )
 from galileo_jax.inference.fits.gradient import Code, GradientFit
 from galileo_jax.model.effects.forms import FORM_NAMES
@@ -676,3 +678,33 @@ def test_a_pair_not_ahead_of_all_or_contradicted_is_not_named(p_value, rival):
 def test_a_single_effect_is_no_pair():
     table = ranked([candidate("air_drag", 40.0, 0.03), candidate("rolling", 9.0)])
     assert pair_ahead_of_all(table, DECISIVE) is None
+
+
+@pytest.mark.parametrize(
+    ("p_value", "unusual", "best", "status", "effects"),
+    [
+        (0.01, (), 7 - EDGE, "none", ()),
+        (0.01 - EDGE, (), 0.0, None, ()),
+        (0.5, (), 7 + EDGE, None, ()),
+        (0.5, ("friction_roughness",), 7 - EDGE, "named", ("uneven_friction",)),
+        (0.5, ("friction_roughness",), 7 + EDGE, None, ()),
+        (0.5, ("gusts",), 0.0, None, ()),
+        (0.5, ("friction_roughness", "lasting_error"), 0.0, None, ()),
+    ],
+)
+def test_imperfections_explain_where_no_effect_beside_them_convinces(
+    p_value, unusual, best, status, effects
+):
+    """Of usual sizes: none; friction alone larger than usual: it has the name of an effect."""
+    found = Comparison(p_value, (), (), {}, (), (), (1.0,), False, unusual)
+    verdict = without_a_name(found, [candidate("air_drag", best)])
+    assert (None if verdict is None else verdict.status) == status
+    if verdict is not None:
+        assert verdict.effects == effects
+        assert to_add(verdict, [candidate("air_drag", best)]) is None
+
+
+def test_a_candidate_with_unusual_imperfections_explains_nothing():
+    """Whatever its p-value is."""
+    assert explains(candidate("air_drag", 9.0))
+    assert not explains(replace(candidate("air_drag", 9.0), unusual=("gusts",)))

@@ -225,10 +225,3 @@ def test_a_misfit_of_a_nuisance_alone_is_put_in_words():
     pull = {"parameter": "impact_restitution", "value": 0.452, "unit": "1", "z": 5.2}
     said = fit_quality({"error": {"chi2_per_dof": 1.1}, "pulls": [pull]})
     assert "The objects bounce, with a restitution of 0.45" in said[-1]
-
-
-def test_an_acceleration_of_any_form_is_said_to_be_there():
-    found = {"kind": "gp", "size_m_s2": {"object1": 0.482, "object2": 0.053}}
-    said = " ".join(fit_quality({"error": {"chi2_per_dof": 1.0}, "discrepancy": found}))
-    assert "about 0.5 m/s² on object1 and 0.05 m/s² on object2" in said
-    assert "acceleration" not in " ".join(fit_quality({"error": {"chi2_per_dof": 1.0}}))

@@ -25,7 +25,7 @@ UNKNOWN = {**ENTRY, "identified": False}
 def fit_of(chi2: float | None = 1.0, **more):
     parameters = {"m1": UNKNOWN, "k1": ENTRY, "k2": UNKNOWN}
     derived = {"mass_ratio": {**ENTRY, "mean": 2.0, "sd": 0.1}, "phi": ENTRY}
-    error = {"chi2_per_dof": chi2}
+    error = {"chi2_per_dof": chi2, "explained_by_noise": chi2 is not None and chi2 < 3}
     return {"parameters": parameters, "derived": derived, "error": error, **more}
 
 

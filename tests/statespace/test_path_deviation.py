@@ -73,3 +73,19 @@ def test_terms_have_no_place_where_their_cause_is_absent():
     assert not len(TERMS["contact_push"].patterns(Seen(seen, SCENE, motion)))
     assert not len(TERMS["gusts"].patterns(Seen(seen, SCENE, motion)))
     assert not len(TERMS["friction_roughness"].patterns(Seen(seen, SCENE, None)))
+
+
+def test_times_that_are_late_shift_bodies_along_their_velocity():
+    """A time that is off by t shifts a body by v t in that frame, and in no other."""
+    seen = observe(HIT, 0, noise_m=1e-6)
+    patterns = TERMS["late_times"].patterns(Seen(seen, SCENE, None))
+    exact = solve(HIT, seen.times_s).velocity_m_s
+    for pattern in patterns:
+        frames = np.flatnonzero(np.abs(pattern).max(axis=(0, 1)))
+        assert len(frames) == 1
+    shifts = np.abs(patterns).sum(axis=0)
+    speed = np.linalg.norm(exact, axis=1)[0]
+    steady = np.flatnonzero(np.convolve(np.abs(np.gradient(speed)), np.ones(7), "same") < 0.35)
+    steady = steady[(steady > 4) & (steady < len(speed) - 4) & (speed[steady] > 0.2)]
+    assert len(steady) > 5
+    np.testing.assert_allclose(np.linalg.norm(shifts[0], axis=0)[steady], speed[steady], rtol=0.1)

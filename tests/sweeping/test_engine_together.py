@@ -9,7 +9,7 @@ from galileo_jax.sweeping.engine_together import EngineTogether
 from galileo_jax.sweeping.task import Task
 from tests.sweeping import work_to_do
 
-ROUNDING = 1e-9  # relative: sums of merged programs may have another order
+ROUNDING = 1e-8  # of z: sums of merged programs may have another order
 # Of a standard deviation: where rounding decides, one of 4,000 draws of the posterior is another.
 ONE_DRAW = 0.03
 
@@ -37,7 +37,7 @@ def test_fits_are_those_of_each_clip_alone(tracks):
     assert merged.keys() == alone.keys()
     for key, (z, parameters) in alone.items():
         best, found = merged[key]
-        assert best == pytest.approx(z, rel=ROUNDING, abs=ROUNDING)
+        assert best == pytest.approx(z, abs=ROUNDING)
         for name, entry in parameters.items():
             few = ONE_DRAW * entry["sd"]
             assert found[name]["mean"] == pytest.approx(entry["mean"], abs=few)

@@ -25,14 +25,12 @@ class FreeFit:
       trials: with the free acceleration among what is always there.
       effects: the free acceleration of each clip.
       gradient: the fit.
-      start: `[parameter]`, z of the hypothesis, no acceleration.
       residual: `[value]`, whitened at the fitted noise scales.
     """
 
     trials: JointProblem
     effects: tuple[FreeAcceleration, ...]
     gradient: GradientFit
-    start: np.ndarray
     residual: np.ndarray
 
     @property
@@ -56,12 +54,10 @@ class FreeFit:
         return self.gradient.jacobian
 
 
-def with_free_acceleration(
-    problem: Problem, spans_s: Sequence[Sequence[Span]], sizes_m_s2: Sequence[float] = ()
-) -> Problem:
+def with_free_acceleration(problem: Problem, spans_s: Sequence[Sequence[Span]]) -> Problem:
     """The problem with a free acceleration of every object among what is always there."""
     spans = tuple(tuple((begin, end) for begin, end in own) for own in spans_s)
-    effect = FreeAcceleration(spans, tuple(sizes_m_s2))
+    effect = FreeAcceleration(spans)
     always = (e for e in problem.model.nuisances if not isinstance(e, FreeAcceleration))
     model = replace(problem.model, nuisances=(*always, effect))
     return replace(problem, model=model, engine=make_engine(problem.engine.name, model))
@@ -96,24 +92,6 @@ def free_fit(
     return found
 
 
-def resized(found: FreeFit, sizes_m_s2: Sequence[float]) -> FreeFit:
-    """Fits again with accelerations of other sizes, from none and from those that were found."""
-    extended = JointProblem(
-        tuple(
-            with_free_acceleration(problem, free_acceleration_of(problem).spans_s, sizes_m_s2)
-            for problem in found.trials.problems
-        )
-    )
-    z = found.z.copy()
-    for clip, (problem, effect) in enumerate(
-        zip(found.trials.problems, found.effects, strict=True)
-    ):
-        for i, size in enumerate(sizes_m_s2):
-            own = [problem.model.index(name) for name in effect.knots(i)]
-            z[found.trials.columns[clip][own]] *= effect.size_m_s2(i) / size
-    return _fitted(extended, [found.start, z], found.free)
-
-
 def embedded(
     trials: JointProblem, extended: JointProblem, z: np.ndarray, free: np.ndarray
 ) -> np.ndarray:
@@ -146,4 +124,4 @@ def _fitted(
         for clip, problem in enumerate(extended.problems)
     ]
     effects = tuple(free_acceleration_of(problem) for problem in extended.problems)
-    return FreeFit(extended, effects, fit, tried[0], np.concatenate(residual))
+    return FreeFit(extended, effects, fit, np.concatenate(residual))

@@ -1,0 +1,93 @@
+"""Boards whose friction varies along the way, moved by an integrator of this test's own."""
+
+import numpy as np
+import pytest
+
+import galileo_jax as gx
+from galileo_jax.report.diagnosis_text import roughness
+
+ANGLE_DEG, FRICTION, LENGTH_M = 25.0, 0.25, 0.01
+FPS, SUBSTEPS, NOISE_M, WAY_M = 100.0, 50, 1e-4, 0.9
+YAML = """
+track: slide.csv
+scenario: incline
+ramp_angle_deg: {angle}
+objects: [{{name: object1, shape: box, mass_kg: 0.2}}]
+"""
+
+
+def drawn(folder, uneven, drag_per_m=0.0, seed=3):
+    """A slide down a board: friction by Ornstein and Uhlenbeck along the way, air drag c v|v|.
+
+    Returns:
+      The clip, and the mean friction of this board.
+    """
+    rng = np.random.default_rng(seed)
+    grid = np.arange(0.0, WAY_M + 0.1, LENGTH_M / 20)
+    keep = np.exp(-1 / 20)
+    excess = [rng.standard_normal()]
+    for shock in rng.standard_normal(len(grid) - 1):
+        excess.append(keep * excess[-1] + np.sqrt(1 - keep**2) * shock)
+    friction = FRICTION + uneven * np.array(excess)
+    angle, dt = np.radians(ANGLE_DEG), 1 / (FPS * SUBSTEPS)
+    place, speed, seen = 0.0, 0.0, []
+    while place < WAY_M:
+        seen.append(place)
+        for _ in range(SUBSTEPS):
+            k = np.interp(place, grid, friction)
+            pull = 9.81 * (np.sin(angle) - k * np.cos(angle)) - drag_per_m * speed * abs(speed)
+            speed = max(speed + pull * dt, 0.0)
+            place += speed * dt
+    way = np.array(seen)
+    x, y = way * np.cos(angle), -way * np.sin(angle)
+    rows = np.column_stack([np.arange(len(way)) / FPS, x, y])
+    rows[:, 1:] += NOISE_M * rng.standard_normal((len(way), 2))
+    head = "time_s,object1_x_m,object1_y_m"
+    np.savetxt(folder / "slide.csv", rows, delimiter=",", header=head, comments="", fmt="%.6f")
+    (folder / "slide.yaml").write_text(YAML.format(angle=ANGLE_DEG))
+    return folder / "slide.yaml", float(friction[grid < WAY_M].mean())
+
+
+@pytest.mark.slow
+def test_friction_that_varies_much_is_uneven(tmp_path):
+    """Ten times as much as on usual boards: the verdict has its name and about its size."""
+    clip, friction = drawn(tmp_path, uneven=0.1)
+    found = gx.diagnose(clip, seed=0)
+    assert (found.verdict.status, found.verdict.effects) == ("named", ("uneven_friction",))
+    assert 0.05 < roughness(found.found.rounds[-1].hypothesis) < 0.2
+    before, after = found.document["history"]
+    assert after["effects"] == ["uneven_friction"]
+    assert after["rmse"] < before["rmse"] and after["chi2_per_dof"] < 2 < before["chi2_per_dof"]
+    entry = found.best.parameters["k1"]
+    assert entry["q025"] < friction < entry["q975"]
+    assert "friction coefficient varies by" in found.sentence
+    assert not found.document["imperfections"]["friction_roughness"]["ordinary"]
+
+
+def test_friction_that_varies_as_usual_is_no_effect(tmp_path):
+    """The exact model is contradicted all the same; intervals hold the mean friction."""
+    clip, friction = drawn(tmp_path, uneven=0.02)
+    found = gx.diagnose(clip, seed=0)
+    assert found.verdict.status == "none"
+    assert found.document["adequate"]
+    entry = found.best.parameters["k1"]
+    assert entry["q025"] < friction < entry["q975"]
+
+
+def test_an_effect_beside_uneven_friction_is_named(tmp_path):
+    """A drag on a usual board: found beside what the board does."""
+    found = gx.diagnose(drawn(tmp_path, uneven=0.02, drag_per_m=1.0)[0], seed=0)
+    names = {name for effect in found.verdict.effects for name in effect.split("+")}
+    assert found.verdict.status in ("named", "ambiguous")
+    assert "air_drag" in names
+
+
+@pytest.mark.parametrize("uneven", [0.02, 0.1])
+def test_a_fit_holds_the_mean_friction(tmp_path, uneven):
+    """As is said: usual or more than usual."""
+    clip, friction = drawn(tmp_path, uneven)
+    fit = gx.fit(clip, seed=0)
+    entry = fit.parameters["k1"]
+    assert entry["q025"] < friction < entry["q975"]
+    assert fit.result["probability_imperfect"] > 0.95
+    assert fit.result["imperfections"]["friction_roughness"]["ordinary"] == (uneven < 0.05)
