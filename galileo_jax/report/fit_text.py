@@ -72,7 +72,7 @@ FORCES = ("liquid_drag", "stiffness")  # known as far as the mass is
 CHI2_GOOD = 0.7
 TOLD_FACTOR = 10.0  # an interval that spans more tells no size
 # Residuals of the noise's size may still follow a pattern that noise does not have.
-PATTERNS = "galileo compare tests whether they have a pattern"
+PATTERNS = "galileo compare tests whether it has a pattern"
 
 
 def meaning(name: str) -> str | None:
