@@ -28,7 +28,7 @@ DECISIVE = 3.0
 # Probability, 3rd ed. 1961, app. B, 'substantial').
 SUBSTANTIAL = log(10) / 2
 # Imperfections that have the name of an effect where they are larger than usual.
-AS_EFFECTS = {("friction_roughness",): "uneven_friction"}
+AS_EFFECTS: dict[tuple[str, ...], str] = {("friction_roughness",): "uneven_friction"}
 UNEVEN = tuple((name,) for name in AS_EFFECTS.values())
 # How much wider that margin is where the base model already passes its comparison: the effect is
 # then so faint that more hypotheses stay possible.

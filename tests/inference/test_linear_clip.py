@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.special import logsumexp
+from scipy.special import logsumexp as scipy_logsumexp
 
 from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.gradient import GradientFitter
@@ -24,6 +24,11 @@ from tests.ramp_model import HIT
 
 VALUES, SIZE_X = 60, 1.0
 TERM = Term("lasts", "{size}", "m", lambda _: 1.0, 3.0, lambda _: np.zeros((0, 1, 1, 1)))
+
+
+def logsumexp(values, axis=None):
+    """As an array."""
+    return np.asarray(scipy_logsumexp(values, axis=axis))
 
 
 @pytest.fixture(scope="module")

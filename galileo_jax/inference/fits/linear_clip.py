@@ -254,7 +254,7 @@ def integrated(clips: Sequence[LinearClip], terms: Sequence[Term], modes: Sequen
     log_weights -= log_q - np.log(len(parts))
     noise = np.linalg.slogdet(best.information[count:, count:])[1]
     at_best = best.value + 0.5 * float(best.x @ best.x) - 0.5 * float(noise)
-    evidence = float(logsumexp(log_weights)) - np.log(len(tried)) - at_best
+    evidence = float(np.asarray(logsumexp(log_weights))) - np.log(len(tried)) - at_best
     which = resampled(log_weights, NUM_DRAWS, np.random.default_rng(1))
     return Sizes(tuple(term.name for term in terms), best.x, tried[which], evidence)
 
@@ -281,7 +281,7 @@ def log_likelihood(
         along2 = (vectors.T @ clip.e) ** 2
         cover = np.exp(2 * NOISE_SD * log_scale)[:, None] + np.maximum(values, 0.0)
         each = -0.5 * np.sum(np.log(cover) + along2 / cover, axis=1) - 0.5 * log_scale**2
-        total += float(logsumexp(each))
+        total += float(np.asarray(logsumexp(each)))
     return total
 
 
