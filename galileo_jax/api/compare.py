@@ -24,7 +24,6 @@ from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
-from galileo_jax.statespace.term import USUAL
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -209,7 +208,8 @@ def compare(
 
 
 def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
-    if any(x > USUAL for x in (fit.problem.sizes or {}).values()):
+    sizes = fit.result.get("imperfections", {})
+    if fit.problem.sizes is not None and not all(one["ordinary"] for one in sizes.values()):
         # With imperfections so large the model fails nowhere; without them it is seen where.
         fit = replace(fit, problem=fit.problem.with_sizes(None), gradient=None)
     gradient = fit.gradient
