@@ -1,7 +1,7 @@
 """Errors of the marks that last: lens, scale, blur, the eye, an encoder.
 
-Smooth ones over a third of the track (Matern's process, nu = 3/2) and brief ones over three rows
-(Ornstein and Uhlenbeck's, nu = 1/2), in each axis of each body.
+Smooth ones (Matern's process, nu = 3/2) over a third of the track and over three rows, in each axis
+of each body.
 
 Source: Rasmussen and Williams (2006), Gaussian Processes for Machine Learning, section 4.2.1.
 """
@@ -22,22 +22,19 @@ def way_m(seen: Seen) -> float:
     return max(longest, 1e-3)
 
 
-def _apart(seen: Seen, lasts_s: float) -> np.ndarray:
-    """`[frame, frame]`, times between frames over a duration."""
+def _smooth(seen: Seen, lasts_s: float) -> Patterns:
     times = seen.observation.times_s
-    return np.abs(times[:, None] - times) / max(lasts_s, 1e-9)
+    apart = np.sqrt(3) * np.abs(times[:, None] - times) / max(lasts_s, 1e-9)
+    return of_axis((1 + apart) * np.exp(-apart), seen)
 
 
 def _long(seen: Seen) -> Patterns:
-    apart = np.sqrt(3) * _apart(seen, LASTS * float(np.ptp(seen.observation.times_s)))
-    return of_axis((1 + apart) * np.exp(-apart), seen)
+    return _smooth(seen, LASTS * float(np.ptp(seen.observation.times_s)))
 
 
 def _brief(seen: Seen) -> Patterns:
     steps = np.diff(seen.observation.times_s)
-    return of_axis(
-        np.exp(-_apart(seen, BRIEFLY * float(np.median(steps) if steps.size else 1.0))), seen
-    )
+    return _smooth(seen, BRIEFLY * float(np.median(steps) if steps.size else 1.0))
 
 
 for name, meaning, patterns in (
