@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
@@ -172,6 +172,24 @@ def fixed_patterns(
     return patterns
 
 
+def known_lines(
+    observation: Observation, inverse_root: Float[np.ndarray, "object axis axis frame"]
+) -> tuple[Bool[np.ndarray, "object frame"], Float[np.ndarray, "object axis frame"]]:
+    """Where places are known along a line only, and its direction in the stated errors.
+
+    Returns:
+      `[object, frame]`; and unit vectors `[object, axis, frame]`, 0 elsewhere.
+    """
+    across = observation.across
+    is_line = (across != 0).any(axis=1)
+    if not is_line.any():
+        return is_line, np.zeros_like(observation.position_m)
+    line = np.stack([-across[:, 1], across[:, 0]], axis=1)
+    white = np.einsum("oijt,ojt->oit", inverse_root, line)
+    length = np.linalg.norm(white, axis=1, keepdims=True)
+    return is_line, np.divide(white, length, out=np.zeros_like(white), where=length > 0)
+
+
 def whitening_of(
     observation: Observation,
     inverse_root: Float[np.ndarray, "object axis axis frame"],
@@ -179,6 +197,10 @@ def whitening_of(
 ) -> Whitening:
     """The covariance of the tracker's errors and of patterns in units of them, decomposed."""
     mask, axes = observation.mask, observation.position_m.shape[1]
+    is_line, along = known_lines(observation, inverse_root)
+    if is_line.any():  # across a line nothing is measured, and no mode is told
+        told = np.einsum("moit,oit->mot", patterns, along)[:, :, None] * along
+        patterns = np.where(is_line[:, None], told, patterns)
     flat = patterns.reshape(len(patterns), -1)
     _, gain, basis = np.linalg.svd(flat, full_matrices=False)
     gain, basis = gain[gain > IDLE], basis[gain > IDLE]  # many patterns are alike

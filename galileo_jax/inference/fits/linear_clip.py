@@ -32,6 +32,7 @@ from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.inference.resampled import resampled
+from galileo_jax.similarity.gaussian_likelihood import known_lines
 from galileo_jax.statespace.sizes import Sizes
 from galileo_jax.statespace.term import Term
 
@@ -126,13 +127,10 @@ def _averaged(values: np.ndarray, problem: Problem) -> Float[np.ndarray, "row va
     """
     observation = problem.observation
     seen = np.repeat(observation.mask[:, None], observation.position_m.shape[1], axis=1)
-    is_line = (observation.across != 0).any(axis=1)
+    is_line, along = known_lines(observation, problem.data.inverse_root)
     if is_line.any():
-        along = np.stack([-observation.across[:, 1], observation.across[:, 0]], axis=1)
-        white = np.einsum("oijt,ojt->oit", problem.data.inverse_root, along)
-        white /= np.maximum(np.linalg.norm(white, axis=1, keepdims=True), 1e-300)
         values = values.reshape(len(values), *observation.position_m.shape).copy()
-        told = np.einsum("roit,oit->rot", values, white)
+        told = np.einsum("roit,oit->rot", values, along)
         values[:, :, 0] = np.where(is_line, told, values[:, :, 0])
         seen[:, 1] &= ~is_line
     own = np.repeat(np.arange(seen.shape[0] * seen.shape[1]), seen.shape[2])[seen.reshape(-1)]
