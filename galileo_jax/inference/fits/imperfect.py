@@ -32,8 +32,8 @@ class Worlds:
 
     Attributes:
       best: the more probable.
-      other: the less probable; None where it is out of the question.
-      share: the probability of `other`.
+      other: the less probable; None where it has no part in the posterior.
+      share: the probability of the less probable.
     """
 
     best: World
@@ -76,7 +76,7 @@ def fit_worlds(
         return Worlds(rough)
     best, other = (rough, exact) if probability > 0.5 else (exact, rough)
     share = min(probability, 1 - probability)
-    return Worlds(best, other, share) if share > EXCLUDED else Worlds(best)
+    return Worlds(best, other if share > EXCLUDED else None, share)
 
 
 def is_usual(world: World) -> bool:
