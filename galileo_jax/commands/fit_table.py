@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 def table(found: "Fit", truth: Mapping[str, float]) -> str:
     """What the user asked for, in a few lines; with a column for the truth if it is known."""
     from galileo_jax.inference.per_mass import SUFFIX
+    from galileo_jax.report.fit_text import chi2_text, fit_quality
     from galileo_jax.results.shown_digits import shown
     from galileo_jax.results.shown_parameters import shown_parameters
 
@@ -30,9 +31,7 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
         lines.append(f"{name:<18}{true:>10}{known}")
     error = result["error"]
     lines.append(
-        f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
-        f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}); {result['status']}"
+        f"{chi2_text(error)}, velocity error {error['rmse']:.4f} m/s (tracking noise "
+        f"{error['noise']:.4f}); {result['status']}"
     )
-    from galileo_jax.report.fit_text import fit_quality
-
     return "\n".join([*lines, *fit_quality(result)])

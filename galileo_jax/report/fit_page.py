@@ -131,7 +131,8 @@ def _header(title: str, run: Run, lead: str, beside: Mapping[str, str]) -> str:
             for line in (*_cuts(result), *result.get("taken_as_exact", []))
         )
     )
-    quality, is_good = " ".join(fit_text.fit_quality(result)), fit_text.fits(result)
+    said = [*fit_text.fit_quality(result), f"({fit_text.chi2_text(result['error'])})"]
+    quality, is_good = " ".join(said), fit_text.fits(result)
     if not lead:
         return header("fit", title, quality, more, is_good)
     links = "".join(

@@ -195,11 +195,19 @@ def imperfection_text(found: Mapping[str, Any]) -> list[str]:
     return said or ["How large each imperfection is does not show."]
 
 
+def chi2_text(error: Mapping[str, Any]) -> str:
+    """What the fit leaves over what noise of the stated size would, as a number."""
+    chi2 = error["chi2_per_dof"]
+    known = chi2 is not None and math.isfinite(chi2)
+    return f"chi2 per degree of freedom {chi2:.2f}" if known else "chi2 not known"
+
+
 def _of_chi2(error: Mapping[str, Any]) -> str:
+    """The same in a sentence."""
     chi2 = error["chi2_per_dof"]
     if chi2 is None or not math.isfinite(chi2):
         return "chi2 per degree of freedom cannot be computed."
-    size = f"{math.sqrt(chi2):.2g} times the stated noise (chi2 per degree of freedom {chi2:.2f})"
+    size = f"{math.sqrt(chi2):.2g} times the stated noise"
     if not error.get("explained_by_noise", True):
         return f"What it leaves is {size}, more than noise and usual imperfections explain."
     if chi2 < CHI2_GOOD:
