@@ -60,6 +60,7 @@ from galileo_jax.diagnosis.second_effect import (
     with_second,
 )
 from galileo_jax.diagnosis.verdict import (
+    AS_EFFECTS,
     CONVINCING,
     PAIR_P,
     UNEVEN,
@@ -157,7 +158,7 @@ def diagnose(
     if rough is not None and not rough.is_beaten_by(candidates):
         rough = rough.with_candidates(trials, candidates, seed)
         verdict = _in_imperfect_world(trials, rough, on_stage)
-        if verdict.status == "unknown" or verdict.effects in UNEVEN:
+        if verdict.status == "unknown" or set(verdict.effects) & set(AS_EFFECTS.values()):
             verdict = None  # a pair or a formula may explain it
     views: list[View] = []
     if verdict is None:

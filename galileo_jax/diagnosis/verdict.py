@@ -108,22 +108,30 @@ def is_nothing_missing(is_base_accepted: bool, candidates: Sequence[Candidate]) 
 def without_a_name(comparison: Comparison, candidates: Sequence[Candidate]) -> Verdict | None:
     """The verdict where no effect is needed in an imperfect world; None where one is.
 
-    None is missing where imperfections of usual sizes leave nothing but noise, and the friction
-    is uneven where it varies by more. An effect that convinces all the same speaks against both.
+    None is missing where imperfections of usual sizes leave nothing but noise and no effect is
+    convincing beside them. The friction is uneven where it varies by more and no effect, with
+    imperfections of usual sizes, explains the data about as well; ambiguous where one does. A
+    formula has to be better than imperfections are.
 
     Args:
       comparison: of the model without effects, with imperfections.
       candidates: ranked, with imperfections, compared with the data.
     """
-    named = [c for c in candidates if explains(c) and c.log_odds >= CONVINCING]
-    if comparison.p_value < ADEQUATE_P or named:
+    if comparison.p_value < ADEQUATE_P:
         return None
+    explaining = [c for c in candidates if explains(c)]
+    lead = max((c.log_odds for c in explaining), default=-np.inf)
+    why = (reasons.imperfections_explain(comparison),)
     if not comparison.unusual:
-        return Verdict("none", (), reasons=(reasons.imperfections_explain(comparison),))
+        return None if lead >= CONVINCING else Verdict("none", (), reasons=why)
     name = AS_EFFECTS.get(comparison.unusual)
-    if name is None:
+    if name is None or lead >= DECISIVE:
         return None
-    return Verdict("named", (name,), reasons=(reasons.imperfections_explain(comparison),))
+    rivals = [c for c in explaining if not c.is_form and c.law is None and c.log_odds > -DECISIVE]
+    if not rivals:
+        return Verdict("named", (name,), reasons=why)
+    because = (reasons.explains(rivals[0]), *why)
+    return Verdict("ambiguous", (rivals[0].name, name), reasons=because)
 
 
 def best_named(candidates: Sequence[Candidate]) -> Candidate:

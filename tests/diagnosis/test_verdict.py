@@ -686,8 +686,10 @@ def test_a_single_effect_is_no_pair():
         (0.01, (), 7 - EDGE, "none", ()),
         (0.01 - EDGE, (), 0.0, None, ()),
         (0.5, (), 7 + EDGE, None, ()),
-        (0.5, ("friction_roughness",), 7 - EDGE, "named", ("uneven_friction",)),
-        (0.5, ("friction_roughness",), 7 + EDGE, None, ()),
+        (0.5, ("friction_roughness",), -3 - EDGE, "named", ("uneven_friction",)),
+        (0.5, ("friction_roughness",), -3 + EDGE, "ambiguous", ("air_drag", "uneven_friction")),
+        (0.5, ("friction_roughness",), 3 - EDGE, "ambiguous", ("air_drag", "uneven_friction")),
+        (0.5, ("friction_roughness",), 3 + EDGE, None, ()),
         (0.5, ("gusts",), 0.0, None, ()),
         (0.5, ("friction_roughness", "lasting_error"), 0.0, None, ()),
     ],
@@ -701,7 +703,10 @@ def test_imperfections_explain_where_no_effect_beside_them_convinces(
     assert (None if verdict is None else verdict.status) == status
     if verdict is not None:
         assert verdict.effects == effects
-        assert to_add(verdict, [candidate("air_drag", best)]) is None
+        added = to_add(verdict, [candidate("air_drag", best)])
+        assert (None if added is None else added.name) == (
+            "air_drag" if status == "ambiguous" else None
+        )
 
 
 def test_a_candidate_with_unusual_imperfections_explains_nothing():
