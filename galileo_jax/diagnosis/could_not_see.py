@@ -117,7 +117,9 @@ def _smallest(
     for _ in range(ROUNDS):
         _, power = slopes_along(trials, fit, probes)
         size = probes[:, where[0]] - own.absent
-        for i, squared in enumerate(power / size**2):
+        # Where an effect is tried at no strength it shows by none.
+        shown = np.divide(power, size**2, out=np.zeros_like(power), where=size != 0)
+        for i, squared in enumerate(shown):
             tried = float(squared), num_left, own.prior, own.absent, log_prior
             found[i] = smallest_shown(*tried)
             if (strength := found[i]) is not None:
