@@ -11,10 +11,16 @@ import numpy as np
 from scipy.special import expit
 
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
-from galileo_jax.inference.fits.linear_clip import integrated, linear_clips, most_probable
+from galileo_jax.inference.fits.linear_clip import (
+    expected_lead,
+    integrated,
+    linear_clips,
+    most_probable,
+)
 from galileo_jax.inference.joint_problem import JointProblem
 
 MOST_ROUNDS, SETTLED = 4, 0.02  # of sizes and fits by turns; of a log size
+HOPELESS = -4.0  # nats, by Laplace: then what more care would change leaves it excluded
 EXCLUDED = 0.05  # a world that is less probable has no part in the posterior
 
 
@@ -66,7 +72,15 @@ def fit_worlds(
 
     exact = World(trials, fitter.fit(seed, on_stage, is_enough=is_enough))
     on_stage("sizing imperfections")
-    rough = with_imperfections(trials, exact.fit)
+    x = None
+    if may_be_exact and trials.terms and exact.fit.code is Code.CONVERGED:
+        clips = linear_clips(trials, exact.fit)
+        modes = most_probable(clips, trials.terms, None, exact.fit)
+        lead = expected_lead(clips, modes, exact.fit)
+        if lead < HOPELESS:
+            return Worlds(exact, share=float(expit(lead)))
+        x = [mode.x for mode in modes]
+    rough = with_imperfections(trials, exact.fit, x)
     if not may_be_exact or rough.fit.sizes is None:
         return Worlds(rough)
     if rough.fit.code is not Code.CONVERGED:
@@ -88,23 +102,26 @@ def is_usual(world: World) -> bool:
 
 
 def with_imperfections(
-    trials: JointProblem, fit: GradientFit, x: Sequence[float] | None = None, to_rest: bool = True
+    trials: JointProblem,
+    fit: GradientFit,
+    x: Sequence[np.ndarray] | None = None,
+    to_rest: bool = True,
 ) -> World:
     """The trials with the sizes of imperfections that a fit asks for, and the fit with these.
 
     Args:
       trials: that were fitted, without sizes.
       fit: of them, with the valleys beside it.
-      x: `[term]`, where to look for sizes, if that is known.
+      x: `[term]` each, where to begin to look for sizes, if that is known.
       to_rest: whether the fit goes on until it stands still.
     """
     terms = trials.terms
     if not terms or fit.code is Code.FAILED:
         return World(trials, fit)
-    starts = None if x is None else [np.asarray(x)]
+    starts, known = x, np.full(len(terms), np.inf)
     for _ in range(MOST_ROUNDS):
         modes = most_probable(linear_clips(trials, fit), terms, starts, fit)
-        moved = np.inf if starts is None else np.abs(modes[0].x - starts[0]).max()
+        moved, known = np.abs(modes[0].x - known).max(), modes[0].x
         starts = [mode.x for mode in modes]
         by_name = dict(zip((term.name for term in terms), modes[0].x.tolist(), strict=True))
         trials = trials.with_sizes(by_name)

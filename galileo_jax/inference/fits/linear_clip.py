@@ -37,7 +37,7 @@ from galileo_jax.statespace.sizes import Sizes
 from galileo_jax.statespace.term import Term
 
 MOST_VALUES = 300  # of a clip that tell sizes: of more, neighbours are averaged
-MOST_STEPS, STILL = 60, 1e-4
+MOST_STEPS, STILL, NEARLY = 60, 1e-4, 0.03  # steps that are left, of the best and of others
 STILL_NATS = 1e-9
 LEAST_DAMPING = 1e-6
 LONGEST_STEP = 1.5  # of a log size, in units of its prior's width
@@ -172,12 +172,26 @@ def most_probable(
         starts = [np.zeros(len(terms)), *(aside if len(terms) > 1 else [])]
     scales = fit.z[len(fit.steps) :]
     marginal = [_without_parameters(clip) for clip in clips]
-    found = [_climbed(marginal, terms, np.concatenate([x, scales])) for x in starts]
+    found = [_climbed(marginal, terms, np.concatenate([x, scales]), NEARLY) for x in starts]
     modes: list[Mode] = []
     for mode in sorted(found, key=lambda one: -one.value):
         if all(np.abs(mode.both - other.both).max() > APART for other in modes):
             modes.append(mode)
-    return modes
+    return [_climbed(marginal, terms, modes[0].both), *modes[1:]]
+
+
+def expected_lead(clips: Sequence[LinearClip], modes: Sequence[Mode], fit: GradientFit) -> float:
+    """Log evidence with sizes over that without, nats, by Laplace's method: round all modes.
+
+    Args:
+      clips: as of `linear_clips`.
+      modes: as of `most_probable`.
+      fit: its noise scales are where that of none begins.
+    """
+    none = _climbed([_without_parameters(clip) for clip in clips], (), fit.z[len(fit.steps) :])
+    own = [mode.value - 0.5 * np.linalg.slogdet(mode.information)[1] for mode in modes]
+    without = none.value - 0.5 * np.linalg.slogdet(none.information)[1]
+    return float(np.asarray(logsumexp(own)) - without)
 
 
 def _without_parameters(clip: LinearClip) -> LinearClip:
@@ -186,13 +200,15 @@ def _without_parameters(clip: LinearClip) -> LinearClip:
     return LinearClip(clip.e, clip.slopes[:, :0], fixed, clip.of_terms)
 
 
-def _climbed(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray) -> Mode:
-    """The mode above `both` `[term and clip]`."""
+def _climbed(
+    clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray, still: float = STILL
+) -> Mode:
+    """The mode above `both` `[term and clip]`; no step is left that is longer than `still`."""
     value, gradient, information = _look(clips, terms, both)
     damping = LEAST_DAMPING
     for _ in range(MOST_STEPS):
         step = np.linalg.solve(information + damping * np.eye(len(both)), gradient)
-        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), STILL))
+        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), still))
         there = np.clip(both + step, -LARGEST, LARGEST)
         new = _look(clips, terms, there)
         if new[0] < value - STILL_NATS:
@@ -200,7 +216,7 @@ def _climbed(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarra
             continue
         moved, both, (value, gradient, information) = np.abs(there - both).max(), there, new
         damping = max(damping / 5, LEAST_DAMPING)
-        if moved < STILL:
+        if moved < still:
             break
     return Mode(both, value, information, len(terms))
 
