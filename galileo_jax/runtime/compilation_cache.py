@@ -1,6 +1,7 @@
 """JAX's persistent compilation cache: what was compiled once starts fast the next time."""
 
 import os
+import warnings
 from pathlib import Path
 
 import platformdirs
@@ -33,6 +34,8 @@ def enable() -> Path | None:
     """
     import jax
 
+    # Of what another process is just writing JAX reads a part, and compiles it itself instead.
+    warnings.filterwarnings("ignore", message="Error reading persistent compilation cache entry")
     folder = cache_folder()
     if folder is None:
         jax.config.update("jax_enable_compilation_cache", False)
