@@ -65,11 +65,9 @@ class FreeAcceleration(Effect):
 
     Attributes:
       spans_s: `[object][piece]`, when each begins and ends, s since the release, in order.
-      sizes_m_s2: `[object]`, s; given like the spans. Empty: `SD_M_S2`.
     """
 
     spans_s: tuple[tuple[Span, ...], ...]
-    sizes_m_s2: tuple[float, ...] = ()
 
     name: ClassVar[str] = "free_acceleration"
 
@@ -81,9 +79,6 @@ class FreeAcceleration(Effect):
         """The knots, and the spans, which are given."""
         found = []
         for i, spans in enumerate(self.spans_s):
-            size = self.size_m_s2(i)
-            prior = Normal(size, 1.0)
-            found.append(Parameter(_size(i), "m/s^2", prior, size, "given", None, True))
             for piece, span in enumerate(spans):
                 for name in _knots(i, piece):
                     found.append(Parameter(name, "1", Normal(0.0, 1.0), 0.0, "latent", 0.1, True))
@@ -113,26 +108,14 @@ class FreeAcceleration(Effect):
 
         return push
 
-    def size_m_s2(self, index: int) -> float:
-        """The standard deviation of an object's acceleration, m/s^2."""
-        return self.sizes_m_s2[index] if self.sizes_m_s2 else SD_M_S2
-
     def knots(self, index: int) -> tuple[str, ...]:
         """The names of all of an object's knots; objects are counted from 0."""
         return tuple(n for p in range(len(self.spans_s[index])) for n in _knots(index, p))
 
-    def knot_times_s(self, index: int) -> np.ndarray:
-        """When each of an object's splines is largest, `[knot]`, s; some beyond its piece."""
-        found = []
-        for piece, (begin, end) in enumerate(self.spans_s[index]):
-            count = len(_knots(index, piece))
-            found.append(begin + (np.arange(count) - 1) / (count - 3) * (end - begin))
-        return np.concatenate(found)
-
     def mixing(self, index: int) -> np.ndarray:
         """From `z` of an object's knots to their accelerations, m/s^2, `[knot, knot]`."""
         counts = [len(_knots(index, piece)) for piece in range(len(self.spans_s[index]))]
-        return self.size_m_s2(index) * np.asarray(block_diag(*(mixing(count) for count in counts)))
+        return SD_M_S2 * np.asarray(block_diag(*(mixing(count) for count in counts)))
 
     def knot_values(self, times_s: np.ndarray, wanted: np.ndarray, index: int) -> np.ndarray:
         """The parameters' `z` with which an object's acceleration is closest to given curves.
@@ -153,7 +136,7 @@ class FreeAcceleration(Effect):
             count = len(_knots(index, piece))
             basis = splines(times_s, np.asarray(begin), np.asarray(end), count) @ mixing(count)
             inside = (times_s >= before) & (times_s < until)
-            blocks.append(np.where(inside[:, None], basis * self.size_m_s2(index), 0.0))
+            blocks.append(np.where(inside[:, None], basis * SD_M_S2, 0.0))
             before = until
         return np.linalg.lstsq(np.concatenate(blocks, axis=1), wanted, rcond=1e-10)[0]
 
@@ -162,17 +145,13 @@ class FreeAcceleration(Effect):
         begin, end = (theta[name] for name in _span(index, piece))
         own = xp.stack([theta[name] for name in _knots(index, piece)], axis=-1)
         count = own.shape[-1]
-        weight = theta[_size(index)][..., None] * (own @ xp.asarray(mixing(count).T))
+        weight = SD_M_S2 * (own @ xp.asarray(mixing(count).T))
         return begin, lambda t: xp.sum(weight * splines(t, begin, end, count), axis=-1)
 
 
 def _knots(index: int, piece: int) -> tuple[str, ...]:
     count = NUM_KNOTS if index == 0 and piece == 0 else NUM_KNOTS_AFTER
     return tuple(f"free_acceleration_{index + 1}_{piece + 1}_{k}" for k in range(count))
-
-
-def _size(index: int) -> str:
-    return f"free_acceleration_{index + 1}_size"
 
 
 def _span(index: int, piece: int) -> tuple[str, str]:

@@ -30,12 +30,6 @@ def plain_button(text: str, action: Callable[[], Any], name: str, enabled: bool 
     button.classes("plain").set_enabled(enabled)
 
 
-def next_button(tab: "Tab", stage: str, text: str) -> None:
-    """Leads on to the next stage, where it is open."""
-    if tab.session.states[stage] != "locked":
-        plain_button(text, lambda: tab.go(stage), f"to-{stage}")
-
-
 def remark(kind: str, sentence: str) -> None:
     """One sentence with its colour."""
     with ui.element("div").classes(f"remark {kind}").props(f'data-remark="{kind}"'):
