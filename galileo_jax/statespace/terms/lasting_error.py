@@ -46,7 +46,7 @@ for name, meaning, patterns in (
             name=name,
             meaning=meaning,
             unit="m",
-            median=lambda seen: 5e-4 * way_m(seen),
+            median=lambda seen: 2e-4 * way_m(seen),
             factor=5.0,
             patterns=patterns,
             is_of_marks=True,
