@@ -38,6 +38,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
 
+LAST_FRAMES = 5  # before it is seen no more, tell where an object goes
 LEAST_FRAMES, LEAST_SHARE = 8, 0.5
 """Of a clip, that tell whether a model describes it."""
 
@@ -58,7 +59,8 @@ class Measurement:
       remarks: what was inferred or left out, one line each.
       way: of object 1, where its path says another than is declared.
       frames_used, frames: in how many an object is seen and used, and how many the clip has.
-      frames_of_scene: of these, how many no cut leaves out.
+      frames_of_scene: of these, how many no cut leaves out, from the first that is declared on,
+        until all objects have left the picture.
     """
 
     clip: Clip
@@ -151,7 +153,7 @@ def measure(clip: Clip) -> Measurement:
         remarks=tuple(remarks),
         frames_used=frames_used,
         frames=len(measured.whole.times_s),
-        frames_of_scene=_between(measured.whole.times_s, cuts),
+        frames_of_scene=_of_scene(clip, measured.whole.times_s, cuts, pixels),
     )
 
 
@@ -164,12 +166,29 @@ def _on_its_way(clip: Clip) -> Measurement:
     return Measurement(clip, whole, whole, pixels, way=way)
 
 
-def _between(times_s: np.ndarray, cuts: Sequence[Cut]) -> int:
-    """How many frames no cut leaves out."""
+def _of_scene(clip: Clip, times_s: np.ndarray, cuts: Sequence[Cut], pixels: Track | None) -> int:
+    """How many frames show what is modelled."""
     is_there = np.ones(len(times_s), bool)
     for each in cuts:
         is_there &= times_s >= each.time_s if each.side == "before" else times_s <= each.time_s
+    is_there[: min(item.first_frame or 0 for item in clip.objects)] = False
+    if pixels is not None:
+        is_there[_left_picture(pixels) :] = False
     return int(is_there.sum())
+
+
+def _left_picture(track: Track) -> int:
+    """The frame in which the last object has gone out of the picture; beyond all if one stays."""
+    gone, beyond = [], len(track.times_s)
+    for place, is_visible in zip(track.position_px, track.is_visible, strict=True):
+        seen = np.flatnonzero(is_visible)[-LAST_FRAMES:]
+        if len(seen) < LAST_FRAMES:
+            return beyond
+        step = (place[seen[-1]] - place[seen[0]]) / (seen[-1] - seen[0])
+        ahead = place[seen[-1]] + LAST_FRAMES * step
+        is_out = (ahead < 0).any() or (ahead > np.array(track.frame_size_px) - 1).any()
+        gone.append(int(seen[-1]) + 1 if is_out else beyond)
+    return max(gone)
 
 
 def _moving(clip: Clip, observation: Observation, cuts: Sequence[Cut], remarks: list[str]) -> Clip:
