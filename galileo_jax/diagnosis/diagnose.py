@@ -173,7 +173,7 @@ def diagnose(
         candidates = rough.with_the_rest(candidates)
         first = Round(rough.base, rough.comparison)
         if verdict.status == "none":
-            rounds = [first]
+            rounds = [first, *rounds[1:]]
             on_round(first)
     verdict = with_known_constants(trials, verdict, candidates, seed)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
@@ -197,9 +197,10 @@ def diagnose(
     left_out: tuple[tuple[str, float, float], ...] = ()
     if len(trials.problems) > 1 and len(rounds) > 1:
         on_stage("predicting each clip from the others")
-        before = leave_one_out_rmse(trials, rounds[0].hypothesis)
-        last = rounds[-1].hypothesis
-        after = leave_one_out_rmse(last.of(trials), last)
+        before, after = (
+            leave_one_out_rmse(one.hypothesis.of(trials), one.hypothesis)
+            for one in (rounds[0], rounds[-1])
+        )
         left_out = tuple(zip((p.name for p in trials.problems), before, after, strict=True))
     each: tuple[EachClip, ...] = ()
     if len(trials.problems) > 1:
