@@ -17,6 +17,7 @@ from functools import cached_property
 import jax
 import jax.numpy as jnp
 import numpy as np
+from scipy.special import chdtrc
 
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import LogNormal, Parameter, PriorTable
@@ -29,6 +30,18 @@ NOISE_SCALE = Parameter("noise_scale", "1", LogNormal(1.0, NOISE_SD), 1.0, "nuis
 # statement is wrong or what is left is no noise.
 NOISE_SCALE_RANGE = (0.5, 1.5)
 NUM_PRIOR_DRAWS = 2000
+CHANCE = 0.01  # noise leaves as much or more so seldom: then it is something else
+
+
+def noise_explains(chi2: float, degrees: float, noise_scale: float = 1.0) -> bool:
+    """Whether noise of that scale leaves a sum of squares as large once in 1 / `CHANCE` times.
+
+    Args:
+      chi2: in units of the stated noise.
+      degrees: of freedom; at least one is taken.
+      noise_scale: in these units.
+    """
+    return bool(chdtrc(max(degrees, 1.0), chi2 / noise_scale**2) > CHANCE)
 
 
 @dataclass(frozen=True)

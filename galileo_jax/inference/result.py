@@ -9,11 +9,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc
 
 from galileo_jax import __version__
 from galileo_jax.inference.confounded import confounded_with_gravity
-from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem
+from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, JointProblem, noise_explains
 from galileo_jax.inference.mass_ratios import mass_ratios
 from galileo_jax.inference.per_mass import (
     SUFFIX,
@@ -43,7 +42,6 @@ FREE_SCALE_WARNING = (
 
 UNSHOWN = ("latent", "given")  # roles that have no entry of their own in result.json
 
-CHANCE = 0.01  # noise leaves as much so seldom: then it is something else
 PULLED_Z = 3.0  # of a nuisance's prior standard deviations; one in four hundred is by chance
 
 
@@ -143,7 +141,7 @@ def error_of(
     error |= distance_error(trials.problems, predictions)
     degrees = max(count - num_fitted, 1.0)
     error["chi2_per_dof"] = chi2 / degrees
-    error["explained_by_noise"] = bool(chdtrc(degrees, chi2 / NOISE_SCALE_RANGE[1] ** 2) > CHANCE)
+    error["explained_by_noise"] = noise_explains(chi2, degrees, NOISE_SCALE_RANGE[1])
     return error
 
 

@@ -9,6 +9,7 @@ from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.fits.imperfect import fit_worlds
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
+from galileo_jax.statespace.term import TERMS
 from tests.oracle_trials import make_trials
 from tests.ramp_model import HIT
 
@@ -73,3 +74,25 @@ def test_errors_that_last_are_found_and_widen_intervals(smooth):
         abs(fit.z[k1] - rough.parameters[k1].prior.inverse(np.array(HIT.friction[0]))) < 3 * width
     )
     assert width > 1.5 * sd_of(trials, plain, "k1")
+
+
+def test_where_bodies_most_probably_were_is_the_dense_conditional_mean(smooth):
+    """U_b U_b^T C^-1 r with C written out: bodies follow what they did, not what marks err by."""
+    world = fit_worlds(with_errors(smooth[0]), 0, may_be_exact=False).best
+    [problem] = world.trials.problems
+    predicted = problem.simulate(world.trials.of_clip(world.trials.theta(world.fit.z), 0))
+    sizes, seen = problem.sizes, problem.observation
+    assert sizes is not None
+    own, every = [], [problem.fixed_patterns]
+    for name, patterns in problem.patterns.items():
+        sized = TERMS[name].factor ** sizes[name] * patterns
+        every.append(sized)
+        own += [] if TERMS[name].is_of_marks else [sized]
+    count = seen.position_m.size
+    of_bodies, of_all = (np.concatenate(p).reshape(-1, count) for p in (own, every))
+    noise_m = np.sqrt(seen.covariance_m2[0, 0, 0, 0])  # alike and independent in every place
+    left = (seen.position_m - predicted).reshape(-1) / noise_m
+    dense = of_bodies.T @ of_bodies @ np.linalg.solve(np.eye(count) + of_all.T @ of_all, left)
+    moved = (problem.followed(predicted) - predicted).reshape(-1) / noise_m
+    np.testing.assert_allclose(moved, dense, atol=1e-3 * np.abs(dense).max())
+    assert np.abs(dense).max() > 0.1

@@ -61,8 +61,9 @@ def test_friction_of_a_board_filmed_obliquely(tmp_path: Path) -> None:
     found = gx.fit(oblique(tmp_path, rectangle=True)).result["parameters"]["k1"]
     assert found["q025"] < K1 < found["q975"], found
     assert found["sd"] < 0.02
-    fooled = gx.fit(oblique(tmp_path, rectangle=False)).result["parameters"]["k1"]
-    assert abs(fooled["mean"] - K1) > 3 * fooled["sd"], fooled
+    told = gx.fit(oblique(tmp_path, rectangle=False), discrepancy="none")
+    fooled = told.result["parameters"]["k1"]
+    assert abs(fooled["mean"] - K1) > 5 * fooled["sd"], fooled
 
 
 def measured(folder: Path) -> Measurement:

@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.special import chdtrc
 
 from galileo_jax.inference.fits.apart import apart
 from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
@@ -40,7 +39,12 @@ from galileo_jax.inference.fits.polish import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.fits.stages import phases
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
-from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE, NOISE_SD, JointProblem
+from galileo_jax.inference.joint_problem import (
+    NOISE_SCALE_RANGE,
+    NOISE_SD,
+    JointProblem,
+    noise_explains,
+)
 from galileo_jax.runtime.batching import side_by_side
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 
@@ -57,7 +61,6 @@ STILL_NATS = STILL**2
 NUM_LOOKS = 3  # round a fit, each from a better one
 OUT_OF_THE_RACE = 60.0  # hypotheses, in the same: far more than any rule of a verdict looks at
 LEAST_AGREEING = 2  # refined starts that must end in the best valley, lest it be a chance find
-CHANCE = 0.01  # a fit that noise leaves so seldom as bad or worse is searched for once more
 OPEN_SD_Z = 0.5  # of the prior's 1: what a phase leaves so open is scattered in the next one
 # What a fit that has come to rest says of itself, well or ill.
 SETTLED = (Code.CONVERGED, Code.MISFIT)
@@ -321,13 +324,12 @@ class GradientFitter:
         return self._residuals.costs(self._batch(z, free))
 
     def is_explained(self, fit: GradientFit, noise_scale: float = 1.0) -> bool:
-        """Whether noise of that scale leaves as much at least once in 1 / CHANCE times."""
+        """Whether `noise_explains` what it leaves."""
         degrees = sum(
             float(GaussianLikelihood.degrees(1.0, clip.data.whitening))
             for clip in self._residuals.clips
         )
-        left = fit.chi2 / noise_scale**2
-        return bool(chdtrc(max(degrees - fit.num_used, 1.0), left) > CHANCE)
+        return noise_explains(fit.chi2, degrees - fit.num_used, noise_scale)
 
     def _looked_round(self, fits: Sequence[GradientFit], seed: int) -> GradientFit:
         """The most evident fit, and what is found round it; with the valleys beside it."""

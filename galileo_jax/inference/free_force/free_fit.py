@@ -87,7 +87,7 @@ def free_fit(
             problems.append(with_free_acceleration(problem, spans))
         extended = JointProblem(tuple(problems))
         is_last = again == num_spans - 1
-        found = _fitted(extended, [embedded(trials, extended, z, free)], in_all_valleys=is_last)
+        found = _fitted(extended, embedded(trials, extended, z, free), in_all_valleys=is_last)
         theta = extended.theta(found.z, found.free)
     return found
 
@@ -101,19 +101,11 @@ def embedded(
     return start
 
 
-def _fitted(
-    extended: JointProblem,
-    starts: Sequence[np.ndarray],
-    free: np.ndarray | None = None,
-    in_all_valleys: bool = True,
-) -> FreeFit:
-    """The best fit from several starts `[parameter]`, z."""
-    free = np.isfinite(starts[0]) if free is None else free
-    tried = np.nan_to_num(np.stack(starts))
+def _fitted(extended: JointProblem, start: np.ndarray, in_all_valleys: bool) -> FreeFit:
+    """The fit from a start `[parameter]`, z; NaN where pinned."""
     fitter, count = GradientFitter(extended, SETTINGS), len(extended.model_parameters)
-    is_free = np.tile(free[:count], (len(tried), 1))
-    fits = fitter.fit_from(tried[:, :count], is_free, np.arange(len(tried)))
-    fit = max(fits, key=lambda fit: fit.log_evidence)
+    own = start[None, :count]
+    [fit] = fitter.fit_from(np.nan_to_num(own), np.isfinite(own), np.zeros(1, int))
     if in_all_valleys:  # the start is of a wrong model, whose restitution may be in another one
         fit = fitter.refit(fit)
     theta = extended.theta(fit.z, fit.free)
