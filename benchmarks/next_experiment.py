@@ -18,15 +18,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from galileo_jax.diagnosis.race import Race
 
 from benchmarks import labs, tables
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import compare
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
-from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.experiment.belief import beliefs_of
 from galileo_jax.experiment.choose import best_first, expect
@@ -36,6 +35,7 @@ from galileo_jax.experiment.settings import Can, Range, grid
 from galileo_jax.measurement.measure import measure
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.precision import in_float64
+from galileo_jax.search.hypothesis import Hypothesis
 
 PAIRS = (
     ("air_drag", "viscous_drag"),

@@ -9,7 +9,6 @@ import numpy as np
 from galileo_jax.comparison.compare import Comparison, Place, Pull
 from galileo_jax.comparison.phases import PHASES
 from galileo_jax.diagnosis import reasons
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Law, MissingForce, Round, Verdict
 from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.inference.build_problem import make_problem
@@ -17,6 +16,7 @@ from galileo_jax.inference.fits.gradient import Code, GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import inverse
+from galileo_jax.search.hypothesis import Hypothesis
 from tests.oracle_run import HIT, make_run
 
 LIBRARY = ("air_drag", "release_delay", "viscous_drag")

@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Diagnosis
-from galileo_jax.diagnosis.score_tests import shapes_beside, slopes_along, strength_of
 from galileo_jax.diagnosis.verdict import CONVINCING
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.per_mass import force_constants, is_any_weighed
 from galileo_jax.model.parameters import Prior, in_units
+from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.score_tests import shapes_beside, slopes_along, strength_of
 
 ROUNDS = 3  # of slopes: each at the strength that the one before gave
 PRIOR_Z = np.linspace(-6.0, 4.0, 401)  # strengths that are looked at, in their prior

@@ -1,24 +1,21 @@
 """The loop: compare, ask which effect is missing, add it, and watch the error fall.
 
 1. Fit the model without effects; compare it with the data.
-2. Fit every effect of the library as a candidate, in one batch, and with them the forms without a
-   physical name (`model/effects/forms`). Rank all by log odds: the evidence (Laplace), which
-   charges for every parameter, and the prior, which charges for how many were tried. The model
-   without effects will do and nothing convinces: the verdict is none.
-3. Compare the best with the data, too. Where the best single effect leaves more than noise, or a
-   form explains the data better, the best single effects are joined by others. Where it leaves only
-   noise, all pairs are searched for those that do so, too (`second_effect`). Pairs stand in the
-   same table (rules: `verdict`, `law_verdict`).
-   Before pairs are tried it is asked whether imperfections of usual sizes, with no effect or with
-   one, explain the data (`imperfect_world`). Pairs and formulas must beat imperfections.
-4. What leaves only noise and is far more probable than all else is named, unless a clip like this
+2. Search for every effect of the library beside it, and for the forms without a physical name
+   (`galileo_jax.search`, `model/effects/forms`). Rank all by log odds: the evidence, which charges
+   for every parameter, and the prior, which charges for how many were tried. The model without
+   effects will do and nothing convinces: the verdict is none.
+3. Compare the best with the data, too. Where none leaves only noise, it is asked whether
+   imperfections of usual sizes, with no effect or with one, explain the data (`imperfect_world`).
+4. Search for pairs in the same table (rules: `verdict`, `law_verdict`). They and formulas must beat
+   imperfections.
+5. What leaves only noise and is far more probable than all else is named, unless a clip like this
    one would not tell it from another (`expected_lead`). Several are ambiguous.
-5. Where only a form explains the data, or nothing does, or only what could explain much (two
+6. Where only a form explains the data, or nothing does, or only what could explain much (two
    effects, or one of many constants), the missing force is inferred without a form
    (`missing_force`). Short formulas that it suggests are fitted in the model (`laws`) and
    stand in the same table. The verdict is law where one does what a named effect must, and no
-   effect of the library, fitted again from there (`library_again`), says it as well; else it is
-   unknown.
+   effect of the library, searched for again from there, says it as well; else it is unknown.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -27,17 +24,10 @@ from dataclasses import dataclass, replace
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
-from galileo_jax.diagnosis.base_again import better_base
-from galileo_jax.diagnosis.candidates import Hypothesis, reduced
+from galileo_jax.diagnosis.candidates import candidate_so_far, candidates_of
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Reason, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_lead import expected_leads
-from galileo_jax.diagnosis.fitted_pairs import (
-    best_of_each,
-    fitted_pairs,
-    pairs_from_base,
-    pairs_like_the_best,
-)
 from galileo_jax.diagnosis.imperfect_world import ImperfectWorld, imperfect_world
 from galileo_jax.diagnosis.known_constants import with_known_constants
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
@@ -50,22 +40,15 @@ from galileo_jax.diagnosis.law_verdict import (
     needs_laws,
 )
 from galileo_jax.diagnosis.leave_one_out import leave_one_out_rmse
-from galileo_jax.diagnosis.library_again import singles_beside, singles_of_pairs
 from galileo_jax.diagnosis.missing_force import View, infer_missing_force, views_of
-from galileo_jax.diagnosis.race import Race
-from galileo_jax.diagnosis.second_effect import (
-    NearPair,
-    contesting_pairs,
-    pairs_near,
-    with_second,
-)
+from galileo_jax.diagnosis.second_effect import with_second
+from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import (
     AS_EFFECTS,
     CONVINCING,
     PAIR_P,
     UNEVEN,
     best_named,
-    decisive_margin,
     explains,
     form_that_leads,
     is_about_pairs,
@@ -81,10 +64,15 @@ from galileo_jax.diagnosis.verdict import (
     within_luck,
     without_a_name,
 )
-from galileo_jax.diagnosis.wide_search import widely_searched
-from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.model.effects.forms import FORM_NAMES
+from galileo_jax.search.hypothesis import Hypothesis, reduced
+from galileo_jax.search.loop import search
+from galileo_jax.search.starts import beside_a_formula
+from galileo_jax.search.table import Entry, Table
+
+# By effects: the fit, and its comparison with the data.
+Comparisons = dict[tuple[str, ...], tuple[GradientFit, Comparison]]
 
 
 def diagnose(
@@ -113,29 +101,30 @@ def diagnose(
       ValueError: `add` names no effect of the trials' models.
     """
     fitter = fitter_of(trials)
+    if add not in ("auto", "none"):
+        trials.free([add])  # raises for unknown names
     on_stage("fitting the model without effects")
     base = Hypothesis((), fitter.fit(seed, on_stage, effects=()))
     on_stage("comparing it with the data")
     first = Round(base, compare(trials, base.fit, seed))
     on_round(first)
-    rounds = [first]
-    library = [name for name in trials.all_effects if name not in FORM_NAMES]
-    if add not in ("auto", "none"):
-        trials.free([add])  # raises for unknown names
-    on_stage(f"fitting {len(library)} candidates")
-    is_adequate = first.comparison.is_adequate
-    race = Race(fitter, base, is_adequate, seed, on_candidate)
-    singles = [(name,) for name in trials.all_effects]
-    candidates = ranked(race([base] * len(singles), singles))
-    again = better_base(fitter, base, candidates)
-    if again is not None:
+
+    def on_entry(table: Table, entry: Entry) -> None:
+        on_candidate(candidate_so_far(table, entry))
+
+    stakes = VerdictStakes(trials, first.comparison.is_adequate)
+    table = Table.of(fitter, stakes, seed, base)
+    on_stage(f"fitting {len(table.library)} candidates")
+    table = search(table, 1, on_entry)
+    if table.base.fit is not base.fit:
         on_stage("comparing a better fit without effects with the data")
-        base, first = again, Round(again, compare(trials, again.fit, seed))
+        base = table.base
+        first = Round(base, compare(trials, base.fit, seed))
         on_round(first)
-        rounds, is_adequate = [first], first.comparison.is_adequate
-        on_stage(f"fitting {len(library)} candidates once more")
-        race = Race(fitter, base, is_adequate, seed, on_candidate)
-        candidates = ranked(race([base] * len(singles), singles))
+        stakes = replace(stakes, is_adequate=first.comparison.is_adequate)
+        table = search(replace(table, stakes=stakes), 1, on_entry)
+    rounds, is_adequate, decisive = [first], stakes.is_adequate, stakes.decisive
+    candidates = candidates_of(table)
     for candidate in candidates:
         on_candidate(candidate)
     if add not in ("auto", "none"):
@@ -148,8 +137,7 @@ def diagnose(
         return Diagnosis(tuple(rounds), candidates, Verdict("none", (), reasons=why))
 
     on_stage("comparing the best candidates with the data")
-    compared: dict[tuple[str, ...], Comparison] = {}
-    decisive = decisive_margin(is_adequate)
+    compared: Comparisons = {}
     candidates = _compared(trials, candidates, decisive, seed, compared)
     rough, verdict = None, None
     if not is_adequate:
@@ -162,7 +150,7 @@ def diagnose(
             verdict = None  # a pair or a formula may explain it
     views: list[View] = []
     if verdict is None:
-        found = _searched(trials, race, candidates, decisive, seed, compared, on_stage)
+        found = _searched(table, candidates, decisive, compared, on_stage, on_entry)
         verdict, candidates, views = found.verdict, found.candidates, found.views
         why = (*why, *found.reasons)
         if not is_adequate and (verdict.status in ("unknown", "law") or is_about_pairs(verdict)):
@@ -182,8 +170,8 @@ def diagnose(
         on_round(rounds[-1])
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
-        comparison = None if rough is not None else compared.get(chosen.effects)
-        if comparison is None:
+        fit, comparison = compared.get(chosen.effects, (None, None))
+        if comparison is None or fit is not chosen.hypothesis.fit:
             comparison = compare(chosen.hypothesis.of(trials), chosen.hypothesis.fit, seed)
         rounds.append(Round(chosen.hypothesis, comparison))
         on_round(rounds[-1])
@@ -227,31 +215,31 @@ class _Searched:
 
 
 def _searched(
-    trials: JointProblem,
-    race: Race,
+    table: Table,
     candidates: tuple[Candidate, ...],
     decisive: float,
-    seed: int,
-    compared: dict[tuple[str, ...], Comparison],
+    compared: Comparisons,
     on_stage: Callable[[str], None],
+    on_entry: Callable[[Table, Entry], None],
 ) -> _Searched:
     """Pairs and, where these or what they say is not enough, formulas, in an exact world.
 
     Args:
-      trials: what was diagnosed.
-      race: that has fitted single effects.
+      table: of the search for single effects.
       candidates: these, ranked, compared with the data.
       decisive: nats by which one hypothesis must be ahead of another.
-      seed: of the replicates.
       compared: comparisons by effects; those made here are added.
       on_stage: told what is being done.
+      on_entry: see `search`.
     """
-    library = [name for name in trials.all_effects if name not in FORM_NAMES]
-    pairs, near, why = _pairs(race, candidates, library, decisive, on_stage)
-    if pairs:
-        candidates = _with_pairs(
-            trials, race, candidates, pairs, decisive, seed, compared, on_stage
-        )
+    trials, seed = table.trials, table.seed
+    single, form = best_named(candidates), form_that_leads(candidates)
+    is_needed = needs_pairs(candidates)
+    on_stage("fitting pairs of effects")
+    table = search(table, 2, on_entry)
+    on_stage("comparing the best pairs with the data")
+    candidates = _compared(trials, candidates_of(table), decisive, seed, compared)
+    why = _why_pairs(table, candidates, single, form if is_needed else None, is_needed)
     verdict = _judged(trials, candidates, decisive, on_stage)
     views: list[View] = []
     if needs_laws(verdict, candidates):
@@ -259,64 +247,58 @@ def _searched(
         # Where much is missing, friction without it is far from the truth: to 0, say. Beside a
         # wrong effect it may be so, too.
         start = reduced(trials, candidates[0].hypothesis, ())
-        views = views_of(trials, start, race.base)
+        views = views_of(trials, start, table.base)
         on_stage("looking for a law: comparing formulas with the missing force")
-        laws = law_candidates(trials, race.base, start, views, len(library), candidates, on_stage)
-        for candidate in ranked(laws):
-            race.on_candidate(candidate)
+        num = len(table.library)
+        laws = law_candidates(trials, table.base, start, views, num, candidates, on_stage)
         both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
         law = law_to_doubt(both)
-        better = []
         if law is not None:
             on_stage("fitting the library's effects again, starting from the law")
-            better = singles_beside(race, law, candidates)
-        if better:
-            candidates = _improved(trials, candidates, better, decisive, seed, compared)
-            both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
-            verdict = _judged(trials, candidates, decisive, on_stage)
+            beside = beside_a_formula(table, law.hypothesis)
+            again = search(table, 1, on_entry, beside)
+            if again.entries != table.entries:
+                candidates = _compared(trials, candidates_of(again), decisive, seed, compared)
+                both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
+                verdict = _judged(trials, candidates, decisive, on_stage)
+                table = again
         if law is None or is_law_needed(verdict, candidates, law, decisive):
             candidates, verdict = both, law_or(trials, verdict, both, decisive)
         else:
             why = [*why, reasons.library_says_it(best_named(candidates), law)]
         verdict = _or_pair(trials, verdict, candidates, decisive, on_stage)
-    verdict = with_second(verdict, candidates, near)
+    log_odds = {key: table.log_odds(entry.hypothesis) for key, entry in table.entries.items()}
+    verdict = with_second(verdict, candidates, log_odds)
     return _Searched(verdict, candidates, views, tuple(why))
 
 
-def _with_pairs(
-    trials: JointProblem,
-    race: Race,
-    candidates: tuple[Candidate, ...],
-    pairs: Sequence[Candidate],
-    decisive: float,
-    seed: int,
-    compared: dict[tuple[str, ...], Comparison],
-    on_stage: Callable[[str], None],
-) -> tuple[Candidate, ...]:
-    """The table with pairs, looked for from more starts where none explains the data."""
-    library = [name for name in trials.all_effects if name not in FORM_NAMES]
-    for candidate in pairs:
-        race.on_candidate(candidate)
-    on_stage("comparing the best pairs with the data")
-    candidates = _compared(trials, (*candidates, *pairs), decisive, seed, compared)
-    if not any(explains(c) for c in candidates):
-        on_stage("searching pairs from the fit without effects")
-        better = pairs_from_base(race, candidates)
-        candidates = _improved(trials, candidates, better, decisive, seed, compared)
-    if not any(explains(c) for c in candidates):
-        on_stage("searching the best pairs from more starts")
-        better, tried = widely_searched(race, candidates), dict(compared)
-        wider = _improved(trials, candidates, better, decisive, seed, tried)
-        # Else formulas would be looked for beside a pair that is wrong in another way.
-        if any(explains(c) for c in wider):
-            candidates = wider
-            compared.clear()
-            compared.update(tried)
-    better = singles_of_pairs(race, candidates)
-    candidates = _improved(trials, candidates, better, decisive, seed, compared)
-    on_stage("looking at pairs that could be confused with the best")
-    better = pairs_like_the_best(race, candidates, library)
-    return _improved(trials, candidates, better, decisive, seed, compared)
+def _why_pairs(
+    table: Table,
+    candidates: Sequence[Candidate],
+    single: Candidate,
+    form: Candidate | None,
+    is_needed: bool,
+) -> list[Reason]:
+    """Why pairs were tried, and what came of it.
+
+    Args:
+      table: with pairs.
+      candidates: with those that count.
+      single: the best single effect.
+      form: that explains the data better.
+      is_needed: whether no single effect explains the data, or a form does it better.
+    """
+    pairs = table.named(2)
+    if not pairs:
+        return []
+    if is_needed:
+        return [reasons.pairs_tried(single, form, len(pairs))]
+    contesting = [c for c in candidates if len(c.effects) == 2]
+    if contesting:
+        return [reasons.pairs_beside(single, len(pairs), len(contesting))]
+    first = max(pairs, key=table.log_odds)
+    behind = single.log_odds - table.log_odds(first)
+    return [reasons.no_pair_contests(single, "+".join(first.effects), behind, len(pairs))]
 
 
 def _in_imperfect_world(
@@ -374,37 +356,6 @@ def fitter_of(trials: JointProblem) -> GradientFitter:
     return GradientFitter(trials)
 
 
-def _pairs(
-    race: Race,
-    candidates: Sequence[Candidate],
-    library: Sequence[str],
-    decisive: float,
-    on_stage: Callable[[str], None],
-) -> tuple[Sequence[Candidate], list[NearPair], list[Reason]]:
-    """Pairs of effects that may explain the data, fitted; pairs that come near; and why these."""
-    form, single = form_that_leads(candidates), best_named(candidates)
-    if needs_pairs(candidates):
-        on_stage("fitting pairs of effects")
-        pairs = fitted_pairs(race, candidates, library)
-        return pairs, [], [reasons.pairs_tried(single, form, len(pairs))] if pairs else []
-    on_stage("looking at pairs of effects that could be confused with the best")
-    near = pairs_near(race, candidates, library, decisive)
-    pairs = contesting_pairs(race, candidates, near, decisive)
-    if pairs:
-        why = [reasons.pairs_beside(single, len(near), len(pairs))]
-        ahead = max(pairs, key=lambda pair: pair.log_odds)
-        if ahead.log_odds > single.log_odds:
-            others = fitted_pairs(race, candidates, library)
-            why.append(reasons.pairs_further(ahead, single, len(others)))
-            pairs = best_of_each([*pairs, *others])
-        return pairs, near, why
-    if near:
-        first, behind = near[0], single.log_odds - near[0].log_odds
-        contested = reasons.no_pair_contests(single, "+".join(first.effects), behind, len(near))
-        return [], near, [contested]
-    return [], [], []
-
-
 def _judged(
     trials: JointProblem,
     candidates: Sequence[Candidate],
@@ -449,29 +400,12 @@ def _looked_at(
     return looked_at_again(verdict, named, list(zip(alike, leads, strict=True)), decisive)
 
 
-def _improved(
-    trials: JointProblem,
-    candidates: Sequence[Candidate],
-    better: Sequence[Candidate],
-    decisive: float,
-    seed: int,
-    compared: dict[tuple[str, ...], Comparison],
-) -> tuple[Candidate, ...]:
-    """The table with better fits in place of theirs, and new ones; arguments as `_compared`."""
-    if not better:
-        return tuple(candidates)
-    for candidate in better:
-        compared.pop(candidate.effects, None)
-    known = {frozenset(c.effects): c for c in (*candidates, *better)}
-    return _compared(trials, known.values(), decisive, seed, compared)
-
-
 def _compared(
     trials: JointProblem,
     candidates: Iterable[Candidate],
     decisive: float,
     seed: int,
-    compared: dict[tuple[str, ...], Comparison],
+    compared: Comparisons,
 ) -> tuple[Candidate, ...]:
     """The table of candidates, the best with their p-values and with whom they are confounded.
 
@@ -484,10 +418,13 @@ def _compared(
     """
     table = ranked(candidates)
     for c in to_compare(table, decisive):
-        if c.effects not in compared:
-            compared[c.effects] = compare(c.hypothesis.of(trials), c.hypothesis.fit, seed)
+        fit = c.hypothesis.fit
+        if c.effects not in compared or compared[c.effects][0] is not fit:
+            compared[c.effects] = fit, compare(c.hypothesis.of(trials), fit, seed)
     done = [
-        replace(c, p_value=compared[c.effects].p_value) if c.effects in compared else c
+        replace(c, p_value=compared[c.effects][1].p_value)
+        if c.effects in compared and compared[c.effects][0] is c.hypothesis.fit
+        else c
         for c in table
     ]
     return tuple(replace(c, confounded_with=rivals(c, done)) for c in done)

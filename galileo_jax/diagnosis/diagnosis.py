@@ -11,9 +11,9 @@ import numpy as np
 from scipy.special import softmax
 
 from galileo_jax.comparison.compare import Comparison
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.each_clip import EachClip
 from galileo_jax.model.effects.forms import FORM_FAMILIES, FORM_NAMES
+from galileo_jax.search.hypothesis import Hypothesis
 
 Status = Literal["none", "named", "ambiguous", "law", "unknown"]
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.comparison.document import comparison_document
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.could_not_see import could_not_see
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.diagnosis.each_clip import kind_of
@@ -28,6 +27,7 @@ from galileo_jax.inference.result import (
     undetermined_by_mass,
 )
 from galileo_jax.inference.summarise import summary_of
+from galileo_jax.search.hypothesis import Hypothesis
 
 Entries = dict[str, dict[str, Any]]  # by parameter
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
 from galileo_jax.diagnosis.expected_lead import expected_leads
 from galileo_jax.diagnosis.law_verdict import (
@@ -21,6 +20,7 @@ from galileo_jax.diagnosis.verdict import log_prior, looked_at_again, within_luc
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.model.effects.forms import FORM_SHAPES
+from galileo_jax.search.hypothesis import Hypothesis
 
 
 def law_candidates(

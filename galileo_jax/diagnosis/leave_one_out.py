@@ -9,11 +9,11 @@ middle.
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import velocity_error
 from galileo_jax.model.parameters import Parameter
+from galileo_jax.search.hypothesis import Hypothesis
 
 
 def leave_one_out_rmse(trials: JointProblem, hypothesis: Hypothesis) -> tuple[float, ...]:

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.inference.free_force.along_path import along_path
 from galileo_jax.inference.free_force.free_fit import FreeFit, free_fit
@@ -29,6 +28,7 @@ from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.free_acceleration import FreeAcceleration
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.motion import dynamics, state_at
+from galileo_jax.search.hypothesis import Hypothesis
 
 NUM_TIMES, NUM_DRAWS = 200, 400
 

@@ -122,22 +122,6 @@ def pairs_beside(single: Candidate, num_near: int, count: int) -> Reason:
     )
 
 
-def pairs_further(pair: Candidate, single: Candidate, count: int) -> Reason:
-    """Why more pairs were tried.
-
-    Args:
-      pair: the most probable of those that may contest a single effect.
-      single: that effect.
-      count: how many were tried.
-    """
-    return Reason(
-        "pairs_further",
-        f"{pair.title} is more probable than {single.title}, so {count} pairs of effects were "
-        "tried as where no single effect explains the data.",
-        {"hypothesis": pair.name, "rival": single.name, "num_pairs": count},
-    )
-
-
 def no_pair_contests(single: Candidate, pair: str, behind: float, num_near: int) -> Reason:
     """No pair of effects comes so near a single effect that it could contest its name.
 

@@ -17,8 +17,8 @@ from scipy.special import softmax
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis import reasons
-from galileo_jax.diagnosis.candidates import MAY_STILL_GAIN
 from galileo_jax.diagnosis.diagnosis import Candidate, Verdict
+from galileo_jax.search.loop import MAY_STILL_GAIN
 
 # Difference in log odds, in nats, at which the weaker of two hypotheses is given up: it is then
 # twenty times less probable (e^3 = 20).
@@ -47,18 +47,13 @@ EXPECTED_ODDS = 3.0
 SECOND_EFFECT_ODDS = 0.1
 # Log evidence, in nats, from which on the best effect is shown where the verdict is unknown.
 LEAST_GAIN = 10.0
-# Of the best single effects so many are joined with others, to so many pairs in all. Then either
-# effect of the best pair is kept and joined with what explains what the other does: so many pairs.
-NUM_JOINED, NUM_PAIRS, NUM_SWAPPED = 3, 6, 6
-# Where no pair explains the data, the best pairs and all of so many single effects are fitted from
-# the fit without effects.
-NUM_CROSSED = 4
 # By how much Laplace's evidences may be wrong, nats: hypotheses so much farther apart than a rule
 # asks are as far apart by any other.
 LAPLACE_NATS = 3.0
 # The log odds that a clip gives for the truth over a rival scatter: where x nats are expected, by
 # sqrt(2 x) (a ratio of two normal densities). Nobody is as lucky as this many of these sds.
 MOST_LUCK = 4.0
+ROUGH_NATS = 1.0  # by which log odds may be too low, where a hypothesis was refined roughly
 
 
 def log_prior(odds: Sequence[float], num_effects: int) -> float:
@@ -380,25 +375,48 @@ def _farthest(decisive: float) -> float:
 
 
 def may_decide(
-    log_odds: np.ndarray, is_form: np.ndarray, best: float, decisive: float, is_base_adequate: bool
+    log_odds: np.ndarray,
+    is_form: np.ndarray,
+    num_effects: np.ndarray,
+    decisive: float,
+    is_base_adequate: bool,
 ) -> np.ndarray:
-    """On which hypotheses, `[hypothesis]`, the verdict may hang: these are fitted in every valley.
+    """On which hypotheses, `[hypothesis]`, the verdict may hang: these are searched with care.
 
     Each may still gain `MAY_STILL_GAIN` nats by that. Where the model without effects will do and
-    no named effect can come to convince, on none.
+    no named effect can come to convince, on none. One with more effects than the leading one has
+    paid for them: it is not behind by bad luck.
 
     Args:
       log_odds: `[hypothesis]`, so far.
       is_form: `[hypothesis]`, whether it is a form without a name.
-      best: of the log odds of others, so far; -inf where there are none.
+      num_effects: `[hypothesis]`.
       decisive: nats by which a rival must be behind.
       is_base_adequate: whether the model without effects leaves nothing but noise.
     """
-    named = log_odds[~is_form].max(initial=best)
+    named = log_odds[~is_form].max(initial=-np.inf)
     if is_base_adequate and named + MAY_STILL_GAIN < CONVINCING:
         return np.zeros(len(log_odds), bool)
-    leads = max(best, float(log_odds.max()))
-    return log_odds > leads - _farthest(decisive) - MAY_STILL_GAIN
+    leader = int(np.argmax(log_odds))
+    is_larger = num_effects > num_effects[leader]
+    farthest = np.where(is_larger, decisive, _farthest(decisive))
+    return log_odds > log_odds[leader] - farthest - MAY_STILL_GAIN
+
+
+def without_surplus(candidates: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates without those of more effects than the leading one that cannot contest it.
+
+    Beside every effect that explains the data stand its pairs with whatever does nothing here.
+    """
+    if not candidates:
+        return []
+    best = max(candidates, key=lambda c: c.log_odds)
+    return [
+        c
+        for c in candidates
+        if len(c.effects) <= max(len(best.effects), 1)
+        or best.log_odds - c.log_odds < DECISIVE + ROUGH_NATS
+    ]
 
 
 def looked_at_again(
@@ -452,9 +470,7 @@ def is_about_pairs(verdict: Verdict) -> bool:
     return verdict.status == "ambiguous" and all("+" in name for name in verdict.effects)
 
 
-def is_close_call(
-    log_odds: np.ndarray, best: float, decisive: float, is_base_adequate: bool
-) -> np.ndarray:
+def is_close_call(log_odds: np.ndarray, decisive: float, is_base_adequate: bool) -> np.ndarray:
     """Of which hypotheses, `[hypothesis]`, Laplace's evidence will not do.
 
     The verdict might be another if their evidences were, by `LAPLACE_NATS`. Of one that is far
@@ -462,15 +478,13 @@ def is_close_call(
 
     Args:
       log_odds: `[hypothesis]`, by Laplace.
-      best: of the log odds of others, so far; -inf where there are none.
       decisive: nats by which a rival must be behind.
       is_base_adequate: whether the model without effects leaves nothing but noise.
     """
-    top = max(best, float(log_odds.max()))
+    top = float(log_odds.max())
     if is_base_adequate and top < CONVINCING - LAPLACE_NATS:
         return np.zeros(len(log_odds), bool)
     least = top - decisive - LAPLACE_NATS
     close = log_odds > least
     is_beside_none = least < (CONVINCING if is_base_adequate else 0.0)
-    others = (best > least) + is_beside_none
-    return close if close.sum() + others > 1 else np.zeros(len(log_odds), bool)
+    return close if close.sum() + is_beside_none > 1 else np.zeros(len(log_odds), bool)

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from scipy.special import softmax
 
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.diagnosis.verdict import decisive_margin
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.search.hypothesis import Hypothesis
 
 FILE = "hypotheses.npz"
 # Of the hypotheses so many take part, unless they are so improbable that no experiment that anybody

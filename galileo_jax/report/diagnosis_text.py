@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.comparison.compare import Comparison
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Reason
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.reasons import p_equals
@@ -15,6 +14,7 @@ from galileo_jax.diagnosis.verdict import UNEVEN
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.results.shown_digits import shown
+from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.statespace.term import TERMS
 
 NO_EFFECTS = "no effects"

@@ -9,7 +9,6 @@ import pytest
 from galileo_jax.api.clips import load
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.simulate import simulate
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.could_not_see import could_not_see, smallest_shown
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.verdict import CONVINCING
@@ -17,6 +16,7 @@ from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.parameters import LogNormal, Normal, Uniform
+from galileo_jax.search.hypothesis import Hypothesis
 from tests.found import candidate_of, comparison_of
 from tests.precision import in_64_bit
 

@@ -3,19 +3,19 @@
 from typing import Any
 
 import pytest
+from galileo_jax.diagnosis.race import Race
 
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Verdict
 from galileo_jax.diagnosis.known_constants import with_known_constants
-from galileo_jax.diagnosis.race import Race
 from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
+from galileo_jax.search.hypothesis import Hypothesis
 from tests.precision import in_64_bit
 
 FORM = next(form for form in FORMS if form.name == "drag_of_a_power")

@@ -14,7 +14,6 @@ import pytest
 from benchmarks.hidden_cases import EXOTIC_FILE
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.missing_force import infer_missing_force, views_of
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
@@ -22,6 +21,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.effect import State, Surroundings
 from galileo_jax.model.effects.free_acceleration import FreeAcceleration, splines
 from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.search.hypothesis import Hypothesis
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT

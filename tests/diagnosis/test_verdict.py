@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.comparison.compare import Comparison
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Verdict
-from galileo_jax.diagnosis.pairs import crossed_pairs, most_alike, not_tried, pairs_to_try
 from galileo_jax.diagnosis.verdict import (
     best_named,
     decisive_margin,
@@ -32,9 +30,11 @@ from galileo_jax.diagnosis.verdict import (
     verdict_of,
     within_luck,
     without_a_name,
+    without_surplus,
 )
 from galileo_jax.inference.fits.gradient import Code, GradientFit
 from galileo_jax.model.effects.forms import FORM_NAMES
+from galileo_jax.search.hypothesis import Hypothesis
 
 FORM, OTHER_FORM = FORM_NAMES[:2]
 EDGE = 1e-6  # just beside a threshold
@@ -445,65 +445,6 @@ def test_the_form_that_leads_is_the_best_that_explains():
     assert form_that_leads([wrong, right, candidate("air_drag", 40.0)]) is right
 
 
-def test_the_pairs_that_promise_most_are_tried_each_once():
-    """From the single effect from which the most is promised."""
-    singles = [candidate("air_drag", 40.0), candidate("rolling", 30.0)]
-    gains = np.array([[99.0, 5.0, 1.0], [16.0, 99.0, 2.0]])
-    found = pairs_to_try(singles, LIBRARY, gains)
-    assert found == [[("air_drag", "stribeck")], [("rolling", "air_drag"), ("rolling", "stribeck")]]
-
-
-def test_six_pairs_are_tried():
-    library = ["air_drag", *(f"effect{i}" for i in range(10))]
-    gains = np.array([[0.0, 5.0, 1.0, 9.0, 3.0, 0.5, 7.0, 2.0, 8.0, 6.0, 4.0]])
-    (found,) = pairs_to_try([candidate("air_drag", 40.0)], library, gains)
-    assert [name for _, name in found] == [f"effect{i}" for i in (2, 7, 5, 8, 0, 9)]
-
-
-def test_either_effect_of_the_best_pair_is_joined_with_what_it_was_not_tried_with():
-    tried = {frozenset(("stribeck", "air_drag")), frozenset(("rolling", "stribeck"))}
-    assert not_tried("air_drag", LIBRARY, tried) == [("air_drag", "rolling")]
-    assert not_tried("stribeck", LIBRARY, tried) == []
-
-
-def test_effects_of_equal_pairs_are_crossed():
-    """Those of pairs that are within 3 nats of the best, unless they were fitted already."""
-    made = ranked(
-        [
-            candidate("a+b", 40.0),
-            candidate("a+c", 39.0),
-            candidate("d+c", 37.0 + EDGE),
-            candidate("e+f", 37.0),
-            candidate("d+b", 20.0),
-        ]
-    )
-    assert crossed_pairs(made) == [("a", "d"), ("b", "c")]
-
-
-def test_at_most_six_are_crossed():
-    names = "abcdefgh"
-    made = ranked(
-        [candidate(f"{a}+{b}", 40.0) for a, b in zip(names[::2], names[1::2], strict=True)]
-    )
-    assert len(crossed_pairs(made)) == 6
-
-
-@pytest.mark.parametrize(
-    ("costs", "lowest", "expected"),
-    [
-        ([9.0, 5.0, 7.0], 5.0, [1, 2, 0]),
-        ([30.0, 25.0 - EDGE, 25.0], 5.0, [1]),
-        ([30.0, 25.0, 5.0 + EDGE, 4.0], 90.0, [3, 2]),
-        (list(range(9, 0, -1)), 0.0, [8, 7, 6, 5, 4, 3]),
-    ],
-)
-def test_up_to_six_that_a_short_search_finds_near_the_best_pair_are_fitted(costs, lowest, expected):
-    assert most_alike(np.array(costs, float), lowest).tolist() == expected
-
-
-# Which are compared, and which cannot be told apart.
-
-
 def compared(*candidates: Candidate, margin: float = DECISIVE) -> list[str]:
     return [c.name for c in to_compare(candidates, margin)]
 
@@ -613,34 +554,50 @@ def test_of_the_unknown_the_best_name_is_shown_if_it_helps():
 def test_on_whom_the_verdict_may_hang(log_odds, is_adequate, expected):
     margin = DECISIVE * (2 if is_adequate else 1)
     is_form = np.zeros(len(log_odds), bool)
-    found = may_decide(np.array(log_odds), is_form, -np.inf, margin, is_adequate)
+    alone = np.ones(len(log_odds), int)
+    found = may_decide(np.array(log_odds), is_form, alone, margin, is_adequate)
     assert found.tolist() == expected
 
 
-def test_a_form_alone_convinces_nobody_and_what_leads_elsewhere_counts():
-    alone = may_decide(np.array([30.0, 0.0]), np.array([True, False]), -np.inf, 6.0, True)
-    assert not alone.any()
-    behind = may_decide(np.array([30.0, 0.0]), np.array([False, False]), 60.0, 3.0, False)
-    assert not behind.any()
+def test_a_form_alone_convinces_nobody():
+    is_form, alone = np.array([True, False]), np.array([1, 1])
+    assert not may_decide(np.array([30.0, 0.0]), is_form, alone, 6.0, True).any()
+
+
+def test_what_has_an_effect_more_than_the_leader_is_not_behind_by_bad_luck():
+    """Eight nats: the margin of three, and five that another valley may bring."""
+    log_odds, num_effects = np.array([50.0, 43.0, 41.0, 41.0]), np.array([1, 2, 2, 1])
+    found = may_decide(log_odds, np.zeros(4, bool), num_effects, 3.0, False)
+    assert found.tolist() == [True, True, False, True]
+
+
+def test_a_pair_that_cannot_contest_the_leading_effect_is_left_out():
+    single, near, far = (
+        candidate(name, odds)
+        for name, odds in (("air_drag", 40.0), (PAIR, 36.1), ("air_drag+stribeck", 35.9))
+    )
+    assert without_surplus([single, near, far]) == [single, near]
+    ahead = candidate(PAIR, 41.0)
+    assert without_surplus([single, ahead, far]) == [single, ahead, far]
+    assert without_surplus([]) == []
 
 
 @pytest.mark.parametrize(
-    ("log_odds", "best", "is_adequate", "expected"),
+    ("log_odds", "is_adequate", "expected"),
     [
-        ([30.0, 24.0 - EDGE, 0.0], -np.inf, False, [False, False, False]),  # 6 nats ahead of all
-        ([30.0, 24.0 + EDGE, 0.0], -np.inf, False, [True, True, False]),
-        ([30.0, 0.0], 31.0, False, [True, False]),  # of a pair, one beside the best single
-        ([6.0 + EDGE], -np.inf, False, [False]),  # far ahead of no effect
-        ([6.0 - EDGE], -np.inf, False, [True]),
-        ([16.0 + EDGE, 0.0], -np.inf, True, [False, False]),  # a faint effect needs 7 nats
-        ([16.0 - EDGE, 0.0], -np.inf, True, [True, False]),
-        ([4.0 + EDGE, -4.0], -np.inf, True, [True, True]),
-        ([4.0 - EDGE, 3.0], -np.inf, True, [False, False]),  # never comes to convince
+        ([30.0, 24.0 - EDGE, 0.0], False, [False, False, False]),  # 6 nats ahead of all
+        ([30.0, 24.0 + EDGE, 0.0], False, [True, True, False]),
+        ([6.0 + EDGE], False, [False]),  # far ahead of no effect
+        ([6.0 - EDGE], False, [True]),
+        ([16.0 + EDGE, 0.0], True, [False, False]),  # a faint effect needs 7 nats
+        ([16.0 - EDGE, 0.0], True, [True, False]),
+        ([4.0 + EDGE, -4.0], True, [True, True]),
+        ([4.0 - EDGE, 3.0], True, [False, False]),  # never comes to convince
     ],
 )
-def test_whose_evidence_must_be_right_to_a_nat(log_odds, best, is_adequate, expected):
+def test_whose_evidence_must_be_right_to_a_nat(log_odds, is_adequate, expected):
     margin = 6.0 if is_adequate else 3.0
-    found = is_close_call(np.array(log_odds), best, margin, is_adequate)
+    found = is_close_call(np.array(log_odds), margin, is_adequate)
     assert found.tolist() == expected
 
 

@@ -5,15 +5,15 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from galileo_jax.diagnosis.candidate_starts import _shape
 
 import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
-from galileo_jax.diagnosis.candidate_starts import _shape
-from galileo_jax.diagnosis.score_tests import strength_of
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+from galileo_jax.search.score_tests import strength_of
 
 
 class Drag(Effect):

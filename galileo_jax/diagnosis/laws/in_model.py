@@ -8,7 +8,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.comparison.bootstrap import whitened
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.diagnosis.laws.grammar import Structure, without_one_factor
 from galileo_jax.diagnosis.laws.one_program import MOST_NUMBERS, ActingFormulas, Spare
 from galileo_jax.diagnosis.laws.screen import NUM_LAWS, Shape, Suggestion, of_family, suggestions
@@ -18,6 +17,7 @@ from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
+from galileo_jax.search.hypothesis import Hypothesis
 
 NUM_REFITTED = 3
 MOST_Z = 2.5

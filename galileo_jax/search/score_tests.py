@@ -45,25 +45,6 @@ def score_tests(
     return np.sqrt(_explained_by(trials, base, probes, candidates, residual, change))
 
 
-def best_gains(
-    trials: JointProblem, base: GradientFit, candidates: Sequence[tuple[str, ...]], seed: int
-) -> np.ndarray:
-    """By how many nats the last effect of each candidate lowers the misfit, as far as slopes tell.
-
-    Half the square of the score test's z, of the best of the effect's shapes.
-
-    Returns:
-      `[candidate]`.
-    """
-    probes = [shapes_beside(trials, base, effects, seed)[1] for effects in candidates]
-    first = np.cumsum([0, *(len(own) for own in probes)])
-    every = np.concatenate(probes)
-    residual, change = _changes(trials, base, every)
-    gains = np.split(explained(*_along(base, residual, change)), first[1:-1])
-    best = first[:-1] + [np.argmax(own) for own in gains]
-    return 0.5 * _explained_by(trials, base, every[best], candidates, residual, change[best])
-
-
 def strength_of(trials: JointProblem, effect: str) -> tuple[np.ndarray, float]:
     """Where an effect's strengths stand (one per clip, or one), and a small one."""
     where = trials.brought_by(effect)

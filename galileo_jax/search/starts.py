@@ -1,4 +1,4 @@
-"""Where candidates are fitted from: scattered starts, and starts that match the residuals.
+"""Where hypotheses are fitted from: scattered starts, and starts that match the residuals.
 
 The position, time or wavelength of an effect has many local optima near the right value. Two kinds
 of starting points deal with this: scattered ones, and matched ones, whose derivative at zero
@@ -6,22 +6,28 @@ strength removes most of the misfit (the score test over all shapes).
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import ndtri
 
-from galileo_jax.diagnosis.score_tests import (
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.inference.fits.starts import scattered_starts
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.parameters import LongTailed, Prior, inverse
+from galileo_jax.runtime.latin_hypercube import latin_hypercube
+from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.score_tests import (
     SHOWS,
     explained,
     shapes_beside,
     slopes_along,
     strength_of,
 )
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
-from galileo_jax.inference.joint_problem import JointProblem
-from galileo_jax.model.parameters import LongTailed, Prior, in_units, inverse
-from galileo_jax.runtime.latin_hypercube import latin_hypercube
+from galileo_jax.search.start import Start
+from galileo_jax.search.table import Table
 
+NUM_SCATTERED = 32  # over all priors, of a hypothesis of several effects
 STARTS_PER_PARAMETER, MOST_STARTS = 32, 96
 NUM_WAYS = 3  # in which they relate to the fit without the candidate; the best of each is refined
 NUM_MATCHED = 3  # shapes kept as starts
@@ -30,28 +36,67 @@ NUM_STRENGTHS, NUM_ZOOMS = 15, 4  # a grid over all strengths, then between neig
 SPREAD_Z = 0.7  # of starts round the fit without the candidate
 
 
-def scattered(
-    fitter: GradientFitter, bases: Sequence[GradientFit], free: np.ndarray, seed: int
-) -> list[np.ndarray]:
-    """For each hypothesis the best of its scattered starts in each way, `[way, z]`.
+def beside(
+    table: Table,
+    move: str,
+    wanted: Sequence[tuple[Hypothesis, tuple[str, ...]]],
+    is_scattered: bool = True,
+) -> list[Start]:
+    """Starts of hypotheses that are their parent and one effect more, its last.
+
+    The shapes that match best, and scattered ones: of one effect round the parent in `NUM_WAYS`
+    ways; of several, which are many hypotheses, over all priors.
 
     Args:
-      fitter: of the trials.
-      bases: of each hypothesis the fit without its new effect.
-      free: `[hypothesis, model parameter]`.
-      seed: of the starts.
+      table: what is known.
+      move: that proposes them.
+      wanted: parents, and the effects of the hypotheses; those asked for already are left out.
+      is_scattered: whether scattered starts are wanted; else the best match is all.
     """
-    starts = [
-        _starts(fitter.trials, base, row, seed) for base, row in zip(bases, free, strict=True)
-    ]
-    of = np.repeat(np.arange(len(free)), [len(own) for own in starts])
-    costs = fitter.search_costs(np.concatenate(starts), free[of])
-    chosen = []
-    for i, own in enumerate(starts):
-        cost = costs[of == i]
-        ways = [np.arange(way, len(own), NUM_WAYS) for way in range(NUM_WAYS)]
-        chosen.append(own[[way[np.argmin(cost[way])] for way in ways]])
-    return chosen
+    wanted = table.not_asked(move, wanted)
+    if not wanted:
+        return []
+    parents = [parent.fit for parent, _ in wanted]
+    sets = [effects for _, effects in wanted]
+    seed = table.seed + table.num_rounds
+    matching = matched(table.fitter, parents, sets, table.seed)
+    starts: list[Start] = []
+    for (parent, effects), free, shapes in zip(wanted, table.free(sets), matching, strict=True):
+        if not is_scattered:
+            shapes, others, ways = shapes[:1], np.empty((0, len(free))), 1
+        elif len(effects) == 1:
+            others, ways = _starts(table.trials, parent.fit, free, table.seed), NUM_WAYS
+        else:
+            others, ways = scattered_starts(table.trials, free, NUM_SCATTERED, seed), 1
+            shapes = shapes[:1]
+        labels = [*range(ways, ways + len(shapes)), *(np.arange(len(others)) % ways)]
+        starts += [
+            Start(effects, z, parent, move, int(label))
+            for z, label in zip([*shapes, *others], labels, strict=True)
+        ]
+    return starts
+
+
+def beside_a_formula(table: Table, formula: Hypothesis) -> list[Start]:
+    """Starts of single effects, all else as beside a formula, which is of trials of its own.
+
+    What a formula explains, one effect alone may explain as well, and a fit from nowhere have
+    missed: its valley is narrow, or lies far from where the model without effects is.
+    """
+    trials, base = table.trials, table.base
+    others = formula.of(trials)
+    at = [others.names.index(name) if name in others.names else -1 for name in trials.names]
+    z = np.where(np.array(at) >= 0, formula.fit.z[at], 0.0)
+    jacobian = formula.fit.jacobian[:, at[: len(trials.model_parameters)]]
+    free = base.fit.free
+    fit = replace(
+        base.fit,
+        z=np.where(free, z, 0.0),
+        jacobian=np.where(free[: jacobian.shape[1]], jacobian, 0.0),
+        log_evidence=-np.inf,
+    )
+    parent = Hypothesis((), fit)
+    return beside(table, "formula", [(parent, (name,)) for name in trials.all_effects])
 
 
 def matched(
@@ -59,84 +104,29 @@ def matched(
     bases: Sequence[GradientFit],
     candidates: Sequence[tuple[str, ...]],
     seed: int,
-) -> tuple[list[np.ndarray], np.ndarray]:
+) -> list[np.ndarray]:
     """For each candidate starts that match its base fit's residuals, `[start, z]`, best first.
 
     Those whose effect has a strength and no shape get one more: the best of all its strengths. As
     far as the slope goes is too far where a little more of an effect changes everything, as
     friction does that nearly holds.
-
-    Returns:
-      The starts, and how much of the squared residuals each candidate's best slope explains,
-      `[candidate]`.
     """
     trials, count = fitter.trials, len(fitter.trials.model_parameters)
     starts: list[np.ndarray] = [np.empty(0)] * len(candidates)
-    gains = np.zeros(len(candidates))
     for base in {id(base): base for base in bases}.values():
         own = [i for i, other in enumerate(bases) if other is base]
         found = _matched_shapes(trials, base, [candidates[i] for i in own], seed)
-        for i, (shapes, gain) in zip(own, found, strict=True):
-            starts[i], gains[i] = shapes, gain
+        for i, shapes in zip(own, found, strict=True):
+            starts[i] = shapes
     plain = [i for i, own in enumerate(starts) if len(own) == 1]
     if not plain:
-        return starts, gains
+        return starts
     free = np.stack([trials.free(candidates[i])[:count] for i in plain])
     where = [strength_of(trials, candidates[i][-1])[0] for i in plain]
     found = best_strengths(fitter, np.concatenate([starts[i] for i in plain]), free, where)
     for i, best in zip(plain, found, strict=True):
         starts[i] = np.stack([best, starts[i][0]])
-    return starts, gains
-
-
-def alike_or_matched(
-    fitter: GradientFitter,
-    best: GradientFit,
-    leader: str,
-    z: np.ndarray,
-    free: np.ndarray,
-    effects: Sequence[str],
-) -> np.ndarray:
-    """Starts, `[candidate, z]`: `z`, or with the leader's shape where that costs less.
-
-    An effect with the same kind of shape (`NAME_start`, `NAME_length`) that explains the data as
-    well has it where the leader has it; between the shapes that are tried a narrow one is missed.
-
-    Args:
-      fitter: of the trials.
-      best: the leading fit.
-      leader: its last effect.
-      z: where each candidate would start.
-      free: `[candidate, model parameter]`.
-      effects: the last effect of each candidate.
-    """
-    parameters = fitter.trials.model_parameters
-    shape = _shape(fitter.trials, leader)
-    alike = z.copy()
-    rows: list[int] = []
-    for row, effect in enumerate(effects):
-        own = _shape(fitter.trials, effect)
-        same = [(own[end], i) for end, i in shape.items() if end in own]
-        for mine, its in same:
-            value = in_units(parameters[its].prior, best.z[its])
-            alike[row, mine] = parameters[mine].prior.inverse(value)
-        if same and np.all(np.isfinite(alike[row])):
-            rows.append(row)
-    if not rows:
-        return z
-    where = [strength_of(fitter.trials, effects[row])[0] for row in rows]
-    alike[rows] = best_strengths(fitter, alike[rows], free[rows], where)
-    costs, others = (fitter.search_costs(starts[rows], free[rows]) for starts in (alike, z))
-    starts = z.copy()
-    starts[rows] = np.where((costs < others)[:, None], alike[rows], z[rows])
     return starts
-
-
-def _shape(trials: JointProblem, effect: str) -> dict[str, int]:
-    """Where an effect's parameters stand beside its strength, by how their names end."""
-    named = {trials.model_parameters[i].name: int(i) for i in trials.brought_by(effect)}
-    start = f"{effect}_"
-    return {n.removeprefix(effect): i for n, i in named.items() if n.startswith(start)}
 
 
 def best_strengths(
@@ -164,11 +154,10 @@ def _most_z(prior: Prior) -> float:
 
 def _matched_shapes(
     trials: JointProblem, base: GradientFit, candidates: Sequence[tuple[str, ...]], seed: int
-) -> list[tuple[np.ndarray, float]]:
+) -> list[np.ndarray]:
     """Of each candidate the shapes of its last effect that match the residuals, `[start, z]`.
 
-    For each shape the strength is the one that its slope at no strength asks for. With them how
-    much of the squared residuals the best explains.
+    For each shape the strength is the one that its slope at no strength asks for.
     """
     beside = [shapes_beside(trials, base, effects, seed) for effects in candidates]
     ends = np.cumsum([len(z) for z, _ in beside])[:-1]
@@ -187,7 +176,7 @@ def _matched_shapes(
             own, most = prior.inverse(wanted[:, column]), _most_z(prior)
             z[best, column] = np.clip(np.nan_to_num(own, nan=-most), -most, most)
         free = trials.free(effects)[: len(trials.model_parameters)]
-        starts.append((np.where(free, z[best, : len(free)], 0.0), float(gains[best[0]])))
+        starts.append(np.where(free, z[best, : len(free)], 0.0))
     return starts
 
 

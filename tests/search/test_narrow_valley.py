@@ -9,12 +9,15 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.diagnosis.candidates import Hypothesis, fit_candidates
 from galileo_jax.diagnosis.diagnose import fitter_of
+from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.loop import search
+from galileo_jax.search.table import Table
 from tests.precision import in_64_bit
 
 # tan 10 = 0.176; k (1 + a) = 0.062 * 2.7 = 0.166.
@@ -56,9 +59,10 @@ def test_the_search_arrives_where_a_start_at_the_truth_does(slowly_released):
                 start[i] = parameter.prior.inverse(jnp.asarray(truth[parameter.name]))
         free = trials.free(("stribeck",))[:count]
         (from_truth,) = fitter.fit_from(start[None], free[None], np.zeros(1, int))
-        searched = fit_candidates(
-            fitter, [base, base], [("stribeck",), ("force_at_a_time",)], seed=0
-        )
-    named, form = (one.fit.log_evidence for one in searched)
+        table = search(Table.of(fitter, VerdictStakes(trials, False), 0, base), 1)
+    named, form = (
+        table.entries[frozenset([name])].hypothesis.fit.log_evidence
+        for name in ("stribeck", "force_at_a_time")
+    )
     assert named > from_truth.log_evidence - 1.0
     assert named > form + DECISIVE

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.diagnosis.candidates import Hypothesis
 from galileo_jax.inference.fits.apart import apart
 from galileo_jax.inference.fits.evidence import Code, GradientFit
 from galileo_jax.inference.fits.weighed import Weighed
+from galileo_jax.search.hypothesis import Hypothesis
 
 FIT = GradientFit(
     z=np.zeros(3), free=np.array([True, True, False]), covariance=np.diag([0.01, 1.0, 0.0]),

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from galileo_jax.diagnosis.candidate_starts import best_strengths
 from galileo_jax.model.parameters import Normal, Parameter
+from galileo_jax.search.starts import best_strengths
 
 HELD = 1e6  # chi2 / 2 of a body that never sets off
 

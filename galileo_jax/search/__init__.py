@@ -1,0 +1,1 @@
+"""The search over hypotheses: one table, moves that propose where to look next, one loop."""

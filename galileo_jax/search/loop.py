@@ -1,0 +1,275 @@
+"""The loop: moves propose where to look, a race sorts the proposals, what comes near is refined.
+
+    propose: every move looks at the table and names starts (`moves/`).
+    race:    all starts descend in one batch, at more noise than the clip's. A start leaves it where
+             it comes to the valley of a better one of its hypothesis, or falls far behind.
+    refine:  the best end of each hypothesis at the clip's own noise, the most promising first; of
+             those on which the conclusion may hang, every end.
+    weigh:   where nats decide, evidence by rollouts instead of Laplace's.
+
+It ends when a round changes nothing on which the conclusion may hang.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from galileo_jax.inference.fits.apart import apart
+from galileo_jax.inference.fits.descent import SAME_VALLEY_NATS, Descended, ends_of
+from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH, valleys
+from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.fits.weighed import weighed
+from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.moves import MOVES
+from galileo_jax.search.score_tests import score_tests
+from galileo_jax.search.start import Start
+from galileo_jax.search.table import BASE, Entry, Key, Table, ask
+
+MOST_ROUNDS = 4
+CHANGED_NATS = 1.0  # by which the evidence of what may decide has changed
+NUM_AT_ONCE = 8  # refined in one batch: the sooner the first can be shown
+MOST_REFINED = 24  # hypotheses of several effects in a round, those that come nearest
+MOST_WEIGHED = 6  # hypotheses whose evidence rollouts mend, in a round
+MAY_STILL_GAIN = 5.0  # nats that a valley with more cost in the race may yet have the better of
+
+
+@dataclass(frozen=True)
+class _End:
+    """Where a start came to: a place to refine from."""
+
+    effects: tuple[str, ...]
+    z: np.ndarray
+    parent: Hypothesis
+    cost: float
+    promise: float  # the cost less what the width of the valley is worth, nats
+
+    @property
+    def key(self) -> Key:
+        return frozenset(self.effects)
+
+
+def search(
+    table: Table,
+    most: int,
+    on_entry: Callable[[Table, Entry], None] = lambda *_: None,
+    starts: Sequence[Start] = (),
+) -> Table:
+    """The table with all that the moves find, up to so many effects at once.
+
+    Args:
+      table: what is known.
+      most: effects of a hypothesis.
+      on_entry: called with a table and each of its rows that is new or better, as soon as that is.
+      starts: where to look first, beside what the moves propose.
+    """
+    for _ in range(MOST_ROUNDS):
+        proposed = [*starts, *(one for move in MOVES.values() for one in move(table, most))]
+        if not proposed:
+            break
+        before = table
+        asked = {ask(one.move, one.parent, one.key) for one in proposed}
+        table = replace(table, asked=table.asked | asked, num_rounds=table.num_rounds + 1)
+        table = _round(table, proposed, on_entry)
+        starts = ()
+        if not _has_changed(before, table):
+            break
+    return table
+
+
+def _has_changed(before: Table, after: Table) -> bool:
+    """Whether anything on which the conclusion may hang is new, or better than it was."""
+    for key in (BASE, *after.deciding()):
+        known = before.entries.get(key)
+        if known is None:
+            return True
+        now = after.entries[key].hypothesis.fit.log_evidence
+        if now - known.hypothesis.fit.log_evidence > CHANGED_NATS:
+            return True
+    return False
+
+
+def _round(
+    table: Table, starts: Sequence[Start], on_entry: Callable[[Table, Entry], None]
+) -> Table:
+    """The table after one round of the loop."""
+    scores = _scores(table, starts)
+
+    def take(table: Table, effects: tuple[str, ...], fit: GradientFit) -> Table:
+        key = frozenset(effects)
+        known = table.entries.get(key)
+        if known is None:
+            entry = Entry(Hypothesis(effects, fit), (fit,), scores.get(key, 0.0))
+        else:
+            entry = known.with_fits([fit], CHANGED_NATS if key == BASE else 0.0)
+        table = table.with_entry(entry)
+        if known is None or entry.hypothesis.fit is fit:
+            on_entry(table, entry)
+        return table
+
+    ends = _raced(table, [one for one in starts if not one.is_near])
+    first = _first_of_each(table, ends)
+    for end, fit in _refined_in_turn(table, first):
+        table = take(table, end.effects, fit)
+    deciding = set(table.deciding()) | {BASE}
+    near = [_End(one.effects, one.z, one.parent, np.nan, np.nan) for one in starts if one.is_near]
+    # What was refined in its turn was so roughly: it goes on.
+    rough = [
+        replace(end, z=table.entries[end.key].hypothesis.fit.z[: len(end.z)])
+        for end in first
+        if end.key in deciding and end.key in table.entries
+    ]
+    rest = [end for end in ends if end.key in table.entries and not any(end is o for o in first)]
+    for end, fit in _refined(table, [*rough, *(e for e in (*near, *rest) if e.key in deciding)]):
+        table = take(table, end.effects, fit)
+    return _weighed(table, on_entry)
+
+
+def _scores(table: Table, starts: Sequence[Start]) -> dict[Key, float]:
+    """How many standard deviations the slope of each new hypothesis' last effect explains."""
+    new: dict[int, list[Start]] = {}
+    seen: set[Key] = set()
+    for start in starts:
+        is_added = set(start.effects[:-1]) == set(start.parent.effects)
+        if is_added and start.effects and start.key not in (*table.entries, *seen):
+            seen.add(start.key)
+            new.setdefault(id(start.parent), []).append(start)
+    scores: dict[Key, float] = {}
+    for own in new.values():
+        found = score_tests(table.trials, own[0].parent.fit, [one.effects for one in own])
+        scores |= {one.key: float(score) for one, score in zip(own, found, strict=True)}
+    return scores
+
+
+def _raced(table: Table, starts: Sequence[Start]) -> list[_End]:
+    """Where starts come to in a race, the best end of every valley of each hypothesis.
+
+    Without those that are far behind, and those in valleys that are known.
+    """
+    if not starts:
+        return []
+    fitter = table.fitter
+    z, free = np.stack([one.z for one in starts]), table.free([one.effects for one in starts])
+    costs = fitter.search_costs(z, free)
+    best: dict[tuple[Key, str, int], int] = {}
+    for i in np.argsort(costs, kind="stable"):
+        best.setdefault((starts[i].key, starts[i].move, starts[i].rivals), int(i))
+    rows = np.array(sorted(best.values()))
+    keys = list(dict.fromkeys(starts[i].key for i in rows))
+    owner = np.array([keys.index(starts[i].key) for i in rows])
+    known = _known_costs(table)
+    lowest = min(known.values())
+    found = fitter.race(z[rows], free[rows], owner, lowest)
+    volume = -0.5 * np.linalg.slogdet(found.best.normal)[1]
+    ends = []
+    for number, key in enumerate(keys):
+        left = np.unique(ends_of(found.joined)[owner == number])
+        for row in valleys(found.best, left):
+            start, cost = starts[rows[row]], float(found.best.cost[row])
+            if key in known and _is_no_news(table.entries[key], known[key], found, row):
+                continue
+            ends.append(
+                _End(start.effects, found.best.z[row], start.parent, cost, cost - volume[row])
+            )
+    return ends
+
+
+def _known_costs(table: Table) -> dict[Key, float]:
+    """What the fits of the table cost in a race, nats."""
+    count = len(table.trials.model_parameters)
+    z = np.stack([entry.hypothesis.fit.z[:count] for entry in table.entries.values()])
+    costs = table.fitter.search_costs(z, table.free(list(table.entries)))
+    return dict(zip(table.entries, costs.tolist(), strict=True))
+
+
+def _is_no_news(entry: Entry, known: float, found: Descended, row: int) -> bool:
+    """Whether an end of a race is behind the fit of its hypothesis, or in a valley of its fits."""
+    cost, z = float(found.best.cost[row]), found.best.z[row]
+    if cost > known + MAY_STILL_GAIN:
+        return True
+    steps = np.stack([fit.z[: len(z)] - z for fit in entry.fits])
+    far = 0.5 * np.einsum("fi,ij,fj->f", steps, found.best.normal[row], steps)
+    return bool(far.min() < SAME_VALLEY_NATS and cost > known - SAME_VALLEY_NATS)
+
+
+def _first_of_each(table: Table, ends: Sequence[_End]) -> list[_End]:
+    """The best end of each hypothesis, by promise; of several effects only what comes near."""
+    best: dict[Key, _End] = {}
+    for end in sorted(ends, key=lambda end: end.cost):
+        best.setdefault(end.key, end)
+    lowest = min([*(end.cost for end in ends), *_known_costs(table).values()])
+    near = [end for end in best.values() if end.cost < lowest + BEHIND_IN_SEARCH]
+    kept = {end.key for end in near[:MOST_REFINED]}
+    chosen = [end for key, end in best.items() if len(key) <= 1 or key in kept]
+    return sorted(chosen, key=lambda end: end.promise)
+
+
+def _refined_in_turn(table: Table, ends: Sequence[_End]) -> list[tuple[_End, GradientFit]]:
+    """Fits from ends, roughly, a few at a time, without those far behind others."""
+    if not ends:
+        return []
+    # A part takes as many steps as its slowest, so that many parts would take many.
+    cuts = [NUM_AT_ONCE] if all(len(end.key) <= 1 for end in ends) else None
+    parts = np.split(np.arange(len(ends)), cuts or range(NUM_AT_ONCE, len(ends), NUM_AT_ONCE))
+    z, free = np.stack([end.z for end in ends]), table.free([end.effects for end in ends])
+    fits = table.fitter.polish_in_turn(z, free, [part for part in parts if part.size])
+    return [(ends[row], fit) for row, fit in fits]
+
+
+def _refined(table: Table, ends: Sequence[_End]) -> list[tuple[_End, GradientFit]]:
+    """Fits from ends, until they have settled; one for each valley."""
+    if not ends:
+        return []
+    keys = list(dict.fromkeys(end.key for end in ends))
+    ends = sorted(ends, key=lambda end: keys.index(end.key))
+    owner = np.array([keys.index(end.key) for end in ends])
+    z, free = np.stack([end.z for end in ends]), table.free([end.effects for end in ends])
+    fits = table.fitter.polish(z, free, owner)
+    return [(ends[row], fit) for row, fit in fits.items()]
+
+
+def _weighed(table: Table, on_entry: Callable[[Table, Entry], None]) -> Table:
+    """The table with evidence by rollouts where Laplace's will not do.
+
+    A draw that is better than all fits is where one of them goes on.
+    """
+    rows = table.best_first
+    if not rows:
+        return table
+    log_odds = np.array([table.log_odds(row.hypothesis) for row in rows])
+    close = np.flatnonzero(table.stakes.is_close_call(log_odds))[:MOST_WEIGHED]
+    if not close.size:
+        return table
+    for key in (BASE, *(rows[i].hypothesis.key for i in close)):
+        entry = table.entries[key]
+        if entry.hypothesis.weighed is not None:
+            continue
+        entry = _mended(table, entry)
+        if key == BASE and entry.hypothesis.weighed is None:
+            return table.with_entry(entry)  # all others would be measured from another place
+        table = table.with_entry(entry)
+        if key != BASE:
+            on_entry(table, entry)
+    return table
+
+
+def _mended(table: Table, entry: Entry) -> Entry:
+    """The row with the evidence of all its valleys, by rollouts round them."""
+    without, residuals = _without_one(table, entry), table.fitter.residuals
+    found = weighed(apart(entry.fits), residuals, table.seed, without)
+    if found.better is not None:
+        count = len(entry.fits[0].steps)
+        free = entry.fits[0].free[None, :count]
+        again = table.fitter.polish(found.better[None, :count], free, np.zeros(1, int))
+        entry = entry.with_fits(list(again.values()))
+        found = weighed(apart(entry.fits), residuals, table.seed, without)
+    sure = found if found.is_sure else None
+    return replace(entry, hypothesis=replace(entry.hypothesis, weighed=sure))
+
+
+def _without_one(table: Table, entry: Entry) -> GradientFit | None:
+    """The best fit without one of the effects of a row; None of the model without effects."""
+    key = entry.hypothesis.key
+    less = [table.entries[key - {name}] for name in key if key - {name} in table.entries]
+    fits = [one.hypothesis.fit for one in less]
+    return max(fits, key=lambda fit: fit.log_evidence, default=None)

@@ -1,0 +1,36 @@
+"""A start: where a move proposes to look for a hypothesis."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from galileo_jax.search.hypothesis import Hypothesis
+
+
+@dataclass(frozen=True)
+class Start:
+    """A place in the space of all parameters from which a hypothesis is searched for.
+
+    Attributes:
+      effects: of the hypothesis.
+      z: `[model parameter]`, each with a unit normal prior.
+      parent: what it was made from; with its last effect added, a score test says what that
+        effect explains.
+      move: name of the move that proposes it.
+      rivals: of a move's starts of a hypothesis with the same label only the best is followed.
+      is_near: whether it is refined at once: beside a fit a race, which assumes more noise, would
+        not tell the valleys apart.
+    """
+
+    effects: tuple[str, ...]
+    z: Float[np.ndarray, " parameter"]
+    parent: Hypothesis
+    move: str
+    rivals: int = 0
+    is_near: bool = False
+
+    @property
+    def key(self) -> frozenset[str]:
+        """The effects in no order."""
+        return frozenset(self.effects)

@@ -1,0 +1,173 @@
+"""The table of all hypotheses that a search has fitted so far."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.model.effects.forms import FORM_NAMES
+from galileo_jax.search.hypothesis import Hypothesis
+
+BASE: frozenset[str] = frozenset()
+Key = frozenset[str]
+SAME_NATS = 3.0  # by which the evidence of a parent differs that is worth asking again
+
+
+class Stakes(Protocol):
+    """What hangs on a hypothesis: how probable it is beforehand, and when it may decide."""
+
+    def log_prior(self, hypothesis: Hypothesis) -> float:
+        """Log of its probability before the data over that of the model without effects."""
+        ...
+
+    def may_decide(
+        self,
+        log_odds: Float[np.ndarray, " row"],
+        is_form: Bool[np.ndarray, " row"],
+        num_effects: Int[np.ndarray, " row"],
+    ) -> Bool[np.ndarray, " row"]:
+        """On which hypotheses the conclusion may hang; these are searched for with care."""
+        ...
+
+    def is_close_call(self, log_odds: Float[np.ndarray, " row"]) -> Bool[np.ndarray, " row"]:
+        """Of which hypotheses Laplace's evidence will not do."""
+        ...
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row of the table.
+
+    Attributes:
+      hypothesis: with the best fit.
+      fits: in every valley that was found.
+      score_z: what its last effect's slope explained beside its parent, in standard deviations.
+    """
+
+    hypothesis: Hypothesis
+    fits: tuple[GradientFit, ...]
+    score_z: float
+
+    def with_fits(self, fits: Sequence[GradientFit], by: float = 0.0) -> "Entry":
+        """The same with more fits; one that is better `by` nats takes the place of the old one."""
+        every = (*self.fits, *fits)
+        best = max(every, key=lambda fit: fit.log_evidence)
+        if best.log_evidence <= self.hypothesis.fit.log_evidence + by:
+            return replace(self, fits=every)
+        return replace(
+            self, fits=every, hypothesis=replace(self.hypothesis, fit=best, weighed=None)
+        )
+
+
+@dataclass(frozen=True)
+class Table:
+    """All hypotheses fitted so far.
+
+    Attributes:
+      fitter: of trials whose models have the whole library.
+      stakes: what hangs on each.
+      seed: of the starts.
+      entries: by the effects, in no order; that without effects is always there.
+      asked: what moves proposed already: name of the move, of what, from which evidence.
+      num_rounds: of the loop, so far.
+    """
+
+    fitter: GradientFitter
+    stakes: Stakes
+    seed: int
+    entries: Mapping[Key, Entry]
+    asked: frozenset[tuple[str, Key, Key, float]] = field(default=frozenset())
+    num_rounds: int = 0
+
+    @classmethod
+    def of(cls, fitter: GradientFitter, stakes: Stakes, seed: int, base: Hypothesis) -> "Table":
+        """The table that holds the model without effects alone."""
+        return cls(fitter, stakes, seed, {BASE: Entry(base, (base.fit, *base.fit.beside), 0.0)})
+
+    @property
+    def trials(self) -> JointProblem:
+        """What the hypotheses were fitted to."""
+        return self.fitter.trials
+
+    @property
+    def base(self) -> Hypothesis:
+        """The model without effects."""
+        return self.entries[BASE].hypothesis
+
+    @property
+    def library(self) -> list[str]:
+        """The effects that have a name."""
+        return [name for name in self.trials.all_effects if name not in FORM_NAMES]
+
+    @property
+    def best_first(self) -> list[Entry]:
+        """The rows with effects, the most probable first."""
+        rows = [entry for key, entry in self.entries.items() if key != BASE]
+        return sorted(rows, key=lambda entry: -self.log_odds(entry.hypothesis))
+
+    def named(self, num_effects: int) -> list[Hypothesis]:
+        """The hypotheses of so many effects, all with a name, the best evidence first."""
+        found = [
+            entry.hypothesis
+            for key, entry in self.entries.items()
+            if len(key) == num_effects and not is_form(key)
+        ]
+        return sorted(found, key=lambda one: -one.fit.log_evidence)
+
+    def leaders(self, num: int) -> list[Hypothesis]:
+        """The most probable hypotheses with effects."""
+        return [entry.hypothesis for entry in self.best_first[:num]]
+
+    def log_odds(self, hypothesis: Hypothesis) -> float:
+        """Over the model without effects, nats."""
+        return hypothesis.evidence_over(self.base) + self.stakes.log_prior(hypothesis)
+
+    def free(self, sets: Sequence[Collection[str]]) -> Bool[np.ndarray, "row parameter"]:
+        """Which of the model's parameters sets of effects leave open."""
+        count = len(self.trials.model_parameters)
+        return np.stack([self.trials.free(tuple(effects))[:count] for effects in sets])
+
+    def deciding(self) -> list[Key]:
+        """The hypotheses on which the conclusion may hang, the best evidence first."""
+        rows = self.best_first
+        if not rows:
+            return []
+        log_odds = np.array([self.log_odds(row.hypothesis) for row in rows])
+        forms = np.array([is_form(row.hypothesis.key) for row in rows])
+        every = (self.base, *(row.hypothesis for row in rows))
+        if any(self.fitter.is_explained(one.fit) for one in every):
+            numbers = np.array([len(row.hypothesis.effects) for row in rows])
+            decides = self.stakes.may_decide(log_odds, forms, numbers)
+        else:  # any fit may yet be the one that does
+            decides = np.ones(len(rows), bool)
+        found = [row for row, does in zip(rows, decides, strict=True) if does]
+        by_evidence = sorted(found, key=lambda row: -row.hypothesis.fit.log_evidence)
+        return [row.hypothesis.key for row in by_evidence]
+
+    def not_asked(
+        self, move: str, wanted: Sequence[tuple[Hypothesis, tuple[str, ...]]]
+    ) -> list[tuple[Hypothesis, tuple[str, ...]]]:
+        """Of proposals `(parent, effects)` those that this move has not made from such a parent."""
+        return [
+            (parent, effects)
+            for parent, effects in wanted
+            if ask(move, parent, frozenset(effects)) not in self.asked
+        ]
+
+    def with_entry(self, entry: Entry) -> "Table":
+        """The table with a row more, or another in its place."""
+        return replace(self, entries={**self.entries, entry.hypothesis.key: entry})
+
+
+def ask(move: str, parent: Hypothesis, key: Key) -> tuple[str, Key, Key, float]:
+    """What makes two proposals of a move one: what for, and from which fit."""
+    return move, parent.key, key, parent.fit.log_evidence // SAME_NATS
+
+
+def is_form(key: Collection[str]) -> bool:
+    """Whether a hypothesis is of a form without a name."""
+    return any(name in FORM_NAMES for name in key)
