@@ -109,6 +109,11 @@ class View:
         return self.trials.problems[0].model
 
     @property
+    def start_path_m(self) -> np.ndarray:
+        """Where each object's motion begins, along its path, `[object]`."""
+        return np.asarray(self.model.scene.surroundings.start_path_m)
+
+    @property
     def free(self) -> np.ndarray:
         """Of the model's parameters."""
         return self.fit.free[: len(self.model.names)]

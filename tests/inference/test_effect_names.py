@@ -5,7 +5,6 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from galileo_jax.diagnosis.candidate_starts import _shape
 
 import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
@@ -13,6 +12,7 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.parameters import LogNormal, Normal, Parameter
+from galileo_jax.search.moves.copy_shape import shape_of
 from galileo_jax.search.score_tests import strength_of
 
 
@@ -56,7 +56,7 @@ def test_an_effect_is_known_by_its_parameters_not_by_how_its_name_begins(clip, e
     for effect in ("drag", "drag_of_mine"):
         assert [names[i] for i in trials.brought_by(effect)] == [effect, f"{effect}_start"]
         assert strength_of(trials, effect)[0].tolist() == [names.index(effect)]
-        assert _shape(trials, effect) == {"_start": names.index(f"{effect}_start")}
+        assert shape_of(trials, effect) == {"_start": names.index(f"{effect}_start")}
     with pytest.raises(ValueError, match="effects not in the model: draggy; there: "):
         trials.brought_by("draggy")
 

@@ -189,8 +189,6 @@ def test_another_effect_takes_the_same_place_in_metres():
     assert z[4] == 0.0, "the leader has no rate to take over"
 
 
-def test_what_has_no_place_or_cannot_be_there_takes_none():
+def test_what_has_no_place_takes_none():
     trials, leader = shaped(PLACE)
     assert copy_shape.with_shape_of(trials, leader, "friction_patch", "air_drag") is None
-    leader.fit.z[2:4] = 0.8, float(PARAMETERS[3].prior.inverse(jnp.asarray(-0.4)))
-    assert copy_shape.with_shape_of(trials, leader, "magnetic_brake", "friction_patch") is None

@@ -255,9 +255,18 @@ class Structure:
             "push": f"a = c {shape}",
             "drag": f"a = -c {shape} sign(v)",
             "drag_force": f"F = -c {shape} sign(v)",
-            "friction": f"k (1 + c {shape})",
+            "friction": f"k (1 + c {self._from_release(shape, values)})",
         }[self.nature]
         return f"{head}, {whom}"
+
+    def _from_release(self, shape: str, values: Mapping[str, float] | None) -> str:
+        """The shape less its value where the motion begins, if that is not 0."""
+        if any(factor.variable == "q" for factor in self.factors):
+            return f"[{shape} - at the release]"
+        if values is None:
+            return f"[{shape} - at t = 0, v = 0]"
+        begin = float(self.value(0.0, 0.0, 0.0, values))
+        return shape if abs(begin) < NEXT_TO_NOTHING else f"[{shape} - {begin:.3g}]"
 
     def value(self, t: Any, q: Any, v: Any, constants: Mapping[str, Any]) -> Any:
         """f, in NumPy."""
@@ -265,6 +274,7 @@ class Structure:
         return eval(self.code, {"__builtins__": {}}, names)
 
 
+NEXT_TO_NOTHING = 0.01  # of a shape, whose size is about 1
 ALONE: Mapping[Nature, str] = {"push": "tq", "drag": "v", "drag_force": "v", "friction": "tqv"}
 """The variables of a single factor, by nature; what else there is is in the library or a push."""
 TOGETHER = ("power_t", "decay_t", "linear_q", "growth_q", "pulse_q", "power_v", "backward_v")

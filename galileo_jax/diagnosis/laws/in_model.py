@@ -260,6 +260,9 @@ def _accelerations(
     for i in range(len(view.path_m)):
         q, v = view.path_m[i], view.speed_m_s[i]
         f = strength * structure.value(view.time_s, q, v, constants) * np.ones_like(q)
+        if structure.nature == "friction":
+            begin = structure.value(0.0, view.start_path_m[i], 0.0, constants)
+            f = f - strength * begin
         if structure.nature != "push":
             f = -np.sign(v) * f
         if structure.nature == "friction":

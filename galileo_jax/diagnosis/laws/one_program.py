@@ -76,11 +76,19 @@ class LawAsFriction(Effect):
             return None
 
         def law(state: State, k: Array) -> Array:
-            changed = changed_friction(k, _value(theta, scene, state))
+            begin = _value(theta, scene, _at_release(scene, state))
+            changed = changed_friction(k, _value(theta, scene, state) - begin)
             is_own = theta[NATURE][..., None] == NATURES.index("friction")
             return k.__array_namespace__().where(is_own, changed, k)
 
         return law
+
+
+def _at_release(scene: Surroundings, state: State) -> State:
+    """Where the motion begins: at time 0, at the place of the release, at rest."""
+    path = state.path_m
+    begin = 0.0 * path + path.__array_namespace__().asarray(scene.start_path_m)
+    return state._replace(time_s=0.0 * state.time_s, path_m=begin, speed_m_s=0.0 * state.speed_m_s)
 
 
 def _value(theta: Theta, scene: Surroundings, state: State) -> Array:

@@ -59,6 +59,8 @@ class Sight:
         constants = {name: values[:, None] for name, values in grid.items()}
         q, v = view.path_m[i], view.speed_m_s[i]
         f = structure.value(view.time_s, q, v, constants)
+        if structure.nature == "friction":
+            f = f - structure.value(0.0, view.start_path_m[i], 0.0, constants)
         return np.broadcast_to(f, (size, len(view.time_s)))
 
     def is_possible(

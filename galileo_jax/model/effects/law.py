@@ -2,10 +2,11 @@
 
     push       a = c f                 along the path
     drag       a = -c f sign(v)        against the motion
-    friction   k -> max(0, k (1 + c f))
+    friction   k -> max(0, k (1 + c (f - f_0)))
 
 with f a formula of the time t since the release, the place q along the path and the speed v (SI),
-without a dimension, on object 1 or on all; `drag_force` is a drag of the same force on all, as a
+without a dimension, on object 1 or on all, and f_0 its value where the motion begins (t = 0, the
+place of the release, at rest), so that k stays the friction there; `drag_force` is a drag of the same force on all, as a
 liquid's: the acceleration of object i is m1/mi times that of object 1. Of a drag c is positive.
 """
 
@@ -106,6 +107,9 @@ class Law(Effect):
         def value(state: State) -> Array:
             t = state.time_s + 0.0 * state.path_m
             f = self.formula(t, state.path_m, state.speed_m_s, xp, **own)
+            if self.nature == "friction":
+                begin = 0.0 * state.path_m + xp.asarray(scene.start_path_m)
+                f = f - self.formula(0.0 * t, begin, 0.0 * state.speed_m_s, xp, **own)
             return strength[..., None] * chosen * f
 
         return value

@@ -47,8 +47,7 @@ def with_shape_of(
 ) -> np.ndarray | None:
     """The leader's parameters, `[model parameter]`, z, with the shape of its effect in another's.
 
-    The same value in SI units; None where they have no kind of shape in common, or one that the
-    other's prior excludes.
+    The same value in SI units; None where they have no kind of shape in common.
     """
     parameters, own = trials.model_parameters, shape_of(trials, other)
     z = leader.fit.z[: len(parameters)].copy()
@@ -56,7 +55,7 @@ def with_shape_of(
     for mine, its in same:
         value = in_units(parameters[its].prior, leader.fit.z[its])
         z[mine] = parameters[mine].prior.inverse(value)
-    return z if same and bool(np.all(np.isfinite(z))) else None
+    return z if same else None
 
 
 def shape_of(trials: JointProblem, effect: str) -> dict[str, int]:
