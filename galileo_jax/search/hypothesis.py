@@ -9,10 +9,6 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.fits.weighed import Weighed
 from galileo_jax.inference.joint_problem import JointProblem
 
-# Between Laplace's and mended evidence, nats: those of hypotheses that describe the data differ by
-# up to 2.5, and alike.
-ALIKE_NATS = 3.0
-
 
 @dataclass(frozen=True)
 class Hypothesis:
@@ -39,19 +35,20 @@ class Hypothesis:
         """The trials that it was fitted to, where the diagnosis's own are `trials`."""
         return self.trials or trials
 
+    @property
+    def log_evidence(self) -> float:
+        """By rollouts where it was mended, else by Laplace; up to the data's constant, nats."""
+        return self.fit.log_evidence if self.weighed is None else self.weighed.log_evidence
+
     def evidence_over(self, base: "Hypothesis") -> float:
         """Log evidence less that of another, nats.
 
-        Like with like, where only Laplace's is known: its errors are alike where hypotheses are.
-        Where that of the other is off by more than such errors are (a fit far from the data has a
-        bent valley), its mended evidence counts for all, so that all are measured from one place.
+        Like with like where nothing was mended. What stays with Laplace's beside a mended base is
+        farther behind the leading hypothesis than Laplace's is wrong.
         """
         if base.weighed is None:
             return self.fit.log_evidence - base.fit.log_evidence
-        known, mended = base.fit.log_evidence, base.weighed.log_evidence
-        if self.weighed is None:
-            return self.fit.log_evidence - (known if abs(known - mended) < ALIKE_NATS else mended)
-        return self.weighed.log_evidence - mended
+        return self.log_evidence - base.log_evidence
 
     @property
     def misfit(self) -> float:

@@ -30,7 +30,6 @@ MOST_ROUNDS = 4
 CHANGED_NATS = 1.0  # by which the evidence of what may decide has changed
 NUM_AT_ONCE = 8  # refined in one batch: the sooner the first can be shown
 MOST_REFINED = 24  # hypotheses of several effects in a round, those that come nearest
-MOST_WEIGHED = 6  # hypotheses whose evidence rollouts mend, in a round
 MAY_STILL_GAIN = 5.0  # nats that a valley with more cost in the race may yet have the better of
 
 
@@ -237,7 +236,7 @@ def _weighed(table: Table, on_entry: Callable[[Table, Entry], None]) -> Table:
     if not rows:
         return table
     log_odds = np.array([table.log_odds(row.hypothesis) for row in rows])
-    close = np.flatnonzero(table.stakes.is_close_call(log_odds))[:MOST_WEIGHED]
+    close = np.flatnonzero(table.stakes.is_close_call(log_odds))
     if not close.size:
         return table
     for key in (BASE, *(rows[i].hypothesis.key for i in close)):

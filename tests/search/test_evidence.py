@@ -25,18 +25,13 @@ def mended(log_evidence):
     return Weighed(log_evidence, np.zeros(256), 200.0, np.zeros((256, 1)), np.zeros(256))
 
 
-def test_mended_with_mended_and_laplace_with_laplace():
+def test_evidence_counts_from_one_place():
     base = Hypothesis((), FIT, weighed=mended(-99.5))
     known = Hypothesis(("air_drag",), at([0, 0, 0], -90.0), weighed=mended(-88.0))
     unknown = Hypothesis(("stribeck",), at([0, 0, 0], -95.0))
     assert known.evidence_over(base) == pytest.approx(11.5)
-    assert unknown.evidence_over(base) == pytest.approx(5.0)
+    assert unknown.evidence_over(base) == pytest.approx(4.5), "all from one place"
     assert known.evidence_over(Hypothesis((), FIT)) == pytest.approx(10.0)
-    off = Hypothesis(
-        (), FIT, weighed=mended(-83.0)
-    )  # a base so far from the data: one place for all
-    assert known.evidence_over(off) == pytest.approx(-5.0)
-    assert unknown.evidence_over(off) == pytest.approx(unknown.fit.log_evidence + 83.0)
 
 
 def test_valleys_apart_the_best_first_and_none_twice():

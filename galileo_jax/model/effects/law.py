@@ -6,8 +6,9 @@
 
 with f a formula of the time t since the release, the place q along the path and the speed v (SI),
 without a dimension, on object 1 or on all, and f_0 its value where the motion begins (t = 0, the
-place of the release, at rest), so that k stays the friction there; `drag_force` is a drag of the same force on all, as a
-liquid's: the acceleration of object i is m1/mi times that of object 1. Of a drag c is positive.
+place of the release, at rest), so that k stays the friction there. `drag_force` is a drag of the
+same force on all, as a liquid's: the acceleration of object i is m1/mi times that of object 1. Of
+a drag c is positive.
 """
 
 from collections.abc import Mapping
