@@ -25,11 +25,11 @@ from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import candidate_so_far, candidates_of
+from galileo_jax.diagnosis.constants_with_names import with_known_constants
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Reason, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
-from galileo_jax.diagnosis.expected_lead import expected_leads
+from galileo_jax.diagnosis.expected_evidence import expected_leads
 from galileo_jax.diagnosis.imperfect_world import ImperfectWorld, imperfect_world
-from galileo_jax.diagnosis.known_constants import with_known_constants
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
 from galileo_jax.diagnosis.law_verdict import (
     best_formula,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import Candidate, Law, Verdict
-from galileo_jax.diagnosis.expected_lead import expected_leads
+from galileo_jax.diagnosis.expected_evidence import expected_leads
 from galileo_jax.diagnosis.law_verdict import (
     contested_by_law,
     law_contested,
@@ -14,7 +14,7 @@ from galileo_jax.diagnosis.law_verdict import (
     law_verdict,
     other_formulas,
 )
-from galileo_jax.diagnosis.laws.in_model import fitted_laws
+from galileo_jax.diagnosis.laws.fit_formulas import fitted_laws
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.diagnosis.verdict import log_prior, looked_at_again, within_luck
 from galileo_jax.inference.joint_problem import JointProblem

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.inference.fits.fitted_clip import FittedClip
-from galileo_jax.inference.fits.programs import FAILED, ClipArrays, Kind, white_of
+from galileo_jax.inference.fits.kernels import FAILED, ClipArrays, Kind, white_of
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.samplers.program import Program
 from galileo_jax.inference.samplers.sampler import LogDensity

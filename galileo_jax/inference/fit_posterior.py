@@ -1,10 +1,9 @@
 """From a gradient fit to a posterior, as narrow or wide as rollouts round the fit say.
 
 The slopes at the best fit know only what is next to it. Where two events come close to each other
-(bodies that nearly touch again; one that stops as the other passes) the misfit has a corner: 370012
-of the rendered clips had an interval of k2 five times too narrow and was off by nine standard
-deviations. So points round the fit are rolled out and weighed by importance (`fits/weighed.py`),
-and the posterior is drawn from these.
+(bodies that nearly touch again; one that stops as the other passes) the misfit has a corner, and an
+interval from slopes may be five times too narrow. So points round the fit are rolled out and
+weighed by importance (`fits/importance_sampling.py`), and the posterior is drawn from these.
 """
 
 from dataclasses import replace
@@ -12,10 +11,10 @@ from dataclasses import replace
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import SETTLED, GradientFit
-from galileo_jax.inference.fits.look_round import MOST_PARAMETERS
+from galileo_jax.inference.fits.importance_sampling import weighed
+from galileo_jax.inference.fits.posterior_check import MOST_PARAMETERS
 from galileo_jax.inference.fits.residuals import Residuals
 from galileo_jax.inference.fits.sized_density import SizedDensity
-from galileo_jax.inference.fits.weighed import weighed
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import ESS, Posterior, Status

@@ -177,7 +177,7 @@ def _is_weighed(posterior: Posterior) -> bool:
 def _has_density(posterior: Posterior) -> bool:
     """Whether `log_density` is that of the draws in z, up to a constant.
 
-    Chains run in coordinates of constant determinant (`fits/valley.py`).
+    Chains run in coordinates of constant determinant (`fits/transport_map.py`).
     """
     of_chains = "sampler" in posterior.provenance and posterior.status is not Status.FIXED_LENGTH
     return of_chains or posterior.provenance.get("method") == "grad"

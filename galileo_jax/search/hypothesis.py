@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.fits.weighed import Weighed
+from galileo_jax.inference.fits.importance_sampling import Weighed
 from galileo_jax.inference.joint_problem import JointProblem
 
 

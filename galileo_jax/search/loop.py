@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from galileo_jax.inference.fits.apart import apart
 from galileo_jax.inference.fits.descent import SAME_VALLEY_NATS, Descended, ends_of
-from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH, valleys
+from galileo_jax.inference.fits.distinct_modes import apart
 from galileo_jax.inference.fits.gradient import GradientFit
-from galileo_jax.inference.fits.weighed import weighed
+from galileo_jax.inference.fits.importance_sampling import weighed
+from galileo_jax.inference.fits.search_results import BEHIND_IN_SEARCH, valleys
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.moves import MOVES
 from galileo_jax.search.score_tests import score_tests

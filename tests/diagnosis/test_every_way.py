@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from galileo_jax.diagnosis.laws import in_model, screen
+from galileo_jax.diagnosis.laws import fit_formulas, rank_formulas
+from galileo_jax.diagnosis.laws.fit_formulas import fitted_laws
 from galileo_jax.diagnosis.laws.grammar import Structure
-from galileo_jax.diagnosis.laws.in_model import fitted_laws
-from galileo_jax.diagnosis.laws.screen import NUM_OF_FAMILY, of_family
-from tests.diagnosis.test_screen import FACTOR, RANGES, TIMES, made, sight
+from galileo_jax.diagnosis.laws.rank_formulas import NUM_OF_FAMILY, of_family
+from tests.diagnosis.test_rank_formulas import FACTOR, RANGES, TIMES, made, sight
 
 
 @pytest.fixture
@@ -18,8 +18,8 @@ def views(monkeypatch) -> Any:
     """One clip in which object 1 is pushed on over a bump."""
     away = (TIMES - 0.5) / 0.1
     seen = sight(3.0 * away * np.exp(-(away**2)))
-    monkeypatch.setattr(screen.Sight, "of", lambda view: seen)
-    monkeypatch.setattr(screen, "_ranges", lambda views: RANGES)
+    monkeypatch.setattr(rank_formulas.Sight, "of", lambda view: seen)
+    monkeypatch.setattr(rank_formulas, "_ranges", lambda views: RANGES)
     surroundings = SimpleNamespace(has_surface=True, names=("object1", "object2"))
     return [
         SimpleNamespace(model=SimpleNamespace(scene=SimpleNamespace(surroundings=surroundings)))
@@ -41,7 +41,7 @@ def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
     family = [made("slope_q", 90.0 - i, *way) for i, way in enumerate(ways)]
     evidence = {"push": 285.0, "friction": 275.0}
 
-    def fitted(trials, near, found, views):
+    def fitted(trials, near, found, views, is_weighed):
         return [
             SimpleNamespace(
                 structure=one.structure,
@@ -53,10 +53,10 @@ def test_a_push_that_the_screening_passed_over_is_fitted(monkeypatch):
             for one in found
         ]
 
-    monkeypatch.setattr(in_model, "suggestions", lambda views, wanted: family[:2])
-    monkeypatch.setattr(in_model, "of_family", lambda views, name: family)
-    monkeypatch.setattr(in_model, "_fitted", fitted)
-    monkeypatch.setattr(in_model, "without_twins", lambda laws: laws)
+    monkeypatch.setattr(fit_formulas, "suggestions", lambda views, wanted: family[:2])
+    monkeypatch.setattr(fit_formulas, "of_family", lambda views, name: family)
+    monkeypatch.setattr(fit_formulas, "_fitted", fitted)
+    monkeypatch.setattr(fit_formulas, "without_twins", lambda laws: laws)
     none: Any = None
     found = fitted_laws(none, none, [])
     assert len(found) == len(family), "each once"

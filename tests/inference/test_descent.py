@@ -9,7 +9,7 @@ from scipy.special import ndtr
 
 from galileo_jax.inference.fits.descent import FEW, Descent, GiveUp, ends_of, join
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.fits.programs import Quadratic
+from galileo_jax.inference.fits.kernels import Quadratic
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
 from galileo_jax.inference.fits.starts import scattered_starts
 from tests.oracle_trials import make_trials

@@ -9,12 +9,12 @@ import pytest
 
 from galileo_jax.inference import fit_posterior as module
 from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
-from galileo_jax.inference.fits.evidence import Code
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.fits.look_round import to_go_on_from
+from galileo_jax.inference.fits.laplace import Code
+from galileo_jax.inference.fits.posterior_check import to_go_on_from
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import Status
-from tests.inference.test_weighed import BENT, TWO, Known, points
+from tests.inference.test_importance_sampling import BENT, TWO, Known, points
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -170,5 +170,5 @@ def test_a_fit_that_is_beside_the_posterior_goes_on(is_smooth, monkeypatch):
 
 
 def test_so_many_parameters_that_no_draw_weighs_anything_are_left(monkeypatch):
-    monkeypatch.setattr("galileo_jax.inference.fits.look_round.MOST_PARAMETERS", 1)
+    monkeypatch.setattr("galileo_jax.inference.fits.posterior_check.MOST_PARAMETERS", 1)
     assert to_go_on_from([AT_THE_CORNER], CORNER, 0).shape == (0, 2)

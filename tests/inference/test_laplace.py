@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from galileo_jax.inference.fits.evidence import Code, GradientFit
+from galileo_jax.inference.fits.laplace import Code, GradientFit
 from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.laplace import laplace_posterior, two_solutions
 from galileo_jax.model.parameters import Normal, Parameter

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp as scipy_logsumexp
 
-from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.imperfect import fit_worlds
+from galileo_jax.inference.fits.importance_sampling import _log_densities
+from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.linear_clip import (
     LinearClip,
     integrated,
@@ -15,7 +16,6 @@ from galileo_jax.inference.fits.linear_clip import (
     most_probable,
 )
 from galileo_jax.inference.fits.sized_density import SizedDensity
-from galileo_jax.inference.fits.weighed import _log_densities
 from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.statespace.term import Term

@@ -9,10 +9,10 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.descent import Descended
-from galileo_jax.inference.fits.ends import Ends
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
-from galileo_jax.inference.fits.programs import Quadratic
-from galileo_jax.inference.fits.stages import before_moving
+from galileo_jax.inference.fits.incremental_shooting import before_moving
+from galileo_jax.inference.fits.kernels import Quadratic
+from galileo_jax.inference.fits.search_results import Ends
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.posterior import Status

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.inference.fits.apart import apart
-from galileo_jax.inference.fits.evidence import Code, GradientFit
-from galileo_jax.inference.fits.weighed import Weighed
+from galileo_jax.inference.fits.distinct_modes import apart
+from galileo_jax.inference.fits.importance_sampling import Weighed
+from galileo_jax.inference.fits.laplace import Code, GradientFit
 from galileo_jax.search.hypothesis import Hypothesis
 
 FIT = GradientFit(

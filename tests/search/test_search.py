@@ -11,8 +11,8 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis.laws.fit_formulas import _with_laws
 from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure
-from galileo_jax.diagnosis.laws.in_model import _with_laws
 from galileo_jax.diagnosis.laws.source import class_source, name_of
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import DECISIVE, LAPLACE_NATS, log_prior

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from galileo_jax.inference.fits.evidence import Code, GradientFit
+from galileo_jax.inference.fits.laplace import Code, GradientFit
 from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.table import Entry, Table, ask

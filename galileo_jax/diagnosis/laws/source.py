@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from galileo_jax.diagnosis.diagnosis import Law as FoundLaw
 from galileo_jax.diagnosis.laws.grammar import Structure
-from galileo_jax.diagnosis.laws.screen import constant_range
+from galileo_jax.diagnosis.laws.rank_formulas import constant_range
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.model.effects.law import Law
 from galileo_jax.model.parameters import LogNormal, Normal, Uniform

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from galileo_jax.inference.fits.programs import Quadratic, propose
+from galileo_jax.inference.fits.kernels import Quadratic, propose
 from galileo_jax.inference.fits.residuals import (
     POINTS,
     Batch,

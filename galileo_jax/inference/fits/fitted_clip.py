@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from galileo_jax.inference.fits.programs import ClipArrays, Kind, Padded
+from galileo_jax.inference.fits.kernels import ClipArrays, Kind, Padded
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import PriorTable

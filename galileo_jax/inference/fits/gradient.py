@@ -3,15 +3,15 @@
     1. Roll out `num_starts` scattered parameter vectors in one batch; keep the best few.
     2. Levenberg-Marquardt (`descent.py`) on  [ C^-1/2 (observed - predicted(z)) ; z ],  the prior
        being the second block, for all starts (and, in a diagnosis, all hypotheses) in one batch.
-    3. The same with fitted noise scales, until a new round gains nothing (`polish.py`).
+    3. The same with fitted noise scales, until a new round gains nothing (`refine.py`).
     4. Where noise does not explain what is left, or the refined starts disagree, a second search,
-       phase by phase (`stages.py`), from more starts, and round what has been found.
+       phase by phase (`incremental_shooting.py`), from more starts, and round what has been found.
     5. Where points round the fit say that the posterior is elsewhere, it goes on from these
-       (`look_round.py`).
+       (`posterior_check.py`).
     6. The normal approximation in z, with covariance (J^T J + 1)^-1; evidence by Laplace
-       (`evidence.py`).
+       (`laplace.py`).
 
-Compiled code (`programs.py`) contains no rollout. JAX can therefore cache it for every engine, and
+Compiled code (`kernels.py`) contains no rollout. JAX can therefore cache it for every engine, and
 all clips share it; clips differ only in the data they pass in. From a single distant starting point
 the search usually ends in a local optimum, because the time of the collision decides which frames
 are compared; scattered starting points cost only one batch. Which optimiser, and why:
@@ -26,18 +26,18 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from galileo_jax.inference.fits.apart import apart
 from galileo_jax.inference.fits.descent import Descended, Descent, GiveUp
-from galileo_jax.inference.fits.ends import BEHIND_IN_SEARCH, Ends
-from galileo_jax.inference.fits.evidence import Code as Code
-from galileo_jax.inference.fits.evidence import GradientFit as GradientFit
-from galileo_jax.inference.fits.evidence import laplace_fits
-from galileo_jax.inference.fits.look_round import to_go_on_from
+from galileo_jax.inference.fits.distinct_modes import apart
+from galileo_jax.inference.fits.incremental_shooting import phases
+from galileo_jax.inference.fits.laplace import Code as Code
+from galileo_jax.inference.fits.laplace import GradientFit as GradientFit
+from galileo_jax.inference.fits.laplace import laplace_fits
 from galileo_jax.inference.fits.normal_matrix import inverse
-from galileo_jax.inference.fits.polish import BEHIND as BEHIND
-from galileo_jax.inference.fits.polish import polish
+from galileo_jax.inference.fits.posterior_check import to_go_on_from
+from galileo_jax.inference.fits.refine import BEHIND as BEHIND
+from galileo_jax.inference.fits.refine import polish
 from galileo_jax.inference.fits.residuals import Batch, Residuals
-from galileo_jax.inference.fits.stages import phases
+from galileo_jax.inference.fits.search_results import BEHIND_IN_SEARCH, Ends
 from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
 from galileo_jax.inference.joint_problem import (
     NOISE_SCALE_RANGE,

@@ -27,7 +27,7 @@ import scipy.linalg
 from jaxtyping import Float
 from scipy.special import logsumexp
 
-from galileo_jax.inference.fits.evidence import GradientFit
+from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.inference.problem import Problem

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from galileo_jax.inference.fits.fitted_clip import FittedClip
-from galileo_jax.inference.fits.programs import (
+from galileo_jax.inference.fits.kernels import (
     Quadratic,
     seen_slopes_batch,
     white_batch,

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
 
-from galileo_jax.inference.fits.evidence import GradientFit
 from galileo_jax.inference.fits.fitted_clip import FittedClip
+from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.linear_clip import linear_clips, log_likelihood
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.similarity.gaussian_likelihood import Whitening

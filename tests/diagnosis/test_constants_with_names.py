@@ -8,8 +8,8 @@ from galileo_jax.diagnosis.race import Race
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis.constants_with_names import with_known_constants
 from galileo_jax.diagnosis.diagnosis import Verdict
-from galileo_jax.diagnosis.known_constants import with_known_constants
 from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter

@@ -6,15 +6,15 @@ Where the posterior is normal, all weights are alike and Z is Laplace's. Where i
 cut off by the end of a prior, they are not, and their mean is the evidence all the same. How much
 they differ says how good it is: the error of log Z is about sqrt(1 / ess - 1 / num).
 
-q has a part for each valley that was found: Student's t along it (`valley.py`), so that valleys add
-up and do not count twice where they overlap. One that bends too much for that has a second part,
-which follows its ridge (`ridge.py`). Where the hypothesis is hardly better than the one
-without its last effect, a quarter of the draws come from there: all else along that one's valley,
-the effect's own parameters from their priors. While an effect is too weak to show, its place or its
-speed may be anything, and Laplace at the best of them sees nothing of that.
+q has a part for each valley that was found: Student's t along it (`transport_map.py`), so that
+valleys add up and do not count twice where they overlap. One that bends too much for that has a
+second part, which follows its ridge (`profile_proposal.py`). Where the hypothesis is hardly better
+than the one without its last effect, a quarter of the draws come from there: all else along that
+one's valley, the effect's own parameters from their priors. While an effect is too weak to show,
+its place or its speed may be anything, and Laplace at the best of them sees nothing of that.
 
 Where few draws count all the same, half of the further ones come from a t that fits those that were
-made (`cloud.py`), a new one every time. Every draw is weighed by the mixture of all that drew.
+made (`t_proposal.py`), a new one every time. Every draw is weighed by the mixture of all that drew.
 
 Source: A. B. Owen, Monte Carlo theory, methods and examples (2013), ch. 9 (mixtures); J. Geweke,
 Bayesian inference in econometric models using Monte Carlo integration, Econometrica 57 (1989), 1317
@@ -29,11 +29,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
 
-from galileo_jax.inference.fits.cloud import Cloud, log_student_t, student_t
-from galileo_jax.inference.fits.evidence import GradientFit
+from galileo_jax.inference.fits.laplace import GradientFit
+from galileo_jax.inference.fits.profile_proposal import Ridge, bent_direction, ridge_along
 from galileo_jax.inference.fits.residuals import Batch, Residuals
-from galileo_jax.inference.fits.ridge import Ridge, bent_direction, ridge_along
-from galileo_jax.inference.fits.valley import Valley, valley_round
+from galileo_jax.inference.fits.t_proposal import Cloud, log_student_t, student_t
+from galileo_jax.inference.fits.transport_map import Valley, valley_round
 from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 

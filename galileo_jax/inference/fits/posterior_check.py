@@ -2,8 +2,8 @@
 
 Starts that agree and a misfit like noise do not prove that a fit is the best: of 60 rendered clips
 two were 6 nats behind a valley next to theirs, where boxes that part after the hit meet again a
-frame earlier. Points drawn round the fit and weighed by importance (`weighed.py`) tell: where few
-of them have all the weight, the posterior is elsewhere, and these are near it.
+frame earlier. Points drawn round the fit and weighed by importance (`importance_sampling.py`) tell:
+where few of them have all the weight, the posterior is elsewhere, and these are near it.
 """
 
 from collections.abc import Sequence
@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from galileo_jax.inference.fits.evidence import GradientFit
+from galileo_jax.inference.fits.importance_sampling import ENOUGH_ESS, weighed
+from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.residuals import Residuals
-from galileo_jax.inference.fits.weighed import ENOUGH_ESS, weighed
 
 NUM_AT_ONCE, MOST = 256, 1024  # draws, and in all where few have all the weight
 NUM_STARTS = 4

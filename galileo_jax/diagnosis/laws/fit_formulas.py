@@ -8,13 +8,19 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.comparison.bootstrap import whitened
+from galileo_jax.diagnosis.laws.formula_interpreter import MOST_NUMBERS, ActingFormulas, Spare
 from galileo_jax.diagnosis.laws.grammar import Structure, without_one_factor
-from galileo_jax.diagnosis.laws.one_program import MOST_NUMBERS, ActingFormulas, Spare
-from galileo_jax.diagnosis.laws.screen import NUM_LAWS, Shape, Suggestion, of_family, suggestions
+from galileo_jax.diagnosis.laws.rank_formulas import (
+    NUM_LAWS,
+    Shape,
+    Suggestion,
+    of_family,
+    suggestions,
+)
 from galileo_jax.diagnosis.laws.source import class_source, law_class, name_of
 from galileo_jax.diagnosis.missing_force import View
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.fits.weighed import Weighed, weighed
+from galileo_jax.inference.fits.importance_sampling import Weighed, weighed
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine

@@ -11,7 +11,7 @@ from galileo_jax.inference import metropolis
 from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.residuals import Residuals
-from galileo_jax.inference.fits.valley import (
+from galileo_jax.inference.fits.transport_map import (
     Valley,
     along,
     learned,

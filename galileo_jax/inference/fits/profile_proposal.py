@@ -2,9 +2,9 @@
 
 Along its least determined directions a posterior may be a crescent. A drag, the power of the speed
 that it grows with, and friction make up for each other over hundreds of the standard deviations of
-what is known best, and not in proportion. No map of a few powers (`valley.py`) follows that; draws
-beside the ridge count for nothing, and those that count are all from its middle: of a power that
-was known to 0.2 they said 0.08, and its evidence came out 1.6 nats too low. But at each place along
+what is known best, and not in proportion. No map of a few powers (`transport_map.py`) follows
+that; draws beside the ridge count for nothing, and those that count are all from its middle: of a
+power that was known to 0.2 they said 0.08, and its evidence came out 1.6 nats too low. But at each place along
 the way all the others are normal about where they are best:
 
     q(u) = q(a) t(others | best at a, covariance at a),    a = u along the direction
@@ -23,11 +23,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.special import logsumexp
 
-from galileo_jax.inference.fits.cloud import log_student_t, student_t
-from galileo_jax.inference.fits.evidence import GradientFit
+from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.fits.residuals import Batch, Residuals, quadratic
-from galileo_jax.inference.fits.valley import Valley
+from galileo_jax.inference.fits.t_proposal import log_student_t, student_t
+from galileo_jax.inference.fits.transport_map import Valley
 from galileo_jax.inference.joint_problem import NOISE_SD
 
 BENT = 3.0  # standard deviations of a stiffer direction, one along a direction: a map follows less

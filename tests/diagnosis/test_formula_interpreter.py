@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from galileo_jax.diagnosis.laws.grammar import structures
-from galileo_jax.diagnosis.laws.one_program import (
+from galileo_jax.diagnosis.laws.formula_interpreter import (
     NAMES,
     ActingFormulas,
     LawAsForce,
@@ -16,6 +15,7 @@ from galileo_jax.diagnosis.laws.one_program import (
     Spare,
     codes_of,
 )
+from galileo_jax.diagnosis.laws.grammar import structures
 from galileo_jax.diagnosis.laws.source import CLASS, law_class, name_of
 from galileo_jax.model.effects.effect import State
 from galileo_jax.rollout.engine_jax import _roll_out_batch

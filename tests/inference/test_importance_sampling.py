@@ -8,13 +8,13 @@ import pytest
 from scipy.optimize import minimize
 from scipy.special import logsumexp
 
-from galileo_jax.inference.fits import weighed as weighed_module
-from galileo_jax.inference.fits.cloud import Cloud
-from galileo_jax.inference.fits.evidence import Code, GradientFit
+from galileo_jax.inference.fits import importance_sampling as weighed_module
+from galileo_jax.inference.fits.importance_sampling import ENOUGH_ESS, weighed
+from galileo_jax.inference.fits.laplace import Code, GradientFit
+from galileo_jax.inference.fits.profile_proposal import bent_direction, ridge_along
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
-from galileo_jax.inference.fits.ridge import bent_direction, ridge_along
-from galileo_jax.inference.fits.valley import valley_round
-from galileo_jax.inference.fits.weighed import ENOUGH_ESS, weighed
+from galileo_jax.inference.fits.t_proposal import Cloud
+from galileo_jax.inference.fits.transport_map import valley_round
 
 STEP = 1e-5
 AGREES_NATS = 0.1  # four errors of 4096 draws

@@ -10,7 +10,7 @@ from galileo_jax.inference.fits.descent import (
     ends_of,
     in_valley,
 )
-from galileo_jax.inference.fits.programs import Quadratic
+from galileo_jax.inference.fits.kernels import Quadratic
 
 BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
 MOST_VALLEYS = 4  # that are polished

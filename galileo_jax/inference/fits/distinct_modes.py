@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from galileo_jax.inference.fits.descent import SAME_VALLEY_NATS
-from galileo_jax.inference.fits.evidence import GradientFit
+from galileo_jax.inference.fits.laplace import GradientFit
 
 MOST_ADDED, ADDS_NATS = 3, 3.0  # valleys whose evidence adds up, unless so far behind the best
 

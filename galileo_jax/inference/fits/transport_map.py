@@ -34,8 +34,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.inference.fits.evidence import GradientFit
-from galileo_jax.inference.fits.programs import FAILED
+from galileo_jax.inference.fits.kernels import FAILED
+from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.residuals import Batch, Residuals
 from galileo_jax.inference.joint_problem import NOISE_SD
 

@@ -20,7 +20,7 @@ from math import log
 import numpy as np
 
 from galileo_jax.diagnosis.laws.grammar import Structure, structures
-from galileo_jax.diagnosis.laws.sight import Sight
+from galileo_jax.diagnosis.laws.linearised_clip import Sight
 from galileo_jax.diagnosis.missing_force import View
 
 LENGTH_NATS = log(10.0)  # a second factor makes a formula a tenth as probable

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from galileo_jax.diagnosis.laws.grammar import FACTORS, Structure
-from galileo_jax.diagnosis.laws.screen import (
+from galileo_jax.diagnosis.laws.linearised_clip import Sight
+from galileo_jax.diagnosis.laws.rank_formulas import (
     BEHIND,
     NUM_LAWS,
     NUM_SINGLE,
@@ -15,7 +16,6 @@ from galileo_jax.diagnosis.laws.screen import (
     chosen,
     suggestion_of,
 )
-from galileo_jax.diagnosis.laws.sight import Sight
 
 FACTOR = {factor.label: factor for factor in FACTORS}
 RANGES = {"t": (0.0, 1.0), "q": (-0.5, 0.5)}
