@@ -18,14 +18,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from galileo_jax.diagnosis.race import Race
 
 from benchmarks import labs, tables
 from galileo_jax.api.diagnose import with_library
 from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import compare
+from galileo_jax.diagnosis.candidates import candidates_of
 from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
+from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import ranked
 from galileo_jax.experiment.belief import beliefs_of
 from galileo_jax.experiment.choose import best_first, expect
@@ -36,6 +37,8 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.loop import search
+from galileo_jax.search.table import Table
 
 PAIRS = (
     ("air_drag", "viscous_drag"),
@@ -138,8 +141,9 @@ def _of_two(
     fitter = fitter_of(trials)
     base = Hypothesis((), fitter.fit(lab.seed, effects=()))
     first = Round(base, compare(trials, base.fit, lab.seed))
-    race = Race(fitter, base, first.comparison.is_adequate, lab.seed, lambda _: None)
-    candidates = ranked(race([base, base], [(lab.effect,), (rival,)]))
+    stakes = VerdictStakes(trials, first.comparison.is_adequate)
+    table = search(Table.of(fitter, stakes, lab.seed, base), 1)
+    candidates = ranked(c for c in candidates_of(table) if c.name in (lab.effect, rival))
     beliefs = beliefs_of(Diagnosis((first,), candidates, Verdict("ambiguous", ())))
     best, *others = beliefs.of
     if all(best.log_odds - other.log_odds >= beliefs.margin for other in others):

@@ -51,7 +51,7 @@ def metropolis_posterior(
 ) -> Posterior:
     """Samples the trials' posterior, started from and tuned by a gradient fit.
 
-    Chains run in coordinates in which the fit's valley is straight (`fits/transport_map.py`). Where they
+    Chains run in coordinates in which the fit's valley is straight (`transport_map.py`). Where they
     have not converged after `FIRST_STEPS`, what they have drawn so far tunes a second run, from
     where they are, in coordinates and with proposals that suit it; it alone is returned.
 

@@ -3,19 +3,21 @@
 from typing import Any
 
 import pytest
-from galileo_jax.diagnosis.race import Race
 
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
+from galileo_jax.diagnosis.candidates import candidates_of
 from galileo_jax.diagnosis.constants_with_names import with_known_constants
 from galileo_jax.diagnosis.diagnosis import Verdict
-from galileo_jax.diagnosis.verdict import ranked
+from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.loop import search
+from galileo_jax.search.table import Table
 from tests.precision import in_64_bit
 
 FORM = next(form for form in FORMS if form.name == "drag_of_a_power")
@@ -35,8 +37,8 @@ def judged(tmp_path, noise_m):
     with in_64_bit():
         fitter = GradientFitter(trials)
         base = Hypothesis((), fitter.fit(0, effects=()))
-        race = Race(fitter, base, False, 0, lambda _: None)
-        table = ranked(race([base] * 2, [("viscous_drag",), (FORM.name,)]))
+        stakes = VerdictStakes(trials, False)
+        table = candidates_of(search(Table.of(fitter, stakes, 0, base), 1))
         evidence = {c.name: c.log_evidence for c in table}
         ahead = evidence["viscous_drag"] - evidence[FORM.name]
         return with_known_constants(trials, NAMED, table, 0), ahead

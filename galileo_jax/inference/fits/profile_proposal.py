@@ -3,9 +3,9 @@
 Along its least determined directions a posterior may be a crescent. A drag, the power of the speed
 that it grows with, and friction make up for each other over hundreds of the standard deviations of
 what is known best, and not in proportion. No map of a few powers (`transport_map.py`) follows
-that; draws beside the ridge count for nothing, and those that count are all from its middle: of a
-power that was known to 0.2 they said 0.08, and its evidence came out 1.6 nats too low. But at each place along
-the way all the others are normal about where they are best:
+that: draws beside the ridge count for nothing, and those that count are all from its middle. Of a
+power that was known to 0.2 they said 0.08, and its evidence came out 1.6 nats too low. But at each
+place along the way all the others are normal about where they are best:
 
     q(u) = q(a) t(others | best at a, covariance at a),    a = u along the direction
 
