@@ -33,7 +33,9 @@ def law(trials, truth, structure: Structure, tau: float, evidence: float) -> Fit
     """As if it had been fitted: friction twice as large at first."""
     name, source = name_of(structure), class_source(structure, [])
     own = _with_laws(trials, [structure], [source])
-    values = truth | {name: 1.0, f"{name}_tau": tau}
+    values = truth | {name: 0.5, f"{name}_tau": tau}
+    for k in ("k1", "k2") if structure.is_on_all else ("k1",):
+        values[k] = 2.0 * truth[k]  # a coefficient is that at the release
     parameters = own.model_parameters
     z = np.append(inverse(parameters, [values.get(p.name, p.absent) for p in parameters]), 0.0)
     free, none = own.free((name,)), np.empty(0)

@@ -31,6 +31,7 @@ def sight(missing_m_s2: np.ndarray, k: float = 0.2, per_m: float = 3000.0) -> Si
         path_m=(TIMES - 0.5)[None],
         speed_m_s=np.ones((1, len(TIMES))),
         moves=np.ones((1, len(TIMES)), bool),
+        start_path_m=np.array([-0.5]),
         model=SimpleNamespace(
             scene=SimpleNamespace(surroundings=SimpleNamespace(gravity=9.81, angle_rad=0.0))
         ),
