@@ -257,7 +257,7 @@ def _searched(
             on_stage("fitting the library's effects again, starting from the law")
             beside = beside_a_formula(table, law.hypothesis)
             again = search(table, 1, on_entry, beside)
-            if again.entries != table.entries:
+            if again.is_better_than(table):
                 candidates = _compared(trials, candidates_of(again), decisive, seed, compared)
                 both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
                 verdict = _judged(trials, candidates, decisive, on_stage)

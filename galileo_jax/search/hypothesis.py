@@ -10,7 +10,7 @@ from galileo_jax.inference.fits.importance_sampling import Weighed
 from galileo_jax.inference.joint_problem import JointProblem
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
     """Effects that are there, and the fit with them.
 

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from galileo_jax.search.hypothesis import Hypothesis
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Start:
     """A place in the space of all parameters from which a hypothesis is searched for.
 

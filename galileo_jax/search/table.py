@@ -38,7 +38,7 @@ class Stakes(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Entry:
     """A row of the table.
 
@@ -63,7 +63,7 @@ class Entry:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """All hypotheses fitted so far.
 
@@ -157,6 +157,11 @@ class Table:
             for parent, effects in wanted
             if ask(move, parent, frozenset(effects)) not in self.asked
         ]
+
+    def is_better_than(self, other: "Table") -> bool:
+        """Whether it has a fit that another table has not."""
+        known = {id(entry.hypothesis.fit) for entry in other.entries.values()}
+        return any(id(entry.hypothesis.fit) not in known for entry in self.entries.values())
 
     def with_entry(self, entry: Entry) -> "Table":
         """The table with a row more, or another in its place."""

@@ -76,6 +76,12 @@ def test_a_better_fit_takes_the_old_one_s_place_and_its_evidence_by_rollouts_goe
     assert old.with_fits([better], by=1.0).hypothesis is old.hypothesis
 
 
+def test_a_table_is_better_by_a_fit_that_the_other_has_not(table):
+    assert not table.is_better_than(table)
+    better = table.with_entry(entry("a", -50.0))
+    assert better.is_better_than(table)
+
+
 def test_a_move_asks_again_only_from_a_parent_whose_evidence_is_another(table):
     parent = table.named(1)[0]
     wanted = [(parent, ("b", "c"))]

@@ -158,3 +158,17 @@ def test_modes_are_of_their_size(observation):
     assert np.isfinite(patterns).all()
     # Patterns beyond the offsets stay millimetres: they shall not explain away physics.
     assert np.abs(patterns[4:]).max() < discrepancy.OFFSET_SD_M
+
+
+@pytest.mark.parametrize("largest", [30.0, 1e8])
+def test_principal_modes_have_the_patterns_covariance_whatever_their_number(largest):
+    generator = np.random.default_rng(5)
+    patterns = generator.standard_normal((40, 12)) * np.geomspace(1e-3, 1.0, 12)
+    patterns[0] = largest
+    for some in (patterns, patterns[:7]):
+        gain, basis = gaussian_likelihood.principal_modes(some)
+        exact = some.T @ some
+        assert (np.diff(gain) <= 0).all()
+        np.testing.assert_allclose(basis @ basis.T, np.eye(len(gain)), atol=1e-9)
+        left = (basis.T * gain**2) @ basis - exact
+        assert np.abs(left).max() < 1e-14 * np.trace(exact)
