@@ -20,8 +20,8 @@ from galileo_jax.similarity.discrepancy import (
     offsets,
     wander,
 )
-from galileo_jax.similarity.hit_discrepancy import HIT_STEP_SD_M
 
+HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none
 NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other in some frame
 CENTRE_SHARE = 0.1  # of a radius: how far a followed point may be from the centre
 
