@@ -12,12 +12,12 @@ import jax.numpy as jnp
 
 from galileo_jax.measurement.errors_at_rest import LEAST_SCALE
 from galileo_jax.similarity import discrepancy
+from galileo_jax.similarity.hit_steps import STEP_SD_M
 from galileo_jax.statespace.kinematics import STILL_M_S
 
 NUM_WAVES = 8
 RESTS_M_S = 1e-4  # what is slower rests, in a motion without noise
 IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
-HIT_STEP_SD_M = 1e-4  # a real hit takes a millisecond or two, a rigid one none
 HIT_END_S = 0.005  # a soft hit takes so long to end, while friction pulls the bodies apart
 HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # trackers are pulled along by what they pass
 OWN_DRIFT_SD_M = 5e-5  # ours less
@@ -72,7 +72,7 @@ def measured(
     is_after = gone > 1e-6
     at_hit = jnp.where(is_after.any(), x[:, jnp.argmax(is_after)], x[:, -1])
     along = IMPULSE_SD * normal((2, 1)) * (x - at_hit[:, None])
-    step = HIT_STEP_SD_M * normal((2, 1))
+    step = STEP_SD_M * normal((2, 1))
     # What moves no more drifts no more, and nothing pushes it any further.
     moves = jnp.abs(jnp.diff(x, prepend=x[:, :1])) > 1e-7
     moving_s = jax.lax.cummax(jnp.where(moves, times, 0.0), axis=1)

@@ -14,6 +14,7 @@ import numpy as np
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.observation.random_patterns import SMALLEST, random_patterns
+from galileo_jax.similarity.hit_steps import hit_steps
 from galileo_jax.similarity.rocking_discrepancy import rocking, rocking_frames, rocking_steps
 
 POINT_SD_M = 0.003  # how far a marked point is from the centre
@@ -122,6 +123,7 @@ def modes(
     found.extend(across_path(observation, scene, rough_sd_m))
     if not scene.has_surface and not scene.moves_in_plane:
         found.extend(_aside(position))
+    found.extend(hit_steps(observation, scene))
     for i in range(count):
         found.extend(rocking_steps(position, scene, i, _rocks(position, observation, scene, i)))
     return np.stack(found)

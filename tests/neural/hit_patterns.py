@@ -9,7 +9,6 @@ from galileo_jax.neural.film import (
     HIT_DRIFT_S,
     HIT_DRIFT_SD_M,
     HIT_END_S,
-    HIT_STEP_SD_M,
     IMPULSE_SD,
     OWN_DRIFT_SD_M,
     PUSH_S,
@@ -23,7 +22,7 @@ MIN_FRAMES_APART = 4  # to tell how fast friction pulls bodies apart
 
 
 def after_hits(position: np.ndarray, observation: Observation, is_filmed: bool) -> list[np.ndarray]:
-    """For each hit and who is in it a step, the way it goes from there; filmed, a slow drift."""
+    """For each hit and who is in it the way it goes from there; filmed, a slow drift."""
     found = []
     for i in range(1, len(position)):
         moved = first_moved(position[i, 0], observation.mask[i])
@@ -41,10 +40,9 @@ def _after(hit: int, objects: tuple[int, int], position: np.ndarray) -> list[np.
     x = position[:, 0]
     found = []
     for i in objects:
-        way, step = np.zeros_like(position), np.zeros_like(position)
+        way = np.zeros_like(position)
         way[i, 0, hit:] = IMPULSE_SD * (x[i, hit:] - x[i, hit])
-        step[i, 0, hit + 1 :] = HIT_STEP_SD_M
-        found.extend([way, step])
+        found.append(way)
     return found
 
 

@@ -16,10 +16,12 @@ from galileo_jax.similarity.discrepancy import (
     modes,
 )
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
+from galileo_jax.similarity.hit_steps import STEP_SD_M, hit_steps
 from galileo_jax.similarity.level_discrepancy import level_modes
 from galileo_jax.similarity.noise_scale import fitted_noise_scale
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT, make_surroundings
+from tests.reference_ramp import solve
 
 SCENE = make_surroundings(HIT)
 
@@ -162,3 +164,15 @@ def test_pucks_wander_in_full_however_fast():
     step = np.diff(x, axis=1)
     expected = 2 * WOBBLE_SD_M**2 * (1 - np.exp(-1 / fps / WOBBLE_S))
     assert np.sum(step**2, axis=0) == pytest.approx(np.full(count - 1, expected), rel=0.01)
+
+
+def test_a_hit_shifts_only_what_follows(hit):
+    """Of both bodies, along the way, by a tenth of a millimetre; nobody is hit, no step."""
+    hit_s = solve(HIT, hit.times_s).hit_s
+    assert hit_s is not None
+    first, second = hit_steps(hit, SCENE)
+    for i, step in enumerate((first, second)):
+        assert not step[1 - i].any() and not step[i, 1].any()
+        assert not step[..., hit.times_s < hit_s - 1 / 30].any()
+        np.testing.assert_array_equal(step[i, 0, hit.times_s > hit_s + 2 / 30], STEP_SD_M)
+    assert hit_steps(observe(replace(HIT, friction=(0.34, 0.2)), 0, noise_m=0.0), SCENE) == []
