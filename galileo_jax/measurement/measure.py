@@ -17,6 +17,7 @@ from galileo_jax.measurement.astray import Astray, find_astray, without_astray
 from galileo_jax.measurement.average_rows import with_rows_averaged
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
+from galileo_jax.measurement.coding_errors import with_coding_errors
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.errors_at_rest import with_errors_at_rest
 from galileo_jax.measurement.find_start_speed import on_ramp, start_speed
@@ -229,6 +230,7 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         return _as_declared(clip, read.observation), None
     pixels = track_once(clip)
     observation = with_errors_at_rest(observe(clip, pixels))
+    observation = with_coding_errors(clip, observation, pixels)
     observation = with_camera_modes(clip, observation, pixels)
     return with_turning(observation) if clip.turning else observation, pixels
 

@@ -50,6 +50,7 @@ class Finished:
     position_px: np.ndarray
     covariance_px2: np.ndarray
     common_px2: np.ndarray
+    shifts_px: np.ndarray
     angle_rad: np.ndarray
 
 
@@ -78,13 +79,13 @@ def finished(
     # A coder sees what is shown, before anything else is put right.
     mended = without_coding_shift(seen, coding, clock)
     seen = [
-        _at_mid_exposure(one, noise, share, piece, clock)
+        _at_mid_exposure(one.poses, noise, share, piece, clock)
         for one, (_, noise), piece, share in zip(mended, seen, pieces, shares, strict=True)
     ]
     excess = motion_variance([(poses[:, :2], noise) for poses, noise in seen], clock)
     return [
-        _anchored(poses, noise, found, piece, excess, clock)
-        for (poses, noise), found, piece in zip(seen, fits, pieces, strict=True)
+        _anchored(poses, noise, one.shifts_px, found, piece, excess, clock)
+        for (poses, noise), one, found, piece in zip(seen, mended, fits, pieces, strict=True)
     ]
 
 
@@ -94,6 +95,7 @@ def joined(pieces: Sequence[Finished], count: int) -> Finished:
         np.full((count, 2), np.nan),
         np.full((count, 2, 2), np.nan),
         np.full((count, 2, 2), np.nan),
+        np.full((count, *pieces[0].shifts_px.shape[1:]), np.nan),
         np.full(count, np.nan),
     )
     for piece in pieces:
@@ -143,6 +145,7 @@ def _at_mid_exposure(
 def _anchored(
     poses: np.ndarray,
     noise: np.ndarray,
+    shifts_px: np.ndarray,
     fits: list[Refined | None],
     piece: Piece,
     excess: np.ndarray,
@@ -185,7 +188,7 @@ def _anchored(
     angle = poses[:, 2] - anchor[2]
     arm = point_px - anchor[:2]
     position = poses[:, :2] + np.stack([rotation(a) @ arm for a in angle])
-    return Finished(position, covariance, common, angle + piece.turned_rad)
+    return Finished(position, covariance, common, shifts_px, angle + piece.turned_rad)
 
 
 def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray:

@@ -87,8 +87,7 @@ def with_silhouette(
     else:
         silhouette = silhouette + middle
     together = np.where(kept[:, None], texture, silhouette)
-    covariance = covariance + _slow_px(path) ** 2 * np.eye(2)
-    return _joined(found, kept, together, covariance)
+    return _joined(found, kept, together, covariance, _slow_px(path))
 
 
 def _joined(
@@ -96,15 +95,19 @@ def _joined(
     kept: Bool[np.ndarray, " frame"],
     place: Float[np.ndarray, "frame 2"],
     covariance: Float[np.ndarray, "frame 2 2"],
+    slow_px: float,
 ) -> Finished:
     """The track of places of which those that are `kept` are by texture."""
     used = np.isfinite(place[:, 0])
     nothing = np.where(used, 0.0, np.nan)
+    shifts_px = np.tile(nothing[:, None, None], (1, *found.shifts_px.shape[1:]))
+    shifts_px[used & ~kept, :2] = slow_px * np.eye(2)
     return Finished(
         position_px=place,
         covariance_px2=np.where(kept[:, None, None], found.covariance_px2, covariance)
         + nothing[:, None, None],
         common_px2=np.tile(nothing[:, None, None], (1, 2, 2)),
+        shifts_px=shifts_px,
         angle_rad=nothing,
     )
 
@@ -177,7 +180,7 @@ def _covariance(place: np.ndarray, clock: np.ndarray) -> Float[np.ndarray, "fram
 
 
 def _slow_px(path: Path) -> float:
-    """Standard deviation per axis of errors that follow each other, px; stated as independent ones.
+    """Standard deviation per axis of errors that follow each other, px.
 
     What is behind an object lets pixels at its rim come and go as it passes. So its area changes
     otherwise than with its distance (a parabola in time) and its smear (its speed).

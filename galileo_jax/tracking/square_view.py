@@ -94,12 +94,14 @@ class SquareView:
             back @ each @ np.swapaxes(back, -1, -2)
             for each in (found.covariance_px2, found.common_px2)
         )
+        shifts = np.einsum("ofij,ofpj->ofpi", back, found.shifts_px)
         assert clip.frame_size_px is not None  # of a video
         return replace(
             found,
             position_px=position,
             covariance_px2=covariance,
             common_px2=common,
+            shifts_px=shifts,
             frame_size_px=clip.frame_size_px,
         )
 

@@ -21,6 +21,9 @@ class Track:
       covariance_px2: `[object, frame, 2, 2]`, the error's covariance of each point.
       common_px2: the same shape, how much of that is one error of the object's first frame, which
         all its points have in common and which turns with it; 0 where pieces follow each other.
+      shifts_px: `[object, frame, pattern, 2]`, errors that follow each other: by how much a coder
+        may shift what moves beside what was taken off. Each pattern has a size of its own, about
+        standard normal, that wanders (`motion_compensation.LASTS_FRAMES`).
       angle_rad: `[object, frame]`, rotation in the image since the first frame,
         clockwise positive (x right, y down).
       is_visible: `[object, frame]`, False where the object is hidden or was lost.
@@ -32,6 +35,7 @@ class Track:
     position_px: Float[np.ndarray, "object frame 2"]
     covariance_px2: Float[np.ndarray, "object frame 2 2"]
     common_px2: Float[np.ndarray, "object frame 2 2"]
+    shifts_px: Float[np.ndarray, "object frame pattern 2"]
     angle_rad: Float[np.ndarray, "object frame"]
     is_visible: Bool[np.ndarray, "object frame"]
     frame_size_px: tuple[int, int]

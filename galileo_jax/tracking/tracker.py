@@ -113,6 +113,7 @@ def track_video(
         position_px=np.stack([item.position_px for item in objects]),
         covariance_px2=np.stack([item.covariance_px2 for item in objects]),
         common_px2=np.stack([item.common_px2 for item in objects]),
+        shifts_px=np.stack([item.shifts_px for item in objects]),
         angle_rad=np.stack([item.angle_rad for item in objects]),
         is_visible=np.stack([np.isfinite(item.angle_rad) for item in objects]),
         frame_size_px=size_px,

@@ -23,6 +23,7 @@ def track(speed_px, last):
         position_px=np.where(is_visible[..., None], place, np.nan),
         covariance_px2=none,
         common_px2=none,
+        shifts_px=np.zeros((1, FRAMES, 0, 2)),
         angle_rad=np.zeros((1, FRAMES)),
         is_visible=is_visible,
         frame_size_px=(WIDTH, HEIGHT),

@@ -23,6 +23,7 @@ def track():
         position_px=PX,
         covariance_px2=COVARIANCE_PX2,
         common_px2=np.zeros_like(COVARIANCE_PX2),
+        shifts_px=np.zeros((*COVARIANCE_PX2.shape[:2], 1, 2)),
         angle_rad=np.zeros((1, 3)),
         is_visible=np.ones((1, 3), bool),
         frame_size_px=(640, 360),

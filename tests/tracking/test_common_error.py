@@ -79,7 +79,7 @@ def seen_as(scenario: str) -> np.ndarray:
     names, times = ("one",), np.arange(FRAMES) / 60
     track = Track(
         names, times, found.position_px[None], found.covariance_px2[None],
-        found.common_px2[None], found.angle_rad[None],
+        found.common_px2[None], found.shifts_px[None], found.angle_rad[None],
         np.ones((1, FRAMES), bool), (640, 360),
     )  # fmt: skip
     clip = Clip(
@@ -115,7 +115,7 @@ def test_an_oblique_picture_has_it_in_its_own_pixels(tmp_path: Path) -> None:
         np.broadcast_to(one, (1, 4, 2, 2)) for one in (FIRST_PX2 + NOISE_PX2, FIRST_PX2)
     )
     of_view = Track(
-        ("one",), np.arange(4) / 60, there, covariance, common,
+        ("one",), np.arange(4) / 60, there, covariance, common, np.zeros((1, 4, 1, 2)),
         np.zeros((1, 4)), np.ones((1, 4), bool), view.size_px,
     )  # fmt: skip
     found = view.track(of_view, clip)

@@ -3,6 +3,7 @@ import pytest
 
 from galileo_jax.tracking.motion_compensation import (
     STEPS_PER_PX,
+    VARIES_PX,
     Coding,
     coding_shift_amplitudes_px,
     without_coding_shift,
@@ -32,7 +33,7 @@ def mended_places(paths, coding, angle_rad=STILL):
         for place, noise in paths
     ]
     return [
-        found[:, :2]
+        found.poses[:, :2]
         for found in without_coding_shift(poses, coding, np.arange(float(len(poses[0][0]))))
     ]
 
@@ -106,6 +107,20 @@ def test_whole_frames_and_what_rests_stay():
     resting = np.tile([30.0, 40.0], (FRAMES, 1))
     (alone,) = mended_places([(resting, noise)], CODING)
     np.testing.assert_array_equal(alone, resting)
+
+
+def test_what_stays_uncertain_is_a_share_of_what_is_taken_off():
+    rng = np.random.default_rng(9)
+    place, noise = seen(ACCELERATED, np.array([0.0, -0.03, 0.0]), coded(), rng)
+    poses = np.column_stack([place, np.zeros(FRAMES)])
+    (found,) = without_coding_shift([(poses, noise)], CODING, CLOCK)
+    assert found.shifts_px.shape == (FRAMES, 2 * len(STEPS_PER_PX), 2)
+    sizes = np.abs(found.shifts_px).max(axis=(0, 2)).reshape(-1, 2)
+    assert sizes.max() <= VARIES_PX
+    assert (sizes[1] > 0.9 * VARIES_PX).all(), "half pixels, along either axis"
+    assert not found.shifts_px[::12].any(), "whole frames show what is there"
+    (plain,) = without_coding_shift([(poses, noise)], Coding(np.zeros(FRAMES, bool)), CLOCK)
+    assert not plain.shifts_px.any()
 
 
 @pytest.mark.parametrize("speed", [3.0, 3.1, 3.25])
