@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.measurement.errors_at_rest import LEAST_SCALE
+from galileo_jax.measurement.errors_at_rest import LEAST_SCALE, SHIFT_SHARE
 from galileo_jax.similarity import discrepancy
 from galileo_jax.similarity.hit_steps import STEP_SD_M
 from galileo_jax.statespace.kinematics import STILL_M_S
@@ -23,7 +23,6 @@ HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # trackers are pulled along by what th
 OWN_DRIFT_SD_M = 5e-5  # ours less
 PUSH_SD_M_S2, PUSH_S = 0.05, 0.2  # of boxes that turn a little at a hit while they are close
 CLOSE_M = 0.008  # half of a box 60 mm deep, against another, each turned by some eight degrees
-SHIFT_SHARE = 0.4  # of the variance in motion, less what scatters at rest: one shift of a rest
 
 Normal = Callable[..., jax.Array]
 """Independent standard normal numbers of a shape; new ones with each call."""

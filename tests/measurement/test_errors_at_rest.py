@@ -65,6 +65,36 @@ def test_a_short_track_is_left_as_it_is():
     assert with_errors_at_rest(short) is short
 
 
+def test_the_shift_of_what_came_to_rest_is_one_error():
+    """Of a coder: a share of the errors in motion, however many frames of the rest there are."""
+    seen = filmed(0.4)
+    back = Observation(
+        seen.names,
+        seen.times_s,
+        seen.position_m[..., ::-1],
+        seen.covariance_m2[..., ::-1],
+        seen.mask,
+    )
+    found = with_errors_at_rest(back)
+    assert found.modes_m is not None
+    assert not found.modes_m[..., :55].any(), "nothing is shared by what moves"
+    shifts = found.modes_m[: len(found.modes_m) - found.num_errors]
+    assert shifts.shape == (2, 1, 2, FRAMES)
+    for axis, mode in enumerate(shifts):
+        assert not mode[0, 1 - axis].any()
+        at_rest = mode[0, axis, 75:]
+        assert (at_rest == at_rest[0]).all()
+        # Of the same frames: what is stated has two sizes, and a median may be either.
+        moving, resting = (
+            np.median(np.diag(covariance_of(found, axis))[part]) * SD_M**2
+            for part in (mode[0, axis] == 0, mode[0, axis] != 0)
+        )
+        assert at_rest[0] ** 2 == pytest.approx(0.4 * (moving - resting), rel=0.35)
+    first = with_errors_at_rest(seen)
+    shifts = 0 if first.modes_m is None else len(first.modes_m) - first.num_errors
+    assert shifts == 0, "the first picture is coded by itself"
+
+
 def at_rest_all_the_time(memory, seed, frames=60):
     """A body that nothing moves, whose errors `[1, 2, frame]` are as `memory` of those before."""
     rng, errors = np.random.default_rng(seed), np.zeros((1, 2, frames))

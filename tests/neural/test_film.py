@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.neural.film import SHIFT_SHARE, Bodies, measured, noisy
+from galileo_jax.measurement.errors_at_rest import SHIFT_SHARE
+from galileo_jax.neural.film import Bodies, measured, noisy
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import modes
 from tests.neural.hit_patterns import after_hits
