@@ -19,6 +19,7 @@ from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.coding_errors import with_coding_errors
 from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
+from galileo_jax.measurement.errors_at_rest import with_errors_at_rest
 from galileo_jax.measurement.find_start_speed import on_ramp, start_speed
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_radii import (
@@ -29,7 +30,6 @@ from galileo_jax.measurement.infer_radii import (
 )
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
-from galileo_jax.measurement.noise_at_rest import with_noise_at_rest
 from galileo_jax.measurement.path_direction import OtherWay, other_way, turned_back, way_text
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.measurement.turning import with_turning
@@ -229,7 +229,7 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
         read = read_track(clip.path, clip.track, clip, clip.fps)
         return _as_declared(clip, read.observation), None
     pixels = track_once(clip)
-    observation = with_noise_at_rest(observe(clip, pixels))
+    observation = with_errors_at_rest(observe(clip, pixels))
     observation = with_coding_errors(clip, observation, pixels)
     observation = with_camera_modes(clip, observation, pixels)
     return with_turning(observation) if clip.turning else observation, pixels

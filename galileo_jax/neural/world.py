@@ -17,7 +17,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.measurement.noise_at_rest import LEAST_SCALE
+from galileo_jax.measurement.errors_at_rest import LEAST_SCALE
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.effects.nuisances import (
     NUISANCES,

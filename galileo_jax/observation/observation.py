@@ -31,8 +31,8 @@ class Observation:
         between frames).
       mask: `[object, frame]`, True where the point was measured.
       modes_m: `[mode, object, 2, frame]`, m: errors that many frames share, each as one standard
-        deviation of it moves the track: a number declared about the camera (corners, lens), the
-        shift with which a coder holds what has come to rest; None where there are none.
+        deviation of it moves the track: a number declared about the camera (corners, lens), what
+        a coder repeats of an error; None where there are none.
       num_errors: how many of `modes_m`, the last, are errors that follow each other in time: unlike
         imperfections, which a good clip need not have, these are there.
       is_turning: the third axis is how far each object has turned, rad, not a place.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.noise_at_rest import LEAST_SCALE, with_noise_at_rest
+from galileo_jax.measurement.errors_at_rest import LEAST_SCALE, with_errors_at_rest
 from galileo_jax.observation.observation import Observation
 
 FRAMES, SD_M = 120, 1e-4
@@ -24,7 +24,7 @@ def filmed(noise_at_rest, seed=81):
 
 
 def scales(observation):
-    found = with_noise_at_rest(observation)
+    found = with_errors_at_rest(observation)
     assert (found.covariance_m2[:, 0, 1] == 0).all()
     variance = np.diag(covariance_of(found, 0)) * SD_M**2
     return np.sqrt(variance / observation.covariance_m2[0, 0, 0])
@@ -62,7 +62,7 @@ def test_a_short_track_is_left_as_it_is():
         whole.covariance_m2[..., :8],
         whole.mask[:, :8],
     )
-    assert with_noise_at_rest(short) is short
+    assert with_errors_at_rest(short) is short
 
 
 def test_the_shift_of_what_came_to_rest_is_one_error():
@@ -75,7 +75,7 @@ def test_the_shift_of_what_came_to_rest_is_one_error():
         seen.covariance_m2[..., ::-1],
         seen.mask,
     )
-    found = with_noise_at_rest(back)
+    found = with_errors_at_rest(back)
     assert found.modes_m is not None
     assert not found.modes_m[..., :55].any(), "nothing is shared by what moves"
     shifts = found.modes_m[: len(found.modes_m) - found.num_errors]
@@ -90,7 +90,7 @@ def test_the_shift_of_what_came_to_rest_is_one_error():
             for part in (mode[0, axis] == 0, mode[0, axis] != 0)
         )
         assert at_rest[0] ** 2 == pytest.approx(0.4 * (moving - resting), rel=0.35)
-    first = with_noise_at_rest(seen)
+    first = with_errors_at_rest(seen)
     shifts = 0 if first.modes_m is None else len(first.modes_m) - first.num_errors
     assert shifts == 0, "the first picture is coded by itself"
 
@@ -121,7 +121,7 @@ def test_errors_that_follow_each_other_are_told_from_independent_ones(memory):
     """The mean of a rest is as uncertain as it is, and whitened errors are independent."""
     of_mean, lags, squares = [], [], []
     for seed in range(30):
-        seen = with_noise_at_rest(at_rest_all_the_time(memory, seed))
+        seen = with_errors_at_rest(at_rest_all_the_time(memory, seed))
         for axis in range(2):
             cover = covariance_of(seen, axis)
             of_mean.append(cover.mean())
@@ -143,7 +143,7 @@ def test_a_slow_start_is_no_error_of_the_rest():
     moved = seen.position_m.copy()
     moved[0, 0, -4:] += SD_M * np.array([2.0, 8.0, 20.0, 40.0])
     starts = Observation(seen.names, seen.times_s, moved, seen.covariance_m2, seen.mask)
-    without, found = (covariance_of(with_noise_at_rest(one), 0) for one in (seen, starts))
+    without, found = (covariance_of(with_errors_at_rest(one), 0) for one in (seen, starts))
     assert np.median(np.diag(found)[:50]) == pytest.approx(
         np.median(np.diag(without)[:50]), rel=0.2
     )
