@@ -1,15 +1,11 @@
-"""The rigid engine's other half: one body that slides on nothing.
+"""One body that slides on nothing: a fall, a flight, a swing on a spring, a body in a liquid.
 
-A fall, a flight, a swing on a spring, a body in a liquid: between bounces the motion is smooth,
-and a Runge-Kutta step of 1/240 s is of fourth order. A bounce is met at its time, by Newton's
-method on the step itself, so that the motion is a continuous function of the parameters with the
-right derivatives, as in `engine_rigid`.
-
-On a straight path the forces act along it; in the plane gravity is a vector, the effects' forces
-act along the velocity, and the path is how far the body has come along its curve.
+Between bounces the motion is smooth, and a Runge-Kutta step of 1/240 s is of fourth order. On a
+straight path the forces act along it; in the plane gravity is a vector, the effects' forces act
+along the velocity, and the path is how far the body has come along its curve.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -18,12 +14,18 @@ from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import recorded, step_by_events
+from galileo_jax.rollout.events import (
+    Motion,
+    System,
+    rolled_out,
+    runge_kutta,
+    to_crossing,
+    total,
+)
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 
 MAX_BOUNCES = 8  # within one recorded step
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
-NEWTON_STEPS = 3
 STILL_M2_S2 = 1e-18  # keeps the derivative of the speed finite at rest
 
 
@@ -39,54 +41,42 @@ class Body(NamedTuple):
     velocity_m_s: Float[jax.Array, " axis"]
     way_m: Float[jax.Array, ""]
 
-    def moved(self, rate: "Body", time_s: Any) -> "Body":
-        """With constant rates for a time."""
-        return Body(*(value + time_s * change for value, change in zip(self, rate, strict=True)))
 
-
-Rate = Callable[[Body, jax.Array], Body]
-
-
+@rolled_out
 def roll_out(
     effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
+    named: Mapping[str, jax.Array],
     scene: Surroundings,
-    count: jax.Array | None = None,
-    acts: jax.Array | None = None,
-) -> tuple[jax.Array, jax.Array]:
-    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
-
-    Of records beyond the first `count` the centres are as in the last of these.
-    """
-    named = {name: theta[i] for i, name in enumerate(names)}
+    dt_s: float,
+    acts: jax.Array | None,
+) -> System:
+    """One body that slides on nothing."""
     law = dynamics(effects, scene, named, jnp, acts)
-    start = jnp.asarray(scene.start_m)[0]
     tangent = _along(law, scene, jnp)
     floor = floor_of(effects, named, scene)
     velocity = start_velocity(effects, named, scene)
-    body = Body(
-        start + law.start_m[0] * tangent,
+    start = Body(
+        jnp.asarray(scene.start_m)[0] + law.start_m[0] * tangent,
         law.start_speed_m_s[0] * tangent if velocity is None else velocity[0],
         jnp.zeros(()),
     )
 
-    def step(body: Body, index: jax.Array) -> Body:
-        return _step(body, index * dt_s, dt_s, law, scene, floor)
+    def advance(body: Body, time_s: jax.Array, left_s: jax.Array, is_last: Any):
+        if floor is None:
+            return _moved(body, time_s, left_s, law, scene, rests=False), left_s
+        return _to_bounce(body, time_s, left_s, is_last, law, scene, floor)
 
-    bodies = recorded(step, body, num_records, count)
-    return bodies.position_m.T[None], bodies.velocity_m_s.T[None]
+    def seen(bodies: Body, _: jax.Array) -> Motion:
+        return bodies.position_m.T[None], bodies.velocity_m_s.T[None]
+
+    return System(start, advance, 1 if floor is None else MAX_BOUNCES, seen)
 
 
 def start_velocity(
     effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings
 ) -> Any | None:
     """The velocity in the plane at the start, `[..., object, 2]`; None on a straight path."""
-    given = [e.start_velocity(theta, scene) for e in effects]
-    found = [velocity for velocity in given if velocity is not None]
-    return sum(found[1:], found[0]) if found else None
+    return total([e.start_velocity(theta, scene) for e in effects])
 
 
 def floor_of(
@@ -142,24 +132,11 @@ def _upward(scene: Surroundings, xp: Any) -> Any:
     return xp.asarray([axis == 1 for axis in range(scene.num_axes)])
 
 
-def _step(
-    body: Body,
-    time_s: jax.Array,
-    dt_s: float,
-    law: Dynamics,
-    scene: Surroundings,
-    floor: Bounce | None,
+def _moved(
+    body: Body, time_s: Any, spent_s: jax.Array, law: Dynamics, scene: Surroundings, rests: Any
 ) -> Body:
-    """One recorded step, bounce by bounce."""
-    if floor is None:
-        return _runge_kutta(
-            body, lambda at, t: rates(at, t, law, scene, rests=False), time_s, jnp.asarray(dt_s)
-        )
-
-    def advance(body: Body, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
-        return _to_bounce(body, time_s, left_s, is_last, law, scene, floor)
-
-    return step_by_events(advance, body, time_s, dt_s, MAX_BOUNCES)
+    """The body after a time without a bounce."""
+    return runge_kutta(lambda at, t: rates(at, t, law, scene, rests), body, time_s, spent_s)
 
 
 def _to_bounce(
@@ -171,57 +148,26 @@ def _to_bounce(
     scene: Surroundings,
     floor: Bounce,
 ) -> tuple[Body, jax.Array]:
-    """Moves on to the next bounce, or by `left_s`; returns the body and the time it took.
+    """Moves on to the next bounce, or by `left_s`; what bounces faster than the last rests."""
+    upward = _upward(scene, jnp)
+    rests = (body.position_m[1] <= floor.height_m) & (body.velocity_m_s[1] == 0)
 
-    When `is_last`, by `left_s` in any case: what bounces faster than that rests.
-    """
-    height, climbs = body.position_m[1] - floor.height_m, body.velocity_m_s[1]
-    rests = (height <= 0) & (climbs == 0)
+    def level(at: Body, _: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return at.position_m[1] - floor.height_m, at.velocity_m_s[1]
+
+    def bounced(at: Body, _: jax.Array) -> Body:
+        falls = -at.velocity_m_s[1]
+        rebound = jnp.where((falls > PLASTIC_M_S) & ~is_last, floor.restitution * falls, 0.0)
+        return at._replace(
+            position_m=jnp.where(upward, floor.height_m, at.position_m),
+            velocity_m_s=jnp.where(upward, rebound, at.velocity_m_s * (1 - floor.grip)),
+        )
 
     def after(spent_s: jax.Array) -> Body:
-        return _runge_kutta(body, lambda at, t: rates(at, t, law, scene, rests), time_s, spent_s)
+        return _moved(body, time_s, spent_s, law, scene, rests)
 
-    whole = after(left_s)
-    sinks = left_s * climbs - (whole.position_m[1] - body.position_m[1])
-    hits = (whole.position_m[1] < floor.height_m) & ~rests
-    # On a parabola through the step's ends; then on the step itself.
-    a = jnp.where(hits, 2 * sinks / left_s**2, 1.0)
-    root = jnp.sqrt(jnp.maximum(climbs**2 + 2 * a * height, 0.0))
-    steady = jnp.abs(a) < 1e-6
-    at = jnp.where(steady, -height / jnp.where(steady, climbs, 1.0), (climbs + root) / a)
-    at = jax.lax.stop_gradient(jnp.clip(jnp.where(hits, at, left_s), 0.0, left_s))
-    for _ in range(NEWTON_STEPS):
-        # The last of the steps carries the derivative of the instant.
-        there = after(jax.lax.stop_gradient(at))
-        miss, speed = there.position_m[1] - floor.height_m, there.velocity_m_s[1]
-        way = jax.lax.stop_gradient(jnp.where(hits & (speed < 0), speed, -1.0))
-        at = jnp.where(hits, jnp.clip(jax.lax.stop_gradient(at) - miss / way, 0.0, left_s), left_s)
-    there = after(at)
-    vy, upward = there.velocity_m_s[1], _upward(scene, jnp)
-    rebound = jnp.where(-vy > PLASTIC_M_S, -floor.restitution * vy, 0.0)
-    rebound = jnp.where(is_last, 0.0, rebound)
-    bounced = Body(
-        jnp.where(upward, floor.height_m, there.position_m),
-        jnp.where(upward, rebound, there.velocity_m_s * (1 - floor.grip)),
-        there.way_m,
-    )
-    found = jax.tree.map(lambda one, other: jnp.where(hits, one, other), bounced, whole)
-    return found, jnp.where(is_last, left_s, at)
-
-
-def _runge_kutta(body: Body, rate: Rate, time_s: jax.Array, h: jax.Array) -> Body:
-    """One step of the classical fourth-order method."""
-    first = rate(body, time_s)
-    second = rate(body.moved(first, 0.5 * h), time_s + 0.5 * h)
-    third = rate(body.moved(second, 0.5 * h), time_s + 0.5 * h)
-    fourth = rate(body.moved(third, h), time_s + h)
-    mean = Body(
-        *(
-            (a + 2 * b + 2 * c + d) / 6
-            for a, b, c, d in zip(first, second, third, fourth, strict=True)
-        )
-    )
-    return body.moved(mean, h)
+    found, spent_s = to_crossing(body, after, level, bounced, left_s, ~rests)
+    return found, jnp.where(is_last, left_s, spent_s)
 
 
 class EngineFree(EngineJax):

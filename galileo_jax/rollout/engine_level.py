@@ -10,7 +10,7 @@ Discs that touch and press, or are pressed against a wall, are held apart by sma
 Walls have no thickness: a disc is on that side on which its centre is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
 
@@ -21,7 +21,7 @@ import numpy as np
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.rollout.engine_free import start_velocity
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import recorded, step_by_events
+from galileo_jax.rollout.events import Motion, System, rolled_out, total
 from galileo_jax.rollout.level_discs import ROOT2, Discs, Table, length
 from galileo_jax.rollout.level_hits import after_bounce, after_hit, bounce_times_s, hit_times_s
 from galileo_jax.rollout.motion import dynamics, state_at
@@ -29,36 +29,22 @@ from galileo_jax.rollout.motion import dynamics, state_at
 MAX_EVENTS = 16  # within one recorded step
 
 
+@rolled_out
 def roll_out(
     effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
+    named: Mapping[str, jax.Array],
     scene: Surroundings,
-    count: jax.Array | None = None,
-    acts: jax.Array | None = None,
-) -> tuple[jax.Array, jax.Array]:
-    """One rollout: `[parameter]` to centres and velocities, each `[object, axis, record]`.
-
-    The third axis, where the track has one, is the turning, rad. Of records beyond the first
-    `count` places are as in the last of these.
-    """
-    named = {name: theta[i] for i, name in enumerate(names)}
-    law = dynamics(effects, scene, named, jnp, acts)
-    rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
+    dt_s: float,
+    acts: jax.Array | None,
+) -> System:
+    """Discs on a level table; the track's third axis, where it has one, is the turning, rad."""
+    shown = _magnified(effects, named, scene)
+    table = _table(effects, named, scene, acts, shown)
     velocity = start_velocity(effects, named, scene)
     assert velocity is not None  # the pucks' law gives one
-    seen = jnp.asarray(scene.start_m)
-    shown = _magnified(effects, named, scene)
-    walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
-    if walls is not None:
-        walls = walls._replace(ends_m=seen[0, :2] + (walls.ends_m - seen[0, :2]) / shown)
-    beside = _sum([e.pressure(named, scene) for e in effects])
-    oval = _sum([e.oval(named, scene) for e in effects])
-    table = Table(law, rims, jnp.asarray(scene.half_length_m), walls, beside, oval)
+    first = jnp.asarray(scene.start_m)
     # Starts and turning as the camera's scale will show them.
-    start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
+    start = first[0, :2] + (first[:, :2] - first[0, :2]) / shown + table.rims.offset_m
     discs = Discs(
         jnp.concatenate([start, jnp.zeros((len(start), 1))], axis=1),
         jnp.concatenate(
@@ -67,42 +53,53 @@ def roll_out(
         jnp.zeros(len(scene.names)),
     )
 
-    def step(discs: Discs, index: jax.Array) -> Discs:
-        return _step(discs, index * dt_s, dt_s, table, scene)
+    def advance(discs: Discs, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
+        return _to_next_event(discs, time_s, left_s, is_last, table, scene)
 
-    found = recorded(step, discs, num_records, count)
-    place, speed = (jnp.moveaxis(each, 0, -1) for each in (found.place_m, found.speed_m_s))
-    if scene.num_axes == 2:
-        return place[:, :2], speed[:, :2]
-    per_turn = ROOT2 / table.radius_m[:, None, None] / shown
-    turned = seen[0, 2] + (seen[:, 2:, None] - seen[0, 2]) / shown + per_turn * place[:, 2:]
-    return (
-        jnp.concatenate([place[:, :2], turned], axis=1),
-        jnp.concatenate([speed[:, :2], per_turn * speed[:, 2:]], axis=1),
+    def seen(discs: Discs, _: jax.Array) -> Motion:
+        place, speed = (jnp.moveaxis(each, 0, -1) for each in (discs.place_m, discs.speed_m_s))
+        if scene.num_axes == 2:
+            return place[:, :2], speed[:, :2]
+        per_turn = ROOT2 / table.radius_m[:, None, None] / shown
+        turned = first[0, 2] + (first[:, 2:, None] - first[0, 2]) / shown + per_turn * place[:, 2:]
+        return (
+            jnp.concatenate([place[:, :2], turned], axis=1),
+            jnp.concatenate([speed[:, :2], per_turn * speed[:, 2:]], axis=1),
+        )
+
+    return System(discs, advance, MAX_EVENTS, seen)
+
+
+def _table(
+    effects: tuple[Effect, ...],
+    named: Mapping[str, jax.Array],
+    scene: Surroundings,
+    acts: jax.Array | None,
+    shown: jax.Array,
+) -> Table:
+    """What does not change in a rollout; `shown`: how many times as large lengths look."""
+    rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
+    walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
+    if walls is not None:
+        origin = jnp.asarray(scene.start_m)[0, :2]
+        walls = walls._replace(ends_m=origin + (walls.ends_m - origin) / shown)
+    return Table(
+        dynamics(effects, scene, named, jnp, acts),
+        rims,
+        jnp.asarray(scene.half_length_m),
+        walls,
+        total([e.pressure(named, scene) for e in effects]),
+        total([e.oval(named, scene) for e in effects]),
     )
 
 
-def _sum(found: Sequence[Any | None]) -> Any | None:
-    given = [each for each in found if each is not None]
-    return sum(given[1:], given[0]) if given else None
-
-
-def _magnified(effects: tuple[Effect, ...], named: dict[str, Any], scene: Surroundings) -> Any:
+def _magnified(effects: tuple[Effect, ...], named: Mapping[str, Any], scene: Surroundings) -> Any:
     """How many times as large as they are the camera shows lengths (about object 1's start)."""
     origin = jnp.asarray(scene.start_m)[:, :, None]
     ends = jnp.concatenate([origin, origin + 1.0], axis=-1)
     for effect in effects:
         ends = effect.measure(ends, named, scene)
     return ends[0, 0, 1] - ends[0, 0, 0]
-
-
-def _step(discs: Discs, time_s: jax.Array, dt_s: float, table: Table, scene: Surroundings) -> Discs:
-    """One recorded step, event by event."""
-
-    def advance(discs: Discs, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
-        return _to_next_event(discs, time_s, left_s, is_last, table, scene)
-
-    return step_by_events(advance, discs, time_s, dt_s, MAX_EVENTS)
 
 
 def _to_next_event(

@@ -19,20 +19,18 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import recorded, step_by_events
+from galileo_jax.rollout.events import Motion, System, rolled_out, runge_kutta, to_crossing, total
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 from galileo_jax.runtime.errors import InputError
 
 SUBSTEPS = 2
 MAX_EVENTS = 4  # within one recorded step
-NEWTON_STEPS = 3
 
 
 class Pendulum(NamedTuple):
@@ -67,10 +65,10 @@ def make_pendulum(
 ) -> Pendulum:
     """Puts parameters (numbers) and effects together."""
     length = theta[LENGTH]
-    given = [s for e in effects if (s := e.stretch(theta, scene)) is not None]
+    stretch = total([0.0 * length, *(e.stretch(theta, scene) for e in effects)])
     rubs = any(e.friction(theta, scene) is not None for e in effects)
     law = dynamics(effects, scene, theta, xp, acts)
-    return Pendulum(law, length, sum(given, 0.0 * length), rubs)
+    return Pendulum(law, length, stretch, rubs)
 
 
 def start(theta: Mapping[str, Any], pendulum: Pendulum) -> Swing:
@@ -124,48 +122,33 @@ def place(swing: Swing, turns: Any, pendulum: Pendulum, first: Swing, scene: Sur
     return pivot + radius(swing) * away, speed * along + grows * away
 
 
+@rolled_out
 def roll_out(
     effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
+    named: Mapping[str, jax.Array],
     scene: Surroundings,
-    count: jax.Array | None = None,
-    acts: jax.Array | None = None,
-) -> tuple[Float[jax.Array, "object 2 record"], Float[jax.Array, "object 2 record"]]:
-    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
-
-    Of records beyond the first `count` the centres are as in the last of these.
-    """
-    named = {name: theta[i] for i, name in enumerate(names)}
+    dt_s: float,
+    acts: jax.Array | None,
+) -> System:
+    """A bob on a circle."""
     pendulum = make_pendulum(effects, named, scene, jnp, acts)
     first = start(named, pendulum)
 
-    def step(swing: Swing, index: jax.Array) -> Swing:
-        return _step(swing, index * dt_s, dt_s, pendulum, scene)
-
-    def seen(swing: Swing, index: jax.Array):
-        way = jnp.sign(swing.turning_rad_s) if pendulum.has_friction else 0.0
-        turns = rates(swing, index * dt_s, way, pendulum, scene)[0].turning_rad_s
-        return place(swing, turns, pendulum, first, scene)
-
-    swings = recorded(step, first, num_records, count)
-    position, velocity = jax.vmap(seen)(swings, jnp.arange(num_records))
-    return position.T[None], velocity.T[None]
-
-
-def _step(
-    swing: Swing, time_s: jax.Array, dt_s: float, pendulum: Pendulum, scene: Surroundings
-) -> Swing:
-    """One recorded step, from one turning back to the next."""
-    if not pendulum.has_friction:
-        return _integrated(swing, time_s, jnp.asarray(dt_s), 0.0, pendulum, scene)
-
-    def advance(swing: Swing, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
+    def advance(swing: Swing, time_s: jax.Array, left_s: jax.Array, is_last: Any):
+        if not pendulum.has_friction:
+            return _moved(swing, time_s, left_s, 0.0, pendulum, scene), left_s
         return _to_turn(swing, time_s, left_s, is_last, pendulum, scene)
 
-    return step_by_events(advance, swing, time_s, dt_s, MAX_EVENTS)
+    def seen(swings: Swing, times_s: jax.Array) -> Motion:
+        def one(swing: Swing, time_s: jax.Array) -> Motion:
+            way = jnp.sign(swing.turning_rad_s) if pendulum.has_friction else 0.0
+            turns = rates(swing, time_s, way, pendulum, scene)[0].turning_rad_s
+            return place(swing, turns, pendulum, first, scene)
+
+        position, velocity = jax.vmap(one)(swings, times_s)
+        return position.T[None], velocity.T[None]
+
+    return System(first, advance, MAX_EVENTS if pendulum.has_friction else 1, seen)
 
 
 def _to_turn(
@@ -181,41 +164,22 @@ def _to_turn(
     starts = jnp.where(excess > 0, jnp.sign(pulled.turning_rad_s), 0.0)
     way = jnp.where(swing.turning_rad_s == 0, starts, jnp.sign(swing.turning_rad_s))
 
+    def level(at: Swing, spent_s: jax.Array) -> tuple[jax.Array, jax.Array]:
+        speeds_up = rates(at, time_s + spent_s, way, pendulum, scene)[0].turning_rad_s
+        return at.turning_rad_s * way, speeds_up * way
+
+    def turned(at: Swing, _: jax.Array) -> Swing:
+        return at._replace(turning_rad_s=jnp.zeros_like(at.turning_rad_s))
+
     def after(spent_s: jax.Array) -> Swing:
-        return _integrated(swing, time_s, spent_s, way, pendulum, scene)
+        return _moved(swing, time_s, spent_s, way, pendulum, scene)
 
-    whole = after(left_s)
-    turns = whole.turning_rad_s * way < 0
-    begin, end = (
-        rates(at, t, way, pendulum, scene)[0].turning_rad_s
-        for at, t in ((swing, time_s), (whole, time_s + left_s))
-    )
-    at = _zero(swing.turning_rad_s, whole.turning_rad_s, begin * left_s, end * left_s, turns)
-    at = jnp.where(turns, at * left_s, left_s)
-    turned = Swing(after(at).angle_rad, jnp.zeros_like(at))
-    found = jax.tree.map(lambda one, other: jnp.where(turns, one, other), turned, whole)
+    found, spent_s = to_crossing(swing, after, level, turned, left_s, way != 0)
     found = jax.tree.map(lambda one, other: jnp.where(way == 0, one, other), swing, found)
-    return found, jnp.where(is_last, left_s, at)
+    return found, jnp.where(is_last, left_s, spent_s)
 
 
-def _zero(first: Any, last: Any, rise: Any, rise_at_last: Any, is_there: Any) -> jax.Array:
-    """Where in [0, 1] the cubic with these values and slopes at its ends is zero; else anything.
-
-    A step is a hundredth of a swing: the cubic is off by less than 1e-7 of the turning.
-    """
-    bend, twist = 3 * (last - first) - 2 * rise - rise_at_last, 2 * (first - last) + rise
-    twist = twist + rise_at_last
-    at = jnp.clip(-first / jnp.where(is_there, last - first, 1.0), 0.0, 1.0)
-    for _ in range(NEWTON_STEPS):
-        # The last of the steps carries the derivative of the instant.
-        at = jax.lax.stop_gradient(at)
-        value = first + at * (rise + at * (bend + at * twist))
-        slope = jax.lax.stop_gradient(rise + at * (2 * bend + 3 * at * twist))
-        at = jnp.clip(at - value / jnp.where(is_there, slope, 1.0), 0.0, 1.0)
-    return at
-
-
-def _integrated(
+def _moved(
     swing: Swing,
     time_s: jax.Array,
     spent_s: jax.Array,
@@ -223,22 +187,14 @@ def _integrated(
     pendulum: Pendulum,
     scene: Surroundings,
 ) -> Swing:
-    h = spent_s / SUBSTEPS
+    """The bob after a time in which it does not turn back."""
+    step_s = spent_s / SUBSTEPS
 
     def rate(at: Swing, t: jax.Array) -> Swing:
         return rates(at, t, way, pendulum, scene)[0]
 
-    def moved(at: Swing, by: Swing, h: Any) -> Swing:
-        return Swing(*(value + h * change for value, change in zip(at, by, strict=True)))
-
     def substep(index: Any, at: Swing) -> Swing:
-        t = time_s + index * h
-        first = rate(at, t)
-        second = rate(moved(at, first, 0.5 * h), t + 0.5 * h)
-        third = rate(moved(at, second, 0.5 * h), t + 0.5 * h)
-        fourth = rate(moved(at, third, h), t + h)
-        four = zip(first, second, third, fourth, strict=True)
-        return moved(at, Swing(*((a + 2 * b + 2 * c + d) / 6 for a, b, c, d in four)), h)
+        return runge_kutta(rate, at, time_s + index * step_s, step_s)
 
     return jax.lax.fori_loop(0, SUBSTEPS, substep, swing)
 
