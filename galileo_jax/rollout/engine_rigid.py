@@ -88,7 +88,7 @@ def _exact_part(
 
     unseen = jax.tree.map(lambda number: jnp.broadcast_to(number, since_s.shape), bodies)
     start = _Seen(bodies, unseen)
-    end = step_by_events(advance, start, time_s, jnp.asarray(whole_s), PART * MAX_EVENTS)
+    end = step_by_events(advance, start, time_s, whole_s, PART * MAX_EVENTS)
     return end.now, end.at_records
 
 

@@ -49,19 +49,10 @@ class System(NamedTuple):
     part: Part | None = None
 
 
-class SystemOf(Protocol):
-    """Parameters by name, and a scene, to what moves in it."""
-
-    def __call__(
-        self,
-        effects: tuple[Effect, ...],
-        named: Mapping[str, jax.Array],
-        scene: Surroundings,
-        dt_s: float,
-        acts: jax.Array | None,
-    ) -> System:
-        """The system; `dt_s` from record to record."""
-        ...
+SystemOf = Callable[
+    [tuple[Effect, ...], Mapping[str, jax.Array], Surroundings, float, jax.Array | None], System
+]
+"""Effects, parameters by name, scene, seconds from record to record, and which effects act."""
 
 
 class RollOut(Protocol):
@@ -71,7 +62,7 @@ class RollOut(Protocol):
     wanted. `acts` `[effect]` as in `motion.dynamics`.
     """
 
-    def __call__(
+    def __call__(  # noqa: D102 - above
         self,
         effects: tuple[Effect, ...],
         names: tuple[str, ...],
@@ -81,9 +72,7 @@ class RollOut(Protocol):
         scene: Surroundings,
         count: jax.Array | None = None,
         acts: jax.Array | None = None,
-    ) -> Motion:
-        """The motion."""
-        ...
+    ) -> Motion: ...
 
 
 def rolled_out(system_of: SystemOf) -> RollOut:
@@ -101,9 +90,8 @@ def rolled_out(system_of: SystemOf) -> RollOut:
     ) -> Motion:
         named = {name: theta[i] for i, name in enumerate(names)}
         system = system_of(effects, named, scene, dt_s, acts)
-        return system.seen(
-            recorded(system, num_records, dt_s, count), dt_s * jnp.arange(num_records)
-        )
+        states = recorded(system, num_records, dt_s, count)
+        return system.seen(states, dt_s * jnp.arange(num_records))
 
     for name in ("__doc__", "__module__", "__name__", "__qualname__"):  # its program's name on disk
         setattr(roll_out, name, getattr(system_of, name))
@@ -121,9 +109,7 @@ def recorded(system: System, num_records: int, dt_s: float, count: jax.Array | N
     """
 
     def step(state: Any, index: jax.Array) -> tuple[Any, Any]:
-        after = step_by_events(
-            system.advance, state, index * dt_s, jnp.asarray(dt_s), system.most_events
-        )
+        after = step_by_events(system.advance, state, index * dt_s, dt_s, system.most_events)
         return after, state
 
     def stepped(state: Any, first: jax.Array) -> tuple[Any, Any]:
@@ -154,11 +140,12 @@ def recorded(system: System, num_records: int, dt_s: float, count: jax.Array | N
 
 
 def step_by_events(
-    advance: Advance, state: State, time_s: Any, dt_s: jax.Array, most_events: int
+    advance: Advance, state: State, time_s: Any, dt_s: Any, most_events: int
 ) -> State:
     """The state a time `dt_s` later; `advance` and `most_events` as of `System`."""
+    whole_s = jnp.asarray(dt_s)
     if most_events == 1:
-        return advance(state, time_s, dt_s, True)[0]
+        return advance(state, time_s, whole_s, True)[0]
 
     def is_left(carry: tuple[State, jax.Array, Any]) -> jax.Array:
         _, left, count = carry
@@ -169,7 +156,7 @@ def step_by_events(
         state, spent = advance(state, time_s + dt_s - left, left, count == most_events - 1)
         return state, left - spent, count + 1
 
-    return jax.lax.while_loop(is_left, phase, (state, dt_s, 0))[0]
+    return jax.lax.while_loop(is_left, phase, (state, whole_s, 0))[0]
 
 
 def runge_kutta(
