@@ -11,11 +11,13 @@ import numpy as np
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.model.effects.laws.liquid import Liquid
 from galileo_jax.observation.observation import Observation
+from galileo_jax.simulation import clip_files
 from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
 from galileo_jax.simulation.filming import film, plane_camera, plane_filming
 from galileo_jax.simulation.free import WATER_KG_M3, FreeTruth, draw_free, hide_free, solve_free
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.motion import Motion
+from galileo_jax.simulation.record import plane_record
 from galileo_jax.simulation.settings import Settings
 from galileo_jax.video import synthetic
 
@@ -38,7 +40,14 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
     motion, bounces = solve_free(truth)
     frames = sampled_motion(truth, motion, settings.fps, settings.seconds or truth.seconds)
     content = declared_content(truth, settings.fps)
-    record = _record(out.stem, settings, truth, frames, bounces)
+    record = plane_record(out.stem, settings, truth, frames) | {
+        "events_s": {"bounces": [round(t + _start_s(truth), 4) for t in bounces]},
+        "trajectory": {
+            "t": np.round(frames.times_s, 6).tolist(),
+            "x": np.round(frames.position_m[0, 0], 6).tolist(),
+            "y": np.round(frames.position_m[0, 1], 6).tolist(),
+        },
+    }
     if settings.track_only:
         write_observation_csv(out, noisy_track(truth, frames, settings.track_noise, looks))
         content = {"track": out.name, **content}
@@ -70,32 +79,6 @@ def _origin(camera: synthetic.Camera) -> dict[str, Any]:
     return {"origin_px": list(camera.origin_px)} if is_near else {}
 
 
-def _record(
-    name: str, settings: Settings, truth: FreeTruth, frames: Motion, bounces: Sequence[float]
-) -> dict[str, Any]:
-    """What stands in NAME.truth.json."""
-    scene = truth.surroundings
-    names = [parameter.name for e in truth.effects for parameter in e.parameters(scene)]
-    return {
-        "name": name,
-        "engine": "galileo_jax",
-        "scenario": truth.scenario,
-        "effect": "+".join(effect.name for effect in truth.effects) or "none",
-        "effect_parameters": {name: truth.values[name] for name in names},
-        "parameters": dict(truth.values),
-        "gravity": truth.gravity,
-        "events_s": {"bounces": [round(t + _start_s(truth), 4) for t in bounces]},
-        "trajectory": {
-            "t": np.round(frames.times_s, 6).tolist(),
-            "x": np.round(frames.position_m[0, 0], 6).tolist(),
-            "y": np.round(frames.position_m[0, 1], 6).tolist(),
-        },
-        "frames": len(frames.times_s),
-        "fps_declared": settings.fps,
-        "seed": settings.seed,
-    }
-
-
 def _start_s(truth: FreeTruth) -> float:
     """When the object is let go, or first looked at, on the true clock after the first frame."""
     return truth.release_s + truth.values.get("release_delay", 0.0)
@@ -117,14 +100,8 @@ def noisy_track(
     magnified = 1.0 + truth.values.get("scale_error", 0.0)
     clock = 1.0 + truth.values.get("frame_rate", 0.0)
     shown = start + magnified * (frames.position_m - start)
-    count = len(frames.times_s)
-    return Observation(
-        names=(truth.thing.name,),
-        times_s=frames.times_s / clock,
-        position_m=shown + noise_m * rng.standard_normal(shown.shape),
-        covariance_m2=np.broadcast_to(noise_m**2 * np.eye(2)[None, :, :, None], (1, 2, 2, count)),
-        mask=np.ones((1, count), bool),
-    )
+    sd = np.full(shown.shape[:2], noise_m)
+    return clip_files.noisy_track((truth.thing.name,), frames.times_s / clock, shown, sd, rng)
 
 
 def declared_content(truth: FreeTruth, fps: float) -> dict[str, Any]:
