@@ -1,6 +1,6 @@
 """What is not on a ramp: falls, flights, springs, liquids and pendulums with known truth.
 
-The laws are the effects' (`rollout/engine_free.rates`); integrator and bounces are SciPy's
+The laws are the effects' (`rollout/particle_free.rates`); integrator and bounces are SciPy's
 (Dormand and Prince, order 8, with events), so that a clip is no copy of the engine that fits it.
 """
 
@@ -21,14 +21,14 @@ from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.effects.laws.start_velocity import PATH, PLANE
 from galileo_jax.model.parameters import Parameter
 from galileo_jax.model.scene.scene import extents
-from galileo_jax.rollout.engine_free import (
+from galileo_jax.rollout.motion import dynamics
+from galileo_jax.rollout.particle_free import (
     PLASTIC_M_S,
     Body,
     floor_of,
     rates,
     start_velocity,
 )
-from galileo_jax.rollout.motion import dynamics
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value
 from galileo_jax.simulation.level import LevelTruth

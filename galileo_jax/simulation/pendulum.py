@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
-from galileo_jax.rollout.engine_pendulum import Swing, make_pendulum, place, rates, start
+from galileo_jax.rollout.particle_pendulum import Swing, make_pendulum, place, rates, start
 from galileo_jax.simulation.motion import RECORD_S, Motion
 from galileo_jax.simulation.to_event import Stretch, by_events
 

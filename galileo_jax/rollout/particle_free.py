@@ -13,11 +13,9 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
-from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.events import (
     Motion,
     System,
-    rolled_out,
     runge_kutta,
     to_crossing,
     total,
@@ -42,12 +40,10 @@ class Body(NamedTuple):
     way_m: Float[jax.Array, ""]
 
 
-@rolled_out
-def roll_out(
+def free_system(
     effects: tuple[Effect, ...],
     named: Mapping[str, jax.Array],
     scene: Surroundings,
-    dt_s: float,
     acts: jax.Array | None,
 ) -> System:
     """One body that slides on nothing."""
@@ -168,9 +164,3 @@ def _to_bounce(
 
     found, spent_s = to_crossing(body, after, level, bounced, left_s, ~rests)
     return found, jnp.where(is_last, left_s, spent_s)
-
-
-class EngineFree(EngineJax):
-    """One body in the plane, see the module."""
-
-    roll_out = staticmethod(roll_out)

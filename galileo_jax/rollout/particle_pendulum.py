@@ -1,10 +1,10 @@
-"""The rigid engine on a circle: a bob on a thread or a rod, at any angle.
+"""A bob on a thread or a rod, on a circle, at any angle.
 
 The angle's equation is integrated by Runge-Kutta steps of 1/480 s (error below 1e-9 of the
 amplitude over 10 s of a thread of 1 m, 1e-6 of one of 5 cm). Dry friction in the bearing holds the
-bob where it turns back, if it can; these instants are met at their time, as in `engine_free`. A
-thread that gives way follows its load at once, since it vibrates much faster than the bob swings
-(first order in the stretch s):
+bob where it turns back, if it can; these instants are met at their time. A thread that gives way
+follows its load at once, since it vibrates much faster than the bob swings (first order in the
+stretch s):
 
     r = L + s (cos a + L w^2 / g)
     L a'' (1 + i + 2 (s / L) (cos a + 3 L w^2 / g)) = -g sin a (1 + (s / L) (cos a - L w^2 / g)) + f
@@ -22,12 +22,8 @@ import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
-from galileo_jax.model.model import Model
-from galileo_jax.rollout.acting_laws import ActingLaws
-from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.events import Motion, System, rolled_out, runge_kutta, to_crossing, total
+from galileo_jax.rollout.events import Motion, System, runge_kutta, to_crossing, total
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
-from galileo_jax.runtime.errors import InputError
 
 SUBSTEPS = 2
 MAX_EVENTS = 4  # within one recorded step
@@ -122,12 +118,10 @@ def place(swing: Swing, turns: Any, pendulum: Pendulum, first: Swing, scene: Sur
     return pivot + radius(swing) * away, speed * along + grows * away
 
 
-@rolled_out
-def roll_out(
+def pendulum_system(
     effects: tuple[Effect, ...],
     named: Mapping[str, jax.Array],
     scene: Surroundings,
-    dt_s: float,
     acts: jax.Array | None,
 ) -> System:
     """A bob on a circle."""
@@ -197,17 +191,3 @@ def _moved(
         return runge_kutta(rate, at, time_s + index * step_s, step_s)
 
     return jax.lax.fori_loop(0, SUBSTEPS, substep, swing)
-
-
-class EnginePendulum(EngineJax):
-    """A bob on a circle, see the module."""
-
-    roll_out = staticmethod(roll_out)
-
-    def __init__(self, model: Model, laws: ActingLaws | None = None):
-        """Raises `InputError` for a track in space."""
-        if model.scene.surroundings.num_axes != 2:
-            raise InputError(
-                "scenario pendulum: a track in the plane (x, y) expected, not in space"
-            )
-        super().__init__(model, laws)

@@ -1,10 +1,9 @@
-"""The rigid engine seen from above: discs that slide and turn on a level table.
+"""Discs that slide and turn on a level table, seen from above.
 
 Each disc is a point (x, y, s) with s = r turning / sqrt(2), whose friction has one size and points
 against its velocity (`effects/laws/pucks.py`). Between events a midpoint step of 1/240 s is exact
 for constant friction on a level table, and second order for every other law; a stop or a hit is
-met at its time (`level_hits`), so that the motion is a continuous function of the parameters with
-the right derivatives, as in `engine_rigid`.
+met at its time (`disc_hits`).
 
 Discs that touch and press, or are pressed against a wall, are held apart by small plastic impacts.
 Walls have no thickness: a disc is on that side on which its centre is.
@@ -19,22 +18,19 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
-from galileo_jax.rollout.engine_free import start_velocity
-from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.events import Motion, System, rolled_out, total
-from galileo_jax.rollout.level_discs import ROOT2, Discs, Table, length
-from galileo_jax.rollout.level_hits import after_bounce, after_hit, bounce_times_s, hit_times_s
+from galileo_jax.rollout.disc_hits import after_bounce, after_hit, bounce_times_s, hit_times_s
+from galileo_jax.rollout.discs import ROOT2, Discs, Table, length
+from galileo_jax.rollout.events import Motion, System, total
 from galileo_jax.rollout.motion import dynamics, state_at
+from galileo_jax.rollout.particle_free import start_velocity
 
 MAX_EVENTS = 16  # within one recorded step
 
 
-@rolled_out
-def roll_out(
+def disc_system(
     effects: tuple[Effect, ...],
     named: Mapping[str, jax.Array],
     scene: Surroundings,
-    dt_s: float,
     acts: jax.Array | None,
 ) -> System:
     """Discs on a level table; the track's third axis, where it has one, is the turning, rad."""
@@ -179,9 +175,3 @@ def _stops(discs: Discs, a: jax.Array) -> jax.Array:
     slows = -jnp.sum(discs.speed_m_s * a, axis=1) / jnp.where(moves, size, 1.0)
     ends = moves & (slows > 0)
     return jnp.where(ends, size / jnp.where(ends, slows, 1.0), jnp.inf)
-
-
-class EngineLevel(EngineJax):
-    """Discs on a level table, see the module."""
-
-    roll_out = staticmethod(roll_out)

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from galileo_jax.model.effects.effect import Array
+from galileo_jax.rollout.discs import ROOT2, Discs, Table, length
 from galileo_jax.rollout.events import newton, reaches_s
-from galileo_jax.rollout.level_discs import ROOT2, Discs, Table, length
 from galileo_jax.rollout.oval_rims import Rim, facing
 
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
