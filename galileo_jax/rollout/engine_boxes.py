@@ -6,6 +6,8 @@ all its effects. From the last record before the first hit on each box has six c
 engine is the check: tests/rollout/test_engine_boxes.py.
 """
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 
@@ -42,18 +44,9 @@ from galileo_jax.runtime.errors import InputError
 MEETING_STEPS = 3  # of Newton's method
 
 
-def roll_out(
-    effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
-    scene: Surroundings,
-    count: jax.Array | None = None,
-    acts: jax.Array | None = None,
-) -> Motion:
-    """One rollout, see `RollOut`; NaN where objects meet while the first still crosses the foot."""
-    poses = roll_out_poses(effects, names, num_records, dt_s, theta, scene, count, acts)
+def roll_out(*rollout: Any) -> Motion:
+    """As of `RollOut`; NaN where objects meet while the first still crosses the foot."""
+    poses = roll_out_poses(*rollout)
     return poses.position_m[:, :2], poses.velocity_m_s[:, :2]
 
 
@@ -67,7 +60,7 @@ def roll_out_poses(
     count: jax.Array | None = None,
     acts: jax.Array | None = None,
 ) -> Poses:
-    """As `roll_out`, in space."""
+    """As `roll_out`, in space; the arguments of `RollOut`."""
     planar = roll_out_in_plane(effects, names, num_records, dt_s, theta, scene, count, acts)
     named = {name: theta[i] for i, name in enumerate(names)}
     shapes = _shapes(dynamics(effects, scene, named, jnp, acts), scene)

@@ -4,15 +4,11 @@ Falls, flights, springs, what moves in a liquid (`particle_free`), pendulums (`p
 and discs on a level table (`particle_discs`): under one name, since one clip has one of them.
 """
 
-from collections.abc import Mapping
-
-import jax
-
-from galileo_jax.model.effects.effect import PENDULUM, Effect, Surroundings
+from galileo_jax.model.effects.effect import PENDULUM
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.events import System, rolled_out
+from galileo_jax.rollout.events import System, Task, rolled_out
 from galileo_jax.rollout.particle_discs import disc_system
 from galileo_jax.rollout.particle_free import free_system
 from galileo_jax.rollout.particle_pendulum import pendulum_system
@@ -20,19 +16,11 @@ from galileo_jax.runtime.errors import InputError
 
 
 @rolled_out
-def roll_out(
-    effects: tuple[Effect, ...],
-    named: Mapping[str, jax.Array],
-    scene: Surroundings,
-    dt_s: float,
-    acts: jax.Array | None,
-) -> System:
+def roll_out(task: Task) -> System:
     """What moves in the scene."""
-    if scene.is_level:
-        return disc_system(effects, named, scene, acts)
-    if PENDULUM in scene.laws:
-        return pendulum_system(effects, named, scene, acts)
-    return free_system(effects, named, scene, acts)
+    if task.scene.is_level:
+        return disc_system(task)
+    return pendulum_system(task) if PENDULUM in task.scene.laws else free_system(task)
 
 
 class EngineParticle(EngineJax):

@@ -14,16 +14,15 @@ derivatives of it are correct; those through soft contacts are not (docs/explana
 MuJoCo's engines are the check: tests/rollout/test_engines.py.
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.events import PART, Motion, System, rolled_out, step_by_events
-from galileo_jax.rollout.motion import Dynamics, dynamics, to_plane
+from galileo_jax.rollout.events import PART, Motion, System, Task, rolled_out, step_by_events
+from galileo_jax.rollout.motion import Dynamics, to_plane
 from galileo_jax.rollout.rigid_bodies import Bodies, rolls
 from galileo_jax.rollout.rigid_impacts import PLASTIC_M_S, after_hits, past_foot
 from galileo_jax.rollout.rigid_motion import (
@@ -38,15 +37,9 @@ MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few boun
 
 
 @rolled_out
-def roll_out(
-    effects: tuple[Effect, ...],
-    named: Mapping[str, jax.Array],
-    scene: Surroundings,
-    dt_s: float,
-    acts: jax.Array | None,
-) -> System:
+def roll_out(task: Task) -> System:
     """Bodies on their path."""
-    law = dynamics(effects, scene, named, jnp, acts)
+    law, scene, dt_s = task.law(), task.scene, task.dt_s
     objects = range(len(scene.names))
     speed = tuple(law.start_speed_m_s[i] for i in objects)
     # What is pushed rolls from the hand.

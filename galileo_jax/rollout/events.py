@@ -8,13 +8,14 @@ right derivatives, whatever the steps.
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.rollout.motion import Dynamics, dynamics
 
 State = TypeVar("State")  # a PyTree
 Motion = tuple[
@@ -23,6 +24,8 @@ Motion = tuple[
 """Centres (m) and velocities (m/s)."""
 Advance = Callable[[Any, jax.Array, jax.Array, Any], tuple[Any, jax.Array]]
 Part = Callable[[Any, jax.Array], tuple[Any, Any]]
+RollOut = Callable[..., Motion]
+"""See `rolled_out`."""
 
 PART = 16  # records are made in parts of so many, as many parts as are asked for
 NEWTON_STEPS = 8
@@ -49,34 +52,35 @@ class System(NamedTuple):
     part: Part | None = None
 
 
-SystemOf = Callable[
-    [tuple[Effect, ...], Mapping[str, jax.Array], Surroundings, float, jax.Array | None], System
-]
-"""Effects, parameters by name, scene, seconds from record to record, and which effects act."""
+class Task(NamedTuple):
+    """What is rolled out.
 
-
-class RollOut(Protocol):
-    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
-
-    Of records beyond the first `count` the centres are as in the last of these; None: all are
-    wanted. `acts` `[effect]` as in `motion.dynamics`.
+    Attributes:
+      effects: all that may act.
+      named: parameters by name.
+      scene: as declared.
+      dt_s: from record to record.
+      acts: `[effect]`, as in `motion.dynamics`.
     """
 
-    def __call__(  # noqa: D102 - above
-        self,
-        effects: tuple[Effect, ...],
-        names: tuple[str, ...],
-        num_records: int,
-        dt_s: float,
-        theta: jax.Array,
-        scene: Surroundings,
-        count: jax.Array | None = None,
-        acts: jax.Array | None = None,
-    ) -> Motion: ...
+    effects: tuple[Effect, ...]
+    named: Mapping[str, jax.Array]
+    scene: Surroundings
+    dt_s: float
+    acts: jax.Array | None
+
+    def law(self) -> Dynamics:
+        """The equations of motion."""
+        return dynamics(self.effects, self.scene, self.named, jnp, self.acts)
 
 
-def rolled_out(system_of: SystemOf) -> RollOut:
-    """The rollout of a system, a function under the name of `system_of`."""
+def rolled_out(system_of: Callable[[Task], System]) -> RollOut:
+    """The rollout of a system, a function under the name of `system_of`.
+
+    It maps `(effects, names, num_records, dt_s, theta, scene, count=None, acts=None)`, theta
+    `[parameter]`, to centres and velocities. Of records beyond the first `count` the centres are as
+    in the last of these; None: all are wanted.
+    """
 
     def roll_out(
         effects: tuple[Effect, ...],
@@ -89,7 +93,7 @@ def rolled_out(system_of: SystemOf) -> RollOut:
         acts: jax.Array | None = None,
     ) -> Motion:
         named = {name: theta[i] for i, name in enumerate(names)}
-        system = system_of(effects, named, scene, dt_s, acts)
+        system = system_of(Task(effects, named, scene, dt_s, acts))
         states = recorded(system, num_records, dt_s, count)
         return system.seen(states, dt_s * jnp.arange(num_records))
 

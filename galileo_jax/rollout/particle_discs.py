@@ -9,34 +9,27 @@ Discs that touch and press, or are pressed against a wall, are held apart by sma
 Walls have no thickness: a disc is on that side on which its centre is.
 """
 
-from collections.abc import Mapping
 from itertools import combinations
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.rollout.disc_hits import after_bounce, after_hit, bounce_times_s, hit_times_s
 from galileo_jax.rollout.discs import ROOT2, Discs, Table, length
-from galileo_jax.rollout.events import Motion, System, total
-from galileo_jax.rollout.motion import dynamics, state_at
+from galileo_jax.rollout.events import Motion, System, Task, total
+from galileo_jax.rollout.motion import state_at
 from galileo_jax.rollout.particle_free import start_velocity
 
 MAX_EVENTS = 16  # within one recorded step
 
 
-def disc_system(
-    effects: tuple[Effect, ...],
-    named: Mapping[str, jax.Array],
-    scene: Surroundings,
-    acts: jax.Array | None,
-) -> System:
+def disc_system(task: Task) -> System:
     """Discs on a level table; the track's third axis, where it has one, is the turning, rad."""
-    shown = _magnified(effects, named, scene)
-    table = _table(effects, named, scene, acts, shown)
-    velocity = start_velocity(effects, named, scene)
+    scene, shown = task.scene, _magnified(task)
+    table = _table(task, shown)
+    velocity = start_velocity(task.effects, task.named, scene)
     assert velocity is not None  # the pucks' law gives one
     first = jnp.asarray(scene.start_m)
     # Starts and turning as the camera's scale will show them.
@@ -66,21 +59,16 @@ def disc_system(
     return System(discs, advance, MAX_EVENTS, seen)
 
 
-def _table(
-    effects: tuple[Effect, ...],
-    named: Mapping[str, jax.Array],
-    scene: Surroundings,
-    acts: jax.Array | None,
-    shown: jax.Array,
-) -> Table:
+def _table(task: Task, shown: jax.Array) -> Table:
     """What does not change in a rollout; `shown`: how many times as large lengths look."""
+    effects, named, scene, _, _ = task
     rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
     walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
     if walls is not None:
         origin = jnp.asarray(scene.start_m)[0, :2]
         walls = walls._replace(ends_m=origin + (walls.ends_m - origin) / shown)
     return Table(
-        dynamics(effects, scene, named, jnp, acts),
+        task.law(),
         rims,
         jnp.asarray(scene.half_length_m),
         walls,
@@ -89,12 +77,12 @@ def _table(
     )
 
 
-def _magnified(effects: tuple[Effect, ...], named: Mapping[str, Any], scene: Surroundings) -> Any:
+def _magnified(task: Task) -> jax.Array:
     """How many times as large as they are the camera shows lengths (about object 1's start)."""
-    origin = jnp.asarray(scene.start_m)[:, :, None]
+    origin = jnp.asarray(task.scene.start_m)[:, :, None]
     ends = jnp.concatenate([origin, origin + 1.0], axis=-1)
-    for effect in effects:
-        ends = effect.measure(ends, named, scene)
+    for effect in task.effects:
+        ends = effect.measure(ends, task.named, task.scene)
     return ends[0, 0, 1] - ends[0, 0, 0]
 
 

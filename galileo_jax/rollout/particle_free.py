@@ -16,11 +16,12 @@ from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
 from galileo_jax.rollout.events import (
     Motion,
     System,
+    Task,
     runge_kutta,
     to_crossing,
     total,
 )
-from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
+from galileo_jax.rollout.motion import Dynamics, state_at
 
 MAX_BOUNCES = 8  # within one recorded step
 PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
@@ -40,17 +41,12 @@ class Body(NamedTuple):
     way_m: Float[jax.Array, ""]
 
 
-def free_system(
-    effects: tuple[Effect, ...],
-    named: Mapping[str, jax.Array],
-    scene: Surroundings,
-    acts: jax.Array | None,
-) -> System:
+def free_system(task: Task) -> System:
     """One body that slides on nothing."""
-    law = dynamics(effects, scene, named, jnp, acts)
+    law, scene = task.law(), task.scene
     tangent = _along(law, scene, jnp)
-    floor = floor_of(effects, named, scene)
-    velocity = start_velocity(effects, named, scene)
+    floor = floor_of(task.effects, task.named, scene)
+    velocity = start_velocity(task.effects, task.named, scene)
     start = Body(
         jnp.asarray(scene.start_m)[0] + law.start_m[0] * tangent,
         law.start_speed_m_s[0] * tangent if velocity is None else velocity[0],

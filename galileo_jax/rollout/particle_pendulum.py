@@ -22,7 +22,7 @@ import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
-from galileo_jax.rollout.events import Motion, System, runge_kutta, to_crossing, total
+from galileo_jax.rollout.events import Motion, System, Task, runge_kutta, to_crossing, total
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 
 SUBSTEPS = 2
@@ -118,15 +118,11 @@ def place(swing: Swing, turns: Any, pendulum: Pendulum, first: Swing, scene: Sur
     return pivot + radius(swing) * away, speed * along + grows * away
 
 
-def pendulum_system(
-    effects: tuple[Effect, ...],
-    named: Mapping[str, jax.Array],
-    scene: Surroundings,
-    acts: jax.Array | None,
-) -> System:
+def pendulum_system(task: Task) -> System:
     """A bob on a circle."""
-    pendulum = make_pendulum(effects, named, scene, jnp, acts)
-    first = start(named, pendulum)
+    scene = task.scene
+    pendulum = make_pendulum(task.effects, task.named, scene, jnp, task.acts)
+    first = start(task.named, pendulum)
 
     def advance(swing: Swing, time_s: jax.Array, left_s: jax.Array, is_last: Any):
         if not pendulum.has_friction:

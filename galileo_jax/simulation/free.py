@@ -30,7 +30,7 @@ from galileo_jax.rollout.particle_free import (
     start_velocity,
 )
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value
+from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value, with_given
 from galileo_jax.simulation.level import LevelTruth
 from galileo_jax.simulation.motion import RECORD_S, Motion
 from galileo_jax.simulation.pendulum import swung
@@ -122,12 +122,7 @@ def draw_free(
         seconds = 1.6
         if SCENARIOS[scenario].moves_in_plane:
             values["floor_grip"] = rng.uniform(0.05, 0.35)
-    for name in given:
-        if name not in values:
-            raise InputError(
-                f"--set: {scenario} has no parameter {name!r}; known: {', '.join(values)}"
-            )
-    values = {name: float(given.get(name, value)) for name, value in values.items()}
+    values = with_given(scenario, values, given)
     release = float(rng.uniform(0.0, LONGEST_DELAY_S)) if scenario == "fall" else 0.0
     thing = ClipObject(name="object1", shape="sphere", size_m=(radius,), mass_kg=values["m1"])
     return FreeTruth(scenario, thing, values, (0.0, top_m), seconds + release, release)

@@ -13,7 +13,7 @@ from galileo_jax.model.effects.laws.liquid import Liquid
 from galileo_jax.observation.observation import Observation
 from galileo_jax.simulation import clip_files
 from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
-from galileo_jax.simulation.filming import film, plane_camera, plane_filming
+from galileo_jax.simulation.filming import declared_picture, film, plane_camera, plane_filming
 from galileo_jax.simulation.free import WATER_KG_M3, FreeTruth, draw_free, hide_free, solve_free
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.motion import Motion
@@ -56,14 +56,10 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
         magnified = 1.0 + truth.values.get("scale_error", 0.0)
         first = camera.project(frames.position_m[:, :, 0])[0]
         content["objects"][0]["point_px"] = np.round(first, 1).tolist()
-        content = {
-            "video": out.name,
-            "direction": settings.direction,
-            "pixels_per_metre": round(camera.pixels_per_metre / magnified, 2),
-            "pixels_per_metre_sd": 0.0,
-            **_origin(camera),
-            **content,
-        }
+        picture = declared_picture(camera, magnified)
+        if not _has_origin(camera):
+            del picture["origin_px"]
+        content = {"video": out.name, **picture, **content}
         record["pixels_per_metre_true"] = camera.pixels_per_metre
         path = synthetic.Motion(frames.times_s, frames.position_m, frames.pitch_rad)
         bodies = (synthetic.Body(truth.thing.shape, truth.thing.size_m or ()),)
@@ -72,11 +68,10 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
     write_yaml_and_truth(out, content, record)
 
 
-def _origin(camera: synthetic.Camera) -> dict[str, Any]:
-    """Where heights count from; a swing is filmed from so near that it is not in the picture."""
+def _has_origin(camera: synthetic.Camera) -> bool:
+    """Whether `load` allows where heights count from; a swing is filmed from very near."""
     axes = zip(camera.origin_px, camera.size_px, strict=True)
-    is_near = all(-size <= at < 2 * size for at, size in axes)  # as `load` allows
-    return {"origin_px": list(camera.origin_px)} if is_near else {}
+    return all(-size <= at < 2 * size for at, size in axes)
 
 
 def _start_s(truth: FreeTruth) -> float:

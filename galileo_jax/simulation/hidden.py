@@ -112,6 +112,21 @@ def check_parameters(
             raise InputError(f"--effect: {effect.name} has no parameter {name!r}; known: {known}")
 
 
+def with_given(
+    scenario: str, drawn: Mapping[str, float], given: Mapping[str, float]
+) -> dict[str, float]:
+    """What was drawn, with given values in its place.
+
+    Raises:
+      InputError: a given name is no parameter of the scenario.
+    """
+    for name in given:
+        if name not in drawn:
+            known = ", ".join(drawn)
+            raise InputError(f"--set: {scenario} has no parameter {name!r}; known: {known}")
+    return {name: float(given.get(name, value)) for name, value in drawn.items()}
+
+
 def hide(truth: Truth, hidden: Hidden, rng: np.random.Generator) -> Truth:
     """Puts an effect into a truth; an error of the declared angle makes its ramp steeper.
 

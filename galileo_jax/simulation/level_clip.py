@@ -12,7 +12,7 @@ from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.simulation.clip_files import WriteClip, noisy_track, write_yaml_and_truth
-from galileo_jax.simulation.filming import film, plane_camera, plane_filming
+from galileo_jax.simulation.filming import declared_picture, film, plane_camera, plane_filming
 from galileo_jax.simulation.free import hide_free
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.level import SCENARIO, LevelTruth, draw_level, solve_level
@@ -73,12 +73,7 @@ def _write(settings: Settings, truth: LevelTruth, looks: np.random.Generator, ou
             content["objects"], camera.project(frames.position_m[:, :, 0]), strict=True
         ):
             entry["point_px"] = np.round(point, 1).tolist()
-        content |= {
-            "direction": settings.direction,
-            "pixels_per_metre": camera.pixels_per_metre,
-            "pixels_per_metre_sd": 0.0,
-            "origin_px": list(camera.origin_px),
-        }
+        content |= declared_picture(camera)
         record["pixels_per_metre_true"] = camera.pixels_per_metre
         path = _with_run_up(motion)
         # From above a puck is a disc.

@@ -12,7 +12,7 @@ from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.simulation.check_settings import shapes_of
 from galileo_jax.simulation.clip_files import WriteClip, noisy_track, write_yaml_and_truth
 from galileo_jax.simulation.declared import Declared
-from galileo_jax.simulation.filming import film_ramp, ramp_camera, ramp_filming
+from galileo_jax.simulation.filming import declared_picture, film_ramp, ramp_camera, ramp_filming
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.like import truth_like
 from galileo_jax.simulation.motion import LONGEST_S, Motion, roll_out
@@ -138,12 +138,8 @@ def _content(
             fault: _off_px(rng, count) if fault in settings.camera_fault else np.zeros((count, 2))
             for fault, count in (("origin", 1), ("points", len(objects)))
         }
-        picture = {
-            "direction": settings.direction,
-            "pixels_per_metre": round(camera.pixels_per_metre / declared.scale, 2),
-            "pixels_per_metre_sd": 0.0,
-            "origin_px": np.round(camera.origin_px + off["origin"][0], 1).tolist(),
-        }
+        origin = np.round(camera.origin_px + off["origin"][0], 1).tolist()
+        picture = declared_picture(camera, declared.scale) | {"origin_px": origin}
         if not settings.no_points:
             points = camera.project(frames.position_m[:, :, 0]) + off["points"]
             for entry, point in zip(objects, points, strict=True):
