@@ -107,12 +107,13 @@ def test_bounces_within_one_step_are_met_at_their_time():
     since = last_s - second_s
     expected = e**2 * speed * since - G * since**2 / 2
     assert expected > 0
-    at = jnp.asarray(height), jnp.asarray(e)
-    assert float(ball(*at, last_s, 8)) == pytest.approx(expected, abs=1e-10)
-    slopes = jax.jacfwd(ball, argnums=(0, 1))(*at, last_s, 8)
-    for i, slope in enumerate(slopes):
-        ends = [
-            float(ball(*(x + s * 1e-6 * (k == i) for k, x in enumerate(at)), last_s, 8))
-            for s in (1, -1)
-        ]
-        assert float(slope) == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-6)
+    at = jnp.array([height, e])
+
+    def end(at: jax.Array) -> jax.Array:
+        return ball(at[0], at[1], last_s, 8)
+
+    assert float(end(at)) == pytest.approx(expected, abs=1e-10)
+    slopes = jax.jacfwd(end)(at)
+    for way, slope in zip(1e-6 * jnp.eye(2), slopes, strict=True):
+        difference = float(end(at + way) - end(at - way)) / 2e-6
+        assert float(slope) == pytest.approx(difference, rel=1e-6)
