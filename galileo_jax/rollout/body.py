@@ -11,6 +11,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Float
 
+from galileo_jax.rollout.events import runge_kutta
+
 
 class Solid(NamedTuple):
     """A convex body, and the plane that it falls on.
@@ -99,19 +101,14 @@ def rotation(quaternion: jax.Array) -> Float[jax.Array, "3 3"]:
     )
 
 
-def mobility(solid: Solid, turned: jax.Array) -> Float[jax.Array, "3 3"]:
-    """From angular momentum over the mass to spin, of a body turned by a matrix."""
-    return mobility_of(solid.inertia_m2, turned)
-
-
 def mobility_of(inertia_m2: Float[jax.Array, " 3"], turned: jax.Array) -> Float[jax.Array, "3 3"]:
-    """As `mobility`, from principal moments over the mass."""
+    """From angular momentum to spin, both over the mass, of a body turned by a matrix."""
     return (turned / inertia_m2) @ turned.T
 
 
 def spin_rad_s(solid: Solid, pose: Pose) -> Float[jax.Array, " 3"]:
     """The angular velocity along the world's axes."""
-    return mobility(solid, rotation(pose.quaternion)) @ pose.momentum_m2_s
+    return mobility_of(solid.inertia_m2, rotation(pose.quaternion)) @ pose.momentum_m2_s
 
 
 def levers_m(solid: Solid, quaternion: jax.Array) -> Float[jax.Array, "corner 3"]:
@@ -146,14 +143,10 @@ def turned_on(
 ) -> Float[jax.Array, " 4"]:
     """The quaternion of a body that turns freely for a time; principal moments over the mass."""
 
-    def rate(at: jax.Array) -> jax.Array:
+    def rate(at: jax.Array, _: object) -> jax.Array:
         spin = mobility_of(inertia_m2, rotation(at / jnp.linalg.norm(at))) @ momentum
         w, v = at[0], at[1:]
         return 0.5 * jnp.concatenate([-(spin @ v)[None], w * spin + jnp.cross(spin, v)])
 
-    first = rate(quaternion)
-    second = rate(quaternion + 0.5 * spent_s * first)
-    third = rate(quaternion + 0.5 * spent_s * second)
-    fourth = rate(quaternion + spent_s * third)
-    found = quaternion + spent_s / 6 * (first + 2 * second + 2 * third + fourth)
+    found = runge_kutta(rate, quaternion, 0.0, spent_s)
     return found / jnp.linalg.norm(found)

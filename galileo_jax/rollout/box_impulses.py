@@ -4,9 +4,16 @@ For every point that touches, with p its impulse and u the speed at which it ope
 
     0 <= p_n,  u_n >= least,  p_n (u_n - least) = 0
 
-and at corners that stand on the table Coulomb friction, as in `body_contact`; faces are smooth.
+and at corners on the plane Coulomb friction, p_t their impulse along it; faces are smooth:
+
+    |p_t| <= mu p_n, and where it slips  p_t = -mu p_n u_t / |u_t|
+
 Found by going round all points, each time with the others' impulses given (projected
-Gauss-Seidel). The sources are `body_contact`'s.
+Gauss-Seidel). `least` says what a contact is: 0 where it lasts, -e u_n where it is hit.
+
+Source: Moreau (1988), Unilateral contact and dry friction in finite freedom dynamics; Jourdan,
+Alart and Jean (1998), A Gauss-Seidel like algorithm to solve frictional contact problems, Comput.
+Methods Appl. Mech. Eng. 155, 31.
 """
 
 import functools
@@ -18,7 +25,7 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
 SWEEPS = 60  # at most
-CONVERGED_M_S = 1e-10  # of one sweep: they converge slowly, and steps add up
+CONVERGED_M_S = 1e-11  # of one sweep: they converge slowly, and steps add up
 TINY = 1e-30  # keeps the derivative of a length finite at 0
 
 

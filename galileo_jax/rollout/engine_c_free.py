@@ -12,7 +12,6 @@ centre's x and y; how the bodies turn stands in `Poses`.
 # pyright: reportAttributeAccessIssue=false
 
 from functools import lru_cache
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -22,7 +21,16 @@ from galileo_jax.model.model import Model
 from galileo_jax.model.scene.free_scene import free_model
 from galileo_jax.rollout.engine_c import LOOK_EVERY, is_at_rest
 from galileo_jax.rollout.engine_rigid import EngineRigid
-from galileo_jax.rollout.free_start import check_free, past_the_foot_m
+from galileo_jax.rollout.events import reaches_s
+from galileo_jax.rollout.free_start import (
+    Poses,
+    as_seen,
+    between_records,
+    check_free,
+    in_space,
+    past_the_foot_m,
+    record_before_hit,
+)
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
 from galileo_jax.rollout.mujoco_fields import Loads, make_loads, write_contacts
 
@@ -37,21 +45,6 @@ RESTITUTION = np.array(
 )
 STIFFNESS = np.array([300.0, 1e5, *[4e5] * 10])
 DAMPING = np.array([*[3e3] * 3, 2e3, 1.5e3, 1e3, 600.0, 400.0, 200.0, 100.0, 50.0, 20.0])
-
-
-class Poses(NamedTuple):
-    """Where bodies are and how they are turned.
-
-    Attributes:
-      position_m, velocity_m_s: `[batch, object, 3, record]`: x along the travel, y up, z towards
-        the camera.
-      quaternion: `[batch, object, 4, record]`, how each is turned from flat and level, in
-        MuJoCo's axes (x, -z, y); 1 until MuJoCo takes over.
-    """
-
-    position_m: np.ndarray
-    velocity_m_s: np.ndarray
-    quaternion: np.ndarray
 
 
 class EngineCFree:
@@ -93,8 +86,9 @@ class EngineCFree:
         model, scene = self.model, self.model.scene.surroundings
         effects, named = model.effects + model.nuisances, model.by_name(usable)
         law = dynamics(effects, scene, named, np)
-        poses = self._planar_poses(usable)
-        begin = self._begin(poses)
+        place, speed = (np.asarray(values, float) for values in self._planar.simulate(usable))
+        poses = in_space(place, speed, np.asarray(model.scene.z_m))
+        begin = record_before_hit(place, speed, scene, model.record_dt_s)
         if begin.min() < poses.position_m.shape[-1]:
             law = law._replace(foot=np.ones_like(law.foot))  # what it did is done
             is_good &= self._is_flat(poses, begin)
@@ -102,27 +96,6 @@ class EngineCFree:
         for values in poses:
             values[~is_good] = np.nan
         return poses
-
-    def _planar_poses(self, theta: np.ndarray) -> Poses:
-        place, speed = (np.asarray(values, float) for values in self._planar.simulate(theta))
-        size, count, _, length = place.shape
-        across = np.tile(np.asarray(self.model.scene.z_m)[:, None, None], (size, 1, 1, length))
-        level = np.tile(np.array([1.0, 0.0, 0.0, 0.0])[:, None], (size, count, 1, length))
-        return Poses(
-            np.concatenate([place, across], axis=2),
-            np.concatenate([speed, np.zeros_like(across)], axis=2),
-            level,
-        )
-
-    def _begin(self, poses: Poses) -> np.ndarray:
-        """The last record before any faces meet, `[batch]`; the number of records if none do."""
-        half = np.asarray(self.model.scene.surroundings.half_length_m)
-        x, v = poses.position_m[:, :, 0], poses.velocity_m_s[:, :, 0]
-        gap = x[:, 1:] - x[:, :-1] - (half[1:] + half[:-1])[:, None]
-        closing = v[:, :-1] - v[:, 1:]
-        near = (closing > 0) & (gap < 1.5 * closing * self.model.record_dt_s)
-        meets: np.ndarray = np.any(near, axis=1)
-        return np.where(np.any(meets, axis=1), meets.argmax(axis=1), meets.shape[1])
 
     def _is_flat(self, poses: Poses, begin: np.ndarray) -> np.ndarray:
         """Whether all of object 1 is on the table when MuJoCo takes over, `[batch]`."""
@@ -153,8 +126,11 @@ class EngineCFree:
             places[waits], speeds[waits] = first[0][waits], first[1][waits]
             # Semi-implicit Euler is second order in x - dt v / 2 (leapfrog), first order in x.
             centre = places[..., :3] - 0.5 * dt * speeds[..., :3]
-            self._record(after, record, centre, speeds[..., :3], law)
-            after.quaternion[..., record] = places[..., 3:]
+            lifted = centre.copy()
+            lifted[..., UP] += self._sunk_m
+            seen = as_seen(lifted, speeds[..., :3], law.table_rad, scene)
+            for values, now in zip(after, (*seen, places[..., 3:]), strict=True):
+                values[..., record] = now
             if record == num_records - 1:
                 break
             is_look = loads.is_steady and record % LOOK_EVERY == 0
@@ -205,29 +181,9 @@ class EngineCFree:
         half = np.asarray(self.model.scene.surroundings.half_length_m)
         gap = np.diff(x, axis=1) - half[1:] - half[:-1]
         closing, faster = -np.diff(v, axis=1), -np.diff(a, axis=1)
-        root = np.sqrt(np.maximum(closing**2 + 2 * faster * gap, 0.0))
-        meets = (closing > 0) & (root > 0)
-        times = np.where(meets, 2 * gap / np.where(meets, closing + root, 1.0), np.inf)
+        times = np.where(closing > 0, reaches_s(gap, closing, faster), np.inf)
         soonest = np.min(times, axis=1)
         return np.where(soonest < 2 * self.model.record_dt_s, soonest, 0.0)
-
-    def _record(
-        self,
-        poses: Poses,
-        record: int,
-        centre: np.ndarray,
-        speed: np.ndarray,
-        law: Dynamics,
-    ) -> None:
-        """Writes one record; a table that slopes is tilted about the foot."""
-        corner = np.asarray(self.model.scene.surroundings.corner_m)
-        cos, sin = np.cos(law.table_rad)[:, None], np.sin(law.table_rad)[:, None]
-        path, up = centre[..., ALONG] - corner, centre[..., UP] + self._sunk_m
-        seen = corner + path * cos, up - path * sin, -centre[..., ACROSS]
-        along = speed[..., ALONG]
-        moves = along * cos, speed[..., UP] - along * sin, -speed[..., ACROSS]
-        poses.position_m[..., record] = np.stack(seen, axis=-1)
-        poses.velocity_m_s[..., record] = np.stack(moves, axis=-1)
 
     def _write(self, batch: Batch, law: Dynamics) -> None:
         """Writes masses, frictions and faces into the batch."""
@@ -244,18 +200,10 @@ class EngineCFree:
 
 def _join(planar: Poses, after: Poses, begin: int, late: float, model: Model) -> None:
     """Puts one rollout's motion after its hit, which is `late` records, where it belongs."""
-    dt, count = model.record_dt_s, planar.position_m.shape[-1]
-    records = np.arange(begin + int(np.ceil(late)), count)
-    at = records - late
-    i = np.minimum(np.floor(at).astype(int), count - 2)
-    s = at - i
-    x0, x1 = after.position_m[..., i], after.position_m[..., i + 1]
-    v0, v1 = after.velocity_m_s[..., i] * dt, after.velocity_m_s[..., i + 1] * dt
-    a, b = 2 * (x0 - x1) + v0 + v1, 3 * (x1 - x0) - 2 * v0 - v1
-    planar.position_m[..., records] = ((a * s + b) * s + v0) * s + x0
-    planar.velocity_m_s[..., records] = (v0 + (v1 - v0) * s) / dt
-    turned = after.quaternion[..., i] * (1 - s) + after.quaternion[..., i + 1] * s
-    planar.quaternion[..., records] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    records = np.arange(begin + int(np.ceil(late)), planar.position_m.shape[-1])
+    found = between_records(after, records - late, model.record_dt_s)
+    for values, new in zip(planar, found, strict=True):
+        values[..., records] = new
 
 
 def face_solref(restitution: np.ndarray) -> np.ndarray:

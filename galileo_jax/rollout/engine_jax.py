@@ -12,6 +12,7 @@ from galileo_jax.model.effects.effect import Effect, Surroundings
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.acting_laws import ActingLaws, Share
 from galileo_jax.rollout.devices import over_devices
+from galileo_jax.rollout.events import Motion, RollOut
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
 from galileo_jax.runtime.batching import RECORDS as LONG
 from galileo_jax.runtime.on_device import OnDevice
@@ -20,21 +21,16 @@ from galileo_jax.runtime.trace_cache import trace_cached
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs
 SPARE = 3  # records beyond the last time: between two of them a place is interpolated
 
-Motion = tuple[
-    Float[jax.Array, "*batch object 2 record"], Float[jax.Array, "*batch object 2 record"]
-]
-
 
 class EngineJax:
     """Simulates batches of parameter vectors; compiled once for all clips of a kind.
 
     Attributes:
-      roll_out: `(effects, names, num_records, dt_s, theta, scene, count, acts)`, theta
-        `[parameter]`, to centres and velocities, each `[object, 2, record]`.
+      roll_out: of one parameter vector.
     """
 
     name = "rigid"
-    roll_out: ClassVar[Callable[..., Motion]]
+    roll_out: ClassVar[RollOut]
 
     def __init__(
         self,
@@ -152,7 +148,7 @@ class EngineJax:
 
 @trace_cached(num_static=5)
 def _roll_out_batch(
-    roll_out: Callable[..., Motion],
+    roll_out: RollOut,
     effects: tuple[Effect, ...],
     names: tuple[str, ...],
     num_records: int,

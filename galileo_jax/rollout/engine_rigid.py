@@ -19,10 +19,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import PART, recorded, recorded_in_parts, step_by_events
-from galileo_jax.rollout.motion import Dynamics, dynamics, to_plane
+from galileo_jax.rollout.events import PART, Motion, System, Task, rolled_out, step_by_events
+from galileo_jax.rollout.motion import Dynamics, to_plane
 from galileo_jax.rollout.rigid_bodies import Bodies, rolls
 from galileo_jax.rollout.rigid_impacts import PLASTIC_M_S, after_hits, past_foot
 from galileo_jax.rollout.rigid_motion import (
@@ -36,55 +36,28 @@ from galileo_jax.rollout.rigid_motion import (
 MAX_EVENTS = 16  # within one recorded step: foot, hit and stops, and a few bounces
 
 
-def roll_out(
-    effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
-    scene: Surroundings,
-    count: jax.Array | None = None,
-    acts: jax.Array | None = None,
-) -> tuple[jax.Array, jax.Array]:
-    """One rollout: `[parameter]` to centres and velocities, each `[object, 2, record]`.
-
-    Of records beyond the first `count` the centres are as in the last of these. `acts` `[effect]`
-    as in `dynamics`.
-    """
-    named = {name: theta[i] for i, name in enumerate(names)}
-    law = dynamics(effects, scene, named, jnp, acts)
+@rolled_out
+def roll_out(task: Task) -> System:
+    """Bodies on their path."""
+    law, scene, dt_s = task.law(), task.scene, task.dt_s
     objects = range(len(scene.names))
     speed = tuple(law.start_speed_m_s[i] for i in objects)
     # What is pushed rolls from the hand.
     rim = tuple(v if rolls(scene, i) else jnp.zeros_like(v) for i, v in enumerate(speed))
     start = Bodies(tuple(law.start_m[i] for i in objects), speed, rim)
-    if law.is_steady:
-
-        def part(bodies: Bodies, first: jax.Array) -> tuple[Bodies, Bodies]:
-            return _exact_part(bodies, first * dt_s, dt_s, law, scene)
-
-        found = recorded_in_parts(part, start, num_records, count)
-    else:
-
-        def step(bodies: Bodies, index: jax.Array) -> Bodies:
-            return _step(bodies, index * dt_s, dt_s, law, scene)
-
-        found = recorded(step, start, num_records, count)
-    path, speed = (jnp.stack(own, axis=-1) for own in (found.path_m, found.speed_m_s))
-    position, velocity = to_plane(path, speed, law.ramp_rad, law.table_rad, scene)
-    return jnp.moveaxis(position, 0, -1), jnp.moveaxis(velocity, 0, -1)
-
-
-def _step(
-    bodies: Bodies, time_s: jax.Array, dt_s: float, law: Dynamics, scene: Surroundings
-) -> Bodies:
-    """One recorded step, event by event."""
 
     def advance(bodies: Bodies, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
-        after, t, _ = _to_next_event(bodies, time_s, left_s, is_last, law, scene)
-        return after, t
+        return _to_next_event(bodies, time_s, left_s, is_last, law, scene)[:2]
 
-    return step_by_events(advance, bodies, time_s, dt_s, MAX_EVENTS)
+    def part(bodies: Bodies, first: jax.Array) -> tuple[Bodies, Bodies]:
+        return _exact_part(bodies, first * dt_s, dt_s, law, scene)
+
+    def seen(bodies: Bodies, _: jax.Array) -> Motion:
+        path, speed = (jnp.stack(own, axis=-1) for own in (bodies.path_m, bodies.speed_m_s))
+        position, velocity = to_plane(path, speed, law.ramp_rad, law.table_rad, scene)
+        return jnp.moveaxis(position, 0, -1), jnp.moveaxis(velocity, 0, -1)
+
+    return System(start, advance, MAX_EVENTS, seen, part if law.is_steady else None)
 
 
 def _exact_part(

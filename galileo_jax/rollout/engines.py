@@ -1,6 +1,6 @@
 """The engines by name, and which one `auto` takes."""
 
-from galileo_jax.model.effects.effect import PENDULUM, infers_gravity
+from galileo_jax.model.effects.effect import infers_gravity
 from galileo_jax.model.model import Model
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.rollout.rollout import Engine
@@ -22,26 +22,19 @@ def make_engine(name: str, model: Model) -> Engine:
         return _free(name, model)
     if name == "auto":
         name = "rigid"
-    is_free = not model.scene.surroundings.has_surface
-    if name == "rigid" and model.scene.surroundings.is_level:
-        from galileo_jax.rollout.engine_level import EngineLevel
+    scene = model.scene.surroundings
+    is_particle = scene.is_level or not scene.has_surface
+    if name == "rigid" and is_particle:
+        from galileo_jax.rollout.engine_particle import EngineParticle
 
-        return EngineLevel(model)
-    if name == "rigid" and PENDULUM in model.scene.surroundings.laws:
-        from galileo_jax.rollout.engine_pendulum import EnginePendulum
-
-        return EnginePendulum(model)
-    if name == "rigid" and is_free:
-        from galileo_jax.rollout.engine_free import EngineFree
-
-        return EngineFree(model)
+        return EngineParticle(model)
     if name == "rigid":
         from galileo_jax.rollout.engine_rigid import EngineRigid
 
         return EngineRigid(model)
-    if is_free or model.scene.surroundings.is_level:
+    if is_particle:
         raise InputError(f"engine: {name!r} has no scene without a ramp; rigid or auto expected")
-    if any(model.scene.surroundings.rolls):
+    if any(scene.rolls):
         raise InputError(f"engine: {name!r} has nothing that rolls; rigid or auto expected")
     if name == "mjx":
         from galileo_jax.rollout.engine_mjx import EngineMJX

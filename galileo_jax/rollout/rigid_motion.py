@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 
 from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.rollout.events import reaches_s
 from galileo_jax.rollout.motion import Dynamics
 from galileo_jax.rollout.rigid_bodies import (
     Bodies,
@@ -140,26 +141,10 @@ def event_times(
         if scene.has_table:
             toward = jnp.where(q[i] < 0, 1.0, -1.0)
             far = jnp.abs(q[i])
-            comes = _reaches(far, toward * v[i], toward * a[i])
+            comes = reaches_s(far, toward * v[i], toward * a[i])
             foot.append(jnp.where(far > PAST_FOOT_M, comes, jnp.inf))
     for i, gap in enumerate(bodies.gap_m(law, scene)):
-        meets = _reaches(gap, v[i] - v[i + 1], a[i] - a[i + 1])
+        meets = reaches_s(gap, v[i] - v[i + 1], a[i] - a[i + 1])
         hit.append(jnp.where(touches[i], jnp.inf, meets))
     soonest = functools.reduce(jnp.minimum, (*grip, *foot, *hit), left_s)
     return Events(tuple(grip), tuple(foot), tuple(hit), soonest)
-
-
-def _reaches(distance: jax.Array, v: jax.Array, a: jax.Array) -> jax.Array:
-    """The first time t >= 0 at which v t + a t^2 / 2 >= `distance` on the way there; inf if never.
-
-    Where the distance is negative: as soon as the speed is not.
-    """
-    under_root = v**2 + 2 * a * distance
-    forward = (v > 0) & ((under_root > 0) | (distance <= 0))
-    turning = (v <= 0) & (a > 0)
-    is_real = under_root > 0
-    root = jnp.where(is_real, jnp.sqrt(jnp.where(is_real, under_root, 1.0)), 0.0)
-    # For v > 0 the usual formula times its conjugate: no cancellation, and a may be zero.
-    at_once = 2 * jnp.maximum(distance, 0.0) / jnp.where(forward, v + root, 1.0)
-    later = (root - v) / jnp.where(turning, a, 1.0)
-    return jnp.where(forward, at_once, jnp.where(turning, later, jnp.inf))

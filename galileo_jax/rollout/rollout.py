@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from galileo_jax.model.model import Model
+from galileo_jax.rollout.events import cubic
 from galileo_jax.rollout.trajectory import Trajectory
 
 JUMP_M_S2 = 30.0  # no steady force accelerates so much
@@ -78,10 +79,8 @@ def at_times(trajectory: Trajectory, times_s: jax.Array) -> tuple[jax.Array, jax
     s = u - i
     x0, x1 = trajectory.position_m[..., i], trajectory.position_m[..., i + 1]
     v0, v1 = trajectory.velocity_m_s[..., i] * dt, trajectory.velocity_m_s[..., i + 1] * dt
-    a = 2 * (x0 - x1) + v0 + v1
-    b = 3 * (x1 - x0) - 2 * v0 - v1
-    position = ((a * s + b) * s + v0) * s + x0
-    velocity = ((3 * a * s + 2 * b) * s + v0) / dt
+    position, velocity = cubic(x0, x1, v0, v1, s)
+    velocity = velocity / dt
     # A jump of the velocity (a hit, the foot): straight on both sides of where they meet.
     jump = v1 - v0
     is_jump = jnp.abs(jump) > JUMP_M_S2 * dt**2

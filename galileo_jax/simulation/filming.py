@@ -71,6 +71,16 @@ def plane_camera(
     )
 
 
+def declared_picture(camera: synthetic.Camera, magnified: float = 1.0) -> dict[str, Any]:
+    """What the yaml says of a picture in which lengths are `magnified` times as large."""
+    return {
+        "direction": camera.direction,
+        "pixels_per_metre": round(camera.pixels_per_metre / magnified, 2),
+        "pixels_per_metre_sd": 0.0,
+        "origin_px": list(camera.origin_px),
+    }
+
+
 def ramp_filming(
     settings: Settings, declared: Declared, num_frames: int, rng: np.random.Generator
 ) -> synthetic.Filming:

@@ -1,6 +1,6 @@
 """What is not on a ramp: falls, flights, springs, liquids and pendulums with known truth.
 
-The laws are the effects' (`rollout/engine_free.rates`); integrator and bounces are SciPy's
+The laws are the effects' (`rollout/particle_free.rates`); integrator and bounces are SciPy's
 (Dormand and Prince, order 8, with events), so that a clip is no copy of the engine that fits it.
 """
 
@@ -21,20 +21,20 @@ from galileo_jax.model.effects.laws.pendulum import ANGLE, LENGTH
 from galileo_jax.model.effects.laws.start_velocity import PATH, PLANE
 from galileo_jax.model.parameters import Parameter
 from galileo_jax.model.scene.scene import extents
-from galileo_jax.rollout.engine_free import (
+from galileo_jax.rollout.motion import dynamics
+from galileo_jax.rollout.particle_free import (
     PLASTIC_M_S,
     Body,
     floor_of,
     rates,
     start_velocity,
 )
-from galileo_jax.rollout.motion import dynamics
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.hidden import Hidden, prior_value
+from galileo_jax.simulation.hidden import Hidden, check_parameters, prior_value, with_given
 from galileo_jax.simulation.level import LevelTruth
 from galileo_jax.simulation.motion import RECORD_S, Motion
 from galileo_jax.simulation.pendulum import swung
-from galileo_jax.simulation.to_event import to_event
+from galileo_jax.simulation.to_event import Stretch, by_events
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
 
 WATER_KG_M3 = 998.0
@@ -122,12 +122,7 @@ def draw_free(
         seconds = 1.6
         if SCENARIOS[scenario].moves_in_plane:
             values["floor_grip"] = rng.uniform(0.05, 0.35)
-    for name in given:
-        if name not in values:
-            raise InputError(
-                f"--set: {scenario} has no parameter {name!r}; known: {', '.join(values)}"
-            )
-    values = {name: float(given.get(name, value)) for name, value in values.items()}
+    values = with_given(scenario, values, given)
     release = float(rng.uniform(0.0, LONGEST_DELAY_S)) if scenario == "fall" else 0.0
     thing = ClipObject(name="object1", shape="sphere", size_m=(radius,), mass_kg=values["m1"])
     return FreeTruth(scenario, thing, values, (0.0, top_m), seconds + release, release)
@@ -204,12 +199,7 @@ def hide_free(truth: Truth, hidden: Hidden, rng: np.random.Generator) -> Truth:
     parameters = effect.parameters(truth.surroundings)
     if effect.name in SCENARIOS[truth.scenario].without or not parameters:
         raise InputError(f"--effect: {effect.name} has no place in scenario {truth.scenario}")
-    names = [parameter.name for parameter in parameters]
-    for name in given:
-        if name not in names:
-            raise InputError(
-                f"--effect: {effect.name} has no parameter {name!r}; known: {', '.join(names)}"
-            )
+    check_parameters(effect, given, parameters)
     share = {parameters[0].name: strength}
     drawn = {p.name: given.get(p.name, _drawn(p, rng, share.get(p.name))) for p in parameters}
     return replace(truth, values={**truth.values, **drawn}, effects=(*truth.effects, effect))
@@ -237,29 +227,26 @@ def solve_free(truth: FreeTruth) -> tuple[Motion, tuple[float, ...]]:
         tangent = np.stack([np.cos(law.ramp_rad), -np.sin(law.ramp_rad)])
         velocity = law.start_speed_m_s[:, None] * tangent
     times = RECORD_S * np.arange(round(truth.seconds / RECORD_S) + 2)
-    rows = np.empty((len(times), 5))
-    now, begin, bounces, rests = np.array([*truth.start_m, *velocity[0], 0.0]), 0, [], False
-    time = 0.0
 
-    def change(t: float, y: np.ndarray) -> np.ndarray:
-        body = Body(y[:2], y[2:4], y[4])  # pyright: ignore[reportArgumentType]
-        return np.hstack(rates(body, np.asarray(t), law, scene, np.asarray(rests)))
+    def stretch(_: float, state: np.ndarray, is_bounce: bool) -> Stretch:
+        now, rests = state.copy(), False
+        if floor is not None and is_bounce:
+            falling = -now[3]
+            rests = falling <= PLASTIC_M_S
+            now[1] = floor.height_m + (0.0 if rests else 1e-12)
+            now[2] *= 1.0 - float(floor.grip)
+            now[3] = 0.0 if rests else float(floor.restitution) * falling
 
-    def touch(t: float, y: np.ndarray) -> float:
-        return 1.0 if floor is None or rests else float(y[1] - floor.height_m)
+        def change(t: float, y: np.ndarray) -> np.ndarray:
+            body = Body(y[:2], y[2:4], y[4])  # pyright: ignore[reportArgumentType]
+            return np.hstack(rates(body, np.asarray(t), law, scene, np.asarray(rests)))
 
-    while begin < len(times):
-        found = to_event(change, touch, time, now, times[begin:], TOLERANCES)
-        until = begin + len(found.rows)
-        rows[begin:until] = found.rows
-        begin, time, now = until, found.time_s, found.state
-        if floor is None or not found.is_event:
-            break
-        bounces.append(time)
-        falling = -now[3]
-        rests = falling <= PLASTIC_M_S
-        now[1] = floor.height_m + (0.0 if rests else 1e-12)
-        now[2] *= 1.0 - float(floor.grip)
-        now[3] = 0.0 if rests else float(floor.restitution) * falling
+        def touch(t: float, y: np.ndarray) -> float:
+            return 1.0 if floor is None or rests else float(y[1] - floor.height_m)
+
+        return Stretch(now, change, touch)
+
+    start = np.array([*truth.start_m, *velocity[0], 0.0])
+    rows, _, bounces = by_events(stretch, start, times, TOLERANCES)
     position, speed = rows[:, :2].T[None], rows[:, 2:4].T[None]
-    return Motion(times, position, speed, np.zeros((1, len(times)))), tuple(bounces)
+    return Motion(times, position, speed, np.zeros((1, len(times)))), bounces

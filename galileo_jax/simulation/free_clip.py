@@ -11,11 +11,13 @@ import numpy as np
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.model.effects.laws.liquid import Liquid
 from galileo_jax.observation.observation import Observation
+from galileo_jax.simulation import clip_files
 from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
-from galileo_jax.simulation.filming import film, plane_camera, plane_filming
+from galileo_jax.simulation.filming import declared_picture, film, plane_camera, plane_filming
 from galileo_jax.simulation.free import WATER_KG_M3, FreeTruth, draw_free, hide_free, solve_free
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.motion import Motion
+from galileo_jax.simulation.record import plane_record
 from galileo_jax.simulation.settings import Settings
 from galileo_jax.video import synthetic
 
@@ -38,7 +40,14 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
     motion, bounces = solve_free(truth)
     frames = sampled_motion(truth, motion, settings.fps, settings.seconds or truth.seconds)
     content = declared_content(truth, settings.fps)
-    record = _record(out.stem, settings, truth, frames, bounces)
+    record = plane_record(out.stem, settings, truth, frames) | {
+        "events_s": {"bounces": [round(t + _start_s(truth), 4) for t in bounces]},
+        "trajectory": {
+            "t": np.round(frames.times_s, 6).tolist(),
+            "x": np.round(frames.position_m[0, 0], 6).tolist(),
+            "y": np.round(frames.position_m[0, 1], 6).tolist(),
+        },
+    }
     if settings.track_only:
         write_observation_csv(out, noisy_track(truth, frames, settings.track_noise, looks))
         content = {"track": out.name, **content}
@@ -47,14 +56,10 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
         magnified = 1.0 + truth.values.get("scale_error", 0.0)
         first = camera.project(frames.position_m[:, :, 0])[0]
         content["objects"][0]["point_px"] = np.round(first, 1).tolist()
-        content = {
-            "video": out.name,
-            "direction": settings.direction,
-            "pixels_per_metre": round(camera.pixels_per_metre / magnified, 2),
-            "pixels_per_metre_sd": 0.0,
-            **_origin(camera),
-            **content,
-        }
+        picture = declared_picture(camera, magnified)
+        if not _has_origin(camera):
+            del picture["origin_px"]
+        content = {"video": out.name, **picture, **content}
         record["pixels_per_metre_true"] = camera.pixels_per_metre
         path = synthetic.Motion(frames.times_s, frames.position_m, frames.pitch_rad)
         bodies = (synthetic.Body(truth.thing.shape, truth.thing.size_m or ()),)
@@ -63,37 +68,10 @@ def _write(settings: Settings, truth: FreeTruth, looks: np.random.Generator, out
     write_yaml_and_truth(out, content, record)
 
 
-def _origin(camera: synthetic.Camera) -> dict[str, Any]:
-    """Where heights count from; a swing is filmed from so near that it is not in the picture."""
+def _has_origin(camera: synthetic.Camera) -> bool:
+    """Whether `load` allows where heights count from; a swing is filmed from very near."""
     axes = zip(camera.origin_px, camera.size_px, strict=True)
-    is_near = all(-size <= at < 2 * size for at, size in axes)  # as `load` allows
-    return {"origin_px": list(camera.origin_px)} if is_near else {}
-
-
-def _record(
-    name: str, settings: Settings, truth: FreeTruth, frames: Motion, bounces: Sequence[float]
-) -> dict[str, Any]:
-    """What stands in NAME.truth.json."""
-    scene = truth.surroundings
-    names = [parameter.name for e in truth.effects for parameter in e.parameters(scene)]
-    return {
-        "name": name,
-        "engine": "galileo_jax",
-        "scenario": truth.scenario,
-        "effect": "+".join(effect.name for effect in truth.effects) or "none",
-        "effect_parameters": {name: truth.values[name] for name in names},
-        "parameters": dict(truth.values),
-        "gravity": truth.gravity,
-        "events_s": {"bounces": [round(t + _start_s(truth), 4) for t in bounces]},
-        "trajectory": {
-            "t": np.round(frames.times_s, 6).tolist(),
-            "x": np.round(frames.position_m[0, 0], 6).tolist(),
-            "y": np.round(frames.position_m[0, 1], 6).tolist(),
-        },
-        "frames": len(frames.times_s),
-        "fps_declared": settings.fps,
-        "seed": settings.seed,
-    }
+    return all(-size <= at < 2 * size for at, size in axes)
 
 
 def _start_s(truth: FreeTruth) -> float:
@@ -117,14 +95,8 @@ def noisy_track(
     magnified = 1.0 + truth.values.get("scale_error", 0.0)
     clock = 1.0 + truth.values.get("frame_rate", 0.0)
     shown = start + magnified * (frames.position_m - start)
-    count = len(frames.times_s)
-    return Observation(
-        names=(truth.thing.name,),
-        times_s=frames.times_s / clock,
-        position_m=shown + noise_m * rng.standard_normal(shown.shape),
-        covariance_m2=np.broadcast_to(noise_m**2 * np.eye(2)[None, :, :, None], (1, 2, 2, count)),
-        mask=np.ones((1, count), bool),
-    )
+    sd = np.full(shown.shape[:2], noise_m)
+    return clip_files.noisy_track((truth.thing.name,), frames.times_s / clock, shown, sd, rng)
 
 
 def declared_content(truth: FreeTruth, fps: float) -> dict[str, Any]:

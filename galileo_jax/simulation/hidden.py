@@ -101,6 +101,32 @@ def prior_value(parameter: Parameter, z: float) -> float:
         return float(parameter.prior.forward(np.asarray(z)))  # pyright: ignore[reportArgumentType]
 
 
+def check_parameters(
+    effect: Effect, given: Mapping[str, float], parameters: Sequence[Parameter]
+) -> None:
+    """Raises `InputError` where a given name is none of the effect's parameters."""
+    names = [parameter.name for parameter in parameters]
+    for name in given:
+        if name not in names:
+            known = ", ".join(names)
+            raise InputError(f"--effect: {effect.name} has no parameter {name!r}; known: {known}")
+
+
+def with_given(
+    scenario: str, drawn: Mapping[str, float], given: Mapping[str, float]
+) -> dict[str, float]:
+    """What was drawn, with given values in its place.
+
+    Raises:
+      InputError: a given name is no parameter of the scenario.
+    """
+    for name in given:
+        if name not in drawn:
+            known = ", ".join(drawn)
+            raise InputError(f"--set: {scenario} has no parameter {name!r}; known: {known}")
+    return {name: float(given.get(name, value)) for name, value in drawn.items()}
+
+
 def hide(truth: Truth, hidden: Hidden, rng: np.random.Generator) -> Truth:
     """Puts an effect into a truth; an error of the declared angle makes its ramp steeper.
 
@@ -112,11 +138,7 @@ def hide(truth: Truth, hidden: Hidden, rng: np.random.Generator) -> Truth:
     names = [parameter.name for parameter in parameters]
     if not names:
         raise InputError(f"--effect: {effect.name} has no place in this scene")
-    for name in given:
-        if name not in names:
-            raise InputError(
-                f"--effect: {effect.name} has no parameter {name!r}; known: {', '.join(names)}"
-            )
+    check_parameters(effect, given, parameters)
     share = float(rng.uniform()) if strength is None else strength
     values: dict[str, float] = {}
     # A zone's start is drawn last: its length has to fit in.

@@ -17,7 +17,7 @@ from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.model.effects.laws.walls import ENDS as WALL_ENDS
 from galileo_jax.rollout.motion import Dynamics, dynamics, state_at
-from galileo_jax.runtime.errors import InputError
+from galileo_jax.simulation.hidden import with_given
 from galileo_jax.simulation.level_hits import Point, Rails, Rims, next_hit, strike, strike_wall
 from galileo_jax.simulation.motion import Motion
 from galileo_jax.simulation.truth import DECLARED_WRONGLY, GRAVITY_M_S2
@@ -107,11 +107,7 @@ def draw_level(
             "wall_restitution": rng.uniform(0.4, 0.95),
             "wall_grip": rng.uniform(0.05, 0.35),
         }
-    for name in given:
-        if name not in values:
-            known = ", ".join(values)
-            raise InputError(f"--set: {SCENARIO} has no parameter {name!r}; known: {known}")
-    values = {name: float(given.get(name, value)) for name, value in values.items()}
+    values = with_given(SCENARIO, values, given)
     values |= {f"{OFFSET}_{axis}2": 0.0 for axis in "xy"}
     x, y = (
         away * math.cos(heading) - aside * math.sin(heading),

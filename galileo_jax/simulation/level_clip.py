@@ -11,12 +11,13 @@ import numpy as np
 from galileo_jax.clip.track_csv import write_observation_csv
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
-from galileo_jax.simulation.filming import film, plane_camera, plane_filming
+from galileo_jax.simulation.clip_files import WriteClip, noisy_track, write_yaml_and_truth
+from galileo_jax.simulation.filming import declared_picture, film, plane_camera, plane_filming
 from galileo_jax.simulation.free import hide_free
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.level import SCENARIO, LevelTruth, draw_level, solve_level
 from galileo_jax.simulation.motion import Motion
+from galileo_jax.simulation.record import plane_record
 from galileo_jax.simulation.settings import Settings
 from galileo_jax.video import synthetic
 
@@ -62,34 +63,17 @@ def _write(settings: Settings, truth: LevelTruth, looks: np.random.Generator, ou
             {"from_m": list(one), "to_m": list(other)} for one, other in truth.walls_m
         ]
     scene = truth.surroundings
-    names = [parameter.name for e in truth.effects for parameter in e.parameters(scene)]
-    record = {
-        "name": out.stem,
-        "engine": "galileo_jax",
-        "scenario": truth.scenario,
-        "effect": "+".join(effect.name for effect in truth.effects) or "none",
-        "effect_parameters": {name: truth.values[name] for name in names},
-        "parameters": dict(truth.values),
-        "gravity": truth.gravity,
-        "events_s": {"hits": [round(hit, 4) for hit in hits]},
-        "frames": len(taken),
-        "fps_declared": settings.fps,
-        "seed": settings.seed,
-    }
+    hits_s = [round(hit, 4) for hit in hits]
+    record = plane_record(out.stem, settings, truth, frames) | {"events_s": {"hits": hits_s}}
     if settings.track_only:
-        write_observation_csv(out, _noisy(settings, truth, frames, taken / clock, looks))
+        write_observation_csv(out, _track(settings, truth, frames, taken / clock, looks))
     else:
         camera = plane_camera(settings, motion, MARGIN_M)
         for entry, point in zip(
             content["objects"], camera.project(frames.position_m[:, :, 0]), strict=True
         ):
             entry["point_px"] = np.round(point, 1).tolist()
-        content |= {
-            "direction": settings.direction,
-            "pixels_per_metre": camera.pixels_per_metre,
-            "pixels_per_metre_sd": 0.0,
-            "origin_px": list(camera.origin_px),
-        }
+        content |= declared_picture(camera)
         record["pixels_per_metre_true"] = camera.pixels_per_metre
         path = _with_run_up(motion)
         # From above a puck is a disc.
@@ -112,22 +96,15 @@ def _with_run_up(motion: Motion) -> synthetic.Motion:
     )
 
 
-def _noisy(
+def _track(
     settings: Settings,
     truth: LevelTruth,
     frames: Motion,
     times_s: np.ndarray,
     looks: np.random.Generator,
 ) -> Observation:
-    """The track with normal errors, of centres and of turning: rims are followed as well."""
-    radii = np.array(truth.surroundings.half_length_m)
+    """The track of centres and of turning: rims are followed as well."""
+    scene = truth.surroundings
     places = np.concatenate([frames.position_m, frames.pitch_rad[:, None]], axis=1)
-    sd = np.stack([np.full(len(radii), settings.track_noise)] * 2 + [settings.track_noise / radii])
-    return Observation(
-        tuple(item.name for item in truth.things),
-        times_s,
-        places + sd.T[:, :, None] * looks.standard_normal(places.shape),
-        np.einsum("ao,ab->oab", sd**2, np.eye(3))[..., None] * np.ones(len(times_s)),
-        np.ones((len(radii), len(times_s)), bool),
-        is_turning=True,
-    )
+    sd = settings.track_noise / np.array([(1.0, 1.0, radius) for radius in scene.half_length_m])
+    return noisy_track(scene.names, times_s, places, sd, looks, is_turning=True)

@@ -28,7 +28,7 @@ class Motion:
       pitch_rad: `[object, time]`, counter-clockwise positive.
       z_m: `[object, time]`, towards the camera; None in a plane.
       quaternion: `[object, 4, time]`, how each is turned from flat and level, as
-        `engine_c_free.Poses`; None in a plane.
+        `free_start.Poses`; None in a plane.
     """
 
     times_s: np.ndarray

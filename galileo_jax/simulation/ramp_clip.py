@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.clip.track_csv import write_observation_csv
-from galileo_jax.observation.observation import Observation
 from galileo_jax.simulation.check_settings import shapes_of
-from galileo_jax.simulation.clip_files import WriteClip, write_yaml_and_truth
+from galileo_jax.simulation.clip_files import WriteClip, noisy_track, write_yaml_and_truth
 from galileo_jax.simulation.declared import Declared
-from galileo_jax.simulation.filming import film_ramp, ramp_camera, ramp_filming
+from galileo_jax.simulation.filming import declared_picture, film_ramp, ramp_camera, ramp_filming
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.like import truth_like
 from galileo_jax.simulation.motion import LONGEST_S, Motion, roll_out
@@ -107,30 +106,14 @@ def _write(
         "seed": seed,
     }
     if settings.track_only:
-        _write_track(out, truth, declared, frames, settings.track_noise, looks)
+        # The centres, as the declared scale and clock show them.
+        shown, times = declared.scale * frames.position_m, np.arange(num_frames) / declared.fps
+        names, sd = truth.surroundings.names, np.full(shown.shape[:2], settings.track_noise)
+        write_observation_csv(out, noisy_track(names, times, shown, sd, looks))
     else:
         filming = ramp_filming(settings, declared, num_frames, faults)
         record |= film_ramp(out, truth, declared, motion, camera, filming, num_frames, seed)
     write_yaml_and_truth(out, content, record)
-
-
-def _write_track(
-    out: Path,
-    truth: Truth,
-    declared: Declared,
-    frames: Motion,
-    noise_m: float,
-    rng: np.random.Generator,
-) -> None:
-    """Writes the centres, as the declared scale and clock show them, with normal errors."""
-    error = noise_m * rng.standard_normal(frames.position_m.shape)
-    position = declared.scale * frames.position_m + error
-    count, _, length = position.shape
-    covariance = np.broadcast_to(noise_m**2 * np.eye(2)[None, :, :, None], (count, 2, 2, length))
-    names = tuple(each.name for each in truth.objects)
-    times = np.arange(length) / declared.fps
-    mask = np.ones((count, length), bool)
-    write_observation_csv(out, Observation(names, times, position, covariance, mask))
 
 
 def _content(
@@ -155,12 +138,8 @@ def _content(
             fault: _off_px(rng, count) if fault in settings.camera_fault else np.zeros((count, 2))
             for fault, count in (("origin", 1), ("points", len(objects)))
         }
-        picture = {
-            "direction": settings.direction,
-            "pixels_per_metre": round(camera.pixels_per_metre / declared.scale, 2),
-            "pixels_per_metre_sd": 0.0,
-            "origin_px": np.round(camera.origin_px + off["origin"][0], 1).tolist(),
-        }
+        origin = np.round(camera.origin_px + off["origin"][0], 1).tolist()
+        picture = declared_picture(camera, declared.scale) | {"origin_px": origin}
         if not settings.no_points:
             points = camera.project(frames.position_m[:, :, 0]) + off["points"]
             for entry, point in zip(objects, points, strict=True):

@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.simulation.declared import Declared
+from galileo_jax.simulation.free import FreeTruth
+from galileo_jax.simulation.level import LevelTruth
 from galileo_jax.simulation.motion import Motion
+from galileo_jax.simulation.settings import Settings
 from galileo_jax.simulation.truth import Truth
 
 
@@ -56,6 +59,26 @@ def truth_record(
         "frames": len(frames.times_s),
         "fps_true": declared.true_fps,
         "fps_declared": declared.fps,
+    }
+
+
+def plane_record(
+    name: str, settings: Settings, truth: FreeTruth | LevelTruth, frames: Motion
+) -> dict[str, Any]:
+    """As `truth_record`, of what is on no ramp, without its events."""
+    scene = truth.surroundings
+    names = [parameter.name for e in truth.effects for parameter in e.parameters(scene)]
+    return {
+        "name": name,
+        "engine": "galileo_jax",
+        "scenario": truth.scenario,
+        "effect": "+".join(effect.name for effect in truth.effects) or "none",
+        "effect_parameters": {name: truth.values[name] for name in names},
+        "parameters": dict(truth.values),
+        "gravity": truth.gravity,
+        "frames": len(frames.times_s),
+        "fps_declared": settings.fps,
+        "seed": settings.seed,
     }
 
 

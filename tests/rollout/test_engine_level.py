@@ -11,7 +11,7 @@ from scipy.spatial import KDTree
 from galileo_jax.model.effects.laws import LAWS
 from galileo_jax.model.effects.laws.pucks import OFFSET, START
 from galileo_jax.model.effects.registry import make_effects
-from galileo_jax.rollout.engine_level import roll_out
+from galileo_jax.rollout.engine_particle import roll_out
 from galileo_jax.rollout.oval_rims import Rim, facing
 from galileo_jax.simulation.level import LevelTruth, draw_level, solve_level
 

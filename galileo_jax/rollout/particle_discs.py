@@ -1,64 +1,39 @@
-"""The rigid engine seen from above: discs that slide and turn on a level table.
+"""Discs that slide and turn on a level table, seen from above.
 
 Each disc is a point (x, y, s) with s = r turning / sqrt(2), whose friction has one size and points
 against its velocity (`effects/laws/pucks.py`). Between events a midpoint step of 1/240 s is exact
 for constant friction on a level table, and second order for every other law; a stop or a hit is
-met at its time (`level_hits`), so that the motion is a continuous function of the parameters with
-the right derivatives, as in `engine_rigid`.
+met at its time (`disc_hits`).
 
 Discs that touch and press, or are pressed against a wall, are held apart by small plastic impacts.
 Walls have no thickness: a disc is on that side on which its centre is.
 """
 
-from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.model.effects.effect import Effect, Surroundings
-from galileo_jax.rollout.engine_free import start_velocity
-from galileo_jax.rollout.engine_jax import EngineJax
-from galileo_jax.rollout.event_loop import recorded, step_by_events
-from galileo_jax.rollout.level_discs import ROOT2, Discs, Table, length
-from galileo_jax.rollout.level_hits import after_bounce, after_hit, bounce_times_s, hit_times_s
-from galileo_jax.rollout.motion import dynamics, state_at
+from galileo_jax.model.effects.effect import Surroundings
+from galileo_jax.rollout.disc_hits import after_bounce, after_hit, bounce_times_s, hit_times_s
+from galileo_jax.rollout.discs import ROOT2, Discs, Table, length
+from galileo_jax.rollout.events import Motion, System, Task, total
+from galileo_jax.rollout.motion import state_at
+from galileo_jax.rollout.particle_free import start_velocity
 
 MAX_EVENTS = 16  # within one recorded step
 
 
-def roll_out(
-    effects: tuple[Effect, ...],
-    names: tuple[str, ...],
-    num_records: int,
-    dt_s: float,
-    theta: jax.Array,
-    scene: Surroundings,
-    count: jax.Array | None = None,
-    acts: jax.Array | None = None,
-) -> tuple[jax.Array, jax.Array]:
-    """One rollout: `[parameter]` to centres and velocities, each `[object, axis, record]`.
-
-    The third axis, where the track has one, is the turning, rad. Of records beyond the first
-    `count` places are as in the last of these.
-    """
-    named = {name: theta[i] for i, name in enumerate(names)}
-    law = dynamics(effects, scene, named, jnp, acts)
-    rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
-    velocity = start_velocity(effects, named, scene)
+def disc_system(task: Task) -> System:
+    """Discs on a level table; the track's third axis, where it has one, is the turning, rad."""
+    scene, shown = task.scene, _magnified(task)
+    table = _table(task, shown)
+    velocity = start_velocity(task.effects, task.named, scene)
     assert velocity is not None  # the pucks' law gives one
-    seen = jnp.asarray(scene.start_m)
-    shown = _magnified(effects, named, scene)
-    walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
-    if walls is not None:
-        walls = walls._replace(ends_m=seen[0, :2] + (walls.ends_m - seen[0, :2]) / shown)
-    beside = _sum([e.pressure(named, scene) for e in effects])
-    oval = _sum([e.oval(named, scene) for e in effects])
-    table = Table(law, rims, jnp.asarray(scene.half_length_m), walls, beside, oval)
+    first = jnp.asarray(scene.start_m)
     # Starts and turning as the camera's scale will show them.
-    start = seen[0, :2] + (seen[:, :2] - seen[0, :2]) / shown + rims.offset_m
+    start = first[0, :2] + (first[:, :2] - first[0, :2]) / shown + table.rims.offset_m
     discs = Discs(
         jnp.concatenate([start, jnp.zeros((len(start), 1))], axis=1),
         jnp.concatenate(
@@ -67,42 +42,48 @@ def roll_out(
         jnp.zeros(len(scene.names)),
     )
 
-    def step(discs: Discs, index: jax.Array) -> Discs:
-        return _step(discs, index * dt_s, dt_s, table, scene)
-
-    found = recorded(step, discs, num_records, count)
-    place, speed = (jnp.moveaxis(each, 0, -1) for each in (found.place_m, found.speed_m_s))
-    if scene.num_axes == 2:
-        return place[:, :2], speed[:, :2]
-    per_turn = ROOT2 / table.radius_m[:, None, None] / shown
-    turned = seen[0, 2] + (seen[:, 2:, None] - seen[0, 2]) / shown + per_turn * place[:, 2:]
-    return (
-        jnp.concatenate([place[:, :2], turned], axis=1),
-        jnp.concatenate([speed[:, :2], per_turn * speed[:, 2:]], axis=1),
-    )
-
-
-def _sum(found: Sequence[Any | None]) -> Any | None:
-    given = [each for each in found if each is not None]
-    return sum(given[1:], given[0]) if given else None
-
-
-def _magnified(effects: tuple[Effect, ...], named: dict[str, Any], scene: Surroundings) -> Any:
-    """How many times as large as they are the camera shows lengths (about object 1's start)."""
-    origin = jnp.asarray(scene.start_m)[:, :, None]
-    ends = jnp.concatenate([origin, origin + 1.0], axis=-1)
-    for effect in effects:
-        ends = effect.measure(ends, named, scene)
-    return ends[0, 0, 1] - ends[0, 0, 0]
-
-
-def _step(discs: Discs, time_s: jax.Array, dt_s: float, table: Table, scene: Surroundings) -> Discs:
-    """One recorded step, event by event."""
-
     def advance(discs: Discs, time_s: jax.Array, left_s: jax.Array, is_last: jax.Array):
         return _to_next_event(discs, time_s, left_s, is_last, table, scene)
 
-    return step_by_events(advance, discs, time_s, dt_s, MAX_EVENTS)
+    def seen(discs: Discs, _: jax.Array) -> Motion:
+        place, speed = (jnp.moveaxis(each, 0, -1) for each in (discs.place_m, discs.speed_m_s))
+        if scene.num_axes == 2:
+            return place[:, :2], speed[:, :2]
+        per_turn = ROOT2 / table.radius_m[:, None, None] / shown
+        turned = first[0, 2] + (first[:, 2:, None] - first[0, 2]) / shown + per_turn * place[:, 2:]
+        return (
+            jnp.concatenate([place[:, :2], turned], axis=1),
+            jnp.concatenate([speed[:, :2], per_turn * speed[:, 2:]], axis=1),
+        )
+
+    return System(discs, advance, MAX_EVENTS, seen)
+
+
+def _table(task: Task, shown: jax.Array) -> Table:
+    """What does not change in a rollout; `shown`: how many times as large lengths look."""
+    effects, named, scene, _, _ = task
+    rims = next(found for e in effects if (found := e.rims(named, scene)) is not None)
+    walls = next((each for e in effects if (each := e.walls(named, scene)) is not None), None)
+    if walls is not None:
+        origin = jnp.asarray(scene.start_m)[0, :2]
+        walls = walls._replace(ends_m=origin + (walls.ends_m - origin) / shown)
+    return Table(
+        task.law(),
+        rims,
+        jnp.asarray(scene.half_length_m),
+        walls,
+        total([e.pressure(named, scene) for e in effects]),
+        total([e.oval(named, scene) for e in effects]),
+    )
+
+
+def _magnified(task: Task) -> jax.Array:
+    """How many times as large as they are the camera shows lengths (about object 1's start)."""
+    origin = jnp.asarray(task.scene.start_m)[:, :, None]
+    ends = jnp.concatenate([origin, origin + 1.0], axis=-1)
+    for effect in task.effects:
+        ends = effect.measure(ends, task.named, task.scene)
+    return ends[0, 0, 1] - ends[0, 0, 0]
 
 
 def _to_next_event(
@@ -182,9 +163,3 @@ def _stops(discs: Discs, a: jax.Array) -> jax.Array:
     slows = -jnp.sum(discs.speed_m_s * a, axis=1) / jnp.where(moves, size, 1.0)
     ends = moves & (slows > 0)
     return jnp.where(ends, size / jnp.where(ends, slows, 1.0), jnp.inf)
-
-
-class EngineLevel(EngineJax):
-    """Discs on a level table, see the module."""
-
-    roll_out = staticmethod(roll_out)

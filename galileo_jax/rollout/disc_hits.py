@@ -1,0 +1,200 @@
+"""When discs meet each other or a wall, and what the hit does to their speeds.
+
+Rims meet where they face each other, and are pushed there: those that are round on the line of
+their middles, all others as `oval_rims` has it.
+"""
+
+import functools
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from galileo_jax.model.effects.effect import Array
+from galileo_jax.rollout.discs import ROOT2, Discs, Table, length
+from galileo_jax.rollout.events import newton, reaches_s
+from galileo_jax.rollout.oval_rims import Rim, facing
+
+PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
+TOUCH_M_S = 1e-9
+NEWTON_STEPS = 3
+CLOSED_M = 1e-7  # rims so near touch
+
+
+def hit_times_s(
+    discs: Discs, a: jax.Array, pairs: np.ndarray, left_s: jax.Array, table: Table
+) -> jax.Array:
+    """When the rims of each pair meet, s `[pair]`; inf where they do not within `left_s`."""
+
+    def gap(pair: np.ndarray, t: jax.Array) -> tuple[jax.Array, jax.Array]:
+        then = discs.after(a, t)
+        normal, gap_m, _, side = _facing(then, pair, table)
+        u = (then.speed_m_s[pair[1]] - then.speed_m_s[pair[0]])[:2]
+        return gap_m, jnp.sum(u * normal) + ROOT2 * jnp.sum(side * then.speed_m_s[pair, 2])
+
+    found = [_meeting_s(functools.partial(gap, pair), left_s) for pair in pairs]
+    return jnp.stack(found) if found else jnp.zeros(0)
+
+
+def _meeting_s(
+    gap: Callable[[jax.Array], tuple[jax.Array, jax.Array]], left_s: jax.Array
+) -> jax.Array:
+    """When gaps close, s `[...]`; inf where they do not within `left_s`.
+
+    Args:
+      gap: a time to gaps, m, and how fast they grow.
+      left_s: what is left of the step.
+    """
+    (now, rate), (_, bends) = jax.jvp(gap, (jnp.zeros(()),), (jnp.ones(()),))
+    # What presses without a speed closes within the step all the same.
+    guess = jnp.where(rate < -TOUCH_M_S, reaches_s(now, -rate, -bends), jnp.inf)
+    is_near = guess <= 2 * left_s
+    at, left = newton(gap, jnp.where(is_near, guess, 0.0), left_s, NEWTON_STEPS)
+    return jnp.where(is_near & (left < CLOSED_M) & (at <= left_s), jnp.maximum(at, 0.0), jnp.inf)
+
+
+def _facing(
+    discs: Discs, pair: np.ndarray, table: Table
+) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    """Of two rims the direction in which they face each other `[2]`, and their gap, m.
+
+    And where they touch, along and across it, as shares of their radii, each `[2]`.
+    """
+    one, other = (int(i) for i in pair)
+    apart = (discs.place_m[other] - discs.place_m[one])[:2]
+    rim = table.rim(discs)
+    if rim is None:
+        distance = length(apart)
+        gap = distance - table.radius_m[one] - table.radius_m[other]
+        return apart / distance, gap, jnp.ones(2), jnp.zeros(2)
+    direction, gap = facing(apart, rim.of(one), rim.of(other))
+    normal = jnp.stack([jnp.cos(direction), jnp.sin(direction)])
+    return normal, gap, *_shares(rim, direction, (one, other))
+
+
+def after_hit(discs: Discs, speed_m_s: jax.Array, pair: np.ndarray, table: Table) -> jax.Array:
+    """Speeds `[object, 3]` after a hit of two discs, one from object `pair[0]` to `pair[1]`."""
+    one, other = both = [int(i) for i in pair]
+    normal, _, reach, side = _facing(discs, pair, table)
+    across = jnp.stack([-normal[1], normal[0]])
+    u, turning = (speed_m_s[other] - speed_m_s[one])[:2], speed_m_s[jnp.array(both), 2]
+    inverse = 1.0 / table.law.mass[jnp.array(both)]
+    approach = -jnp.sum(u * normal) - ROOT2 * jnp.sum(side * turning)
+    slip = jnp.sum(u * across) - ROOT2 * jnp.sum(reach * turning)
+    # J = m r^2 / 2: turning adds twice the inverse mass.
+    gives = (
+        jnp.sum(inverse * (1.0 + 2.0 * side**2)),
+        jnp.sum(inverse * (1.0 + 2.0 * reach**2)),
+        -2.0 * jnp.sum(inverse * reach * side),
+    )
+    push, rub = _impulse(approach, slip, gives, table.rims.restitution, table.rims.grip)
+    impulse, turns = push * normal + rub * across, ROOT2 * (side * push - reach * rub)
+    change = jnp.concatenate([impulse, turns[1:]])
+    back = jnp.concatenate([-impulse, turns[:1]])
+    return speed_m_s.at[other].add(change * inverse[1]).at[one].add(back * inverse[0])
+
+
+def _shares(
+    rim: Rim, direction: jax.Array, which: tuple[int, int] | None = None
+) -> tuple[jax.Array, jax.Array]:
+    """Where rims touch in a direction, along and across it, as shares of their radii."""
+    chosen = rim if which is None else jax.tree.map(lambda each: each[jnp.array(which)], rim)
+    reach, side, _ = chosen.reach_m(direction)
+    return reach / chosen.radius_m, side / chosen.radius_m
+
+
+def _impulse(
+    approach: jax.Array,
+    slip: jax.Array,
+    gives: tuple[jax.Array, jax.Array, jax.Array],
+    restitution: Array,
+    grip: Array,
+) -> tuple[jax.Array, jax.Array]:
+    """What a hit gives along and across: Newton's, and Coulomb's or as much as stops the slip.
+
+    Args:
+      approach: speed of the touching points towards each other, m/s.
+      slip: across, m/s.
+      gives: by how much impulses of 1 change the speed along, across, and one the other.
+      restitution: as in `Rims`.
+      grip: as in `Rims`.
+    """
+    along, across, mixed = gives
+    e = jnp.where(approach > PLASTIC_M_S, restitution, 0.0)
+    wanted = jnp.maximum((1.0 + e) * approach, 0.0)
+    rub = -(along * slip + mixed * wanted) / (along * across - mixed**2)
+    push = (wanted - mixed * rub) / along
+    way = jnp.sign(rub)
+    slides = jnp.abs(rub) > grip * push
+    most = wanted / (along + way * grip * mixed)
+    hits = wanted > 0
+    push, rub = jnp.where(slides, most, push), jnp.where(slides, way * grip * most, rub)
+    return jnp.where(hits, push, 0.0), jnp.where(hits, rub, 0.0)
+
+
+def _before_wall(place_m: jax.Array, ends_m: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """How far centres `[object, 3]` are from a wall, m; across it towards them; along it `[2]`."""
+    along = ends_m[1] - ends_m[0]
+    along = along / length(along)
+    left = jnp.stack([-along[1], along[0]])
+    beside = (place_m[:, :2] - ends_m[0]) @ left
+    side = jnp.where(beside < 0, -1.0, 1.0)
+    return side * beside, side[:, None] * left, along
+
+
+def _at_wall(
+    discs: Discs, ends_m: jax.Array, table: Table
+) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    """How far rims are from a wall, m, and across it towards each disc, `[object, 2]`.
+
+    And where they would touch, along and across that, as shares of their radii, each `[object]`.
+    """
+    away, normal, _ = _before_wall(discs.place_m, ends_m)
+    rim = table.rim(discs)
+    if rim is None:
+        reach, side = jnp.ones(len(away)), jnp.zeros(len(away))
+    else:
+        reach, side = _shares(rim, jnp.arctan2(normal[:, 1], normal[:, 0]))
+    return away - reach * table.radius_m, normal, reach, side
+
+
+def bounce_times_s(discs: Discs, a: jax.Array, left_s: jax.Array, table: Table) -> jax.Array:
+    """When each disc meets each wall, s `[wall, object]`; inf where not within `left_s`."""
+
+    def one(ends_m: jax.Array) -> jax.Array:
+        def gap(t: jax.Array) -> tuple[jax.Array, jax.Array]:
+            then = discs.after(a, t[..., None])
+            gap_m, normal, _, side = _at_wall(then, ends_m, table)
+            speed = jnp.sum(then.speed_m_s[:, :2] * normal, axis=1)
+            return gap_m, speed + ROOT2 * side * then.speed_m_s[:, 2]
+
+        at = _meeting_s(gap, left_s)
+        _, _, along = _before_wall(discs.place_m, ends_m)
+        there = discs.after(a, jnp.where(at < jnp.inf, at, 0.0)[:, None]).place_m[:, :2] - ends_m[0]
+        passes = (there @ along >= 0) & (there @ along <= length(ends_m[1] - ends_m[0]))
+        return jnp.where(passes, at, jnp.inf)
+
+    if table.walls is None:
+        return jnp.zeros((0, len(table.radius_m)))
+    return jnp.stack([one(ends) for ends in table.walls.ends_m])
+
+
+def after_bounce(
+    discs: Discs, speed_m_s: jax.Array, wall: int, table: Table
+) -> tuple[jax.Array, jax.Array]:
+    """Places and speeds `[object, 3]` of all discs, were they to strike a wall here."""
+    assert table.walls is not None
+    gap, normal, reach, side = _at_wall(discs, table.walls.ends_m[wall], table)
+    # What was pressed into the wall within the step, by a thousandth of a millimetre, comes back.
+    into = jnp.maximum(-gap, 0.0)
+    across = jnp.stack([-normal[:, 1], normal[:, 0]], axis=1)
+    turning = ROOT2 * speed_m_s[:, 2]
+    approach = -jnp.sum(speed_m_s[:, :2] * normal, axis=1) - side * turning
+    slip = jnp.sum(speed_m_s[:, :2] * across, axis=1) - reach * turning
+    gives = 1.0 + 2.0 * side**2, 1.0 + 2.0 * reach**2, -2.0 * reach * side  # as in `after_hit`
+    push, rub = _impulse(approach, slip, gives, table.walls.restitution, table.walls.grip)
+    change = push[:, None] * normal + rub[:, None] * across
+    turns = ROOT2 * (side * push - reach * rub)
+    change = jnp.concatenate([change, turns[:, None]], axis=1)
+    return discs.place_m.at[:, :2].add(into[:, None] * normal), speed_m_s + change

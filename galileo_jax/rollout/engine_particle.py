@@ -1,0 +1,38 @@
+"""The particle engine: what has a place, and at most one angle, and follows no given path.
+
+Falls, flights, springs, what moves in a liquid (`particle_free`), pendulums (`particle_pendulum`),
+and discs on a level table (`particle_discs`): under one name, since one clip has one of them.
+"""
+
+from galileo_jax.model.effects.effect import PENDULUM
+from galileo_jax.model.model import Model
+from galileo_jax.rollout.acting_laws import ActingLaws
+from galileo_jax.rollout.engine_jax import EngineJax
+from galileo_jax.rollout.events import System, Task, rolled_out
+from galileo_jax.rollout.particle_discs import disc_system
+from galileo_jax.rollout.particle_free import free_system
+from galileo_jax.rollout.particle_pendulum import pendulum_system
+from galileo_jax.runtime.errors import InputError
+
+
+@rolled_out
+def roll_out(task: Task) -> System:
+    """What moves in the scene."""
+    if task.scene.is_level:
+        return disc_system(task)
+    return pendulum_system(task) if PENDULUM in task.scene.laws else free_system(task)
+
+
+class EngineParticle(EngineJax):
+    """Particles, see the module."""
+
+    roll_out = staticmethod(roll_out)
+
+    def __init__(self, model: Model, laws: ActingLaws | None = None):
+        """Raises `InputError` for a pendulum's track in space."""
+        scene = model.scene.surroundings
+        if PENDULUM in scene.laws and scene.num_axes != 2:
+            raise InputError(
+                "scenario pendulum: a track in the plane (x, y) expected, not in space"
+            )
+        super().__init__(model, laws)

@@ -1,0 +1,275 @@
+"""The event kernel: smooth motion up to the next event, a jump there, and on, record by record.
+
+An engine is a `System`: where it starts, and how it goes on to its next event. What finds events
+and integrates between them is here, too. The last Newton step towards an event carries the
+derivative of its instant, so that a motion is a continuous function of its parameters with the
+right derivatives, whatever the steps.
+"""
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from galileo_jax.model.effects.effect import Effect, Surroundings
+from galileo_jax.rollout.motion import Dynamics, dynamics
+
+State = TypeVar("State")  # a PyTree
+Motion = tuple[
+    Float[jax.Array, "*batch object 2 record"], Float[jax.Array, "*batch object 2 record"]
+]
+"""Centres (m) and velocities (m/s)."""
+Advance = Callable[[Any, jax.Array, jax.Array, Any], tuple[Any, jax.Array]]
+Part = Callable[[Any, jax.Array], tuple[Any, Any]]
+RollOut = Callable[..., Motion]
+"""See `rolled_out`."""
+
+PART = 16  # records are made in parts of so many, as many parts as are asked for
+NEWTON_STEPS = 8
+
+
+class System(NamedTuple):
+    """What an engine moves, and how.
+
+    Attributes:
+      start: the state at the release.
+      advance: `(state, time_s, left_s, is_last)` to the state at the next event, or after
+        `left_s`, and the time that took; the latter in any case where `is_last`, so that events
+        that never end hold up nobody.
+      most_events: so many advances make up a step at most; 1: there are no events.
+      seen: states `[record, ...]` and their times to centres and velocities.
+      part: where motion between events is known in closed form, a state and the index of its
+        record to the state `PART` records later, and those at the records, `[record, ...]`.
+    """
+
+    start: Any
+    advance: Advance
+    most_events: int
+    seen: Callable[[Any, jax.Array], Motion]
+    part: Part | None = None
+
+
+class Task(NamedTuple):
+    """What is rolled out.
+
+    Attributes:
+      effects: all that may act.
+      named: parameters by name.
+      scene: as declared.
+      dt_s: from record to record.
+      acts: `[effect]`, as in `motion.dynamics`.
+    """
+
+    effects: tuple[Effect, ...]
+    named: Mapping[str, jax.Array]
+    scene: Surroundings
+    dt_s: float
+    acts: jax.Array | None
+
+    def law(self) -> Dynamics:
+        """The equations of motion."""
+        return dynamics(self.effects, self.scene, self.named, jnp, self.acts)
+
+
+def rolled_out(system_of: Callable[[Task], System]) -> RollOut:
+    """The rollout of a system, a function under the name of `system_of`.
+
+    It maps `(effects, names, num_records, dt_s, theta, scene, count=None, acts=None)`, theta
+    `[parameter]`, to centres and velocities. Of records beyond the first `count` the centres are as
+    in the last of these; None: all are wanted.
+    """
+
+    def roll_out(
+        effects: tuple[Effect, ...],
+        names: tuple[str, ...],
+        num_records: int,
+        dt_s: float,
+        theta: jax.Array,
+        scene: Surroundings,
+        count: jax.Array | None = None,
+        acts: jax.Array | None = None,
+    ) -> Motion:
+        named = {name: theta[i] for i, name in enumerate(names)}
+        system = system_of(Task(effects, named, scene, dt_s, acts))
+        states = recorded(system, num_records, dt_s, count)
+        return system.seen(states, dt_s * jnp.arange(num_records))
+
+    for name in ("__doc__", "__module__", "__name__", "__qualname__"):  # its program's name on disk
+        setattr(roll_out, name, getattr(system_of, name))
+    return roll_out
+
+
+def recorded(system: System, num_records: int, dt_s: float, count: jax.Array | None = None) -> Any:
+    """The states at every record: leaves `[record, ...]`.
+
+    Args:
+      system: what moves.
+      num_records: which is compiled for.
+      dt_s: from one to the next.
+      count: of records that are wanted; beyond, bodies stay where they are then. None: all.
+    """
+
+    def step(state: Any, index: jax.Array) -> tuple[Any, Any]:
+        after = step_by_events(system.advance, state, index * dt_s, dt_s, system.most_events)
+        return after, state
+
+    def stepped(state: Any, first: jax.Array) -> tuple[Any, Any]:
+        return jax.lax.scan(step, state, first + jnp.arange(PART))
+
+    part = system.part or stepped
+    num_parts = -(-num_records // PART)
+    if count is None:
+        made = jax.lax.scan(part, system.start, PART * jnp.arange(num_parts))[1]
+        return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[:num_records], made)
+
+    def one(i: jax.Array, carry: tuple[Any, Any]) -> tuple[Any, Any]:
+        state, made = carry
+        state, own = part(state, i * PART)
+        put = functools.partial(jax.lax.dynamic_update_slice_in_dim, start_index=i * PART, axis=0)
+        return state, jax.tree.map(put, made, own)
+
+    padded = num_parts * PART
+    empty = jax.tree.map(lambda leaf: jnp.zeros((padded, *leaf.shape), leaf.dtype), system.start)
+    made = jax.lax.fori_loop(0, -(-count // PART), one, (system.start, empty))[1]
+    is_over = jnp.arange(padded) >= count
+
+    def held(leaf: jax.Array) -> jax.Array:
+        over = is_over.reshape(-1, *[1] * (leaf.ndim - 1))
+        return jnp.where(over, leaf[count - 1], leaf)[:num_records]
+
+    return jax.tree.map(held, made)
+
+
+def step_by_events(
+    advance: Advance, state: State, time_s: Any, dt_s: Any, most_events: int
+) -> State:
+    """The state a time `dt_s` later; `advance` and `most_events` as of `System`."""
+    whole_s = jnp.asarray(dt_s)
+    if most_events == 1:
+        return advance(state, time_s, whole_s, True)[0]
+
+    def is_left(carry: tuple[State, jax.Array, Any]) -> jax.Array:
+        _, left, count = carry
+        return (left > 0) & (count < most_events)
+
+    def phase(carry: tuple[State, jax.Array, Any]):
+        state, left, count = carry
+        state, spent = advance(state, time_s + dt_s - left, left, count == most_events - 1)
+        return state, left - spent, count + 1
+
+    return jax.lax.while_loop(is_left, phase, (state, whole_s, 0))[0]
+
+
+def runge_kutta(
+    rate: Callable[[State, Any], State], state: State, time_s: Any, step_s: Any
+) -> State:
+    """The state after one step of the classical fourth-order method; `rate` of state and time."""
+
+    def moved(by: State, spent_s: Any) -> State:
+        return jax.tree.map(lambda value, change: value + spent_s * change, state, by)
+
+    first = rate(state, time_s)
+    second = rate(moved(first, 0.5 * step_s), time_s + 0.5 * step_s)
+    third = rate(moved(second, 0.5 * step_s), time_s + 0.5 * step_s)
+    fourth = rate(moved(third, step_s), time_s + step_s)
+    mean = jax.tree.map(
+        lambda a, b, c, d: (a + 2 * b + 2 * c + d) / 6, first, second, third, fourth
+    )
+    return moved(mean, step_s)
+
+
+def reaches_s(distance: Any, v: Any, a: Any) -> Any:
+    """The first time t >= 0 at which v t + a t^2 / 2 >= `distance` on the way there; inf if never.
+
+    Where the distance is negative: as soon as the speed is not. In the array standard.
+    """
+    xp = distance.__array_namespace__()
+    under_root = v**2 + 2 * a * distance
+    forward = (v > 0) & ((under_root > 0) | (distance <= 0))
+    turning = (v <= 0) & (a > 0)
+    is_real = under_root > 0
+    root = xp.where(is_real, xp.sqrt(xp.where(is_real, under_root, 1.0)), 0.0)
+    # For v > 0 the usual formula times its conjugate: no cancellation, and a may be zero.
+    at_once = 2 * xp.maximum(distance, 0.0) / xp.where(forward, v + root, 1.0)
+    later = (root - v) / xp.where(turning, a, 1.0)
+    return xp.where(forward, at_once, xp.where(turning, later, xp.inf))
+
+
+def cubic(x0: Any, x1: Any, v0: Any, v1: Any, share: Any) -> tuple[Any, Any]:
+    """Hermite's cubic between two ends, with slopes per step, at a share of the step; its slope."""
+    a, b = 2 * (x0 - x1) + v0 + v1, 3 * (x1 - x0) - 2 * v0 - v1
+    return ((a * share + b) * share + v0) * share + x0, (3 * a * share + 2 * b) * share + v0
+
+
+def newton(
+    level: Callable[[jax.Array], tuple[jax.Array, jax.Array]], at: jax.Array, most: Any, steps: int
+) -> tuple[jax.Array, jax.Array]:
+    """Where a level falls through zero, and what is left of it one step before; not below 0.
+
+    Safeguarded by bisection. Beyond `most` where it does so there only.
+
+    Args:
+      level: a time to levels `[...]`, above zero before, and how fast they rise.
+      at: a first guess, `[...]`.
+      most: the last time at which the level may be asked for.
+      steps: of the search.
+    """
+    low, high, left = jnp.zeros_like(at), jnp.full_like(at, jnp.inf), jnp.zeros_like(at)
+    for _ in range(steps):
+        at = jax.lax.stop_gradient(jnp.clip(at, 0.0, most))
+        left, rate = level(at)
+        rate = jax.lax.stop_gradient(rate)
+        low = jnp.where(left > 0, at, low)
+        high = jnp.where(left > 0, high, at)
+        new = at - left / jnp.where(rate < 0, rate, -1.0)
+        is_inside = (rate < 0) & (new >= low) & (new <= high)
+        at = jnp.where(is_inside, new, 0.5 * (low + high))
+    return at, left
+
+
+def to_crossing(
+    state: State,
+    after: Callable[[jax.Array], State],
+    level: Callable[[State, jax.Array], tuple[jax.Array, jax.Array]],
+    jump: Callable[[State, jax.Array], State],
+    left_s: jax.Array,
+    may: jax.Array,
+) -> tuple[State, jax.Array]:
+    """The state behind the first of some events, or after `left_s`, and the time that took.
+
+    The instant is that of the cubic through level and rate at both ends of the step, which is off
+    by the fourth power of the step.
+
+    Args:
+      state: now.
+      after: the state after a time without events.
+      level: of a state and the time until it, what falls through zero at an event, `[...]`, and
+        how fast it rises.
+      jump: the state behind the events, from that before them and which they are, `[...]`.
+      left_s: what is left of the step.
+      may: `[...]`, which events there can be.
+    """
+    whole = after(left_s)
+    over = jnp.where(left_s > 0, left_s, 1.0)
+    (begin, rate), (end, last_rate) = level(state, jnp.zeros_like(left_s)), level(whole, left_s)
+    comes = may & (end < 0)
+    # What still rises, maybe from an event, comes down late.
+    guess = jnp.where(rate > 0, 1.0, begin / jnp.where(comes, begin - end, 1.0))
+    on_cubic = functools.partial(cubic, begin, end, rate * over, last_rate * over)
+    share, _ = newton(on_cubic, guess, 1.0, NEWTON_STEPS)
+    is_there = (begin <= 0) & (rate <= 0)
+    at = jnp.where(comes, jnp.where(is_there, 0.0, share * left_s), jnp.inf)
+    soonest, any_comes = jnp.min(at), jnp.any(comes)
+    spent_s = jnp.where(any_comes, soonest, left_s)
+    jumped = jump(after(spent_s), at <= soonest)
+    found = jax.tree.map(lambda one, other: jnp.where(any_comes, one, other), jumped, whole)
+    return found, spent_s
+
+
+def total(given: Sequence[Any | None]) -> Any | None:
+    """The sum of what is given; None where nothing is."""
+    terms = [each for each in given if each is not None]
+    return sum(terms[1:], terms[0]) if terms else None

@@ -1,0 +1,162 @@
+"""One body that slides on nothing: a fall, a flight, a swing on a spring, a body in a liquid.
+
+Between bounces the motion is smooth, and a Runge-Kutta step of 1/240 s is of fourth order. On a
+straight path the forces act along it; in the plane gravity is a vector, the effects' forces act
+along the velocity, and the path is how far the body has come along its curve.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from galileo_jax.model.effects.effect import Bounce, Effect, Surroundings
+from galileo_jax.rollout.events import (
+    Motion,
+    System,
+    Task,
+    runge_kutta,
+    to_crossing,
+    total,
+)
+from galileo_jax.rollout.motion import Dynamics, state_at
+
+MAX_BOUNCES = 8  # within one recorded step
+PLASTIC_M_S = 0.02  # slower impacts are plastic: nothing bounces for ever
+STILL_M2_S2 = 1e-18  # keeps the derivative of the speed finite at rest
+
+
+class Body(NamedTuple):
+    """The body at one instant, or its rates of change.
+
+    Attributes:
+      position_m, velocity_m_s: `[axis]`, x, y (up) and, in space, z.
+      way_m: how far it has come along its curve.
+    """
+
+    position_m: Float[jax.Array, " axis"]
+    velocity_m_s: Float[jax.Array, " axis"]
+    way_m: Float[jax.Array, ""]
+
+
+def free_system(task: Task) -> System:
+    """One body that slides on nothing."""
+    law, scene = task.law(), task.scene
+    tangent = _along(law, scene, jnp)
+    floor = floor_of(task.effects, task.named, scene)
+    velocity = start_velocity(task.effects, task.named, scene)
+    start = Body(
+        jnp.asarray(scene.start_m)[0] + law.start_m[0] * tangent,
+        law.start_speed_m_s[0] * tangent if velocity is None else velocity[0],
+        jnp.zeros(()),
+    )
+
+    def advance(body: Body, time_s: jax.Array, left_s: jax.Array, is_last: Any):
+        if floor is None:
+            return _moved(body, time_s, left_s, law, scene, rests=False), left_s
+        return _to_bounce(body, time_s, left_s, is_last, law, scene, floor)
+
+    def seen(bodies: Body, _: jax.Array) -> Motion:
+        return bodies.position_m.T[None], bodies.velocity_m_s.T[None]
+
+    return System(start, advance, 1 if floor is None else MAX_BOUNCES, seen)
+
+
+def start_velocity(
+    effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings
+) -> Any | None:
+    """The velocity in the plane at the start, `[..., object, 2]`; None on a straight path."""
+    return total([e.start_velocity(theta, scene) for e in effects])
+
+
+def floor_of(
+    effects: Sequence[Effect], theta: Mapping[str, Any], scene: Surroundings
+) -> Bounce | None:
+    """The floor at its true height, never above the body's start.
+
+    Its height is given as measured; what magnifies the picture magnifies its depth, too.
+    """
+    floor = next((f for e in effects if (f := e.bounce(theta, scene)) is not None), None)
+    if floor is None:
+        return None
+    xp = floor.height_m.__array_namespace__()
+    start = xp.asarray(scene.start_m)[0]
+    higher = [[0.0, 1.0 if axis == 1 else 0.0] for axis in range(scene.num_axes)]
+    seen = start[None, :, None] + xp.asarray(higher)[None]
+    for effect in effects:
+        seen = effect.measure(seen, theta, scene)
+    magnified = seen[0, 1, 1] - seen[0, 1, 0]
+    depth = xp.maximum((start[1] - floor.height_m) / magnified, xp.zeros_like(magnified))
+    return floor._replace(height_m=start[1] - depth)
+
+
+def rates(body: Body, time_s: Any, law: Dynamics, scene: Surroundings, rests: Any) -> Body:
+    """How a body changes; one that `rests` on the floor is not pulled through it."""
+    xp = body.position_m.__array_namespace__()
+    if scene.moves_in_plane:
+        speed = xp.sqrt(xp.sum(body.velocity_m_s**2) + STILL_M2_S2)
+        tangent, way = body.velocity_m_s / speed, body.way_m
+        down = [xp.sin(law.ramp_rad), -xp.cos(law.ramp_rad)]
+        weight = law.gravity * xp.stack([*down, *[0.0 * down[0]] * (scene.num_axes - 2)])
+    else:
+        tangent = _along(law, scene, xp)
+        speed = xp.sum(body.velocity_m_s * tangent)
+        way = xp.sum((body.position_m - xp.asarray(scene.start_m)[0]) * tangent)
+        weight = 0.0 * tangent
+    state = state_at(way[None], speed[None], time_s, scene)
+    a = weight + (law.drive(state) / law.inertia)[0] * tangent
+    for push in law.pushes:
+        a = a + push(body.velocity_m_s, time_s) / law.inertia[0]
+    held = rests & _upward(scene, xp)
+    return Body(body.velocity_m_s, xp.where(held, xp.maximum(a, xp.zeros_like(a)), a), speed)
+
+
+def _along(law: Dynamics, scene: Surroundings, xp: Any) -> Any:
+    """The direction of a straight path, `[axis]`; in the plane forward."""
+    cos, sin = xp.cos(law.ramp_rad), xp.sin(law.ramp_rad)
+    return xp.stack([cos, -sin, *[0.0 * cos] * (scene.num_axes - 2)])
+
+
+def _upward(scene: Surroundings, xp: Any) -> Any:
+    """Which axis is upward, `[axis]`."""
+    return xp.asarray([axis == 1 for axis in range(scene.num_axes)])
+
+
+def _moved(
+    body: Body, time_s: Any, spent_s: jax.Array, law: Dynamics, scene: Surroundings, rests: Any
+) -> Body:
+    """The body after a time without a bounce."""
+    return runge_kutta(lambda at, t: rates(at, t, law, scene, rests), body, time_s, spent_s)
+
+
+def _to_bounce(
+    body: Body,
+    time_s: jax.Array,
+    left_s: jax.Array,
+    is_last: jax.Array,
+    law: Dynamics,
+    scene: Surroundings,
+    floor: Bounce,
+) -> tuple[Body, jax.Array]:
+    """Moves on to the next bounce, or by `left_s`; what bounces faster than the last rests."""
+    upward = _upward(scene, jnp)
+    rests = (body.position_m[1] <= floor.height_m) & (body.velocity_m_s[1] == 0)
+
+    def level(at: Body, _: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return at.position_m[1] - floor.height_m, at.velocity_m_s[1]
+
+    def bounced(at: Body, _: jax.Array) -> Body:
+        falls = -at.velocity_m_s[1]
+        rebound = jnp.where((falls > PLASTIC_M_S) & ~is_last, floor.restitution * falls, 0.0)
+        return at._replace(
+            position_m=jnp.where(upward, floor.height_m, at.position_m),
+            velocity_m_s=jnp.where(upward, rebound, at.velocity_m_s * (1 - floor.grip)),
+        )
+
+    def after(spent_s: jax.Array) -> Body:
+        return _moved(body, time_s, spent_s, law, scene, rests)
+
+    found, spent_s = to_crossing(body, after, level, bounced, left_s, ~rests)
+    return found, jnp.where(is_last, left_s, spent_s)
