@@ -35,7 +35,9 @@ within this share of its size from the foot turns there."""
 UNKNOWN_M = 0.06
 """The size of an object that nobody measured."""
 LOST_FRAMES = 10
-"""An object that is hidden for less is not lost."""
+"""An object that is hidden for less is not lost, and one that is outside by then has left."""
+LAST_FRAMES = 5
+"""Before it is seen no more, tell where an object goes."""
 STEPS_ON_WAY = 9
 """Places on a way of two frames at which a puck is compared with the others."""
 APART = 0.8
@@ -223,11 +225,18 @@ def _size_m(declared: ClipObject) -> float:
     return max(declared.size_m) * (1 if declared.shape == "box" else 2)
 
 
+def leaves_picture(track: Track, i: int, last: int) -> bool:
+    """Whether object `i`, last seen in frame `last`, goes out of the picture soon after that."""
+    seen = np.flatnonzero(track.is_visible[i, : last + 1])[-LAST_FRAMES:]
+    place = track.position_px[i, seen]
+    if len(seen) < 2:
+        return False
+    goes_to = place[-1] + LOST_FRAMES * (place[-1] - place[0]) / (seen[-1] - seen[0])
+    return bool(((goes_to < 0) | (goes_to > np.array(track.frame_size_px) - 1)).any())
+
+
 def _is_lost(track: Track, i: int, last: int, last_used: int | None) -> bool:
     """Whether object `i`, last seen in frame `last`, should be in the picture after that."""
     after = (len(track.times_s) - 1 if last_used is None else last_used) - last
-    if after < LOST_FRAMES or track.is_visible[i, last + 1 :].any():
-        return False
-    step = np.nan_to_num(track.position_px[i, last] - track.position_px[i, last - 1])
-    goes_to = track.position_px[i, last] + LOST_FRAMES * step
-    return bool(((goes_to >= 0) & (goes_to < track.frame_size_px)).all())
+    is_back = track.is_visible[i, last + 1 :].any()
+    return after >= LOST_FRAMES and not is_back and not leaves_picture(track, i, last)

@@ -13,7 +13,12 @@ from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_file import read_track
-from galileo_jax.measurement.astray import Astray, find_astray, without_astray
+from galileo_jax.measurement.astray import (
+    Astray,
+    find_astray,
+    leaves_picture,
+    without_astray,
+)
 from galileo_jax.measurement.average_rows import with_rows_averaged
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
@@ -38,7 +43,6 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
 
-LAST_FRAMES = 5  # before it is seen no more, tell where an object goes
 LEAST_FRAMES, LEAST_SHARE = 8, 0.5
 """Of a clip, that tell whether a model describes it."""
 
@@ -179,15 +183,10 @@ def _of_scene(clip: Clip, times_s: np.ndarray, cuts: Sequence[Cut], pixels: Trac
 
 def _left_picture(track: Track) -> int:
     """The frame in which the last object has gone out of the picture; beyond all if one stays."""
-    gone, beyond = [], len(track.times_s)
-    for place, is_visible in zip(track.position_px, track.is_visible, strict=True):
-        seen = np.flatnonzero(is_visible)[-LAST_FRAMES:]
-        if len(seen) < LAST_FRAMES:
-            return beyond
-        step = (place[seen[-1]] - place[seen[0]]) / (seen[-1] - seen[0])
-        ahead = place[seen[-1]] + LAST_FRAMES * step
-        is_out = (ahead < 0).any() or (ahead > np.array(track.frame_size_px) - 1).any()
-        gone.append(int(seen[-1]) + 1 if is_out else beyond)
+    gone = [0]
+    for i, is_visible in enumerate(track.is_visible):
+        last = int(np.flatnonzero(is_visible)[-1]) if is_visible.any() else 0
+        gone.append(last + 1 if leaves_picture(track, i, last) else len(track.times_s))
     return max(gone)
 
 
