@@ -94,6 +94,12 @@ FORMS = {
         lambda n: f"0:00:{58 + (80 + 4 * n) // 100:02d}:{(80 + 4 * n) % 100:02d}")),
     "frames_of_a_second": text("time;x;y", body=clocked(
         lambda n: f"0:00:{1 + (20 + n) // 25:02d}:{(20 + n) % 25:02d}")),
+    "two_spaces_and_commas": text("t  x  y", body=lines("  ", ",")),
+    "last_row_first": text("t,x,y", body=lines()[::-1]),
+    "times_coarser_than_rows": text("t,x,y", body=[f"{0.04 * n:.1f},{x},{y}"
+                                                   for n, (_, x, y) in enumerate(truth().T)]),
+    "row_numbers_beside_times": text(body=[f"{n} {one}" for n, one in enumerate(lines(" "))]),
+    "time_and_height_swapped": text("y,x,t"),
     "a_time_twice": text("t,x,y", body=[lines()[0], *lines()]),
 }  # fmt: skip
 
