@@ -51,6 +51,19 @@ def test_what_is_let_go_in_the_clip_does_not(release_s, drag_per_s, seed):
     assert start_speed(went(way(release_s, drag_per_s, 90), seed)) is None
 
 
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("held_s", [0.0, 0.5])
+def test_what_goes_up_first_moves_against_the_way(held_s, seed):
+    """Pushed up a slope at 1.2 m/s before the clip or in it, and slides down again."""
+    time = np.maximum(np.arange(120) / FPS - held_s, 0.0)
+    found = start_speed(went(-1.2 * time + A_M_S2 * time**2 / 2, seed))
+    if held_s:
+        assert found is None
+    else:
+        assert found is not None
+        assert abs(found.mean_m_s + 1.2) < 4 * found.sd_m_s < 0.2
+
+
 def test_rest_and_too_few_places_tell_nothing():
     assert start_speed(went(np.zeros(60))) is None
     assert start_speed(went(way(-0.4, count=6))) is None

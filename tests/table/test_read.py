@@ -193,6 +193,13 @@ def test_several_objects_by_names_in_the_titles_or_above(tmp_path: Path) -> None
         np.testing.assert_allclose(table.position[1, 0], truth()[1] + 1)
 
 
+def test_an_object_of_one_letter_is_told_from_an_acceleration(tmp_path: Path) -> None:
+    body = [f"{t},{x},{y},{x},{y}" for t, x, y in truth().T]
+    titles = "t (s),{0} x ({2}),{0} y ({2}),{1} x ({2}),{1} y ({2})"
+    assert read(tmp_path, text(titles.format("a", "b", "m"), body=body)).names == ("a", "b")
+    assert read(tmp_path, text(titles.format("a", "b", "cm"), body=body)).names == ("a", "b")
+
+
 def test_motion_capture_names_its_markers_alone(tmp_path: Path) -> None:
     heading = ["NO_OF_FRAMES\t21", "FREQUENCY\t25", "MARKER_NAMES\tA\tB"]
     body = [f"{x}\t0\t{y}\t{x + 1}\t0\t{y}" for _, x, y in truth().T]
