@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from galileo_jax.observation.observation import stretches
 from galileo_jax.tracking.finish import Finished
 from galileo_jax.tracking.noise import motion_variance, sudden
 from galileo_jax.tracking.pieces import Start
@@ -157,10 +158,9 @@ def _joined(
 
 def _in_long_runs(chosen: Bool[np.ndarray, " frame"]) -> Bool[np.ndarray, " frame"]:
     """Those of the chosen frames that follow each other for a while."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     result = np.zeros_like(chosen)
-    for begin, end in edges.reshape(-1, 2):
-        result[begin:end] = end - begin >= SAME_FRAMES
+    for run in stretches(chosen):
+        result[run] = run.stop - run.start >= SAME_FRAMES
     return result
 
 

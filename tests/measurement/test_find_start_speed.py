@@ -8,8 +8,8 @@ import pytest
 from galileo_jax.api.fit import fit
 from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_problem
-from galileo_jax.measurement.find_start_speed import start_speed
 from galileo_jax.measurement.measure import measure
+from galileo_jax.measurement.segments.start_speed import start_speed
 from galileo_jax.observation.observation import Observation
 
 FPS, NOISE_M, A_M_S2 = 60.0, 5e-4, 2.4

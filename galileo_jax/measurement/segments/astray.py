@@ -12,14 +12,14 @@ Something that looks the same, and where the object might well be after a time o
 the fit tells from it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.clip.walls import distance_to_wall
+from galileo_jax.measurement.segments.strangers import jumps
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 
@@ -84,7 +84,7 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
             why = f"it is then in the same place as {other}; both are left out from there on"
             found.append(Astray(name, float(observation.times_s[frame]), why, True))
             continue
-        if (frame := _leapt(clip, observation, i, seen)) is not None:
+        if (frame := _leapt(clip, observation, i)) is not None:
             why = "its velocity jumps although it hits nothing: something else is tracked there"
             if SCENARIOS[clip.scenario].is_level:
                 why += ", or the puck was struck by something that is not in the scene"
@@ -99,15 +99,6 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
             why += "; it is left out from there on"
         found.append(Astray(name, float(observation.times_s[frame]), why, is_left_out))
     return tuple(found)
-
-
-def without_astray(observation: Observation, astray: Sequence[Astray]) -> Observation:
-    """The observation without what is to be left out."""
-    mask = observation.mask.copy()
-    for one in astray:
-        if one.is_left_out:
-            mask[observation.names.index(one.name), observation.times_s >= one.time_s] = False
-    return replace(observation, mask=mask)
 
 
 def longest_absence(observation: Observation) -> tuple[str, float, float] | None:
@@ -145,26 +136,22 @@ def _shared(clip: Clip, observation: Observation, i: int) -> tuple[int, str] | N
     return found
 
 
-def _leapt(clip: Clip, observation: Observation, i: int, seen: np.ndarray) -> int | None:
+def _leapt(clip: Clip, observation: Observation, i: int) -> int | None:
     """The first frame in which object `i` is where only a blow could have taken it; or None.
 
     Once it has gone half its size: until then a hand may be at it.
     """
     scenario = SCENARIOS[clip.scenario]
     is_asked = (scenario.has_ramp or scenario.is_level) and clip.is_scale_known
-    if not is_asked or len(seen) < FEWEST_FRAMES:
+    path = observation.path(i)
+    seen = path.frames
+    if not is_asked or len(path) < FEWEST_FRAMES:
         return None
-    place = observation.position_m[i, :2][:, seen]
-    step_s = np.diff(observation.times_s[seen])
-    velocity = np.diff(place) / step_s
-    jump = np.hypot(*np.diff(velocity))
-    variance = observation.variance_m2[i, seen]
-    step_variance = (variance[1:] + variance[:-1]) / step_s**2
-    sd = np.sqrt(step_variance[1:] + step_variance[:-1])
-    most = BLOW_M_S2 * (step_s[1:] + step_s[:-1]) / 2 + CLEAR * sd
+    place = path.place_m[:2]
+    step_s, velocity, _ = path.steps
     gone = np.hypot(*(place[:, 1:-1] - place[:, :1])) > _size_m(clip.objects[i]) / 2
-    for at in np.flatnonzero((jump > most) & gone):
-        way = velocity[:, at] * (step_s[at] + step_s[at + 1])
+    for at in np.flatnonzero(jumps(path, BLOW_M_S2, CLEAR) & gone):
+        way = velocity[:2, at] * (step_s[at] + step_s[at + 1])
         reach = np.hypot(*way)
         if scenario.is_level:
             frames = seen[at : at + 3]
