@@ -152,56 +152,41 @@ def _leapt(clip: Clip, observation: Observation, i: int) -> int | None:
     gone = np.hypot(*(place[:, 1:-1] - place[:, :1])) > _size_m(clip.objects[i]) / 2
     for at in np.flatnonzero(jumps(path, BLOW_M_S2, CLEAR) & gone):
         way = velocity[:2, at] * (step_s[at] + step_s[at + 1])
-        reach = np.hypot(*way)
         if scenario.is_level:
-            frames = seen[at : at + 3]
-            may_be_hit = _meets(clip, observation, i, frames, place[:, at], way)
+            on_way = place[:, at, None] + way[:, None] * np.linspace(0.0, 1.0, STEPS_ON_WAY)
+            may_meet = _may_meet(clip, observation, i, on_way, seen[at : at + 3])
         else:
-            may_be_hit = _may_be_hit(clip, observation, i, int(seen[at + 1]), float(reach))
-        if not may_be_hit:
+            there, reach_m = place[:, at + 1, None], float(np.hypot(*way))
+            may_meet = _may_meet(clip, observation, i, there, seen[at + 1 : at + 2], reach_m)
+        if not may_meet:
             # Of three places that no puck takes one after the other the middle one may be wrong.
             return int(seen[at + 1 if scenario.is_level else at + 2])
     return None
 
 
-def _meets(
+def _may_meet(
     clip: Clip,
     observation: Observation,
     i: int,
+    places_m: np.ndarray,
     frames: np.ndarray,
-    place: np.ndarray,
-    way: np.ndarray,
+    reach_m: float = 0.0,
 ) -> bool:
-    """Whether puck `i`, at a place in the first of these frames, may meet another, or a wall.
+    """Whether object `i`, at some places `[2, place]`, may meet another, a wall or the ramp's foot.
 
-    One that is not seen there may be anywhere.
+    One that is not seen in one of the frames may be anywhere.
     """
     size = _size_m(clip.objects[i])
-    on_way = place[:, None] + way[:, None] * np.linspace(0.0, 1.0, STEPS_ON_WAY)
+    if SCENARIOS[clip.scenario].has_table and abs(places_m[0]).min() < NEAR * size + reach_m:
+        return True
     for wall in clip.walls:
-        if distance_to_wall(on_way.T, wall.ends_m).min() < NEAR * size / 2:
+        if distance_to_wall(places_m.T, wall.ends_m).min() < NEAR * size / 2 + reach_m:
             return True
     for j, other in enumerate(clip.objects):
-        if j == i:
-            continue
         there = observation.position_m[j, :2][:, frames]
-        apart = np.linalg.norm(on_way[:, :, None] - there[:, None, :], axis=0)
-        if not apart.min() > NEAR * (size + _size_m(other)) / 2:
+        apart = np.linalg.norm(places_m[:, :, None] - there[:, None, :], axis=0)
+        if j != i and not apart.min() > NEAR * (size + _size_m(other)) / 2 + reach_m:
             return True
-    return False
-
-
-def _may_be_hit(clip: Clip, observation: Observation, i: int, frame: int, reach_m: float) -> bool:
-    """Whether object `i` is near another, one that is not seen there, or the ramp's foot."""
-    sizes = [_size_m(item) for item in clip.objects]
-    place = observation.position_m[i, :2, frame]
-    if SCENARIOS[clip.scenario].has_table and abs(place[0]) < NEAR * sizes[i] + reach_m:
-        return True
-    for other, size in enumerate(sizes):
-        if other != i:
-            apart = np.hypot(*(observation.position_m[other, :2, frame] - place))
-            if not apart > NEAR * (size + sizes[i]) / 2 + reach_m:
-                return True
     return False
 
 
