@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import galileo_jax as gx
+from galileo_jax.clip.scenarios import SCENARIOS
 
 ROLL_RAD, SD_M = math.radians(1.7), 5e-4
 CLIP = "track: throw.csv\nscenario: flight\nobjects: [{name: object1, shape: sphere}]\n"
@@ -39,3 +40,11 @@ def test_a_declared_error_of_the_vertical_stands_for_it(throw):
     result = gx.fit(throw, effects=[]).result
     nuisance = result["nuisances"]["declared_angle"]
     assert abs(nuisance["mean"] - ROLL_RAD) < 4 * nuisance["sd"]
+
+
+def test_what_is_seen_from_above_or_by_several_cameras_has_no_vertical_to_be_off():
+    has_vertical = {name for name, one in SCENARIOS.items() if "vertical_sd_deg" in one.keys}
+    in_plane = {name for name, one in SCENARIOS.items() if one.moves_in_plane}
+    assert {name for name in in_plane if "camera_roll" not in SCENARIOS[name].without} == (
+        has_vertical
+    )
