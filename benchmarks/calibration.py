@@ -38,8 +38,8 @@ from galileo_jax.api.fit_result import Fit
 from galileo_jax.api.simulate import Simulated, simulate
 from galileo_jax.api.track import Track, track
 from galileo_jax.comparison.compare import ADEQUATE_P
-from galileo_jax.measurement.cuts import cut, to_last_cut
 from galileo_jax.measurement.measure import Measurement
+from galileo_jax.measurement.segments.segments import segment
 from galileo_jax.model.model import Model
 from galileo_jax.model.scene.scene import compile_scene
 from galileo_jax.rollout.engines import make_engine
@@ -159,8 +159,9 @@ def seen(truth: Truth, position_m: np.ndarray, fps: float, noise_m: float) -> Tr
     """Positions `[object, 2, frame]`, m, as a track of a clip that declares the truth's scene."""
     observation = tracks.observed(position_m, fps, noise_m)
     clip = tracks.declared(truth.objects, truth.ramp_angle_deg, fps, position_m.shape[-1])
-    used, cuts = cut(clip, observation)
-    return Track(clip, None, Measurement(clip, to_last_cut(used, cuts), observation, cuts=cuts))
+    segments = segment(clip, observation)
+    used = segments.used(observation)
+    return Track(clip, None, Measurement(clip, used, observation, segments=segments))
 
 
 def in_mujoco(truth: Truth, times_s: np.ndarray) -> np.ndarray:

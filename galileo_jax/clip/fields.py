@@ -140,21 +140,20 @@ def _ramp_angle_deg(value: float) -> float:
     return value
 
 
-def _angle_sd_deg(value: float) -> float:
-    if not 0 <= value <= MAX_ANGLE_SD_DEG:
-        raise wrong(f"{value:g} is outside [0, {MAX_ANGLE_SD_DEG:g}] degrees")
-    return value
+def _up_to(most: float, unit: str) -> AfterValidator:
+    """Refuses what is negative, or more than `most`."""
+
+    def check(value: float) -> float:
+        if not 0 <= value <= most:
+            raise wrong(f"{value:g} is outside [0, {most:g}] {unit}")
+        return value
+
+    return AfterValidator(check)
 
 
 def _scale_sd(value: float) -> float:
     if value < 0:
         raise wrong(f"{value:g} is negative; pixels per metre, 0 or more, expected")
-    return value
-
-
-def _origin_sd_px(value: float) -> float:
-    if not 0 <= value <= MAX_ORIGIN_SD_PX:
-        raise wrong(f"{value:g} is outside [0, {MAX_ORIGIN_SD_PX:g}] pixels")
     return value
 
 
@@ -292,8 +291,8 @@ ScaleSd = Annotated[Number, AfterValidator(_scale_sd)]
 Gravity = Annotated[Number, AfterValidator(_gravity)]
 FrameRate = Annotated[Number, AfterValidator(_fps)]
 RampAngle = Annotated[Number, AfterValidator(_ramp_angle_deg)]
-AngleSd = Annotated[Number, AfterValidator(_angle_sd_deg)]
-OriginSd = Annotated[Number, AfterValidator(_origin_sd_px)]
+AngleSd = Annotated[Number, _up_to(MAX_ANGLE_SD_DEG, "degrees")]
+OriginSd = Annotated[Number, _up_to(MAX_ORIGIN_SD_PX, "pixels")]
 LiquidDensity = Annotated[Number, AfterValidator(_liquid_density)]
 MarkedPoint = Annotated[Point, AfterValidator(_point_px)]
 Corrections = Annotated[tuple[Correction, ...], BeforeValidator(_corrections)]

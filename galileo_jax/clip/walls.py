@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float
 from pydantic import BaseModel, BeforeValidator, ConfigDict, model_validator
 
 from galileo_jax.clip.fields import Point, short, wrong
+from galileo_jax.observation.observation import stretches
 
 MOST_WALLS = 12
 FARTHEST_M = 100.0
@@ -103,8 +104,7 @@ def bounces(
     """The frames in which a puck is nearest to a wall, one for each stay beside it."""
     away = distance_to_wall(np.moveaxis(np.nan_to_num(place_m), 0, -1), ends_m)
     away = np.where(is_seen, away, np.inf)
-    near = np.flatnonzero(np.diff(np.concatenate([[False], away < NEAR * radius_m, [False]])))
-    return [a + int(np.argmin(away[a:b])) for a, b in zip(near[::2], near[1::2], strict=True)]
+    return [near.start + int(np.argmin(away[near])) for near in stretches(away < NEAR * radius_m)]
 
 
 Walls = Annotated[tuple[Wall, ...], BeforeValidator(_walls)]

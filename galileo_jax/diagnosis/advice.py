@@ -50,6 +50,11 @@ SEPARATES = (
         "does not",
     ),
     (
+        {"camera_roll", "magnus", "constant_force"},
+        "hang a plumb line into the picture; whether or not the camera was rolled, "
+        "`vertical_sd_deg: 2` in the clip file allows for it",
+    ),
+    (
         {"spring_tether", "constant_force"},
         "use a longer run: a spring's force grows with the distance",
     ),

@@ -45,9 +45,7 @@ def from_first_common_frame(clip: Clip, observation: Observation) -> Observation
     common = np.flatnonzero(observation.mask.all(axis=0))
     if not common.size:
         raise InputError(f"{clip.path}: there is no frame in which every object is seen")
-    mask = observation.mask.copy()
-    mask[:, : common[0]] = False
-    return replace(observation, mask=mask)
+    return observation.without(slice(common[0]))
 
 
 def with_walls_in_metres(clip: Clip, pixels: Track | None) -> Clip:

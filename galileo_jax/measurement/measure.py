@@ -13,14 +13,11 @@ from galileo_jax.clip.picture_plane import picture_plane
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.track_file import read_track
-from galileo_jax.measurement.astray import Astray, find_astray, without_astray
 from galileo_jax.measurement.average_rows import with_rows_averaged
 from galileo_jax.measurement.camera_modes import with_camera_modes
 from galileo_jax.measurement.check_frame_rate import frame_rate_doubt
 from galileo_jax.measurement.coding_errors import with_coding_errors
-from galileo_jax.measurement.cuts import HELD, Cut, cut, cuts_of, to_last_cut
 from galileo_jax.measurement.errors_at_rest import with_errors_at_rest
-from galileo_jax.measurement.find_start_speed import on_ramp, start_speed
 from galileo_jax.measurement.infer_foot import infer_foot, needs_foot
 from galileo_jax.measurement.infer_radii import (
     from_first_common_frame,
@@ -31,6 +28,16 @@ from galileo_jax.measurement.infer_radii import (
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.path_direction import OtherWay, other_way, turned_back, way_text
+from galileo_jax.measurement.segments.astray import Astray, leaves_picture
+from galileo_jax.measurement.segments.segments import (
+    HELD,
+    Cut,
+    Phase,
+    Segments,
+    cuts_of,
+    segment,
+)
+from galileo_jax.measurement.segments.start_speed import on_ramp, start_speed
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.measurement.turning import with_turning
 from galileo_jax.measurement.wander_size import with_wander
@@ -38,7 +45,6 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.to_metres import observe
 from galileo_jax.tracking.track import Track
 
-LAST_FRAMES = 5  # before it is seen no more, tell where an object goes
 LEAST_FRAMES, LEAST_SHARE = 8, 0.5
 """Of a clip, that tell whether a model describes it."""
 
@@ -49,12 +55,11 @@ class Measurement:
 
     Attributes:
       clip: with what was inferred filled in.
-      observation: in metres, without what `cuts` leave out.
+      observation: in metres, of what is motion of the scene.
       whole: in metres, to the clip's end.
       pixels: the track in pixels; None where the clip is a track already.
       inferred: key of the clip that was left null to value and sd.
-      cuts: where and why parts of the track are left out, in time's order.
-      astray: objects whose tracks are not to be believed to their ends.
+      segments: which part of the track that is, and why.
       doubts: of what is declared and of tracks gone astray, one line each; results repeat them.
       remarks: what was inferred or left out, one line each.
       way: of object 1, where its path says another than is declared.
@@ -68,14 +73,23 @@ class Measurement:
     whole: Observation
     pixels: Track | None = None
     inferred: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    cuts: tuple[Cut, ...] = ()
-    astray: tuple[Astray, ...] = ()
+    segments: Segments = field(default_factory=Segments)
     doubts: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     way: OtherWay | None = None
     frames_used: int = 0
     frames: int = 0
     frames_of_scene: int = 0
+
+    @property
+    def cuts(self) -> tuple[Cut, ...]:
+        """Where and why parts of the track are left out, in time's order."""
+        return self.segments.cuts
+
+    @property
+    def astray(self) -> tuple[Astray, ...]:
+        """Objects whose tracks are not to be believed to their ends."""
+        return self.segments.astray
 
     @property
     def no_verdict(self) -> str | None:
@@ -124,11 +138,10 @@ def measure(clip: Clip) -> Measurement:
     measured = _with_pucks(measured, remarks) if is_level(clip) else measured
     measured = _with_sizes(measured, remarks) if needs_sizes(measured.clip) else measured
     pixels, doubt = measured.pixels, frame_rate_doubt(measured.clip, measured.observation)
-    observation, cuts = cut(measured.clip, measured.observation)
-    remarks.extend(f"{clip.path}: {each}" for each in cuts)
-    measured = replace(measured, clip=_moving(measured.clip, observation, cuts, remarks))
-    astray = () if pixels is None else find_astray(measured.clip, observation, pixels)
-    observation = without_astray(to_last_cut(observation, cuts), astray)
+    segments = segment(measured.clip, measured.observation, pixels)
+    remarks.extend(f"{clip.path}: {each}" for each in segments.cuts)
+    observation = segments.used(measured.observation)
+    measured = replace(measured, clip=_moving(measured.clip, observation, segments, remarks))
     if is_level(measured.clip) or clip.scenario == "toss":
         # The places of a ball in space are as uncertain along its way as its times, which a wander
         # that is told by the track would take for it.
@@ -140,37 +153,35 @@ def measure(clip: Clip) -> Measurement:
         remarks.extend(f"{clip.path}: {line}" for line in said)
     other_doubts = (
         f"{clip.path}: {one}: {one.why}; see the overlay: galileo track {clip.source or clip.path}"
-        for one in astray
+        for one in segments.astray
     )
     way = [] if measured.way is None else [f"{clip.path}: {way_text(clip, measured.way)}"]
     return replace(
         measured,
         observation=observation,
         inferred={**found, **measured.inferred},
-        cuts=cuts,
-        astray=astray,
+        segments=segments,
         doubts=(*way, *([] if doubt is None else [doubt]), *other_doubts),
         remarks=tuple(remarks),
         frames_used=frames_used,
         frames=len(measured.whole.times_s),
-        frames_of_scene=_of_scene(clip, measured.whole.times_s, cuts, pixels),
+        frames_of_scene=_of_scene(clip, measured.whole, segments, pixels),
     )
 
 
 def _on_its_way(clip: Clip) -> Measurement:
     """A measurement whose points are turned, if need be, to where the clip says that they go."""
     whole, pixels = observed(clip)
-    way = other_way(clip, cut(clip, whole)[0], may_turn=pixels is None)
+    way = other_way(clip, segment(clip, whole).used(whole), may_turn=pixels is None)
     if way is not None and way.is_turned_back:
         whole = turned_back(clip, whole, way)
     return Measurement(clip, whole, whole, pixels, way=way)
 
 
-def _of_scene(clip: Clip, times_s: np.ndarray, cuts: Sequence[Cut], pixels: Track | None) -> int:
+def _of_scene(clip: Clip, whole: Observation, segments: Segments, pixels: Track | None) -> int:
     """How many frames show what is modelled."""
-    is_there = np.ones(len(times_s), bool)
-    for each in cuts:
-        is_there &= times_s >= each.time_s if each.side == "before" else times_s <= each.time_s
+    phases = segments.phases(whole.names, whole.times_s)
+    is_there = ((phases == Phase.SCENE) | (phases == Phase.ASTRAY)).any(axis=0)
     is_there[: min(item.first_frame or 0 for item in clip.objects)] = False
     if pixels is not None:
         is_there[_left_picture(pixels) :] = False
@@ -179,26 +190,21 @@ def _of_scene(clip: Clip, times_s: np.ndarray, cuts: Sequence[Cut], pixels: Trac
 
 def _left_picture(track: Track) -> int:
     """The frame in which the last object has gone out of the picture; beyond all if one stays."""
-    gone, beyond = [], len(track.times_s)
-    for place, is_visible in zip(track.position_px, track.is_visible, strict=True):
-        seen = np.flatnonzero(is_visible)[-LAST_FRAMES:]
-        if len(seen) < LAST_FRAMES:
-            return beyond
-        step = (place[seen[-1]] - place[seen[0]]) / (seen[-1] - seen[0])
-        ahead = place[seen[-1]] + LAST_FRAMES * step
-        is_out = (ahead < 0).any() or (ahead > np.array(track.frame_size_px) - 1).any()
-        gone.append(int(seen[-1]) + 1 if is_out else beyond)
+    gone = [0]
+    for i, is_visible in enumerate(track.is_visible):
+        last = int(np.flatnonzero(is_visible)[-1]) if is_visible.any() else 0
+        gone.append(last + 1 if leaves_picture(track, i, last) else len(track.times_s))
     return max(gone)
 
 
-def _moving(clip: Clip, observation: Observation, cuts: Sequence[Cut], remarks: list[str]) -> Clip:
+def _moving(clip: Clip, observation: Observation, segments: Segments, remarks: list[str]) -> Clip:
     """The clip with `starts_moving`, where nobody lets the object go in what is left of it.
 
     On a ramp with a table whoever moves at first was perhaps pushed, which is an effect: it is said
     and not assumed.
     """
     scenario = SCENARIOS[clip.scenario]
-    if any(each.why == HELD for each in cuts) and "starts_moving" in scenario.keys:
+    if any(each.why == HELD for each in segments.cuts) and "starts_moving" in scenario.keys:
         return clip.model_copy(update={"starts_moving": True})
     if clip.starts_moving is not None or "starts_moving" not in scenario.keys:
         return clip
@@ -237,12 +243,11 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
 
 def _as_declared(clip: Clip, observation: Observation) -> Observation:
     """Without what is before the first and after the last frames; tracking begins and ends so."""
-    mask = observation.mask.copy()
     for i, item in enumerate(clip.objects):
-        mask[i, : item.first_frame or 0] = False
+        observation = observation.without(slice(item.first_frame or 0), i)
         if item.last_frame is not None:
-            mask[i, item.last_frame + 1 :] = False
-    return replace(observation, mask=mask)
+            observation = observation.without(slice(item.last_frame + 1, None), i)
+    return observation
 
 
 def _with_foot(clip: Clip, remarks: list[str]) -> Clip:
@@ -277,9 +282,9 @@ def _with_slope(clip: Clip, remarks: list[str]) -> Measurement:
     if clip.video is not None:
         # The object's outline stands along the ramp: a first look, without it, tells how steep.
         first_look, _ = observed(_without_sizes(clip))
-        clip = _inclined(clip, infer_slope(clip, cut(clip, first_look)[0]))
+        clip = _inclined(clip, infer_slope(clip, segment(clip, first_look).used(first_look)))
     observation, pixels = observed(clip)
-    slope = infer_slope(clip, cut(clip, observation)[0])
+    slope = infer_slope(clip, segment(clip, observation).used(observation))
     clip = _inclined(clip, slope)
     remarks.append(
         f"{clip.path}: ramp_angle_deg: null; {observation.names[0]}'s path falls by "

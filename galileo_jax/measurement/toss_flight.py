@@ -1,4 +1,4 @@
-"""What the poses say before the first impact: where it begins, and how the body is thrown."""
+"""What the poses of a toss say: how the body is thrown, and how high it lies in the end."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,6 +9,9 @@ from galileo_jax.observation.poses import Poses
 
 NEAR_SHARE = 0.06  # of the edge: a lowest corner nearer to the plane may touch it in the next frame
 FEWEST = 6  # frames of a flight that tell velocity and spin
+LAST_FRAMES = 12
+STILL_M = 5e-4  # whoever goes no further in its last frames is at rest
+FLAT = np.cos(np.radians(2.0))  # one of its axes is upright to within two degrees
 
 
 @dataclass(frozen=True)
@@ -72,3 +75,17 @@ def flight_of(poses: Poses, size_m: np.ndarray) -> Flight | None:
     first = Rotation.from_rotvec(turning[0]) * turned[0]
     quaternion = first.as_quat(scalar_first=True)
     return Flight(last, place[0], place[1], quaternion, turning[1], place[2])
+
+
+def resting_height_m(tosses: Sequence[Poses]) -> float | None:
+    """The median height of the centre, m, over the tosses that end on a face; None: none does."""
+    from scipy.spatial.transform import Rotation  # a third of a second, for tosses alone
+
+    found = []
+    for poses in tosses:
+        place = poses.position_m[-LAST_FRAMES:]
+        turned = Rotation.from_quat(poses.quaternion[-1], scalar_first=True).as_matrix()
+        is_flat = np.abs(turned[2]).max() > FLAT
+        if len(place) == LAST_FRAMES and is_flat and np.ptp(place, axis=0).max() < STILL_M:
+            found.append(np.median(place[:, 2]))
+    return float(np.median(found)) if found else None

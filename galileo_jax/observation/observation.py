@@ -1,9 +1,9 @@
 """An observation: what was measured, in metres and seconds, with its errors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 NOMINAL_SCALE_PX_PER_M = 500.0
 
@@ -13,6 +13,50 @@ still small enough for the other's to keep its digits in one covariance."""
 
 LEAST_SD_M = 1e-6
 """Smaller errors do not keep their digits beside it."""
+
+
+def stretches(chosen: Bool[np.ndarray, " frame"]) -> list[slice]:
+    """The runs of chosen frames that follow each other."""
+    steps = np.diff(np.concatenate([[0], chosen.astype(int), [0]]))
+    ends = zip(np.flatnonzero(steps > 0), np.flatnonzero(steps < 0), strict=True)
+    return [slice(int(first), int(after)) for first, after in ends]
+
+
+@dataclass(frozen=True)
+class PointPath:
+    """Where one object was seen.
+
+    Attributes:
+      frames: `[place]`, numbers of the frames in which it was.
+      times_s: `[place]`, s.
+      place_m: `[axis, place]`, m.
+      variance_m2: `[place]`, of a coordinate, m^2.
+    """
+
+    frames: Int[np.ndarray, " place"]
+    times_s: Float[np.ndarray, " place"]
+    place_m: Float[np.ndarray, "axis place"]
+    variance_m2: Float[np.ndarray, " place"]
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    @property
+    def steps(
+        self,
+    ) -> tuple[
+        Float[np.ndarray, " step"], Float[np.ndarray, "axis step"], Float[np.ndarray, " step"]
+    ]:
+        """From each place to the next: the time, s, the velocity, m/s, and its sd."""
+        step_s = np.diff(self.times_s)
+        sd = np.sqrt(self.variance_m2[1:] + self.variance_m2[:-1]) / step_s
+        return step_s, np.diff(self.place_m) / step_s, sd
+
+    def __getitem__(self, part: slice | np.ndarray) -> "PointPath":
+        """Some of the places: a slice, or which of them."""
+        return PointPath(
+            self.frames[part], self.times_s[part], self.place_m[:, part], self.variance_m2[part]
+        )
 
 
 @dataclass(frozen=True)
@@ -82,6 +126,32 @@ class Observation:
         # What is left of the digits of a covariance beside what was not measured.
         along = np.maximum(trace - UNMEASURED_SD_M**2, LEAST_SD_M**2)
         return np.where(is_line, along, trace / axes)
+
+    def path(self, index: int = 0) -> PointPath:
+        """Where an object was seen, without how far it had turned."""
+        seen = np.flatnonzero(self.mask[index])
+        axes = 2 if self.is_turning else self.position_m.shape[1]
+        place = self.position_m[index, :axes][:, seen]
+        return PointPath(seen, self.times_s[seen], place, self.variance_m2[index, seen])
+
+    def without(self, frames: slice, objects: slice | int = slice(None)) -> "Observation":
+        """The observation in which objects count as not seen in some frames."""
+        mask = self.mask.copy()
+        mask[objects, frames] = False
+        return replace(self, mask=mask)
+
+    def between(self, frames: slice) -> "Observation":
+        """Some of its frames alone."""
+        modes, turned = self.modes_m, self.turned_rad
+        return replace(
+            self,
+            times_s=self.times_s[frames],
+            position_m=self.position_m[..., frames],
+            covariance_m2=self.covariance_m2[..., frames],
+            mask=self.mask[:, frames],
+            modes_m=None if modes is None else modes[..., frames],
+            turned_rad=None if turned is None else turned[:, frames],
+        )
 
     @property
     def axes(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.measurement.cuts import Cut
+from galileo_jax.measurement.segments.segments import Cut
 from galileo_jax.prediction.posterior_predictive import (
     PosteriorPredictive,
     posterior_predictive,

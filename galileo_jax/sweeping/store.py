@@ -22,10 +22,10 @@ import numpy as np
 
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip
-from galileo_jax.measurement.astray import Astray
-from galileo_jax.measurement.cuts import Cut
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.measurement.path_direction import OtherWay
+from galileo_jax.measurement.segments.astray import Astray
+from galileo_jax.measurement.segments.segments import Cut, Segments
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import replacing, write_json
 from galileo_jax.runtime.errors import InputError
@@ -141,7 +141,8 @@ class Store:
         own["way"] = OtherWay(**notes["way"]) if notes.get("way") else None
         astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
         cuts = tuple(Cut(**entry) for entry in notes.get("cuts", []))
-        measured = Measurement(clip, seen, seen, None, notes["inferred"], cuts, astray, **own)
+        segments = Segments(cuts, astray)
+        measured = Measurement(clip, seen, seen, None, notes["inferred"], segments, **own)
         return MeasuredClip(measured, picture or None)
 
     def save_clip(self, key: str, measured: MeasuredClip) -> None:

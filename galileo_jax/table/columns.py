@@ -21,6 +21,9 @@ PLACES = ("x", "y", "z", "line", "angle")
 EVEN_SHARE = 0.02
 """Of its median step: a clock's steps differ by less, a body's by more."""
 
+LEAST_TICKS = 8
+"""Steps: fewer may be the same by chance."""
+
 SURE = 0.9
 """The median of a column of likelihoods is higher."""
 
@@ -100,6 +103,20 @@ def _is_even(numbers: Numbers) -> bool:
     return bool(np.ptp(steps) <= 2 * max(rounding, EVEN_SHARE * float(np.median(steps))))
 
 
+def _is_even_as_printed(numbers: Numbers) -> bool:
+    """Whether a column rises by the same to the last digit that is printed."""
+    steps = np.diff(numbers.values[np.isfinite(numbers.values)])
+    if steps.size < LEAST_TICKS or steps.min() < 0:
+        return False
+    return bool(np.ptp(steps) <= 2 * 1.01 * numbers.resolution)
+
+
+def _ticks(numbers: Numbers) -> bool:
+    """Whether a column rises by the same to the last of many digits, as no place does."""
+    steps = np.diff(numbers.values[np.isfinite(numbers.values)])
+    return _is_even_as_printed(numbers) and numbers.resolution < EVEN_SHARE * np.median(steps)
+
+
 def _unevenness(numbers: Numbers) -> float:
     """The range of a rising column's steps, over the usual one."""
     steps = np.diff(numbers.values[np.isfinite(numbers.values)])
@@ -123,10 +140,13 @@ def _with_clock(heading: Heading, columns: Columns) -> Columns:
     """The columns with one that is the time or counts frames, where the numbers show one."""
     free = [n for n in columns.numbers if not columns.meanings[n].role
             or (not heading.is_titled and columns.meanings[n].role in PLACES)]  # fmt: skip
-    for role, is_it in (("frame", _is_count), ("time", _is_even)):
-        found = [n for n in free if is_it(columns.numbers[n])]
-        if found:
-            return _given(columns, {found[0]: role})
+    counts = [n for n in free if _is_count(columns.numbers[n])]
+    ticks = [n for n in free if n not in counts and _ticks(columns.numbers[n])]
+    if counts:
+        # A table that counts its rows may have their times beside it.
+        return _given(columns, {counts[0]: "frame"} | dict.fromkeys(ticks[:1], "time"))
+    if even := [n for n in free if _is_even(columns.numbers[n])]:
+        return _given(columns, {even[0]: "time"})
     if not heading.is_titled and free and _is_rising(columns.numbers[free[0]].values):
         return _given(columns, {free[0]: "time"})
     return columns
@@ -196,22 +216,25 @@ def _swapped_back(path: Path, heading: Heading, columns: Columns) -> Columns:
     clock, places = columns.of("time"), [n for role in PLACES for n in columns.of(role)]
     if len(clock) != 1 or columns.of("object"):
         return columns
-    steps = np.diff(columns.numbers[clock[0]].values)
-    if not (np.nan_to_num(steps, nan=1.0) < 0).any():
+    called = columns.numbers[clock[0]]
+    goes_back = bool((np.nan_to_num(np.diff(called.values), nan=1.0) < 0).any())
+    if not goes_back and _is_even_as_printed(called):
         return columns
+    is_clock = _is_even if goes_back else _ticks
     even = sorted(
-        (n for n in places if _is_even(columns.numbers[n])),
+        (n for n in places if is_clock(columns.numbers[n])),
         key=lambda n: _unevenness(columns.numbers[n]),
     )
     if not even or len(places) > 3:
         return columns
-    roles = [columns.meanings[n].role for n in sorted(places)]
+    roles = sorted((columns.meanings[n].role for n in places), key=PLACES.index)
     rest = sorted(n for n in (*places, clock[0]) if n != even[0])
     by_column = {even[0]: "time"} | dict(zip(rest, roles, strict=True))
     said = ", ".join(f"{heading.name_of(n)!r} as {role}" for n, role in by_column.items())
     step = float(np.median(np.diff(columns.numbers[even[0]].values)))
     warning = (
         f"{path}: {heading.name_of(even[0])!r} rises evenly by {step:g} and "
-        f"{heading.name_of(clock[0])!r} goes up and down: titles swapped; read {said}"
+        f"{heading.name_of(clock[0])!r} {'goes up and down' if goes_back else 'does not'}: titles "
+        f"swapped; read {said}"
     )
     return replace(_given(columns, by_column), warnings=(*columns.warnings, warning))

@@ -102,21 +102,27 @@ def _separator(lines: list[str]) -> str:
     return next((mark for mark in "\t;," if mark in "".join(sample)), ",")
 
 
-def _fit(lines: list[str], separator: str) -> tuple[float, int]:
-    """(share of rows that are numbers and no more than usual, which of two that fit is meant)."""
+def _fit(lines: list[str], separator: str) -> tuple[float, int, float]:
+    """How well a separator fits: the larger, the better.
+
+    Share of rows that are numbers and no more than usual; which of two that fit is meant; share of
+    cells that are numbers.
+    """
     rows = [_cells(line, separator) for line in lines]
     filled = [n for row in rows if (n := sum(map(bool, row))) > 1]
     if not filled or (separator == ", " and not _is_comma_twice(rows)):
-        return 0.0, 0
+        return 0.0, 0, 0.0
     usual = max(sorted(set(filled)), key=filled.count)
-    good = 0
+    good, num_cells, num_numbers = 0, 0, 0
     for row in rows:
         cells = [cell for cell in row if cell]
         numbers = [cell for cell in cells if is_number(cell) or is_time(cell) or is_nothing(cell)]
         least = len(cells) if separator == " " else max(1, len(cells) / 2)  # words have spaces
+        num_cells, num_numbers = num_cells + len(cells), num_numbers + len(numbers)
         good += len(cells) <= usual and len(numbers) >= least
     # A comma with a space, where it fits, is told by every cell's own decimal comma.
-    return round(good / len(rows), 2), 2 if separator == ", " else 1
+    meant = 2 if separator == ", " else 1
+    return round(good / len(rows), 2), meant, round(num_numbers / num_cells, 2)
 
 
 def _is_comma_twice(rows: list[list[str]]) -> bool:

@@ -15,7 +15,7 @@ from galileo_jax.table.columns import PLACES, Columns, with_roles
 from galileo_jax.table.grid import read_grid
 from galileo_jax.table.heading import Heading, split_heading
 from galileo_jax.table.pandas_h5 import is_hdf5, read_h5
-from galileo_jax.table.repeated import motion_starts, without_repeats
+from galileo_jax.table.repeated import motion_starts, unrounded, without_repeats
 from galileo_jax.table.spreadsheet import is_spreadsheet
 from galileo_jax.table.text import content_of
 from galileo_jax.table.titles import LENGTHS, RADIANS, SECONDS
@@ -51,7 +51,7 @@ def read_table(path: Path, fps: float | None = None) -> TrackTable:
 
 def _table(path: Path, heading: Heading, columns: Columns) -> TrackTable:
     lines = [line for line, _ in heading.body]
-    times, frames, _unit_s = _clock(path, heading, columns, lines)
+    times, frames, resolution_s = _clock(path, heading, columns, lines)
     names, axes, places, resolution = _places(path, heading, columns)
     unit = _unit(path, heading, columns)
     warnings = list(columns.warnings)
@@ -64,8 +64,12 @@ def _table(path: Path, heading: Heading, columns: Columns) -> TrackTable:
         names, places, clock = _by_object(path, heading, ids[0], columns, clock, places[0])
         times, frames = (clock, None) if times is not None else (None, clock)
     elif times is not None:
+        if times.size > 1 and (np.diff(times) < 0).all():
+            times, places, lines = times[::-1] - times[-1], places[..., ::-1], lines[::-1]
+            warnings.append(f"{path}: the last row comes first: read from the end")
+        times, even = unrounded(path, times, places, resolution_s)
         times, places, said = without_repeats(path, times, places, lines)
-        warnings += said
+        warnings += [*even, *said]
     elif frames is not None:
         frames, places, said = without_repeats(path, frames, places, lines)
         warnings += said
@@ -104,11 +108,11 @@ def _table(path: Path, heading: Heading, columns: Columns) -> TrackTable:
 def _clock(
     path: Path, heading: Heading, columns: Columns, lines: Sequence[int]
 ) -> tuple[np.ndarray | None, np.ndarray | None, float]:
-    """(times in s, None, s per unit) or (None, frames, ...), `[row]`; (None, None) without both."""
+    """(times in s, None, their resolution) or (None, frames, 0), `[row]`; neither: both None."""
     role = "time" if columns.of("time") else "frame"
     found = columns.of(role)
     if not found:
-        return None, None, 1.0
+        return None, None, 0.0
     values = columns.numbers[found[0]].values
     if np.isnan(values).any():
         at = int(np.isnan(values).argmax())
@@ -117,7 +121,7 @@ def _clock(
             "expected"
         )
     if role == "frame":
-        return None, values, 1.0
+        return None, values, 0.0
     written = columns.meanings[found[0]].unit
     if written is not None and written not in SECONDS:
         raise InputError(
@@ -128,7 +132,7 @@ def _clock(
         per_unit = 1e-3
     if abs(values[0]) * per_unit > 1e6:  # a date: what is left of its digits begins at 0
         values = values - values[0]
-    return values * per_unit, None, per_unit
+    return values * per_unit, None, columns.numbers[found[0]].resolution * per_unit
 
 
 def _places(

@@ -5,10 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.table.clock import COMMON_FPS
+
 LEAST_ROWS = 4
 """Of a motion; after fewer a smaller time is a mistake in the file."""
 MOST_STEPS = 3.0
 """From the first row of a motion to its second."""
+ROUNDED = 1.01
+"""Units in the last place between times that were rounded up and down."""
 
 
 def motion_starts(clock: np.ndarray | None) -> tuple[int, ...]:
@@ -28,6 +32,36 @@ def motion_starts(clock: np.ndarray | None) -> tuple[int, ...]:
     is_back = np.abs(clock[begin] - clock[0]) <= step
     goes_on = clock[begin + 1] - clock[begin] <= MOST_STEPS * step
     return tuple(starts) if is_back.all() and goes_on.all() else (0,)
+
+
+def unrounded(
+    path: Path, times: np.ndarray, places: np.ndarray, resolution_s: float
+) -> tuple[np.ndarray, list[str]]:
+    """Times `[row]` that are printed more coarsely than rows follow each other, and what was done.
+
+    Where most of the rows at one time have other places, and even steps agree with all the times to
+    the last place that is printed, these steps are used: those of a usual frame rate if they do.
+    """
+    is_repeat = np.diff(times) == 0
+    goes_on = (np.diff(places, axis=-1) != 0).any(axis=(0, 1))
+    if times.size < LEAST_ROWS or not is_repeat.any() or goes_on[is_repeat].mean() < 0.5:
+        return times, []
+    rows = np.arange(times.size)
+    told = float(np.polyfit(rows, times, 1)[0])
+    usual = sorted((1 / fps for fps in COMMON_FPS), key=lambda step: abs(step - told))
+    agrees = [
+        step
+        for step in (usual[0], told)
+        if step > 0 and np.ptp(times - step * rows) <= ROUNDED * resolution_s
+    ]
+    if not agrees:
+        return times, []
+    step = agrees[0]
+    said = (
+        f"{path}: times in steps of {resolution_s:g} s stand in several rows; even steps of "
+        f"{step:.3g} s agree with all of them and are used"
+    )
+    return step * rows, [said]
 
 
 def without_repeats(

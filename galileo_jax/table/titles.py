@@ -23,7 +23,7 @@ _LISTS = yaml.safe_load((Path(__file__).parent / "words.yaml").read_text("utf-8"
 WORDS: dict[str, Role] = _by_word(_LISTS["roles"])
 FILLERS, DERIVED = (frozenset(_LISTS[key].split()) for key in ("fillers", "derived"))
 SYMBOLS = frozenset("va")
-"""Of quantities made from places; 'A X' is the place of A."""
+"""Of quantities made from places; 'A X' is the place of A, and so is 'a x (cm)'."""
 
 LENGTHS: dict[str, str] = _by_word(_LISTS["lengths"])
 SECONDS: dict[str, float] = _by_word(_LISTS["seconds"])
@@ -87,7 +87,7 @@ def _from_tokens(tokens: Sequence[str], unit: str | None) -> Title:
         return Title(WORDS[joined], unit=unit)
     if len(tokens) == 1 and (match := NUMBERED.fullmatch(tokens[0])):
         return Title(WORDS[match[1].lower()], match[2], unit)
-    if DERIVED & set(lower) or SYMBOLS & set(tokens):
+    if DERIVED & set(lower) or (SYMBOLS & set(tokens) and unit not in LENGTHS):
         return Title("", unit=unit)
     if unit is None and len(lower) > 1 and lower[-1] in UNITS and lower[-1] not in WORDS:
         tokens, lower, unit = tokens[:-1], lower[:-1], lower[-1]

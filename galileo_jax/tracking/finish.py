@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
+from galileo_jax.observation.observation import stretches
 from galileo_jax.tracking.motion_compensation import Coding, without_coding_shift
 from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
@@ -199,9 +200,9 @@ def _without_glimpses(poses: np.ndarray, corrected: Sequence[int]) -> np.ndarray
     """
     is_seen = np.isfinite(poses[:, 0])
     result = np.zeros_like(is_seen)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_seen, [False]]).astype(int)))
     last_end: int | None = None
-    for begin, end in edges.reshape(-1, 2):
+    for run in stretches(is_seen):
+        begin, end = run.start, run.stop
         is_same = last_end is not None and (
             np.hypot(*(poses[begin] - poses[last_end - 1])[:2]) < SAME_PLACE_PX
         )

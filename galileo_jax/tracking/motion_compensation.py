@@ -30,6 +30,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.optimize import minimize
 
+from galileo_jax.observation.observation import stretches
 from galileo_jax.tracking.noise import has_moved
 
 STEPS_PER_PX = np.array([1.0, 2.0, 4.0])
@@ -298,11 +299,10 @@ def _moves(
 
 def _pieces(moves: Bool[np.ndarray, " frame"]) -> list[slice]:
     """Of each unbroken motion all that fit into it, one after the other."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(int)))
     return [
         slice(first, first + PIECE_FRAMES)
-        for begin, end in edges.reshape(-1, 2)
-        for first in range(begin, end - PIECE_FRAMES + 1, PIECE_FRAMES)
+        for run in stretches(moves)
+        for first in range(run.start, run.stop - PIECE_FRAMES + 1, PIECE_FRAMES)
     ]
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from galileo_jax.observation.observation import stretches
 from galileo_jax.tracking.finish import Finished
 from galileo_jax.tracking.noise import motion_variance, sudden
 from galileo_jax.tracking.pieces import Start
@@ -23,6 +24,9 @@ agree to this, in pixels or by the object's size."""
 INSIDE, BESIDE = 0.5, 2.0
 """A silhouette is the object's if its middle is within this share of its size of where the texture
 is, or if it begins within so many sizes of where that was last seen."""
+ON_OBJECT = 0.3
+"""Standard deviation per axis of a point somewhere on an object about its middle, by its size: of a
+square's points 1 / sqrt(12)."""
 OUTLINE_AREA = (0.3, 6.0)
 """A silhouette's area by that of the declared outline: a smear makes it larger."""
 EDGE_PX = 0.03
@@ -49,8 +53,10 @@ def with_silhouette(
     """The object's track, where its silhouette shows more than its texture from that.
 
     Where it is known how far the two are apart, both are used, and the point stays the followed
-    one, but for what is round, whose middle it becomes; otherwise the silhouette's middle is
-    followed alone.
+    one, but for what is round, whose middle it becomes. Otherwise it becomes the silhouette's
+    middle. If a smooth path leads to that from where the texture was last seen (it was held until
+    then, say, and its silhouette was one with the hand's), both are used all the same: how far
+    they are apart is then an unknown shift of the silhouette.
 
     Args:
       found: by texture.
@@ -80,14 +86,52 @@ def with_silhouette(
         return found
     if not is_fixed and _way_px(place[shown]) < _way_px(found.position_px[seen]):
         return found
-    kept = _in_long_runs(seen & ~shown) & is_fixed
+    kept, slow_px = _in_long_runs(seen & ~shown), _slow_px(path)
+    if not is_fixed:
+        kept[path.frames[0] :] = False
+        last, middle = _led_on(found.position_px, kept, path, size, clock)
+        kept[last + 1 :] = False
+        if kept.any():
+            slow_px = float(np.hypot(slow_px, ON_OBJECT * size))
     texture, silhouette = found.position_px, place
     if start.outline.is_round or not is_fixed:
         texture = texture - middle
     else:
         silhouette = silhouette + middle
     together = np.where(kept[:, None], texture, silhouette)
-    return _joined(found, kept, together, covariance, _slow_px(path))
+    return _joined(found, kept, together, covariance, slow_px)
+
+
+def _led_on(
+    texture_px: Float[np.ndarray, "frame 2"],
+    kept: Bool[np.ndarray, " frame"],
+    path: Path,
+    size_px: float,
+    clock: Float[np.ndarray, " frame"],
+) -> tuple[int, Float[np.ndarray, "2"]]:
+    """The last frame by texture from which a path leads to the silhouette's, and how far apart.
+
+    -1: there is none. What is about to be lost is no longer where its texture seems to be, so
+    SAME_FRAMES of it have to be as smooth as a parabola. With d the distance, and on the texture's
+    side alone, one parabola goes through these and the silhouette's first,
+
+        x(t) = x_0 + v t + a t^2 / 2 + d
+    """
+    after = np.array(path.frames[:SAME_FRAMES])
+    for last in np.flatnonzero(kept)[::-1]:
+        own = np.arange(last - SAME_FRAMES + 1, last + 1)
+        if own[0] < 0 or not kept[own].all():
+            continue
+        design = np.vander(clock[own] - clock[last], 3)
+        left = texture_px[own] - design @ np.linalg.lstsq(design, texture_px[own])[0]
+        if np.sum(left**2) > (SAME_FRAMES - 3) * SAME_PX**2:
+            continue
+        frames = np.concatenate([own, after])
+        design = np.column_stack([np.vander(clock[frames] - clock[last], 3), frames <= last])
+        places = np.concatenate([texture_px[own], path.places_px[: len(after)]])
+        apart = np.linalg.lstsq(design, places)[0][-1]
+        return (int(last), apart) if np.hypot(*apart) < size_px else (-1, np.zeros(2))
+    return -1, np.zeros(2)
 
 
 def _joined(
@@ -114,10 +158,9 @@ def _joined(
 
 def _in_long_runs(chosen: Bool[np.ndarray, " frame"]) -> Bool[np.ndarray, " frame"]:
     """Those of the chosen frames that follow each other for a while."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(int)))
     result = np.zeros_like(chosen)
-    for begin, end in edges.reshape(-1, 2):
-        result[begin:end] = end - begin >= SAME_FRAMES
+    for run in stretches(chosen):
+        result[run] = run.stop - run.start >= SAME_FRAMES
     return result
 
 

@@ -13,8 +13,9 @@ from galileo_jax.api.track_doubts import FAR, taken_as_exact, with_track_doubts
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.commands import command
 from galileo_jax.commands import fit as fit_command
-from galileo_jax.measurement.astray import Astray
 from galileo_jax.measurement.measure import Measurement
+from galileo_jax.measurement.segments.astray import Astray
+from galileo_jax.measurement.segments.segments import Segments
 from galileo_jax.observation.observation import Observation
 
 ANGLE_DEG, SCALE = 20.0, 500.0
@@ -94,7 +95,7 @@ def test_a_good_fit_is_left_alone(measured) -> None:
 
 
 def test_a_fit_of_a_lost_object_says_so(measured) -> None:
-    lost = replace(measured, astray=(Astray("object1", 0.634, "it leaps"),))
+    lost = replace(measured, segments=Segments(astray=(Astray("object1", 0.634, "it leaps"),)))
     found = with_track_doubts([lost], result(1.1))
     assert found["status"] == "the fit converged; but object1 is lost from 0.63 s on"
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.measurement.astray import Astray, find_astray, without_astray
+from galileo_jax.measurement.segments.astray import Astray, find_astray
+from galileo_jax.measurement.segments.segments import Segments
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 
@@ -63,7 +64,7 @@ def test_tracks_at_one_place_are_both_left_out_from_there() -> None:
         (name, AT / FPS, True) for name in NAMES
     ]
     assert "same place as other" in found[0].why and "same place as one" in found[1].why
-    kept = without_astray(seen, found).mask
+    kept = Segments(astray=found).used(seen).mask
     assert kept[:, :AT].all() and not kept[:, AT:].any()
 
 
@@ -79,7 +80,7 @@ def test_a_puck_that_turns_back_far_from_all_is_left_out_from_there() -> None:
     assert (found.name, found.is_left_out) == ("one", True)
     assert found.time_s == pytest.approx(AT / FPS)
     assert "hits nothing" in found.why and "left out" in found.why
-    kept = without_astray(seen, [found]).mask
+    kept = Segments(astray=(found,)).used(seen).mask
     assert kept[1].all() and kept[0, :AT].all() and not kept[0, AT:].any()
 
 

@@ -7,11 +7,10 @@ import pytest
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_problem
-from galileo_jax.measurement.cuts import HELD, STOPPED, STRUCK, cut
-from galileo_jax.measurement.find_blow import blow_frame
-from galileo_jax.measurement.find_hand import hand_frame
-from galileo_jax.measurement.find_stop import arrest_frame
 from galileo_jax.measurement.measure import inferred, measure
+from galileo_jax.measurement.segments.blow import arrest_frame, blow_frame
+from galileo_jax.measurement.segments.hand import hand_frame
+from galileo_jax.measurement.segments.segments import HELD, STOPPED, STRUCK, Segments, segment
 from galileo_jax.observation.observation import Observation
 
 NOISE_M = 1e-4
@@ -94,9 +93,9 @@ def test_a_declared_floor_is_in_the_scene(tmp_path):
     """What bounces on it is not cut off."""
     clip = load_clip(write_clip(tmp_path, "fall", "floor: true\n"))
     seen = slid(np.append(1.2 * np.arange(1, 60) / 60, np.zeros(5)), 60.0)
-    assert cut(clip, seen) == (seen, ())
+    assert segment(clip, seen) == Segments()
     bare = clip.model_copy(update={"floor": False})
-    (stop,) = cut(bare, seen)[1]
+    (stop,) = segment(bare, seen).cuts
     assert stop.time_s == pytest.approx(59 / 60)
 
 
@@ -202,12 +201,12 @@ def test_slow_motion_within_a_film_is_named(tmp_path):
     clip = load_clip(write_clip(tmp_path, "flight"))
     steps = np.repeat([1 / 60, 1 / 240], [25, 60])
     clock = np.cumsum(steps) - steps[0]
-    (found,) = cut(clip, flight_with_clock(clock))[1]
+    (found,) = segment(clip, flight_with_clock(clock)).cuts
     assert "goes on 0.2" in found.why and "the frame rate changes there" in found.why
     assert found.time_s == pytest.approx(24 / 60, abs=3 / 60)
 
 
 def test_a_blow_is_no_change_of_the_rate(tmp_path):
     clip = load_clip(write_clip(tmp_path, "flight"))
-    (found,) = cut(clip, flight_with_clock(np.arange(60) / 60, bounce=-5.0))[1]
+    (found,) = segment(clip, flight_with_clock(np.arange(60) / 60, bounce=-5.0)).cuts
     assert found.why == STRUCK

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.load import load_clip
-from galileo_jax.measurement.cuts import STRUCK
-from galileo_jax.measurement.find_bounce import bounce_frame
 from galileo_jax.measurement.measure import measure
+from galileo_jax.measurement.segments.bounce import bounce_frame
+from galileo_jax.measurement.segments.segments import STRUCK
 from galileo_jax.observation.observation import Observation
 
 FPS, FRAMES, AT = 145.0, 50, 22

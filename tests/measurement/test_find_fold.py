@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.cuts import FOLDS, cut
+from galileo_jax.measurement.segments.ramp_ends import FOLDS
+from galileo_jax.measurement.segments.segments import Segments, segment
 from galileo_jax.observation.observation import Observation
 from tests.measurement.test_find_tip import clip_of
 from tests.oracle_trials import FPS, observe
@@ -32,7 +33,8 @@ def test_one_that_slides_past_ends_the_track(seed):
     seen = observe(HIT, seed)
     frame = frame_of_hit(seen) + 8
     folded = closer(seen, frame, 1e-3 * np.arange(1, 8) ** 1.5)
-    used, (why,) = cut(clip_of(HIT), folded)
+    segments = segment(clip_of(HIT), folded)
+    (why,), used = segments.cuts, segments.used(folded)
     assert (why.name, why.side, why.why) == ("object1", "after", FOLDS)
     assert abs(round(why.time_s * FPS) - frame) <= 2
     assert used.mask[:, : frame - 2].all() and not used.mask[:, frame + 2 :].any()
@@ -42,7 +44,7 @@ def test_one_that_slides_past_ends_the_track(seed):
 def test_bodies_that_slide_along_a_line(experiment):
     for seed in range(5):
         seen = observe(experiment, seed)
-        assert cut(clip_of(experiment), seen) == (seen, ())
+        assert segment(clip_of(experiment), seen) == Segments()
 
 
 def test_those_that_part_and_meet_again():
@@ -53,11 +55,11 @@ def test_those_that_part_and_meet_again():
     place = seen.position_m.copy()
     place[1, 0, hit : hit + 5] += parted
     bounced = replace(seen, position_m=place)
-    assert cut(clip_of(HIT), bounced) == (bounced, ())
+    assert segment(clip_of(HIT), bounced) == Segments()
 
 
 def test_a_wrong_length_is_no_fold():
     """Of objects declared 10 mm too long."""
     seen = observe(HIT, 0)
     long = replace(HIT, size_m=((0.07, 0.06), (0.07, 0.06)))
-    assert cut(clip_of(long), seen) == (seen, ())
+    assert segment(clip_of(long), seen) == Segments()

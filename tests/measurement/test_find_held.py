@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.find_held import let_go_frame, standstill_frame
+from galileo_jax.measurement.segments.hand import let_go_frame
+from galileo_jax.measurement.segments.rest import standstill_frame
 from galileo_jax.observation.observation import Observation
 
 NOISE_M, AMPLITUDE_M = 3e-4, 0.06

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.find_placed import placed_frames
+from galileo_jax.measurement.segments.rest import placed_frames
 from galileo_jax.observation.observation import Observation
 
 NOISE_M, SLOPE = 3e-4, 0.4

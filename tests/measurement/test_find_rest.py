@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.find_rest import REST_S, rest_frame
+from galileo_jax.measurement.segments.rest import REST_S, rest_frame
 from galileo_jax.observation.observation import Observation
 
 FPS, RADIUS_M, COUNT = 100.0, 0.02, 300

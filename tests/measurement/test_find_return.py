@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.cuts import RETURNS, cut
+from galileo_jax.measurement.segments.ramp_ends import RETURNS
+from galileo_jax.measurement.segments.segments import Segments, segment
 from tests.measurement.test_find_tip import clip_of
 from tests.oracle_trials import FPS, observe
 from tests.ramp_model import HIT
@@ -27,7 +28,8 @@ def test_one_that_comes_back_to_the_foot(seed):
     assert clip.objects[0].size_m is not None
     half = clip.objects[0].size_m[0] / 2
     seen, _ = pulled_back(seed, half - 5e-3)
-    used, (why,) = cut(clip, seen)
+    segments = segment(clip, seen)
+    (why,), used = segments.cuts, segments.used(seen)
     assert (why.name, why.side, why.why) == ("object1", "after", RETURNS)
     last = round(why.time_s * FPS)
     assert seen.position_m[0, 0, last] > half > seen.position_m[0, 0, last + 2]
@@ -36,4 +38,4 @@ def test_one_that_comes_back_to_the_foot(seed):
 
 def test_one_that_turns_back_on_the_table():
     seen, _ = pulled_back(0, 0.08)
-    assert cut(clip_of(HIT), seen) == (seen, ())
+    assert segment(clip_of(HIT), seen) == Segments()

@@ -8,8 +8,8 @@ import pytest
 from galileo_jax.api.fit import fit
 from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_problem
-from galileo_jax.measurement.find_start_speed import start_speed
 from galileo_jax.measurement.measure import measure
+from galileo_jax.measurement.segments.start_speed import start_speed
 from galileo_jax.observation.observation import Observation
 
 FPS, NOISE_M, A_M_S2 = 60.0, 5e-4, 2.4
@@ -49,6 +49,19 @@ def test_what_was_let_go_before_moves(before_s, drag_per_s, seed):
 @pytest.mark.parametrize("drag_per_s", [0.0, 1.0, 4.0])
 def test_what_is_let_go_in_the_clip_does_not(release_s, drag_per_s, seed):
     assert start_speed(went(way(release_s, drag_per_s, 90), seed)) is None
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("held_s", [0.0, 0.5])
+def test_what_goes_up_first_moves_against_the_way(held_s, seed):
+    """Pushed up a slope at 1.2 m/s before the clip or in it, and slides down again."""
+    time = np.maximum(np.arange(120) / FPS - held_s, 0.0)
+    found = start_speed(went(-1.2 * time + A_M_S2 * time**2 / 2, seed))
+    if held_s:
+        assert found is None
+    else:
+        assert found is not None
+        assert abs(found.mean_m_s + 1.2) < 4 * found.sd_m_s < 0.4
 
 
 def test_rest_and_too_few_places_tell_nothing():

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.measurement.cuts import TIPS_OVER, cut
+from galileo_jax.measurement.segments.ramp_ends import TIPS_OVER
+from galileo_jax.measurement.segments.segments import Segments, segment
 from galileo_jax.observation.observation import Observation
 from tests.oracle_trials import FPS, observe
 from tests.ramp_model import HIT
@@ -51,7 +52,9 @@ TURNING = np.array([5e-3, 7e-3, 2e-3, -8e-3])
 def test_a_tall_box_that_lies_down_ends_the_track():
     seen = observe(TALL, 0)
     frame = past_foot(seen) + 3
-    used, (why,) = cut(clip_of(TALL), raised(seen, 0, frame, TURNING, -0.015))
+    seen = raised(seen, 0, frame, TURNING, -0.015)
+    segments = segment(clip_of(TALL), seen)
+    (why,), used = segments.cuts, segments.used(seen)
     assert (why.name, why.side, why.why) == ("object1", "after", TIPS_OVER)
     assert abs(round(why.time_s * FPS) - (frame - 1)) <= 1
     assert not used.mask[:, frame:].any(), "object 2 is hit by another body than was declared"
@@ -62,16 +65,17 @@ def test_one_that_turns_in_the_foot_itself():
     """It never stands on the table: what is used ends on the ramp."""
     seen = observe(TALL, 1)
     frame = past_foot(seen)
-    used, (why,) = cut(clip_of(TALL), raised(seen, 0, frame, np.full(1, -8e-3), -0.015))
+    segments = segment(clip_of(TALL), raised(seen, 0, frame, np.full(1, -8e-3), -0.015))
+    (why,), used = segments.cuts, segments.used(seen)
     assert why.why == TIPS_OVER
-    assert seen.position_m[0, 0][used.mask[0]].max() < -0.02
+    assert used.position_m[0, 0][used.mask[0]].max() < -0.02
 
 
 def test_what_is_hit_may_tip_over():
     seen = observe(TALL, 2)
     frame = int(np.argmax(seen.position_m[1, 0] > 0.26))
     rise = np.array([4e-3, 9e-3, 12e-3, 8e-3, 4e-3])  # a cube goes over its edge, as high as before
-    _, (why,) = cut(clip_of(CUBES), raised(observe(CUBES, 2), 1, frame, rise, 0.0))
+    (why,) = segment(clip_of(CUBES), raised(observe(CUBES, 2), 1, frame, rise, 0.0)).cuts
     assert (why.name, why.why) == ("object2", TIPS_OVER)
     assert abs(round(why.time_s * FPS) - frame) <= 3
 
@@ -84,7 +88,7 @@ def test_what_does_not_tip(experiment, slope):
         seen = observe(experiment, seed)
         x = seen.position_m[:, 0]
         seen.position_m[:, 1] += slope * np.where(x > 0, x, 0.0)
-        assert cut(clip_of(experiment), seen) == (seen, ())
+        assert segment(clip_of(experiment), seen) == Segments()
         rocks = EDGE_M / 2 * np.array([0.6, 1.0, 0.6])
         seen = raised(seen, 0, past_foot(seen), rocks, 0.0)
-        assert cut(clip_of(experiment), seen) == (seen, ())
+        assert segment(clip_of(experiment), seen) == Segments()

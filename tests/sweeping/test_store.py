@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from galileo_jax.measurement.astray import Astray
+from galileo_jax.measurement.segments.astray import Astray
+from galileo_jax.measurement.segments.segments import Segments
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.cell import Cell, make_cells
@@ -32,7 +33,9 @@ def test_a_clip_comes_back_to_the_last_digit(clip, tmp_path):
     assert measured.clip.source == str(clip)
     store = Store(tmp_path / "out")
     assert not store.has_clip(files.key)
-    measured = replace(measured, astray=(Astray("object1", 0.1 + 0.2, "nothing is there"),))
+    measured = replace(
+        measured, segments=Segments(astray=(Astray("object1", 0.1 + 0.2, "nothing is there"),))
+    )
     store.save_clip(files.key, replace(tracked, measurement=measured, thumbnail=b"picture"))
     assert store.clip(files.key).thumbnail == b"picture"
     again = store.clip(files.key).measurement

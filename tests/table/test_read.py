@@ -94,6 +94,12 @@ FORMS = {
         lambda n: f"0:00:{58 + (80 + 4 * n) // 100:02d}:{(80 + 4 * n) % 100:02d}")),
     "frames_of_a_second": text("time;x;y", body=clocked(
         lambda n: f"0:00:{1 + (20 + n) // 25:02d}:{(20 + n) % 25:02d}")),
+    "two_spaces_and_commas": text("t  x  y", body=lines("  ", ",")),
+    "last_row_first": text("t,x,y", body=lines()[::-1]),
+    "times_coarser_than_rows": text("t,x,y", body=[f"{0.04 * n:.1f},{x},{y}"
+                                                   for n, (_, x, y) in enumerate(truth().T)]),
+    "row_numbers_beside_times": text(body=[f"{n} {one}" for n, one in enumerate(lines(" "))]),
+    "time_and_height_swapped": text("y,x,t"),
     "a_time_twice": text("t,x,y", body=[lines()[0], *lines()]),
 }  # fmt: skip
 
@@ -185,6 +191,13 @@ def test_several_objects_by_names_in_the_titles_or_above(tmp_path: Path) -> None
         assert len(table.names) == 2
         check(table)
         np.testing.assert_allclose(table.position[1, 0], truth()[1] + 1)
+
+
+def test_an_object_of_one_letter_is_told_from_an_acceleration(tmp_path: Path) -> None:
+    body = [f"{t},{x},{y},{x},{y}" for t, x, y in truth().T]
+    titles = "t (s),{0} x ({2}),{0} y ({2}),{1} x ({2}),{1} y ({2})"
+    assert read(tmp_path, text(titles.format("a", "b", "m"), body=body)).names == ("a", "b")
+    assert read(tmp_path, text(titles.format("a", "b", "cm"), body=body)).names == ("a", "b")
 
 
 def test_motion_capture_names_its_markers_alone(tmp_path: Path) -> None:

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from galileo_jax.tracking.finish import finished
+from galileo_jax.tracking.finish import Finished, finished
 from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.pieces import Start
 from galileo_jax.tracking.refiner import Refined
-from galileo_jax.tracking.silhouette import paths_of
+from galileo_jax.tracking.second_opinion import ON_OBJECT, with_silhouette
+from galileo_jax.tracking.silhouette import Part, Path, paths_of
 from galileo_jax.tracking.template import Outline
 from galileo_jax.tracking.tracker import track_video
 from tests.tracking.test_common_error import Whole
@@ -126,3 +127,41 @@ def test_after_a_gap_counts_what_the_path_before_leads_to(is_thrown_back):
     assert seen[:25].all()
     assert seen[40:].all() != is_thrown_back
     assert seen[40:].any() != is_thrown_back
+
+
+def released(is_led: bool = True) -> tuple[Finished, Path, np.ndarray]:
+    """Held until frame 20, then its texture goes astray, and its silhouette parts from the hand's.
+
+    The followed point is 6 px beside the silhouette's middle.
+    """
+    rng = np.random.default_rng(0)
+    time = np.arange(50.0)
+    middle = np.stack([100 + 0.6 * np.maximum(time - 20, 0) ** 2, np.full(50, 80.0)], axis=1)
+    texture = middle + [6.0, 0.0] + 0.05 * rng.standard_normal((50, 2))
+    texture[28:32, 0] += [-9, 5, -14, 2]
+    texture[32:] = np.nan
+    none = np.where(np.isfinite(texture[:, 0]), 0.0, np.nan)
+    square = none[:, None, None] + np.zeros((50, 2, 2))
+    found = Finished(texture, square + 1e-2 * np.eye(2), square, square, none)
+    places = middle[33:] + 0.1 * rng.standard_normal((17, 2)) + [0.0, 0.0 if is_led else 25.0]
+    parts = [Part(at, 18.0**2, at - 9, at + 9) for at in places]
+    return found, Path(list(range(33, 50)), list(time[33:]), parts), middle
+
+
+def test_texture_and_silhouette_are_one_path_where_it_leads_from_one_to_the_other():
+    """The frames in which a hand holds it are kept, how far they are apart stays unknown."""
+    found, path, middle = released()
+    start = Start("ball", (106.0, 80.0), Outline(None))
+    track = with_silhouette(found, start, [path], np.arange(50.0))
+    seen = np.isfinite(track.angle_rad)
+    assert seen[:28].all() and not seen[28:33].any() and seen[33:].all()
+    assert np.abs(track.position_px[seen] - middle[seen]).max() < 2.0
+    assert (track.shifts_px[:28] == 0).all()
+    assert (track.shifts_px[33:, 0, 0] >= ON_OBJECT * 18.0).all()
+
+
+def test_a_silhouette_to_which_no_path_leads_is_followed_alone():
+    found, path, _ = released(is_led=False)
+    start = Start("ball", (106.0, 80.0), Outline(None))
+    track = with_silhouette(found, start, [path], np.arange(50.0))
+    assert (np.flatnonzero(np.isfinite(track.angle_rad)) == path.frames).all()

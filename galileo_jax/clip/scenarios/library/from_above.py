@@ -12,6 +12,7 @@ register(
         moves_in_plane=True,
         laws=("pucks",),
         without=(
+            "camera_roll",  # gravity points into the picture
             "constant_force",  # along the velocity: nothing pushes so
             "initial_push",  # the pucks' own start velocities
             "magnus",  # nothing flies

@@ -14,6 +14,6 @@ register(
         has_ramp=False,
         moves_in_plane=True,
         laws=("start_velocity",),
-        without=WITHOUT,
+        without=(*WITHOUT, "camera_roll"),  # poses of several cameras
     )
 )

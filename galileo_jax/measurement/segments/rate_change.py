@@ -28,12 +28,10 @@ class RateChange(NamedTuple):
 
 def rate_change(observation: Observation) -> RateChange | None:
     """Where the clock of object 1's track changes; None where it does not."""
-    seen = np.flatnonzero(observation.mask[0])
-    axes = 2 if observation.is_turning else observation.position_m.shape[1]
-    times_s, place_m = observation.times_s[seen], observation.position_m[0][:axes, seen]
-    noise = np.sqrt(observation.variance_m2[0, seen])
+    path = observation.path()
+    times_s, place_m, noise = path.times_s, path.place_m, np.sqrt(path.variance_m2)
     best: tuple[float, RateChange] | None = None
-    for at in range(FEWEST, len(seen) - FEWEST - SMEARED + 1):
+    for at in range(FEWEST, len(path) - FEWEST - SMEARED + 1):
         sides = slice(max(at - FRAMES, 0), at), slice(at + SMEARED, at + SMEARED + FRAMES)
         middle_s = (times_s[at - 1] + times_s[at]) / 2
         before, after = (
@@ -47,7 +45,7 @@ def rate_change(observation: Observation) -> RateChange | None:
         if factor is not None and _kinked_left(times_s[both], place_m[:, both], noise) < MOST_LEFT:
             factor = None
         if factor is not None and (best is None or left < best[0]):
-            best = left, RateChange(int(seen[at - 1]), factor)
+            best = left, RateChange(int(path.frames[at - 1]), factor)
     return best[1] if best else None
 
 

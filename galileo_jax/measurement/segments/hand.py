@@ -17,32 +17,65 @@ exactly the parabola of what follows tells, back to the first frame that it does
 
 import numpy as np
 
-from galileo_jax.measurement.find_blow import continues
-from galileo_jax.observation.observation import Observation
+from galileo_jax.measurement.segments.blow import continues
+from galileo_jax.observation.observation import Observation, PointPath
 
 HELD, PUSHED, CLEAR = 0.5, 2.0, 4.0
 WAY, EARLY = (0.15, 0.7), 0.2  # shares of the length of the way
 WINDOW_SHARE, FEWEST = 0.05, 6  # of the frames in motion; frames
 PUSHED_WAY = 0.5  # of the way on a level table
 LATER = 0.4  # of the windows of what falls or flies: the others tell what is usual
+FIRST_WAY = (0.05, 0.3)  # of a swing: between these shares of it a line is laid
+LEAST_S, LEAST_FRAMES = 0.04, 4  # held for less, or in fewer frames, it is not held
+LEAST_PLACES = 3  # through which the line is laid
+STILL_SD = 6.0  # of the errors: what is farther from where it was has moved
 MOST_SPREAD = 0.5  # of a_way within the way: what accelerates so unevenly has no usual way
+
+
+def let_go_frame(observation: Observation) -> int | None:
+    """The first frame in which a swing moves by itself; None where it is not held at first.
+
+    From rest the distance d from where it was grows as (t - t0)^2: the root of a straight line
+    through sqrt(d), between a twentieth and three tenths of the first way, is when it is let go.
+    What swings already when the film begins has its root before the first frame; its place at rest
+    scatters by no more than errors do. What sinks in a liquid is let go so, too.
+    """
+    path = observation.path()
+    times, place = path.times_s, path.place_m
+    if len(path) < 2 * LEAST_FRAMES:
+        return None
+    stood = np.median(place[:, :LEAST_FRAMES], axis=1, keepdims=True)
+    gone = np.linalg.norm(place - stood, axis=0)
+    farthest = int(np.argmax(gone > FIRST_WAY[1] * gone.max()))  # where the first way is that long
+    low = max(FIRST_WAY[0] * gone.max(), STILL_SD * float(np.sqrt(np.median(2 * path.variance_m2))))
+    moves = np.flatnonzero(gone[: farthest + 1] > low)
+    if len(moves) < LEAST_PLACES:
+        return None
+    slope, intercept = np.polyfit(times[moves], np.sqrt(gone[moves]), 1)
+    if slope <= 0:
+        return None
+    let_go_s = -intercept / slope
+    step_s = float(np.median(np.diff(times)))
+    if let_go_s - times[0] < max(LEAST_S, LEAST_FRAMES * step_s):
+        return None
+    if (gone[times < let_go_s - step_s] > low).any():
+        return None  # it was elsewhere before: no rest
+    at = int(np.searchsorted(times, let_go_s + step_s))
+    return int(path.frames[at]) if at < len(path) else None
 
 
 def hand_frame(observation: Observation) -> int | None:
     """The first frame in which object 1 is free of the hand that moves it; None: at once."""
-    seen = np.flatnonzero(observation.mask[0])
-    if len(seen) < 4 * FEWEST:
+    path = observation.path()
+    if len(path) < 4 * FEWEST:
         return None
-    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
-    variance = observation.variance_m2[0, seen]
-    gone, length = _gone(place_m)
-    left = gone > CLEAR * np.sqrt(variance + variance[0]) + 1e-3 * length
-    began = len(left) - int(np.argmin(np.append(left[::-1], False)))
-    size = max(FEWEST, round(WINDOW_SHARE * (len(seen) - began)))
-    if began == 0 or len(seen) - began < 4 * size:
+    gone, length = _gone(path.place_m)
+    began = _leaves(path, gone, length)
+    size = max(FEWEST, round(WINDOW_SHARE * (len(path) - began)))
+    if began == 0 or len(path) - began < 4 * size:
         return None  # it moves when it is first seen: whoever let it go is not in the clip
-    starts = np.arange(began, len(seen) - size)
-    found, sd = _accelerations(times_s, gone, variance, starts, size)
+    starts = np.arange(began, len(path) - size)
+    found, sd = _accelerations(path, gone, starts, size)
     middle = gone[starts + size // 2] / length
     on_way = (middle > WAY[0]) & (middle < WAY[1])
     if on_way.sum() < size:
@@ -54,7 +87,7 @@ def hand_frame(observation: Observation) -> int | None:
     is_held &= (np.abs(found - usual) > CLEAR * sd) & (middle < EARLY)
     if not is_held.any():
         return None
-    return int(seen[starts[np.flatnonzero(is_held)[-1]] + size])
+    return int(path.frames[starts[np.flatnonzero(is_held)[-1]] + size])
 
 
 def pushed_frame(observation: Observation) -> int | None:
@@ -63,19 +96,17 @@ def pushed_frame(observation: Observation) -> int | None:
     It gains speed, by `CLEAR` standard deviations of its acceleration in a window, within the first
     half of its way only: what gains speed for longer is pulled by something of the scene.
     """
-    seen = np.flatnonzero(observation.mask[0])
-    if len(seen) < 4 * FEWEST:
+    path = observation.path()
+    if len(path) < 4 * FEWEST:
         return None
-    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
-    variance = observation.variance_m2[0, seen]
-    gone, length = _gone(place_m)
-    size = max(FEWEST, round(WINDOW_SHARE * len(seen)))
-    starts = np.arange(len(seen) - size + 1)
-    found, sd = _accelerations(times_s, gone, variance, starts, size)
+    gone, length = _gone(path.place_m)
+    size = max(FEWEST, round(WINDOW_SHARE * len(path)))
+    starts = np.arange(len(path) - size + 1)
+    found, sd = _accelerations(path, gone, starts, size)
     gains = np.flatnonzero(found > CLEAR * sd)
     if not gains.size or gone[gains[-1] + size - 1] > PUSHED_WAY * length:
         return None
-    return int(seen[min(gains[-1] + size, len(seen) - 1)])
+    return int(path.frames[min(gains[-1] + size, len(path) - 1)])
 
 
 def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
@@ -85,39 +116,38 @@ def thrown_frame(observation: Observation, rest_belongs: bool) -> int | None:
       observation: the motion of the scene, to where it ends.
       rest_belongs: whether it may lie still at first, without a hand.
     """
-    axes = 2 if observation.is_turning else observation.position_m.shape[1]
-    seen = np.flatnonzero(observation.mask[0])
-    if len(seen) < 3 * FEWEST:
+    path = observation.path()
+    if len(path) < 3 * FEWEST:
         return None
-    times_s, place_m = observation.times_s[seen], observation.position_m[0][:axes, seen]
-    variance = observation.variance_m2[0, seen]
     if rest_belongs:
-        gone = np.linalg.norm(place_m - place_m[:, :1], axis=0)
-        moves = gone > CLEAR * np.sqrt(variance + variance[0]) + 1e-3 * gone.max()
-        began = len(moves) - int(np.argmin(np.append(moves[::-1], False)))
-        times_s, place_m, variance = times_s[began:], place_m[:, began:], variance[began:]
-        seen = seen[began:]
-    size, held = max(FEWEST, round(WINDOW_SHARE * len(seen))), -1
-    while 3 * size <= len(seen):
-        held, is_clear = _last_held(times_s, place_m, variance, size)
+        gone = np.linalg.norm(path.place_m - path.place_m[:, :1], axis=0)
+        path = path[_leaves(path, gone, float(gone.max())) :]
+    size, held = max(FEWEST, round(WINDOW_SHARE * len(path))), -1
+    while 3 * size <= len(path):
+        held, is_clear = _last_held(path, size)
         if held >= 0 or is_clear:
             break
         size *= 2  # so short a window does not tell the acceleration
     first = held + size if held >= 0 else 0
-    free = slice(first, min(first + max(2 * FEWEST, 2 * size), len(seen)))
-    while first > 0 and continues(times_s, place_m, variance, first - 1, free):
+    free = slice(first, min(first + max(2 * FEWEST, 2 * size), len(path)))
+    while first > 0 and continues(path, first - 1, free):
         first -= 1
-    return int(seen[first]) if first else None
+    return int(path.frames[first]) if first else None
 
 
-def _last_held(
-    times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, size: int
-) -> tuple[int, bool]:
+def _leaves(path: PointPath, gone_m: np.ndarray, length_m: float) -> int:
+    """The first place from which on it is clearly away from where it was."""
+    variance = path.variance_m2
+    left = gone_m > CLEAR * np.sqrt(variance + variance[0]) + 1e-3 * length_m
+    return len(left) - int(np.argmin(np.append(left[::-1], False)))
+
+
+def _last_held(path: PointPath, size: int) -> tuple[int, bool]:
     """Where the last window with a hand on begins, -1: none; and whether noise lets it show."""
-    starts = np.arange(len(times_s) - size + 1)
-    each = [_accelerations(times_s, one, variance, starts, size) for one in place_m]
+    starts = np.arange(len(path) - size + 1)
+    each = [_accelerations(path, one, starts, size) for one in path.place_m]
     found, sd = np.array([one for one, _ in each]), max(one for _, one in each)
-    velocity = np.gradient(place_m, times_s, axis=1)[:, starts + size // 2]
+    velocity = np.gradient(path.place_m, path.times_s, axis=1)[:, starts + size // 2]
     is_later = starts >= LATER * len(starts)
     apart, weight = _beside_free(found, velocity, is_later, sd)
     scatter = max(1.4826 * float(np.median(apart[is_later])), sd)
@@ -150,12 +180,15 @@ def _beside_free(
 
 
 def _accelerations(
-    times_s: np.ndarray, gone: np.ndarray, variance: np.ndarray, starts: np.ndarray, size: int
+    path: PointPath, gone: np.ndarray, starts: np.ndarray, size: int
 ) -> tuple[np.ndarray, float]:
     """The acceleration in each window of `size` frames, `[window]`, and its standard deviation."""
-    found = np.array([_acceleration(times_s, gone, int(i), size) for i in starts])
+    times_s = path.times_s
+    parts = [slice(start, start + size) for start in starts.tolist()]
+    found = [2 * np.polyfit(times_s[p] - times_s[p.start], gone[p], 2)[0] for p in parts]
     step_s = np.median(np.diff(times_s))
-    return found, float(np.sqrt(720 * np.median(variance) / size) / (size * step_s) ** 2)
+    sd = np.sqrt(720 * np.median(path.variance_m2) / size) / (size * step_s) ** 2
+    return np.array(found), float(sd)
 
 
 def _gone(place_m: np.ndarray) -> tuple[np.ndarray, float]:
@@ -165,8 +198,3 @@ def _gone(place_m: np.ndarray) -> tuple[np.ndarray, float]:
     length = float(np.hypot(*(place_m[:, furthest] - began[:, 0])))
     along = (place_m[:, furthest] - began[:, 0]) / max(length, np.finfo(float).tiny)
     return along @ (place_m - began), length
-
-
-def _acceleration(times_s: np.ndarray, gone: np.ndarray, start: int, size: int) -> float:
-    part = slice(start, start + size)
-    return float(2 * np.polyfit(times_s[part] - times_s[start], gone[part], 2)[0])

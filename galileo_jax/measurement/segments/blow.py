@@ -1,4 +1,4 @@
-"""A blow: the velocity jumps, and nothing in the scene is there to hit.
+"""A blow, or a stop: the velocity jumps, and nothing in the scene is there to hit.
 
 Between the steps a and b around a frame, with d the time between their middles, it is a blow if
 of the change of velocity c = v_b - v_a
@@ -20,7 +20,7 @@ the parabola of the frames before them goes on to.
 
 import numpy as np
 
-from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.observation import Observation, PointPath
 
 HIT_M_S2 = 20.0  # two g
 SHARE = 0.3
@@ -31,6 +31,9 @@ STEPS = 3  # on either side
 SMEARED = 2  # steps into which the blow itself may fall
 PARABOLA_FRAMES, FEWEST = 10, 4  # on either side of a blow
 AS_WELL = 9.0  # in -2 log likelihood: three standard deviations
+SLOWED, STEADY, STOP_CLEAR, BEFORE = 0.6, 0.9, 5.0, 3  # of a stop
+SMEARED_FRAMES = 1
+"""Of a video: the hit falls into an exposure, whose frame shows neither."""
 FLOOR = 0.01  # of the track's variance: a few points may leave nothing in some direction
 
 
@@ -42,16 +45,11 @@ def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False
       index: of the object.
       from_rest: whether what is at rest may be struck; else it is let go.
     """
-    seen = np.flatnonzero(observation.mask[index])
-    axes = 2 if observation.is_turning else observation.position_m.shape[1]
-    if len(seen) < 2 * STEPS + SMEARED + 2:
+    path = observation.path(index)
+    if len(path) < 2 * STEPS + SMEARED + 2:
         return None
-    times_s, place_m = observation.times_s[seen], observation.position_m[index][:axes, seen]
-    step_s = np.diff(times_s)
-    velocity = np.diff(place_m) / step_s
-    variance = observation.variance_m2[index, seen]
-    sd = np.sqrt(variance[1:] + variance[:-1]) / step_s
-    middle_s = times_s[:-1] + step_s / 2
+    step_s, velocity, sd = path.steps
+    middle_s = path.times_s[:-1] + step_s / 2
     windows = np.lib.stride_tricks.sliding_window_view(velocity, STEPS, axis=1)
     usual, error = np.median(windows, axis=-1), _median(sd) / np.sqrt(STEPS)
     centre_s = _median(middle_s)
@@ -76,14 +74,14 @@ def blow_frame(observation: Observation, index: int = 0, from_rest: bool = False
     last = first + int(np.argmin(np.append(is_blow[first:], False)))
     # Of the windows that see it, those in whose middle it is: there the change is largest.
     at = first + int(np.argmax(size[first:last]))
-    return int(seen[last_before(times_s, place_m, variance, at + STEPS)])
+    return int(path.frames[last_before(path, at + STEPS)])
 
 
-def last_before(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, about: int) -> int:
-    """The last frame before a blow that is within `STEPS` frames of `about`."""
+def last_before(path: PointPath, about: int) -> int:
+    """The last place before a blow that is within `STEPS` places of `about`."""
     begin, end = max(about - PARABOLA_FRAMES + 1, 0), about + PARABOLA_FRAMES + 1
-    times, place = times_s[begin:end] - times_s[about], place_m[:, begin:end]
-    floor = FLOOR * float(np.median(variance[begin:end])) * np.eye(len(place))
+    times, place = path.times_s[begin:end] - path.times_s[about], path.place_m[:, begin:end]
+    floor = FLOOR * float(np.median(path.variance_m2[begin:end])) * np.eye(len(place))
     left = {}
     for last in range(about - STEPS, about + STEPS + 1):
         sides = slice(None, last + 1 - begin), slice(last + 1 - begin, None)
@@ -94,37 +92,29 @@ def last_before(times_s: np.ndarray, place_m: np.ndarray, variance: np.ndarray, 
         left[last] = count * np.linalg.slogdet(beside @ beside.T / count + floor)[1]
     last = max(last for last, cost in left.items() if cost <= min(left.values()) + AS_WELL)
     for _ in range(SMEARED):
-        if continues(times_s, place_m, variance, last):
+        if continues(path, last):
             break
         last -= 1
     return last
 
 
-def continues(
-    times_s: np.ndarray,
-    place_m: np.ndarray,
-    variance: np.ndarray,
-    last: int,
-    own: slice | None = None,
-) -> bool:
-    """Whether a frame lies where the parabola of others goes on to, `CLEAR` sd at most.
+def continues(path: PointPath, last: int, own: slice | None = None) -> bool:
+    """Whether the parabola of some places, `own`, goes on to another, by `CLEAR` sd at most.
 
-    Args:
-      times_s: `[frame]`.
-      place_m: `[axis, frame]`.
-      variance: `[frame]`, m^2.
-      last: the frame.
-      own: the others; None: those before it.
+    Without `own` it is that of those before it.
     """
     own = slice(max(last - PARABOLA_FRAMES, 0), last) if own is None else own
-    since = times_s[own] - times_s[last]
+    place_m = path.place_m
+    since = path.times_s[own] - path.times_s[last]
     if len(since) < FEWEST:
         return True
     design = np.vander(since, 3)
     solution = np.linalg.lstsq(design, place_m[:, own].T, rcond=None)[0]
     beside = place_m[:, own].T - design @ solution
     scatter = np.sum(beside**2, axis=0) / max(len(since) - 3, 1)
-    known = np.maximum(scatter, variance[last]) * (1 + np.linalg.inv(design.T @ design)[2, 2])
+    known = np.maximum(scatter, path.variance_m2[last]) * (
+        1 + np.linalg.inv(design.T @ design)[2, 2]
+    )
     return bool(np.all((place_m[:, last] - solution[2]) ** 2 <= CLEAR**2 * known))
 
 
@@ -134,16 +124,43 @@ def _beside(times_s: np.ndarray, place_m: np.ndarray) -> np.ndarray:
     return place_m - (design @ np.linalg.lstsq(design, place_m.T, rcond=None)[0]).T
 
 
+def arrest_frame(observation: Observation) -> int | None:
+    """The last frame before object 1 is stopped within one step; None where it is not.
+
+    With v_i the speed in the direction of motion, it is stopped at step i if
+
+        v_i < SLOWED v,   and no v_j > SLOWED v after it,   v = median of steps i - 2, i - 3, i - 4
+        v_(i-2) > STEADY v                                  (what brakes slows down step by step)
+        (v - v_i) / n steps > HIT_M_S2                      (and no friction brakes like a wall)
+        v > STOP_CLEAR standard deviations of a step
+
+    n is 1, or 2 where the hit is smeared over two steps: v_(i-1) < STEADY v.
+    """
+    path = observation.path()
+    step_s, velocity, speed_sd = path.steps
+    for i in range(BEFORE + 1, len(step_s)):
+        way = velocity[:, i - 1 - BEFORE : i - 1].sum(axis=1)
+        going = way @ velocity / max(float(np.hypot(*way)), np.finfo(float).tiny)
+        usual = np.median(going[i - 1 - BEFORE : i - 1])
+        is_clear = usual > STOP_CLEAR * np.median(speed_sd[i - 1 - BEFORE : i - 1])
+        is_smeared = going[i - 1] <= STEADY * usual
+        braked_m_s2 = (usual - going[i]) / (step_s[i] * (2 if is_smeared else 1))
+        is_hit = braked_m_s2 > HIT_M_S2 and going[i - 2] > STEADY * usual
+        if is_clear and is_hit and going[i:].max() < SLOWED * usual:
+            return int(path.frames[i - 1 if is_smeared else i])
+    return None
+
+
 def goes_on(observation: Observation, last: int) -> bool:
     """Whether object 1 still moves after the frame `last`, with more than a tenth of its speed."""
-    seen = np.flatnonzero(observation.mask[0])
-    at = int(np.searchsorted(seen, last))
-    before, after = seen[max(at - STEPS, 0) : at + 1], seen[at + SMEARED : at + SMEARED + STEPS + 1]
+    path = observation.path()
+    at = int(np.searchsorted(path.frames, last))
+    before = path[max(at - STEPS, 0) : at + 1]
+    after = path[at + SMEARED : at + SMEARED + STEPS + 1]
     if min(len(before), len(after)) < 2:
         return False
-    place, times = observation.position_m[0], observation.times_s
     speeds = [
-        np.linalg.norm(place[:, part[-1]] - place[:, part[0]]) / (times[part[-1]] - times[part[0]])
+        np.linalg.norm(part.place_m[:, -1] - part.place_m[:, 0]) / np.ptp(part.times_s)
         for part in (before, after)
     ]
     return bool(speeds[1] > GOES_ON * speeds[0])

@@ -18,7 +18,7 @@ are several times those across, and a ball that grazes the table changes its vel
 import numpy as np
 from scipy import special
 
-from galileo_jax.measurement.find_blow import FEWEST, PARABOLA_FRAMES, last_before
+from galileo_jax.measurement.segments.blow import FEWEST, PARABOLA_FRAMES, last_before
 from galileo_jax.observation.observation import Observation
 
 CHANCE = 1e-6  # a flight has tens of frames
@@ -32,20 +32,18 @@ def bounce_frame(observation: Observation) -> int | None:
     Args:
       observation: a track in space, three axes.
     """
-    seen = np.flatnonzero(observation.mask[0])
-    times_s, place_m = observation.times_s[seen], observation.position_m[0][:, seen]
-    variance = observation.variance_m2[0, seen]
-    if len(seen) < 2 * FEWEST:
+    path = observation.path()
+    if len(path) < 2 * FEWEST:
         return None
-    middles = range(FEWEST - 1, len(seen) - FEWEST)
-    chance = np.array([_chance(times_s, place_m, k) for k in middles])
+    middles = range(FEWEST - 1, len(path) - FEWEST)
+    chance = np.array([_chance(path.times_s, path.place_m, k) for k in middles])
     is_bounce = chance < CHANCE
     if not is_bounce.any():
         return None
     first = int(np.argmax(is_bounce))
     last = first + int(np.argmin(np.append(is_bounce[first:], False)))
     at = middles[first + int(np.argmin(chance[first:last]))]
-    return int(seen[last_before(times_s, place_m, variance, at)])
+    return int(path.frames[last_before(path, at)])
 
 
 def _chance(times_s: np.ndarray, place_m: np.ndarray, middle: int) -> float:

@@ -1,6 +1,7 @@
 """The speed of what moves already when it is first seen: whoever let it go did so before.
 
-The first half of the way is described in two ways with as many numbers each,
+The first half of the way (of the way back, where it first goes the other way: up a slope, say) is
+described in two ways with as many numbers each,
 
     let go in the clip:    s = s0 + a u^2 / 2 + b u^3 + c u^4,    u = max(t - t_r, 0),    t_r >= 0
     moving at first:       s = s0 + v0 t + a t^2 / 2 + b t^3 + c t^4,                     v0 > a dt
@@ -27,7 +28,7 @@ RELEASES = 48  # instants between which the best is looked for
 
 
 class StartSpeed(NamedTuple):
-    """A speed along the way and its standard deviation, m/s."""
+    """A speed along the way, negative against it, and its standard deviation, m/s."""
 
     mean_m_s: float
     sd_m_s: float
@@ -41,12 +42,16 @@ def start_speed(observation: Observation) -> StartSpeed | None:
     distance = np.linalg.norm(gone, axis=0)
     if len(seen) < FEWEST or not distance.max() > 0:
         return None
-    along = gone[:, int(np.argmax(distance))] / distance.max()
-    way = along @ gone
-    early = slice(0, max(FEWEST, int(np.argmax(way > EARLY * way.max()))))
-    times = (observation.times_s[seen] - observation.times_s[seen[0]])[early]
-    covariance = observation.covariance_m2[0][..., seen[early]]
+    farthest = int(np.argmax(distance))
+    along = gone[:, farthest] / distance[farthest]
+    covariance = observation.covariance_m2[0][..., seen]
     sd = np.sqrt(np.einsum("i,ijt,j->t", along, covariance, along))
+    way = along @ gone
+    back = int(np.argmin(way[: farthest + 1]))
+    sign = -1.0 if way[back] < -CLEAR * math.hypot(sd[0], sd[back]) else 1.0
+    way, end = sign * way, back if sign < 0 else farthest
+    early = slice(0, max(FEWEST, int(np.argmax(way > EARLY * way[end]))))
+    times, sd = (observation.times_s[seen] - observation.times_s[seen[0]])[early], sd[early]
     moving, moves_cost, spread = _least_squares(
         np.vander(times, TERMS, increasing=True), way[early], sd
     )
@@ -56,6 +61,7 @@ def start_speed(observation: Observation) -> StartSpeed | None:
     if found.mean_m_s - CLEAR * found.sd_m_s < in_a_step:
         return None
     better = _let_go_cost(times, way[early], sd) - moves_cost
+    found = found._replace(mean_m_s=sign * found.mean_m_s)
     return found if better > CLEAR**2 * size else None
 
 

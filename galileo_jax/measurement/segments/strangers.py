@@ -7,11 +7,12 @@ three frames of a hit that is of the scene only the hard one is told from that h
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Bool
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.walls import distance_to_wall
-from galileo_jax.measurement.find_blow import CLEAR, HIT_M_S2, SMEARED, STEPS, blow_frame
-from galileo_jax.observation.observation import Observation
+from galileo_jax.measurement.segments.blow import CLEAR, HIT_M_S2, SMEARED, STEPS, blow_frame
+from galileo_jax.observation.observation import Observation, PointPath
 
 NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other
 STEPS_ON_WAY = 9  # places between two frames at which distances are looked at
@@ -35,18 +36,24 @@ def _first(clip: Clip, observation: Observation, i: int) -> int | None:
 
 def _hard(clip: Clip, observation: Observation, i: int) -> int | None:
     """The last frame before a blow that is clear from one step to the next."""
-    seen = np.flatnonzero(observation.mask[i])
-    step_s = np.diff(observation.times_s[seen])
-    velocity = np.diff(observation.position_m[i, :2][:, seen]) / step_s
-    variance = observation.variance_m2[i, seen]
-    step_variance = (variance[1:] + variance[:-1]) / step_s**2
-    sd = np.sqrt(step_variance[1:] + step_variance[:-1])
-    jump = np.linalg.norm(np.diff(velocity), axis=0)
-    is_blow = jump > HIT_M_S2 * (step_s[1:] + step_s[:-1]) / 2 + CLEAR * sd
-    for at in np.flatnonzero(is_blow):
-        if not _has_partner(clip, observation, i, slice(seen[at], seen[at + 2] + 1)):
-            return int(seen[at])
+    path = observation.path(i)
+    for at in np.flatnonzero(jumps(path, HIT_M_S2, CLEAR)):
+        if not _has_partner(clip, observation, i, slice(path.frames[at], path.frames[at + 2] + 1)):
+            return int(path.frames[at])
     return None
+
+
+def jumps(path: PointPath, most_m_s2: float, clear: float) -> Bool[np.ndarray, " middle"]:
+    """Whether the velocity changes beyond an acceleration and noise, for each place but the ends.
+
+    Args:
+      path: of an object.
+      most_m_s2: nothing but a blow accelerates so.
+      clear: standard deviations of the change that are no noise.
+    """
+    step_s, velocity, sd = path.steps
+    change = np.linalg.norm(np.diff(velocity[:2]), axis=0)
+    return change > most_m_s2 * (step_s[1:] + step_s[:-1]) / 2 + clear * np.hypot(sd[1:], sd[:-1])
 
 
 def _soft(clip: Clip, observation: Observation, i: int) -> int | None:

@@ -12,14 +12,14 @@ Something that looks the same, and where the object might well be after a time o
 the fit tells from it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.clip.walls import distance_to_wall
+from galileo_jax.measurement.segments.strangers import jumps
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 
@@ -35,7 +35,9 @@ within this share of its size from the foot turns there."""
 UNKNOWN_M = 0.06
 """The size of an object that nobody measured."""
 LOST_FRAMES = 10
-"""An object that is hidden for less is not lost."""
+"""An object that is hidden for less is not lost, and one that is outside by then has left."""
+LAST_FRAMES = 5
+"""Before it is seen no more, tell where an object goes."""
 STEPS_ON_WAY = 9
 """Places on a way of two frames at which a puck is compared with the others."""
 APART = 0.8
@@ -82,7 +84,7 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
             why = f"it is then in the same place as {other}; both are left out from there on"
             found.append(Astray(name, float(observation.times_s[frame]), why, True))
             continue
-        if (frame := _leapt(clip, observation, i, seen)) is not None:
+        if (frame := _leapt(clip, observation, i)) is not None:
             why = "its velocity jumps although it hits nothing: something else is tracked there"
             if SCENARIOS[clip.scenario].is_level:
                 why += ", or the puck was struck by something that is not in the scene"
@@ -97,15 +99,6 @@ def find_astray(clip: Clip, observation: Observation, track: Track) -> tuple[Ast
             why += "; it is left out from there on"
         found.append(Astray(name, float(observation.times_s[frame]), why, is_left_out))
     return tuple(found)
-
-
-def without_astray(observation: Observation, astray: Sequence[Astray]) -> Observation:
-    """The observation without what is to be left out."""
-    mask = observation.mask.copy()
-    for one in astray:
-        if one.is_left_out:
-            mask[observation.names.index(one.name), observation.times_s >= one.time_s] = False
-    return replace(observation, mask=mask)
 
 
 def longest_absence(observation: Observation) -> tuple[str, float, float] | None:
@@ -143,76 +136,57 @@ def _shared(clip: Clip, observation: Observation, i: int) -> tuple[int, str] | N
     return found
 
 
-def _leapt(clip: Clip, observation: Observation, i: int, seen: np.ndarray) -> int | None:
+def _leapt(clip: Clip, observation: Observation, i: int) -> int | None:
     """The first frame in which object `i` is where only a blow could have taken it; or None.
 
     Once it has gone half its size: until then a hand may be at it.
     """
     scenario = SCENARIOS[clip.scenario]
     is_asked = (scenario.has_ramp or scenario.is_level) and clip.is_scale_known
-    if not is_asked or len(seen) < FEWEST_FRAMES:
+    path = observation.path(i)
+    seen = path.frames
+    if not is_asked or len(path) < FEWEST_FRAMES:
         return None
-    place = observation.position_m[i, :2][:, seen]
-    step_s = np.diff(observation.times_s[seen])
-    velocity = np.diff(place) / step_s
-    jump = np.hypot(*np.diff(velocity))
-    variance = observation.variance_m2[i, seen]
-    step_variance = (variance[1:] + variance[:-1]) / step_s**2
-    sd = np.sqrt(step_variance[1:] + step_variance[:-1])
-    most = BLOW_M_S2 * (step_s[1:] + step_s[:-1]) / 2 + CLEAR * sd
+    place = path.place_m[:2]
+    step_s, velocity, _ = path.steps
     gone = np.hypot(*(place[:, 1:-1] - place[:, :1])) > _size_m(clip.objects[i]) / 2
-    for at in np.flatnonzero((jump > most) & gone):
-        way = velocity[:, at] * (step_s[at] + step_s[at + 1])
-        reach = np.hypot(*way)
+    for at in np.flatnonzero(jumps(path, BLOW_M_S2, CLEAR) & gone):
+        way = velocity[:2, at] * (step_s[at] + step_s[at + 1])
         if scenario.is_level:
-            frames = seen[at : at + 3]
-            may_be_hit = _meets(clip, observation, i, frames, place[:, at], way)
+            on_way = place[:, at, None] + way[:, None] * np.linspace(0.0, 1.0, STEPS_ON_WAY)
+            may_meet = _may_meet(clip, observation, i, on_way, seen[at : at + 3])
         else:
-            may_be_hit = _may_be_hit(clip, observation, i, int(seen[at + 1]), float(reach))
-        if not may_be_hit:
+            there, reach_m = place[:, at + 1, None], float(np.hypot(*way))
+            may_meet = _may_meet(clip, observation, i, there, seen[at + 1 : at + 2], reach_m)
+        if not may_meet:
             # Of three places that no puck takes one after the other the middle one may be wrong.
             return int(seen[at + 1 if scenario.is_level else at + 2])
     return None
 
 
-def _meets(
+def _may_meet(
     clip: Clip,
     observation: Observation,
     i: int,
+    places_m: np.ndarray,
     frames: np.ndarray,
-    place: np.ndarray,
-    way: np.ndarray,
+    reach_m: float = 0.0,
 ) -> bool:
-    """Whether puck `i`, at a place in the first of these frames, may meet another, or a wall.
+    """Whether object `i`, at some places `[2, place]`, may meet another, a wall or the ramp's foot.
 
-    One that is not seen there may be anywhere.
+    One that is not seen in one of the frames may be anywhere.
     """
     size = _size_m(clip.objects[i])
-    on_way = place[:, None] + way[:, None] * np.linspace(0.0, 1.0, STEPS_ON_WAY)
+    if SCENARIOS[clip.scenario].has_table and abs(places_m[0]).min() < NEAR * size + reach_m:
+        return True
     for wall in clip.walls:
-        if distance_to_wall(on_way.T, wall.ends_m).min() < NEAR * size / 2:
+        if distance_to_wall(places_m.T, wall.ends_m).min() < NEAR * size / 2 + reach_m:
             return True
     for j, other in enumerate(clip.objects):
-        if j == i:
-            continue
         there = observation.position_m[j, :2][:, frames]
-        apart = np.linalg.norm(on_way[:, :, None] - there[:, None, :], axis=0)
-        if not apart.min() > NEAR * (size + _size_m(other)) / 2:
+        apart = np.linalg.norm(places_m[:, :, None] - there[:, None, :], axis=0)
+        if j != i and not apart.min() > NEAR * (size + _size_m(other)) / 2 + reach_m:
             return True
-    return False
-
-
-def _may_be_hit(clip: Clip, observation: Observation, i: int, frame: int, reach_m: float) -> bool:
-    """Whether object `i` is near another, one that is not seen there, or the ramp's foot."""
-    sizes = [_size_m(item) for item in clip.objects]
-    place = observation.position_m[i, :2, frame]
-    if SCENARIOS[clip.scenario].has_table and abs(place[0]) < NEAR * sizes[i] + reach_m:
-        return True
-    for other, size in enumerate(sizes):
-        if other != i:
-            apart = np.hypot(*(observation.position_m[other, :2, frame] - place))
-            if not apart > NEAR * (size + sizes[i]) / 2 + reach_m:
-                return True
     return False
 
 
@@ -223,11 +197,18 @@ def _size_m(declared: ClipObject) -> float:
     return max(declared.size_m) * (1 if declared.shape == "box" else 2)
 
 
+def leaves_picture(track: Track, i: int, last: int) -> bool:
+    """Whether object `i`, last seen in frame `last`, goes out of the picture soon after that."""
+    seen = np.flatnonzero(track.is_visible[i, : last + 1])[-LAST_FRAMES:]
+    place = track.position_px[i, seen]
+    if len(seen) < 2:
+        return False
+    goes_to = place[-1] + LOST_FRAMES * (place[-1] - place[0]) / (seen[-1] - seen[0])
+    return bool(((goes_to < 0) | (goes_to > np.array(track.frame_size_px) - 1)).any())
+
+
 def _is_lost(track: Track, i: int, last: int, last_used: int | None) -> bool:
     """Whether object `i`, last seen in frame `last`, should be in the picture after that."""
     after = (len(track.times_s) - 1 if last_used is None else last_used) - last
-    if after < LOST_FRAMES or track.is_visible[i, last + 1 :].any():
-        return False
-    step = np.nan_to_num(track.position_px[i, last] - track.position_px[i, last - 1])
-    goes_to = track.position_px[i, last] + LOST_FRAMES * step
-    return bool(((goes_to >= 0) & (goes_to < track.frame_size_px)).all())
+    is_back = track.is_visible[i, last + 1 :].any()
+    return after >= LOST_FRAMES and not is_back and not leaves_picture(track, i, last)

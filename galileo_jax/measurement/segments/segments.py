@@ -1,0 +1,257 @@
+"""The segments of a track: held, of the scene, what comes after it, and gone astray.
+
+Real clips show more than their scene: the hand that lets go, the stop at the end of a board, a
+blow by something that is no partner. What lies beyond is left out, and a `Cut` says where and why;
+what is no more the object that was marked is `Astray`.
+
+    board without a table    from the rest after which it comes down, and from where the hand is
+                             off; to a stop, a blow, or the rest after which it is carried away
+    level                    from where it gains no more speed; to a stop or a blow
+    fall, flight, board      to where the film goes over to slow motion
+    fall, flight             from where the hand is off; to a stop (fall) or a blow, unless a floor
+                             is declared
+    toss                     to the first impact
+    pendulum, spring, liquid from where it is let go, to a blow or a stop
+    ramp                     to where a box tips over, two that touch turn aside, or object 1 comes
+                             back to the foot
+    from_above               to a blow where neither another puck nor a declared wall is, or to a
+                             quarter of a second after everything has come to rest
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
+
+from galileo_jax.clip.poses_csv import read_poses_csv
+from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
+from galileo_jax.measurement.segments.astray import Astray, find_astray
+from galileo_jax.measurement.segments.blow import (
+    SMEARED_FRAMES,
+    arrest_frame,
+    blow_frame,
+    goes_on,
+)
+from galileo_jax.measurement.segments.bounce import bounce_frame
+from galileo_jax.measurement.segments.hand import (
+    hand_frame,
+    let_go_frame,
+    pushed_frame,
+    thrown_frame,
+)
+from galileo_jax.measurement.segments.ramp_ends import ramp_end
+from galileo_jax.measurement.segments.rate_change import rate_change
+from galileo_jax.measurement.segments.rest import placed_frames, rest_frame, standstill_frame
+from galileo_jax.measurement.segments.strangers import stranger_frame
+from galileo_jax.measurement.toss_flight import last_free_frame
+from galileo_jax.observation.observation import Observation
+from galileo_jax.tracking.track import Track
+
+STOPPED = "is stopped by something that is not in the scene"
+STRUCK = "is struck by something that is not in the scene: its velocity jumps there"
+CHANGES_RATE = (
+    "goes on {:.3g} times as fast, its acceleration by the square of that: the frame rate changes "
+    "there (slow motion?), which only a cut film or a table with true times can mend"
+)
+LANDED = "comes down on the table"
+RESTS = "is at rest, and so is everything else that is still seen"
+PLACED = "is put into its place by a hand before that"
+TAKEN = "is taken away by a hand from then on"
+IS_HELD = "is held before that"
+HELD = "is moved by a hand before that: it accelerates differently from later"
+PUSHED = "is pushed by a hand before that: it gains speed on a level table"
+
+SWINGS = ("pendulum", "spring", "liquid")
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Where the part of a track that is used begins or ends.
+
+    Attributes:
+      name: the object's.
+      time_s: of the first frame that is used, or of the last.
+      side: which part is left out.
+      why: a phrase with the object as its subject.
+    """
+
+    name: str
+    time_s: float
+    side: str  # "before" or "after"
+    why: str
+
+    def __str__(self) -> str:
+        """One line, without the clip's name."""
+        return f"{self.name} {self.why}; everything {self.side} {self.time_s:.3f} s is left out"
+
+
+class Phase(IntEnum):
+    """What an object does in a frame."""
+
+    BEFORE = 0  # it is in a hand, or not let go yet
+    SCENE = 1  # it moves, or rests, as the scene has it
+    AFTER = 2  # something that is not of the scene has ended its motion
+    ASTRAY = 3  # what is tracked is not, or may not be, the object
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Where a track is motion of its scene.
+
+    Attributes:
+      cuts: where it begins and ends, in time's order.
+      astray: objects whose tracks are not to be believed to their ends.
+    """
+
+    cuts: tuple[Cut, ...] = ()
+    astray: tuple[Astray, ...] = ()
+
+    def phases(self, names: Sequence[str], times_s: np.ndarray) -> Int[np.ndarray, "object frame"]:
+        """The `Phase` of each object in each frame."""
+        found = np.full((len(names), len(times_s)), Phase.SCENE)
+        for one in self.astray:
+            if one.is_left_out:
+                found[names.index(one.name), times_s >= one.time_s] = Phase.ASTRAY
+        for cut in self.cuts:
+            if cut.side == "before":
+                found[:, times_s < cut.time_s] = Phase.BEFORE
+            else:
+                found[:, times_s > cut.time_s] = Phase.AFTER
+        return found
+
+    def used(self, observation: Observation) -> Observation:
+        """What of an observation is motion of the scene.
+
+        Frames at its end in which nothing is seen any more cost only time, and are gone; those
+        before it stay: frames are counted from the clip's beginning.
+        """
+        phases = self.phases(observation.names, observation.times_s)
+        used = replace(observation, mask=observation.mask & (phases == Phase.SCENE))
+        if not any(cut.side == "after" for cut in self.cuts):
+            return used
+        seen = observation.mask & (phases != Phase.BEFORE) & (phases != Phase.AFTER)
+        return used.between(slice(int(np.flatnonzero(seen.any(axis=0))[-1]) + 1))
+
+
+def segment(clip: Clip, observation: Observation, track: Track | None = None) -> Segments:
+    """The segments of a track.
+
+    Args:
+      clip: what is declared.
+      observation: of all the clip.
+      track: the same in pixels; None: it was tracked elsewhere, and nothing has gone astray.
+    """
+    scenario = SCENARIOS[clip.scenario]
+    if scenario.is_level:
+        kept = _of_pucks(clip, _Kept(observation))
+    elif scenario.has_table:
+        kept = _Kept(observation).end_with(ramp_end(clip, observation))
+    else:
+        kept = _of_one(clip, _Kept(observation))
+    astray = () if track is None else find_astray(clip, kept.observation, track)
+    return Segments(tuple(cut for cut in (kept.begin, kept.end) if cut is not None), astray)
+
+
+def cuts_of(measured: Sequence[Any]) -> dict[str, Any]:
+    """For a result's document: `{"cuts": {clip: [{name, time_s, side, why}]}}`, or nothing."""
+    found = {one.name: [asdict(each) for each in one.cuts] for one in measured if one.cuts}
+    return {"cuts": found} if found else {}
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """An observation without what has been left out so far."""
+
+    observation: Observation
+    begin: Cut | None = None
+    end: Cut | None = None
+
+    def begin_at(self, frame: int | None, why: str) -> "_Kept":
+        """Without what is before a frame; None: nothing is left out."""
+        if frame is None:
+            return self
+        rest = self.observation.without(slice(None, frame))
+        time_s = float(rest.times_s[frame])
+        return replace(self, observation=rest, begin=Cut(rest.names[0], time_s, "before", why))
+
+    def end_with(self, found: tuple[int, int, str] | None) -> "_Kept":
+        """Without what is after a frame that some object tells, and why; None: all stays."""
+        if found is None:
+            return self
+        frame, i, why = found
+        rest = self.observation.without(slice(frame + 1, None))
+        time_s = float(rest.times_s[frame])
+        return replace(self, observation=rest, end=Cut(rest.names[i], time_s, "after", why))
+
+
+def is_board(clip: Clip) -> bool:
+    """Whether it shows a board without a table."""
+    scenario = SCENARIOS[clip.scenario]
+    return scenario.has_ramp and not scenario.has_table
+
+
+def _of_one(clip: Clip, kept: _Kept) -> _Kept:
+    """Of one object that slides, falls, flies or swings."""
+    scenario = SCENARIOS[clip.scenario]
+    is_let_go = is_board(clip) and not clip.starts_moving and "start_velocity" not in scenario.laws
+    if is_let_go:
+        first, last = placed_frames(kept.observation)
+        kept = kept.begin_at(first, PLACED)
+        kept = kept if last is None else kept.end_with((last, 0, TAKEN))
+    if clip.scenario in SWINGS:
+        kept = kept.begin_at(let_go_frame(kept.observation), IS_HELD)
+    kept = kept.end_with(_end(clip, kept.observation))
+    is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
+    if is_board(clip) and scenario.angle_deg == 0:
+        return kept.begin_at(pushed_frame(kept.observation), PUSHED)
+    if is_free and not clip.objects[0].first_frame:
+        rest_belongs = clip.scenario == "fall"
+        return kept.begin_at(thrown_frame(kept.observation, rest_belongs), HELD)
+    return kept.begin_at(hand_frame(kept.observation), HELD) if is_let_go else kept
+
+
+def _end(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
+    """The last frame before the motion of one object ends, 0, and why; None where it goes on."""
+    ends: list[tuple[int | None, str]] = []
+    is_free = clip.scenario in ("fall", "flight") and not clip.has_floor
+    is_in_space = observation.position_m.shape[1] == 3
+    if clip.scenario == "toss" and clip.track is not None:
+        poses = read_poses_csv(clip.track, clip.track_up)
+        ends.append((last_free_frame(poses, clip.objects[0].size_m), LANDED))
+    if is_board(clip) or (is_free and clip.scenario == "fall"):
+        ends.append((arrest_frame(observation), STOPPED))
+    if clip.scenario in SWINGS:
+        ends.append((standstill_frame(observation), STOPPED))
+    if is_board(clip) or is_free or clip.scenario in SWINGS:
+        is_flight = clip.scenario == "flight" and is_in_space
+        struck = bounce_frame(observation) if is_flight else blow_frame(observation)
+        ends.append((struck, STRUCK))
+    if (is_board(clip) or is_free) and (change := rate_change(observation)) is not None:
+        ends.append((change.last, CHANGES_RATE.format(change.factor)))
+    found = [(frame, why) for frame, why in ends if frame is not None]
+    if not found:
+        return None
+    last, why = min(found)
+    if why == STOPPED and goes_on(observation, last):
+        why = STRUCK
+    # Of a video: the hit falls into an exposure, whose frame shows neither.
+    return last - (SMEARED_FRAMES if clip.video is not None else 0), 0, why
+
+
+def _of_pucks(clip: Clip, kept: _Kept) -> _Kept:
+    """To the first blow by a stranger, or to when all that is seen has come to rest.
+
+    Of a film, tracks that leap are looked at by themselves: they may be of something else.
+    """
+    observation = kept.observation
+    if clip.video is None and (struck := stranger_frame(clip, observation)) is not None:
+        return kept.end_with((*struck, STRUCK))
+    radii = [item.size_m[0] for item in clip.objects if item.size_m is not None]
+    last = rest_frame(observation, min(radii)) if radii else None
+    if last is None:
+        return kept
+    return kept.end_with((last, int(np.argmax(observation.mask[:, last])), RESTS))

@@ -1,0 +1,37 @@
+"""Camera roll: gravity does not point straight down in the picture.
+
+    g = gravity (sin r, -cos r),    r = camera_roll, forward of the picture's vertical
+
+Source: Hartley and Zisserman, Multiple View Geometry (2004), chapter 6 (a camera that is turned
+about its line of sight turns the picture).
+Confused with: magnus where the direction of flight hardly changes, and a level force. A plumb line
+in the picture tells; `vertical_sd_deg` allows for it in every model.
+"""
+
+import math
+from typing import ClassVar
+
+from galileo_jax.model.effects.effect import ANGLE, Array, Effect, Surroundings, Theta
+from galileo_jax.model.effects.registry import register
+from galileo_jax.model.parameters import Normal, Parameter
+
+PRIOR = Normal(0.0, math.radians(2.0))
+
+
+@register
+class CameraRoll(Effect):
+    """The camera was rolled about its line of sight."""
+
+    name: ClassVar[str] = "camera_roll"
+
+    def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
+        """The roll; none but in the plane of a picture whose vertical is taken at its word."""
+        is_asked = scene.moves_in_plane and scene.num_axes == 2 and ANGLE not in scene.expected
+        return (Parameter("camera_roll", "rad", PRIOR, 0.0, "effect", 0.05),) if is_asked else ()
+
+    def tilt(self, theta: Theta, scene: Surroundings) -> tuple[Array, Array] | None:
+        """Of gravity in the plane."""
+        if not self.parameters(scene):
+            return None
+        forward = theta["camera_roll"]
+        return forward, 0.0 * forward
