@@ -12,6 +12,7 @@ from galileo_jax.api.command_line import command_line
 from galileo_jax.api.effect_choice import check_addition
 from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.motion import Motion, motions_at
+from galileo_jax.api.options import DiagnoseOptions, options_of
 from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.scenarios import SCENARIOS
@@ -337,8 +338,10 @@ def diagnose(
       >>> found.verdict.status, found.verdict.effects
       ('named', ('air_drag',))
     """
-    files = tuple(str(path) for path in effects_from)
-    check_addition(add, files)
+    options = options_of(
+        DiagnoseOptions, locals(), effects_from=tuple(str(path) for path in effects_from)
+    )
+    check_addition(add, options.effects_from)
     with progress.scope(on_progress, cancel):
         with progress.part(0.0, TRACKED):
             measured, track_s = as_measurements(
@@ -349,14 +352,14 @@ def diagnose(
         command = command_line(
             "diagnose",
             [one.clip.source for one in measured],
-            effects_from=files,
+            effects_from=options.effects_from,
             add=add,
             engine=engine,
             seed=seed or None,
             pixels_per_metre=pixels_per_metre,
         )
         with progress.part(TRACKED, 1.0):
-            return _diagnosed(measured, add, engine, seed, track_s, files, command)
+            return _diagnosed(measured, options, track_s, command)
 
 
 def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
@@ -395,19 +398,13 @@ def with_library(
 
 
 def _diagnosed(
-    measured: Sequence[Measurement],
-    add: str,
-    engine: str,
-    seed: int,
-    track_s: float,
-    files: tuple[str, ...],
-    command: str,
+    measured: Sequence[Measurement], options: DiagnoseOptions, track_s: float, command: str
 ) -> Diagnosis:
     clips, observations = [one.clip for one in measured], [one.observation for one in measured]
-    began = time.perf_counter()
-    problem = with_library(clips, observations, engine)
-    if add not in ("auto", "none", *problem.all_effects):
-        raise InputError(f"--add: {add} has no place in {clips[0].path}")
+    seed, files, began = options.seed, options.effects_from, time.perf_counter()
+    problem = with_library(clips, observations, options.engine)
+    if options.add not in ("auto", "none", *problem.all_effects):
+        raise InputError(f"--add: {options.add} has no place in {clips[0].path}")
 
     share, stage = 0.0, ""
 
@@ -442,7 +439,7 @@ def _diagnosed(
     found = run_loop(
         problem,
         seed=seed,
-        add=add,
+        add=options.add,
         on_stage=on_stage,
         on_round=on_round,
         on_candidate=on_candidate,

@@ -8,14 +8,15 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of
-from galileo_jax.api.fit_options import (
+from galileo_jax.api.fit_result import Fit, make_fit
+from galileo_jax.api.options import (
     BLOCK_STEPS,
     OF_THESIS,
     Discrepancy,
     FitOptions,
     ignored_options,
+    options_of,
 )
-from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.schema import Clip
@@ -118,24 +119,12 @@ def fit(
       >>> abs(fit.parameters["k1"]["mean"] - made.truths[0]["k1"]) < 0.01
       True
     """
-    options = FitOptions(
-        method=method,
+    options = options_of(
+        FitOptions,
+        locals(),
         effects=names_of(effects),
-        effects_from=tuple(str(path) for path in effects_from),
+        effects_from=tuple(map(str, effects_from)),
         free=names_of(free),
-        discrepancy=discrepancy,
-        motion=motion,
-        engine=engine,
-        noise=noise,
-        seed=seed,
-        sampler=sampler,
-        max_steps=max_steps,
-        chains=chains,
-        init=init,
-        preset=preset,
-        similarity=similarity,
-        acceptance=acceptance,
-        selection=selection,
     )
     _check(options)
     with progress.scope(on_progress, cancel):

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from galileo_jax.api.options import options_of
 from galileo_jax.clip.declaration import Declaration
 from galileo_jax.clip.label import LabelledClip, label_clip
 
@@ -91,32 +92,4 @@ def label(
       >>> gx.label("slide.csv", gravity=9.8).clip.gravity
       9.8
     """
-    return label_clip(
-        Path(clip),
-        Declaration(
-            scenario=scenario,
-            fps=fps,
-            point=point or {},
-            size=size or {},
-            shape=shape or {},
-            first_frame=first_frame or {},
-            last_frame=last_frame or {},
-            correct=correct or {},
-            pixels_per_metre=pixels_per_metre,
-            pixels_per_metre_sd=pixels_per_metre_sd,
-            scale=scale,
-            rectangle=rectangle,
-            lens=lens,
-            ramp_angle=ramp_angle,
-            ramp_angle_sd=ramp_angle_sd,
-            ramp=ramp,
-            track_units=track_units,
-            track_y=track_y,
-            track_origin=track_origin,
-            direction=direction,
-            origin=origin,
-            origin_sd=origin_sd,
-            gravity=gravity,
-            level=level,
-        ),
-    )
+    return label_clip(Path(clip), options_of(Declaration, locals()))

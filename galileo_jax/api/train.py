@@ -86,13 +86,8 @@ def train(
     check_known("--preset", "preset", preset, PRESETS)
     if engine is not None:
         check_known("--engine", "engine", engine, ENGINES)
-    overrides = {
-        "samples": samples,
-        "frames": frames,
-        "seed": seed,
-        "engine": engine,
-        "max_epochs": max_epochs,
-    }
+    arguments = locals()
+    overrides = {name: arguments[name] for name in (*LEAST, "engine")}
     for name, least in LEAST.items():
         value = overrides[name]
         if value is not None and not (isinstance(value, int) and value >= least):

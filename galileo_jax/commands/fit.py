@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import get_args
 
-from galileo_jax.api.fit_options import Discrepancy, ignored_options
+from galileo_jax.api.options import Discrepancy, ignored_options
 from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
 from galileo_jax.commands.fit_table import table

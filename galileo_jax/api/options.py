@@ -1,7 +1,8 @@
-"""What `fit` can be asked for, importable without JAX, and which options go together."""
+"""What a function of the API was asked for, as one value; importable without JAX."""
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Literal, TypeVar
 
 BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 MAX_STEPS = 4000
@@ -9,6 +10,20 @@ OF_GALILEO = ("sampler", "max_steps", "init")  # options of chains, by preset
 OF_THESIS = ("similarity", "acceptance", "selection")
 
 Discrepancy = Literal["auto", "none", "rough"]
+Options = TypeVar("Options")
+
+
+def options_of(kind: type[Options], arguments: Mapping[str, Any], **checked: Any) -> Options:
+    """The options of a call, `kind` being a dataclass with fields of the arguments' names.
+
+    Args:
+      kind: of the options.
+      arguments: of the call by name, its `locals()`; None: as the field's default.
+      **checked: what is not taken as it was given.
+    """
+    names = [one.name for one in fields(kind)]  # pyright: ignore[reportArgumentType]
+    given = {name: arguments[name] for name in names if arguments[name] is not None}
+    return kind(**given | checked)
 
 
 @dataclass(frozen=True)
@@ -32,6 +47,16 @@ class FitOptions:
     similarity: str = "thesis_gaussian"
     acceptance: str = "coin"
     selection: str = "best"
+
+
+@dataclass(frozen=True)
+class DiagnoseOptions:
+    """What `diagnose` was asked for; the arguments of the same names."""
+
+    add: str = "auto"
+    effects_from: tuple[str, ...] = ()
+    engine: str = "auto"
+    seed: int = 0
 
 
 def ignored_options(method: str, preset: str) -> tuple[tuple[str, ...], str]:
