@@ -110,7 +110,7 @@ def build_page(session: Session) -> None:
             viewer = Viewer()
             strip = ui.element("div").classes("strip timed")
             with strip:
-                chart = ui.plotly(charts._figure([], "", "", False))
+                chart = ui.plotly(charts.EMPTY)
         panel = ui.element("aside").classes("right")
     job = ui.element("div")
 
@@ -296,7 +296,7 @@ def _figure(tab: Tab) -> Any:
         count = tab.session.sheet.info.frame_count
         return charts.track_figure(track, dark, count / tab.session.sheet.marks.fps)
     if tab.stage == "fit":
-        return charts.fit_figure(motion, None, dark)
+        return charts.fit_figure(motion, dark)
     is_of_this_model = found.compare is not None and tab.session.states["compare"] == "done"
     stretches = found.compare["stretches"] if found.compare and is_of_this_model else ()
     own = [one for one in stretches if one["clip"] == tab.session.active]
@@ -307,7 +307,7 @@ def _figure(tab: Tab) -> Any:
     ahead = (found.prediction or {"clips": {}})["clips"].get(tab.session.active)
     if tab.stage == "predict" and ahead is not None:
         return charts.prediction_figure(ahead, dark)
-    return charts.fit_figure(motion, None, dark) if tab.stage == "predict" else None
+    return charts.fit_figure(motion, dark) if tab.stage == "predict" else None
 
 
 def _candidate(tab: Tab) -> tuple[str, Any] | None:

@@ -106,12 +106,12 @@ def test_figures_are_plain_data_that_a_page_can_take():
     extra = ("air_drag", {"times": [0.0], "model_x": [[0.0]], "white": [[0.1]]})
     for dark in (False, True):
         for figure in (
-            charts.fit_figure(MOTION, None, dark, extra),
+            charts.fit_figure(MOTION, dark),
             charts.residual_figure(MOTION, [stretch], dark, extra),
         ):
             assert json.loads(json.dumps(figure)) == figure
     shaded = charts.residual_figure(MOTION, [stretch], False)["layout"]["shapes"]
-    assert [(one["x0"], one["x1"]) for one in shaded if one.get("yref") == "paper"] == [(0.0, 0.1)]
+    assert [(one["x0"], one["x1"]) for one in shaded if one["type"] == "rect"] == [(0.0, 0.1)]
 
 
 @pytest.mark.video
