@@ -274,11 +274,11 @@ class Diagnosis:
         write_beliefs(folder / FILE, self.problem, beliefs_of(self.found))
         self.report(folder / "report.html")
         if svg:
-            from galileo_jax.report.diagnosis_plots import write_diagnosis_plots  # Matplotlib
+            from galileo_jax.report.diagnosis_page import before_after_charts
+            from galileo_jax.report.draw import write_svgs
 
-            write_diagnosis_plots(
-                folder / PLOTS, self.problem, self.found, int(self.document["seed"])
-            )
+            seed = int(self.document["seed"])
+            write_svgs(folder / PLOTS, before_after_charts(self.problem, self.found, seed))
         best.save(folder / "model", report=False)
         return folder
 

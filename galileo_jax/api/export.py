@@ -82,7 +82,8 @@ def export(
 
 
 def _plots(folder: Path, out: Path) -> list[Path]:
-    from galileo_jax.report.fit_plots import write_fit_plots  # imports Matplotlib
+    from galileo_jax.report.draw import write_svgs
+    from galileo_jax.report.fit_page import charts_of_run
 
     if not folder.is_dir():
         raise InputError(f"--to {SVG}: of a folder written by `galileo fit`, not of {folder}")
@@ -91,5 +92,5 @@ def _plots(folder: Path, out: Path) -> list[Path]:
     for name, one in folders.items():
         run = load_run(one)
         with outputs(out):
-            written += write_fit_plots(run, out / name if len(folders) > 1 else out)
+            written += write_svgs(out / name if len(folders) > 1 else out, charts_of_run(run))
     return written

@@ -53,6 +53,12 @@ def write_report(
     return page
 
 
+def charts_of_run(run: Run) -> list[Chart]:
+    """All figures of a fit's page."""
+    fitted = posterior_predictive(run, seed=int(run.result["seed"]))
+    return [chart for some in fit_charts(run, fitted).values() for chart in some]
+
+
 def fit_charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
     """The figures of a fit, by section of the page."""
     objects, clip = range(len(fitted.observation.names)), run.problem.name
