@@ -193,7 +193,7 @@ def stacked(name: str, label: str, panels: Iterable[Panel], panel_px: int | None
     return Chart(name, label, joined, panel_px=panel_px)
 
 
-def time_limits(times_s: np.ndarray) -> tuple[float, float]:
+def time_limits(times_s: np.ndarray | Sequence[float]) -> tuple[float, float]:
     """The clip's time with a little room."""
     spare = 0.02 * float(times_s[-1] - times_s[0])
     return float(times_s[0]) - spare, float(times_s[-1]) + spare

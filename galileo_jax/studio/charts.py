@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import MissingForce
-from galileo_jax.report.chart import Band, Chart, Line, Panel, Points
+from galileo_jax.report.chart import Band, Chart, Line, Panel, Points, time_limits
 from galileo_jax.report.diagnosis_charts import known_objects, missing_force_chart
 from galileo_jax.report.plotly_figure import dark, figure
 from galileo_jax.report.style import object_colour
@@ -17,7 +17,7 @@ FIGURES = 6  # after the point, of what is drawn
 LAYOUT = {
     "paper_bgcolor": "rgba(0,0,0,0)",
     "margin": {"l": 58, "r": 12, "t": 8, "b": 36},
-    "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0, "font": {"size": 12}},
+    "legend": {"y": 1.0, "yref": "paper", "yanchor": "bottom"},
     "showlegend": True,
     "height": None,  # that of its place on the page
 }
@@ -62,7 +62,8 @@ def residual_figure(
       extra: another model's name, and the residuals that it leaves.
     """
     times, two = motion["times"], np.full(2, 2.0)
-    marks: list[Any] = [Band(np.array([times[0], times[-1]]), -two, two, "ink", "", 0.07)]
+    ends = time_limits(times)
+    marks: list[Any] = [Band(np.array(ends), -two, two, "ink", "", 0.07)]
     for i, name in enumerate(motion["objects"]):
         for axis, values in zip("xy", motion["white"][i], strict=False):
             label, is_hollow = f"{name}, {axis}", axis == "y"
@@ -71,7 +72,7 @@ def residual_figure(
             label, curve = f"{name}, {extra[0]}", extra[1]
             marks.append(Line(curve["times"], curve["white"][i], object_colour(i), label, i > 0, 2))
     failing = tuple((one["start"], one["end"]) for one in stretches)
-    panel = Panel("residual / noise", tuple(marks), xlabel="time, s", highlights=failing)
+    panel = Panel("residual / noise", tuple(marks), "", "time, s", ends, highlights=failing)
     return _figure(panel, is_dark)
 
 
