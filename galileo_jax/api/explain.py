@@ -11,7 +11,7 @@ from galileo_jax.api.command_line import command_line
 from galileo_jax.api.compare import Comparison, compare
 from galileo_jax.api.diagnose import Diagnosis, diagnose
 from galileo_jax.api.fit import fit as fit_tracks
-from galileo_jax.api.fit_result import Fit
+from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
 from galileo_jax.api.proposed_clip import clip_of
 from galileo_jax.api.track import Track
@@ -75,20 +75,8 @@ class Explanation:
           path: the page; of several clips each has its own: NAME.html becomes NAME_CLIP.html.
           beside: titles of other pages to their places, for links; None: none.
         """
-        from galileo_jax.report.fit_page import write_report
-
         path = Path(path)
-        runs = self.fit.runs(path.parent)
-        several = len(runs) > 1
-        return tuple(
-            write_report(
-                run,
-                path.with_name(f"{path.stem}_{run.problem.name}{path.suffix}") if several else path,
-                self.paragraph,
-                beside or {},
-            )
-            for run in runs
-        )
+        return write_pages(self.fit.runs(path.parent), path, self.paragraph, beside)
 
     @in_float64
     def save(self, folder: str | Path) -> "Explanation":

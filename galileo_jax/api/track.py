@@ -113,6 +113,18 @@ class Track:
             raise InputError(f"{path}: {error.strerror or error}") from error
         return path
 
+    def save_tables(self, folder: str | Path) -> tuple[Path, ...]:
+        """Writes track_px.csv of a video and, where the scale is declared, track_m.csv."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        written: tuple[Path, ...] = ()
+        if self.pixels is not None:
+            written = (folder / "track_px.csv",)
+            write_pixel_csv(written[0], self.pixels)
+        if self.clip.pixels_per_metre is not None:
+            written += (self.save(folder / "track_m.csv"),)
+        return written
+
     def save_overlay(self, folder: str | Path) -> tuple[Path, ...]:
         """Draws the paths over the video: `overlay.png` and `overlay.mp4` in `folder`.
 

@@ -5,7 +5,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.clip_options import (
+    add_clip_options,
+    load_clips,
+    out_folder,
+    warn_of_tracks,
+)
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
 from galileo_jax.results.truth import hidden_effect
@@ -32,7 +37,7 @@ def main(argv: Sequence[str]) -> int | None:
         print("\n".join(_lines(found, hidden, out)))
         display("writing the page", 1.0)
         found.save(out, svg=svg)
-    warn(line for one in found.measurements for line in (*one.remarks, *one.doubts))
+    warn_of_tracks(found.measurements)
     command.say(f"{out}/diagnosis.json, {out}/report.html, {out}/model")
     return None
 
@@ -62,13 +67,14 @@ def _round_head(first: Mapping[str, Any]) -> str:
 def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
     """The last of the rounds, and how the friction coefficients changed since the one before."""
     from galileo_jax.report import diagnosis_text
+    from galileo_jax.results.shown_digits import value_text
 
     row = rows[-1]
     frictions = ""
     for name in FRICTIONS:
         if name not in row:
             continue
-        value = diagnosis_text.value_text(row[name])
+        value = value_text(row[name], "+-")
         if len(rows) > 1:
             value += f" ({row[name]['mean'] - rows[-2][name]['mean']:+.4f})"
         frictions += f"  {value:<28}"

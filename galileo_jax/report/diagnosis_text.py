@@ -14,7 +14,8 @@ from galileo_jax.diagnosis.reasons import p_text as p_text
 from galileo_jax.diagnosis.verdict import UNEVEN
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.results.shown_digits import shown
+from galileo_jax.report.phrases import listed
+from galileo_jax.results.shown_digits import value_text
 from galileo_jax.statespace.term import TERMS
 
 NO_EFFECTS = "no effects"
@@ -32,12 +33,6 @@ def round_text(row: Mapping[str, Any]) -> str:
     """What the model of a round has, of a row of `history` in diagnosis.json."""
     text = effects_text(row["effects"])
     return f"{text}, imperfect" if row.get("imperfect") and not row["effects"] else text
-
-
-def value_text(entry: Mapping[str, Any]) -> str:
-    """A parameter's mean, standard deviation and unit."""
-    unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-    return f"{shown(entry)} +- {shown(entry, 'sd')}{unit}"
 
 
 def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
@@ -127,8 +122,8 @@ def ambiguity(rivals: Sequence[str]) -> str:
     common = [name for name in hypotheses[0] if all(name in own for own in hypotheses)]
     if not common:
         alone, beside = _without_company(hypotheses)
-        names = " and ".join([", ".join(alone[:-1]), alone[-1]])
-        together = f", alone or together with {_any_of(beside)}" if beside else ""
+        names = listed(alone)
+        together = f", alone or together with {listed(beside, 'or')}" if beside else ""
         return (
             f"This clip cannot distinguish between {names}; each of them explains the data"
             f"{together}."
@@ -137,7 +132,7 @@ def ambiguity(rivals: Sequence[str]) -> str:
     others = [name for name in rest if name]
     alone = "" if len(others) == len(rest) else "alone or "
     return (
-        f"{' and '.join(common)} explains the data {alone}together with {_any_of(others)}; "
+        f"{' and '.join(common)} explains the data {alone}together with {listed(others, 'or')}; "
         f"this clip cannot tell which."
     )
 
@@ -158,10 +153,6 @@ def _without_company(hypotheses: Sequence[Sequence[str]]) -> tuple[list[str], li
     if len(least) < 2:
         return ["+".join(own) for own in hypotheses], []
     return ["+".join(own) for own in least], list(dict.fromkeys(beside))
-
-
-def _any_of(names: Sequence[str]) -> str:
-    return " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
 
 
 def formula_text(record: Mapping[str, Any]) -> str:
@@ -248,7 +239,9 @@ def next_command(
     return f"galileo fit {files}{more} --effects {','.join(effects)}"
 
 
-def strength_texts(effects: Sequence[str], entry: Mapping[str, Any]) -> dict[str, str]:
+def strength_texts(
+    effects: Sequence[str], entry: Mapping[str, Any], sign: str = "+-"
+) -> dict[str, str]:
     """The strengths of a candidate's effects as text, by name.
 
     Where no object was weighed, a force is given per mass: only that is determined.
@@ -256,12 +249,14 @@ def strength_texts(effects: Sequence[str], entry: Mapping[str, Any]) -> dict[str
     Args:
       effects: of the candidate.
       entry: of the candidate in diagnosis.json.
+      sign: before a standard deviation.
     """
     derived = entry.get("derived", {})
     found = {}
     for name, strength in strengths(effects, entry["parameters"]).items():
         per_mass = derived.get(f"{name}{SUFFIX}")
-        found[name] = f"{value_text(per_mass)} (over m1)" if per_mass else value_text(strength)
+        text = value_text(per_mass or strength, sign)
+        found[name] = f"{text} (over m1)" if per_mass else text
     return found
 
 

@@ -19,7 +19,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report.fit_text import fits, meaning
 from galileo_jax.report.style import object_colour
-from galileo_jax.results.shown_digits import number, shown
+from galileo_jax.results.shown_digits import number, shown, unit_text, value_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 
@@ -182,9 +182,7 @@ def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str]) -> str
 def _value(entry: Mapping[str, Any]) -> str:
     if not entry["identified"]:
         return '<span class="soft">not determined</span>'
-    unit = "" if entry["unit"] == "1" else f" {escape(entry['unit'])}"
-    value = shown(entry)
-    return f"{value} &plusmn; {shown(entry, 'sd')}{unit}" if entry["sd"] else f"{value}{unit}"
+    return escape(value_text(entry) if entry["sd"] else f"{shown(entry)}{unit_text(entry)}")
 
 
 def _model(row: ClipRow) -> str:

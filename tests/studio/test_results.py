@@ -129,7 +129,7 @@ def test_a_missing_force_is_drawn_of_all_objects_in_one_figure_in_the_colours_of
 
 def test_a_prediction_has_the_clips_end():
     keys = ("time_s", "x_m", "x_q025_m", "x_q975_m")
-    found = {"objects": {"ball": dict.fromkeys(keys, [0.0, 1.0])}, "clip_end": 0.5}
+    found = {"objects": {"ball": dict.fromkeys(keys, (0.0, 1.0))}, "clip_end": 0.5}
     (end,) = charts.prediction_figure(found, True)["layout"]["shapes"]
     assert (end["x0"], end["x1"]) == (0.5, 0.5)
 
