@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax import __version__
-from galileo_jax.api.command_line import command_line
 from galileo_jax.api.effect_choice import check_addition
 from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.motion import Motion, motions_at
@@ -39,6 +38,7 @@ from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.report.diagnosis_text import verdict as sentence_of
+from galileo_jax.results.command_line import command_line
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.results.truth import hidden_effect
 from galileo_jax.runtime import progress

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.api.clips import ClipLike, as_list, load
-from galileo_jax.api.command_line import command_line
 from galileo_jax.api.compare import Comparison, compare
 from galileo_jax.api.diagnose import Diagnosis, diagnose
 from galileo_jax.api.fit import fit as fit_tracks
@@ -21,6 +20,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.report.paragraph import paragraph
+from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError

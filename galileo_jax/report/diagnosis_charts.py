@@ -51,8 +51,10 @@ def candidates_chart(candidates: Sequence[Candidate]) -> Chart:
 
 def known_objects(missing: MissingForce, names: Sequence[str]) -> dict[int, str]:
     """By index the objects that were tracked while they moved: of others nothing is known."""
-    known = np.isfinite(missing.acceleration_m_s2).any(axis=-1)
-    return {i: name for i, name in enumerate(names) if known[i]}
+    known = [bool(np.isfinite(one).any()) for one in missing.acceleration_m_s2]
+    return {
+        i: name for i, (name, is_known) in enumerate(zip(names, known, strict=True)) if is_known
+    }
 
 
 def missing_force_chart(missing: MissingForce, names: Mapping[int, str]) -> Chart:

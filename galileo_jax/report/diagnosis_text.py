@@ -1,6 +1,5 @@
 """The results of a comparison and of a diagnosis as sentences, for the terminal and the pages."""
 
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from galileo_jax.diagnosis.verdict import UNEVEN
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.phrases import listed
+from galileo_jax.results.command_line import command_line
 from galileo_jax.results.shown_digits import value_text
 from galileo_jax.statespace.term import TERMS
 
@@ -221,22 +221,20 @@ def next_command(
     folder: Path = Path(),
 ) -> str:
     """The command to run next; `folder`: where the diagnosis is saved."""
-    files = shlex.join(clips)
-    more = "".join(f" --effects-from {shlex.quote(path)}" for path in effects_from)
-    found = diagnosis.verdict
+    files, found = tuple(effects_from), diagnosis.verdict
     if found.status == "none" or found.effects in UNEVEN:
-        return f"galileo fit {files}"
+        return command_line("fit", clips)
     effects: Sequence[str] = found.effects
     if found.status == "ambiguous":
         effects = found.effects[0].split("+")
     if found.status == "unknown":
         formula = proposed_formula(found, diagnosis.candidates)
         if formula is None:
-            return f"galileo diagnose {files}{more} --effects-from my_effect.py"
+            return command_line("diagnose", clips, effects_from=(*files, "my_effect.py"))
         effects = formula.effects
     if found.status in ("law", "unknown"):
-        more += f" --effects-from {shlex.quote(str(folder / PROPOSED))}"
-    return f"galileo fit {files}{more} --effects {','.join(effects)}"
+        files = (*files, str(folder / PROPOSED))
+    return command_line("fit", clips, effects_from=files, effects=",".join(effects))
 
 
 def strength_texts(
