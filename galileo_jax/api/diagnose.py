@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax import __version__
-from galileo_jax.api.effect_choice import check_addition
+from galileo_jax.api.effect_choice import check_addition, resolved
 from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.motion import Motion, motions_at
 from galileo_jax.api.options import DiagnoseOptions, options_of
@@ -195,7 +195,7 @@ class Diagnosis:
         notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
         notes["status"] = gradient.code.value
         if self.effects_from:
-            notes["effects_from"] = [str(Path(path).resolve()) for path in self.effects_from]
+            notes["effects_from"] = resolved(self.effects_from)
         if is_unknown and gradient.sizes is None:
             rough = with_imperfections(part, gradient)
             part, gradient = rough.trials, rough.fit
@@ -446,23 +446,35 @@ def _diagnosed(
     )
     with progress.part(max(share, ADVISED), 1.0):
         found = with_next(found, clips[0], problem, seed)
-    record = diagnosis_document(problem, found, seed)
-    document = {
-        "clips": [clip.source for clip in clips],
-        TRACKS: [digest(observation) for observation in observations],
-        "sentence": sentence_of(found),
-        **record,
-        **inferred(measured),
-        **({"effects_from": [str(Path(path).resolve()) for path in files]} if files else {}),
-        "left_out": [name for name in effect_names() if name not in problem.all_effects],
-        "engine": problem.problems[0].engine.name,
-        "timings_s": {
-            "track": round(track_s, 3),
-            "diagnose": round(time.perf_counter() - began, 3),
-        },
-        "version": __version__,
-        "seed": seed,
+    timings = {
+        "track": round(track_s, 3),
+        "diagnose": round(time.perf_counter() - began, 3),
     }
+    document = _document(measured, problem, found, options, timings)
     made = Diagnosis(tuple(measured), problem, found, document, command, files)
     progress.report("diagnosed", 1.0, made)
     return made
+
+
+def _document(
+    measured: Sequence[Measurement],
+    problem: JointProblem,
+    found: Found,
+    options: DiagnoseOptions,
+    timings: Mapping[str, float],
+) -> dict[str, Any]:
+    """diagnosis.json; `timings` by stage, s."""
+    clips, files = [one.clip for one in measured], options.effects_from
+    return {
+        "clips": [clip.source for clip in clips],
+        TRACKS: [digest(one.observation) for one in measured],
+        "sentence": sentence_of(found),
+        **diagnosis_document(problem, found, options.seed),
+        **inferred(measured),
+        **({"effects_from": resolved(files)} if files else {}),
+        "left_out": [name for name in effect_names() if name not in problem.all_effects],
+        "engine": problem.problems[0].engine.name,
+        "timings_s": timings,
+        "version": __version__,
+        "seed": options.seed,
+    }

@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of
+from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of, resolved
 from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.options import (
     BLOCK_STEPS,
@@ -287,7 +287,21 @@ def _fitted(
                 "sampling": dict(posterior.stats),
             }
     timings["fit"] = time.perf_counter() - began
-    notes |= extra | {"motion": options.motion}
+    notes |= extra | _notes(options, clips, problem, posterior, gradient)
+    made = finish(posterior, z_best, notes)
+    progress.report("fitted", 1.0, made)
+    return made
+
+
+def _notes(
+    options: FitOptions,
+    clips: Sequence[Clip],
+    problem: JointProblem,
+    posterior: Posterior,
+    gradient: GradientFit | None,
+) -> dict[str, Any]:
+    """What result.json says beside the numbers: doubts, imperfections, what was asked for."""
+    notes: dict[str, Any] = {"motion": options.motion}
     said: list[str | None] = []
     if gradient is not None and options.method != "mh":
         said = [two_solutions(problem, gradient, posterior.flat()), uncertain_width(posterior)]
@@ -298,13 +312,10 @@ def _fitted(
     if options.free:
         notes["free"] = sorted(options.free)
     if options.effects_from:
-        notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
+        notes["effects_from"] = resolved(options.effects_from)
     if gradient is not None and gradient.sizes is not None:
         notes["imperfections"] = imperfections(problem, gradient.sizes, posterior)
-    notes["discrepancy_asked"] = options.discrepancy
-    made = finish(posterior, z_best, notes)
-    progress.report("fitted", 1.0, made)
-    return made
+    return notes | {"discrepancy_asked": options.discrepancy}
 
 
 def _gradient(

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
-from galileo_jax.sweeping.carry_out import Watch, carry_out
+from galileo_jax.sweeping.carry_out import COMPUTED, Report, carry_out
 from galileo_jax.sweeping.cell import Cell, make_cells
 from galileo_jax.sweeping.clip_files import ClipFiles
 from galileo_jax.sweeping.clip_rows import make_clip_rows
@@ -29,16 +29,14 @@ from galileo_jax.sweeping.resources import Computing, num_workers
 from galileo_jax.sweeping.simulated import simulated_clips
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.summary import COLUMNS, Row, make_rows, write_tables
-from galileo_jax.sweeping.task import Engine, Failure
+from galileo_jax.sweeping.task import Engine
 from galileo_jax.sweeping.work import PAGE
 
 if TYPE_CHECKING:
     import pandas as pd
 
 MOST_PAGES = 60  # cells up to which each gets a page of its own, where the config does not say
-TRACKED, COMPUTED = 0.2, 0.98  # shares of the work, for progress
 CONFIG = "config.yaml"  # in the sweep's folder, of a config that was no file
-Report = Callable[[str, float, Any], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,9 +193,7 @@ def sweep(
         done = sum(store.has_result(cell.name) and cell.name not in again for cell in cells)
         report("starting", 0.0, {"cells": len(cells), "done": done, "folder": store.folder})
         with _engine(computing) as worker:
-            carry_out(
-                cells, store, worker, _watch(report), with_page=with_page, computed_again=again
-            )
+            carry_out(cells, store, worker, report, with_page=with_page, computed_again=again)
         report("writing the page", COMPUTED, None)
         rows = make_rows(cells, store)
         tables = write_tables(store.folder, rows)
@@ -235,33 +231,6 @@ def _reporter(on_progress: OnProgress | None) -> Report:
             on_progress(stage, share, partial)
 
     return report
-
-
-def _watch(report: Report) -> Watch:
-    """Reports each clip and each cell as it is done."""
-    what, count, done = "tracking", 0, 0
-
-    def share() -> float:
-        start, end = (0.0, TRACKED) if what == "tracking" else (TRACKED, COMPUTED)
-        return start + (end - start) * (done / count if count else 1.0)
-
-    def stage() -> str:
-        return f"{what}, {done} of {count} done"
-
-    def begin(stage_name: str, number: int) -> None:
-        nonlocal what, count, done
-        what, count, done = stage_name, number, 0
-        report(stage(), share(), None)
-
-    def advance() -> None:
-        nonlocal done
-        done += 1
-        report(stage(), share(), None)
-
-    def fail(name: str, failure: Failure) -> None:
-        report(stage(), share(), {"failed": name, "why": failure.line})
-
-    return Watch(begin, advance, fail)
 
 
 def _config_file(name: str) -> Path:
