@@ -15,7 +15,7 @@ from galileo_jax.api.look import Look, look
 from galileo_jax.api.proposed_clip import clip_of
 from galileo_jax.api.track import Track
 from galileo_jax.api.understand import Understood, is_declared, understand
-from galileo_jax.clip.load import YAML_SUFFIXES, has_yaml, load_clip
+from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
@@ -28,7 +28,6 @@ from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 
 UNDERSTOOD, FITTED, COMPARED = 0.1, 0.35, 0.4  # shares of the work, for progress
-FILM_SUFFIXES = (".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".mts", ".wmv")
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import cv2
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report.fit_text import fits, meaning
 from galileo_jax.report.style import object_colour
+from galileo_jax.report.video_frames import jpeg
 from galileo_jax.results.shown_digits import number, shown, unit_text, value_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
@@ -76,13 +76,7 @@ def thumbnail(clip: Clip, observation: Observation) -> bytes | None:
                 break
     except InputError:  # a picture is no reason to fail
         return None
-    if picture is None:
-        return None
-    height, width = picture.shape[:2]
-    smaller = min(1.0, PICTURE_PX / max(height, width))
-    size = (max(1, round(width * smaller)), max(1, round(height * smaller)))
-    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+    return None if picture is None else jpeg(picture, PICTURE_PX, QUALITY)
 
 
 def middle_frame(observation: Observation) -> int:
