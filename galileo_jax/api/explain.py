@@ -13,7 +13,7 @@ from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
 from galileo_jax.api.proposed_clip import clip_of
-from galileo_jax.api.track import Track
+from galileo_jax.api.track import tracks_of
 from galileo_jax.api.understand import Understood, is_declared, understand
 from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_clip
 from galileo_jax.clip.schema import Clip
@@ -250,8 +250,7 @@ def _explained(clips: Sequence[Clip], engine: str, seed: int) -> Explanation:
     )
     if check.is_adequate or check.found.no_verdict is not None:
         return Explanation(first, check, None, command)
-    tracks = [Track(one.clip, one.pixels, one) for one in first.measurements]
     with progress.part(COMPARED, 0.95):
-        found = diagnose(tracks, engine=engine, seed=seed)
+        found = diagnose(tracks_of(first.measurements), engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)
         return Explanation(found.best, check, found, command)

@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -168,6 +168,11 @@ class Track:
 TrackLike = Track | ClipLike
 
 
+def tracks_of(measured: Iterable[Measurement]) -> list[Track]:
+    """The tracks of clips that were measured, for another call."""
+    return [Track(one.clip, one.pixels, one) for one in measured]
+
+
 @in_float64
 def track(
     clip: ClipLike,
@@ -210,8 +215,7 @@ def track(
 def _tracked(clip: Clip) -> Track:
     if SCENARIOS[clip.scenario].has_table and not clip.is_scale_known and clip.video is not None:
         return Track(clip, track_once(clip), None)
-    measured = measure(clip)
-    return Track(measured.clip, measured.pixels, measured)
+    return tracks_of([measure(clip)])[0]
 
 
 def as_measurements(

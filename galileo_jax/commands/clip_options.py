@@ -38,7 +38,7 @@ def load_clips(call_clips: Sequence[str], pixels_per_metre: float | None) -> "li
 def warn(lines: Iterable[str]) -> None:
     """Prints warnings to stderr, each once."""
     for line in dict.fromkeys(lines):
-        command.console().print(f"warning: {line}", soft_wrap=True, markup=False)
+        command.say(f"warning: {line}")
 
 
 def warn_of_tracks(measured: "Sequence[Measurement]", more: Iterable[str] = ()) -> None:

@@ -10,7 +10,7 @@ from galileo_jax.clip.load import has_yaml
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.sources import source_of
 from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import corrections
+from galileo_jax.commands.clip_options import corrections, warn
 from galileo_jax.commands.options import adder
 
 LINE = ("X1", "Y1", "X2", "Y2")
@@ -30,10 +30,9 @@ def main(argv: Sequence[str]) -> int | None:
         asked[key] = {name: _frame(text) for name, text in asked[key]}
     asked["correct"] = corrections(asked["correct"])
     done = label(path, **asked)
-    for line in [f"note: {note}" for note in done.notes]:
-        command.console().print(line, soft_wrap=True, markup=False)
-    for warning in done.clip.warnings:
-        command.console().print(f"warning: {warning}", soft_wrap=True, markup=False)
+    for note in done.notes:
+        command.say(f"note: {note}")
+    warn(done.clip.warnings)
     print(done.path)
     return None
 
