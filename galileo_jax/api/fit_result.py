@@ -88,15 +88,10 @@ class Fit:
         `identified` is False where the clip does not determine the parameter: the interval is
         then the prior's.
         """
-        import pandas as pd
+        from galileo_jax.results.export import parameter_table
 
-        rows = {
-            name: {"kind": kind, **entry}
-            for kind in ("parameters", "derived", "nuisances")
-            for name, entry in self.result[kind].items()
-        }
         columns = ["kind", "mean", "sd", "q025", "q975", "unit", "identified"]
-        return pd.DataFrame.from_dict(rows, orient="index").reindex(columns=columns)
+        return parameter_table(self.result).set_index("name").rename_axis(None)[columns]
 
     @property
     @in_float64

@@ -58,7 +58,7 @@ def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path
         return [path]
     tables = {
         TRACK: _track_table(tracks, fitted),
-        PARAMETERS: _parameter_table(result),
+        PARAMETERS: parameter_table(result),
         DRAWS: _draw_table(posterior),
     }
     return _write(tables, out, to)
@@ -129,7 +129,7 @@ def _track_table(
     return pd.concat(parts, ignore_index=True)
 
 
-def _parameter_table(result: dict[str, Any]) -> "pd.DataFrame":
+def parameter_table(result: Mapping[str, Any]) -> "pd.DataFrame":
     """One row per parameter, with the part of result.json in which it stands."""
     import pandas as pd
 

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -80,6 +80,11 @@ class Tab:
         """Draws, and shows it in this tab at once: what is typed next must not be swept away."""
         self.session.mark(marks)
         self.redraw()
+
+    def change(self, **given: Any) -> None:
+        """Draws the active clip's marks with other values."""
+        if self.session.sheet is not None:
+            self.mark(replace(self.session.sheet.marks, **given))
 
     def preview(self, candidate: str) -> None:
         """Looks at a candidate's curve."""
