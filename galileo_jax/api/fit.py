@@ -3,7 +3,7 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from galileo_jax.api.options import (
     OF_THESIS,
     Discrepancy,
     FitOptions,
+    check_choices,
     ignored_options,
     options_of,
 )
@@ -144,8 +145,7 @@ def _check(options: FitOptions) -> None:
     """
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
-    check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
-    check_known("--discrepancy", "discrepancy", options.discrepancy, get_args(Discrepancy))
+    check_choices(options)
     if options.discrepancy == "rough" and not _has_imperfections(options):
         raise InputError(
             "--discrepancy rough: of --method grad or mh, --motion planar, --init grad and "
@@ -153,8 +153,6 @@ def _check(options: FitOptions) -> None:
         )
     check_known("--engine", "engine", options.engine, ENGINES)
     check_known("--motion", "motion", options.motion, MOTIONS)
-    check_known("--init", "init", options.init, ("grad", "cnn"))
-    check_known("--preset", "preset", options.preset, ("galileo", "thesis"))
     _refuse_ignored(options)
     if options.method == "mh":
         from galileo_jax.inference.samplers import sampler_names
@@ -162,9 +160,8 @@ def _check(options: FitOptions) -> None:
         check_known("--sampler", "sampler", options.sampler, sampler_names())
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
-            f"--max-steps: {options.max_steps} is not a multiple of {BLOCK_STEPS}, "
-            f"{BLOCK_STEPS} or "
-            "more"
+            f"--max-steps: {options.max_steps} is not a multiple of {BLOCK_STEPS}, {BLOCK_STEPS} "
+            "or more"
         )
     if options.motion == "free":
         if options.engine == "mjx":

@@ -2,7 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_args, get_origin
+
+from galileo_jax.runtime.known_names import check_known
 
 BLOCK_STEPS = 25  # of every chain, between two looks at convergence
 MAX_STEPS = 4000
@@ -24,6 +26,14 @@ def options_of(kind: type[Options], arguments: Mapping[str, Any], **checked: Any
     names = [one.name for one in fields(kind)]  # pyright: ignore[reportArgumentType]
     given = {name: arguments[name] for name in names if arguments[name] is not None}
     return kind(**given | checked)
+
+
+def check_choices(options: Any) -> None:
+    """Raises `InputError` where an option, whose type lists what there is, has another value."""
+    for one in fields(options):
+        if get_origin(one.type) is Literal:
+            option = f"--{one.name.replace('_', '-')}"
+            check_known(option, one.name, getattr(options, one.name), get_args(one.type))
 
 
 @dataclass(frozen=True)

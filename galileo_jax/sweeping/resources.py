@@ -4,9 +4,10 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
+from galileo_jax.api.options import check_choices
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.runtime.known_names import check_known
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Resources:
 class Computing:
     """Where a sweep is computed; the arguments of `sweep` of the same names."""
 
-    engine: str = "local"
+    engine: Literal["local", "ray"] = "local"
     address: str | None = None
     workers: int | None = None
     cpus_per_worker: int = 1
@@ -53,7 +54,7 @@ class Computing:
 
     def check(self) -> None:
         """Raises `InputError` where the options are wrong or do not go together."""
-        check_known("--engine", "engine", self.engine, ENGINES)
+        check_choices(self)
         if self.address and self.engine != "ray":
             raise InputError("--address: for --engine ray only")
         for name, least in LEAST.items():
@@ -76,7 +77,6 @@ class Computing:
         return num_together() if is_free else 1
 
 
-ENGINES = ("local", "ray")
 LEAST = {"workers": 0, "cpus_per_worker": 1, "gpus_per_worker": 0, "together": 1}
 NUM_TOGETHER = 64  # cells whose program calls an accelerator makes at once
 SINGLE_THREAD = "--xla_cpu_multi_thread_eigen=false"
