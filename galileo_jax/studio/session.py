@@ -1,7 +1,6 @@
 """What all tabs look at: the clips, their marks, the results, and the job that runs."""
 
 import asyncio
-import itertools
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -61,7 +60,6 @@ class Session:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._asked: Mapping[str, float] | None = None  # the sliders, while an answer is awaited
         self._waiting: Mapping[str, float] | None = None
-        self._ids = itertools.count()
         self._context: dict[str, Any] = {}
         self.worker = Worker(str(self.root), self._from_worker)
         self._effects_left: tuple[str, ...] = ()  # in the result that lies there

@@ -178,15 +178,13 @@ def sweep(
             engine=None if engine == "local" else engine,
             address=address,
         )
-        write_json(
-            store.folder / "sweep.json",
-            {
-                "command": command,
-                "configs": [one.model_dump(mode="json") for one in configs],
-                "cells": [cell.name for cell in cells],
-                "version": __version__,
-            },
-        )
+        document = {
+            "command": command,
+            "configs": [one.model_dump(mode="json") for one in configs],
+            "cells": [cell.name for cell in cells],
+            "version": __version__,
+        }
+        write_json(store.folder / "sweep.json", document)
         if retry:
             for cell in cells:
                 store.forget_failure(cell.name)
@@ -195,14 +193,18 @@ def sweep(
         with _engine(computing) as worker:
             carry_out(cells, store, worker, report, with_page=with_page, computed_again=again)
         report("writing the page", COMPUTED, None)
-        rows = make_rows(cells, store)
-        tables = write_tables(store.folder, rows)
-        write_sweep_page(
-            store.folder / PAGE, name, rows, command, make_clip_rows(cells, store, rows)
-        )
-        made = Sweep(store.folder, tuple(tables), tuple(rows))
+        made = _written(name, cells, store, command)
         report("done", 1.0, made)
     return made
+
+
+def _written(name: str, cells: Sequence[Cell], store: Store, command: str) -> Sweep:
+    """The finished sweep, with its tables and its page."""
+    rows = make_rows(cells, store)
+    tables = write_tables(store.folder, rows)
+    clips = make_clip_rows(cells, store, rows)
+    write_sweep_page(store.folder / PAGE, name, rows, command, clips)
+    return Sweep(store.folder, tuple(tables), tuple(rows))
 
 
 def _check_not_imported_by_worker() -> None:
