@@ -73,7 +73,7 @@ def _known() -> str:
 
 
 def _help() -> str:
-    return f"{USAGE}\n\n{indent(command.in_columns(VERBS), '  ')}"
+    return f"{USAGE}\n\n{indent(command.in_columns(dict(VERBS)), '  ')}"
 
 
 def run_verb(name: str, verb: str) -> None:

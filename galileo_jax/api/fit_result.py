@@ -91,7 +91,12 @@ class Fit:
         from galileo_jax.results.export import parameter_table
 
         columns = ["kind", "mean", "sd", "q025", "q975", "unit", "identified"]
-        return parameter_table(self.result).set_index("name").rename_axis(None)[columns]
+        return (
+            parameter_table(self.result)
+            .set_index("name")
+            .rename_axis(None)
+            .reindex(columns=columns)
+        )
 
     @property
     @in_float64

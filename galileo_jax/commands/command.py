@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from galileo_jax.runtime.errors import InputError
@@ -63,9 +63,8 @@ def refuse_ignored(argv: Sequence[str], options: Sequence[str], why: str) -> Non
             raise InputError(f"{option}: {why}")
 
 
-def in_columns(rows: Iterable[tuple[str, str]]) -> str:
+def in_columns(known: Mapping[Any, Any]) -> str:
     """Names and what they mean, a line each."""
-    known = dict(rows)
     width = max(map(len, known))
     return "\n".join(f"{name:<{width}}  {meaning}" for name, meaning in known.items())
 

@@ -12,7 +12,7 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.api.catalogue import effects
 
     known = effects(call.effects_from)
-    print(command.in_columns(known["meaning"].items()))
+    print(command.in_columns(known["meaning"].to_dict()))
     return None
 
 

@@ -11,7 +11,7 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.api.catalogue import scenarios
 
     known = scenarios()
-    print(command.in_columns(known["meaning"].items()))
+    print(command.in_columns(known["meaning"].to_dict()))
     return None
 
 
