@@ -20,6 +20,7 @@ from galileo_jax.report.fit_text import fits, meaning
 from galileo_jax.report.style import object_colour
 from galileo_jax.report.video_frames import jpeg
 from galileo_jax.results.shown_digits import number, shown, unit_text, value_text
+from galileo_jax.results.shown_parameters import point_estimate
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 
@@ -132,10 +133,7 @@ def _values(row: ClipRow) -> dict[str, Mapping[str, Any]]:
     """By name: frictions and mass ratios; of a motion that has none what it does determine."""
     if row.fit is not None:
         entries = {**row.fit["parameters"], **row.fit["derived"]}
-        # A method with an answer of its own: its draws are no posterior.
-        best = dict(row.fit.get("best") or {})
-        if {"m1", "m2"} <= set(best):
-            best["mass_ratio"] = best["m1"] / best["m2"]
+        best = point_estimate(row.fit)
         for name in set(best) & set(entries):
             entries[name] = {**entries[name], "mean": best[name], "sd": None, "identified": True}
     elif row.diagnosis is not None:
