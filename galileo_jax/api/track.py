@@ -114,14 +114,14 @@ class Track:
         return path
 
     def save_tables(self, folder: str | Path) -> tuple[Path, ...]:
-        """Writes track_px.csv of a video and, where the scale is declared, track_m.csv."""
+        """Writes track_px.csv of a video and, where the scale in metres is known, track_m.csv."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         written: tuple[Path, ...] = ()
         if self.pixels is not None:
             written = (folder / "track_px.csv",)
             write_pixel_csv(written[0], self.pixels)
-        if self.clip.pixels_per_metre is not None:
+        if self.clip.pixels_per_metre is not None and not self.clip.is_scale_assumed:
             written += (self.save(folder / "track_m.csv"),)
         return written
 

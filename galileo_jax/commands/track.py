@@ -35,7 +35,7 @@ def main(argv: Sequence[str]) -> int | None:
     warn(found.warnings[len(clip.warnings) :])
     for line in _summary(found.pixels):
         command.say(line)
-    if found.clip.pixels_per_metre is None:
+    if out / "track_m.csv" not in written:
         command.say(
             "note: no csv in metres, because pixels_per_metre is not known; give --pixels-per-metre"
         )
