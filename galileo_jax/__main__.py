@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
+from textwrap import indent
 
 import galileo_jax
 from galileo_jax import __version__
@@ -72,9 +73,7 @@ def _known() -> str:
 
 
 def _help() -> str:
-    width = max(len(verb) for verb, _ in VERBS)
-    lines = [f"  {verb:<{width}}  {summary}" for verb, summary in VERBS]
-    return "\n".join([USAGE, "", *lines])
+    return f"{USAGE}\n\n{indent(command.in_columns(dict(VERBS)), '  ')}"
 
 
 def run_verb(name: str, verb: str) -> None:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax import __version__
-from galileo_jax.api.command_line import command_line
 from galileo_jax.api.effect_choice import EffectsLike
 from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit
@@ -18,6 +17,7 @@ from galileo_jax.comparison.compare import compare as compare_fit
 from galileo_jax.comparison.document import comparison_document
 from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
 from galileo_jax.inference.fits.gradient import SETTLED, Code, GradientFit, GradientFitter
+from galileo_jax.results.command_line import command_line
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
@@ -197,8 +197,8 @@ def compare(
         command = command_line(
             "compare",
             words,
-            effects=of_model,
-            effects_from=files,
+            effects=",".join(of_model),
+            effects_from=tuple(files),
             engine=engine,
             seed=chosen or None,
             pixels_per_metre=pixels_per_metre,

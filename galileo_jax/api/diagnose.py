@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax import __version__
-from galileo_jax.api.command_line import command_line
-from galileo_jax.api.effect_choice import check_addition
+from galileo_jax.api.effect_choice import check_addition, resolved
 from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.motion import Motion, motions_at
+from galileo_jax.api.options import DiagnoseOptions, options_of
 from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.scenarios import SCENARIOS
@@ -24,8 +24,8 @@ from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.laws.source import proposed_file
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
-from galileo_jax.experiment.advise import with_next
 from galileo_jax.experiment.belief import FILE, beliefs_of, write_beliefs
+from galileo_jax.experiment.choose import with_next
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code
@@ -38,6 +38,7 @@ from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.report.diagnosis_text import verdict as sentence_of
+from galileo_jax.results.command_line import command_line
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.results.truth import hidden_effect
 from galileo_jax.runtime import progress
@@ -194,7 +195,7 @@ class Diagnosis:
         notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
         notes["status"] = gradient.code.value
         if self.effects_from:
-            notes["effects_from"] = [str(Path(path).resolve()) for path in self.effects_from]
+            notes["effects_from"] = resolved(self.effects_from)
         if is_unknown and gradient.sizes is None:
             rough = with_imperfections(part, gradient)
             part, gradient = rough.trials, rough.fit
@@ -273,11 +274,11 @@ class Diagnosis:
         write_beliefs(folder / FILE, self.problem, beliefs_of(self.found))
         self.report(folder / "report.html")
         if svg:
-            from galileo_jax.report.diagnosis_plots import write_diagnosis_plots  # Matplotlib
+            from galileo_jax.report.diagnosis_page import before_after_charts
+            from galileo_jax.report.draw import write_svgs
 
-            write_diagnosis_plots(
-                folder / PLOTS, self.problem, self.found, int(self.document["seed"])
-            )
+            seed = int(self.document["seed"])
+            write_svgs(folder / PLOTS, before_after_charts(self.problem, self.found, seed))
         best.save(folder / "model", report=False)
         return folder
 
@@ -337,8 +338,10 @@ def diagnose(
       >>> found.verdict.status, found.verdict.effects
       ('named', ('air_drag',))
     """
-    files = tuple(str(path) for path in effects_from)
-    check_addition(add, files)
+    options = options_of(
+        DiagnoseOptions, locals(), effects_from=tuple(str(path) for path in effects_from)
+    )
+    check_addition(add, options.effects_from)
     with progress.scope(on_progress, cancel):
         with progress.part(0.0, TRACKED):
             measured, track_s = as_measurements(
@@ -349,14 +352,14 @@ def diagnose(
         command = command_line(
             "diagnose",
             [one.clip.source for one in measured],
-            effects_from=files,
+            effects_from=options.effects_from,
             add=add,
             engine=engine,
             seed=seed or None,
             pixels_per_metre=pixels_per_metre,
         )
         with progress.part(TRACKED, 1.0):
-            return _diagnosed(measured, add, engine, seed, track_s, files, command)
+            return _diagnosed(measured, options, track_s, command)
 
 
 def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
@@ -395,19 +398,13 @@ def with_library(
 
 
 def _diagnosed(
-    measured: Sequence[Measurement],
-    add: str,
-    engine: str,
-    seed: int,
-    track_s: float,
-    files: tuple[str, ...],
-    command: str,
+    measured: Sequence[Measurement], options: DiagnoseOptions, track_s: float, command: str
 ) -> Diagnosis:
     clips, observations = [one.clip for one in measured], [one.observation for one in measured]
-    began = time.perf_counter()
-    problem = with_library(clips, observations, engine)
-    if add not in ("auto", "none", *problem.all_effects):
-        raise InputError(f"--add: {add} has no place in {clips[0].path}")
+    seed, files, began = options.seed, options.effects_from, time.perf_counter()
+    problem = with_library(clips, observations, options.engine)
+    if options.add not in ("auto", "none", *problem.all_effects):
+        raise InputError(f"--add: {options.add} has no place in {clips[0].path}")
 
     share, stage = 0.0, ""
 
@@ -442,30 +439,42 @@ def _diagnosed(
     found = run_loop(
         problem,
         seed=seed,
-        add=add,
+        add=options.add,
         on_stage=on_stage,
         on_round=on_round,
         on_candidate=on_candidate,
     )
     with progress.part(max(share, ADVISED), 1.0):
         found = with_next(found, clips[0], problem, seed)
-    record = diagnosis_document(problem, found, seed)
-    document = {
-        "clips": [clip.source for clip in clips],
-        TRACKS: [digest(observation) for observation in observations],
-        "sentence": sentence_of(found),
-        **record,
-        **inferred(measured),
-        **({"effects_from": [str(Path(path).resolve()) for path in files]} if files else {}),
-        "left_out": [name for name in effect_names() if name not in problem.all_effects],
-        "engine": problem.problems[0].engine.name,
-        "timings_s": {
-            "track": round(track_s, 3),
-            "diagnose": round(time.perf_counter() - began, 3),
-        },
-        "version": __version__,
-        "seed": seed,
+    timings = {
+        "track": round(track_s, 3),
+        "diagnose": round(time.perf_counter() - began, 3),
     }
+    document = _document(measured, problem, found, options, timings)
     made = Diagnosis(tuple(measured), problem, found, document, command, files)
     progress.report("diagnosed", 1.0, made)
     return made
+
+
+def _document(
+    measured: Sequence[Measurement],
+    problem: JointProblem,
+    found: Found,
+    options: DiagnoseOptions,
+    timings: Mapping[str, float],
+) -> dict[str, Any]:
+    """diagnosis.json; `timings` by stage, s."""
+    clips, files = [one.clip for one in measured], options.effects_from
+    return {
+        "clips": [clip.source for clip in clips],
+        TRACKS: [digest(one.observation) for one in measured],
+        "sentence": sentence_of(found),
+        **diagnosis_document(problem, found, options.seed),
+        **inferred(measured),
+        **({"effects_from": resolved(files)} if files else {}),
+        "left_out": [name for name in effect_names() if name not in problem.all_effects],
+        "engine": problem.problems[0].engine.name,
+        "timings_s": timings,
+        "version": __version__,
+        "seed": options.seed,
+    }

@@ -16,6 +16,7 @@ from galileo_jax.experiment.measured import write_clip
 from galileo_jax.experiment.plan import candidates, farthest, middle, parted, stands
 from galileo_jax.experiment.settings import Can
 from galileo_jax.runtime import progress
+from galileo_jax.runtime.atomic_write import writing_into
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, Cancelled, OnProgress
@@ -140,12 +141,8 @@ def discover(
         if folder is None:
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="galileo."))
         folder = Path(folder)
-        if folder.exists() and not folder.is_dir():
-            raise InputError(f"--out: {folder} is a file; a folder expected")
-        try:
+        with writing_into(folder):
             folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"--out: {folder}: {error.strerror or error}") from error
         try:
             described = lab.describe()
         except LabError as error:

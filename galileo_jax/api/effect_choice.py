@@ -28,6 +28,11 @@ def chosen_effects(names: Sequence[str], files: Sequence[str | Path]) -> tuple[E
     return make_effects(list(names))
 
 
+def resolved(files: Sequence[str | Path]) -> list[str]:
+    """The files by their whole paths, as results name them."""
+    return [str(Path(path).resolve()) for path in files]
+
+
 def check_addition(add: str, files: Sequence[str | Path]) -> None:
     """Raises `InputError` where `add` is neither auto, none nor an effect."""
     for path in files:

@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.api.clips import ClipLike, as_list, load
-from galileo_jax.api.command_line import command_line
 from galileo_jax.api.compare import Comparison, compare
 from galileo_jax.api.diagnose import Diagnosis, diagnose
 from galileo_jax.api.fit import fit as fit_tracks
-from galileo_jax.api.fit_result import Fit
+from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
 from galileo_jax.api.proposed_clip import clip_of
-from galileo_jax.api.track import Track
+from galileo_jax.api.track import tracks_of
 from galileo_jax.api.understand import Understood, is_declared, understand
-from galileo_jax.clip.load import YAML_SUFFIXES, has_yaml, load_clip
+from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_clip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.report.paragraph import paragraph
+from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
@@ -28,7 +28,6 @@ from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 
 UNDERSTOOD, FITTED, COMPARED = 0.1, 0.35, 0.4  # shares of the work, for progress
-FILM_SUFFIXES = (".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".mts", ".wmv")
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,20 +74,8 @@ class Explanation:
           path: the page; of several clips each has its own: NAME.html becomes NAME_CLIP.html.
           beside: titles of other pages to their places, for links; None: none.
         """
-        from galileo_jax.report.fit_page import write_report
-
         path = Path(path)
-        runs = self.fit.runs(path.parent)
-        several = len(runs) > 1
-        return tuple(
-            write_report(
-                run,
-                path.with_name(f"{path.stem}_{run.problem.name}{path.suffix}") if several else path,
-                self.paragraph,
-                beside or {},
-            )
-            for run in runs
-        )
+        return write_pages(self.fit.runs(path.parent), path, self.paragraph, beside)
 
     @in_float64
     def save(self, folder: str | Path) -> "Explanation":
@@ -263,8 +250,7 @@ def _explained(clips: Sequence[Clip], engine: str, seed: int) -> Explanation:
     )
     if check.is_adequate or check.found.no_verdict is not None:
         return Explanation(first, check, None, command)
-    tracks = [Track(one.clip, one.pixels, one) for one in first.measurements]
     with progress.part(COMPARED, 0.95):
-        found = diagnose(tracks, engine=engine, seed=seed)
+        found = diagnose(tracks_of(first.measurements), engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)
         return Explanation(found.best, check, found, command)

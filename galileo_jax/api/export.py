@@ -12,9 +12,9 @@ from galileo_jax.results.export import (
     clip_folders,
     export_run,
     export_tracks,
-    outputs,
 )
 from galileo_jax.results.run import load_run, read_result
+from galileo_jax.runtime.atomic_write import writing_into
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
@@ -82,7 +82,8 @@ def export(
 
 
 def _plots(folder: Path, out: Path) -> list[Path]:
-    from galileo_jax.report.fit_plots import write_fit_plots  # imports Matplotlib
+    from galileo_jax.report.draw import write_svgs
+    from galileo_jax.report.fit_page import charts_of_run
 
     if not folder.is_dir():
         raise InputError(f"--to {SVG}: of a folder written by `galileo fit`, not of {folder}")
@@ -90,6 +91,6 @@ def _plots(folder: Path, out: Path) -> list[Path]:
     written = []
     for name, one in folders.items():
         run = load_run(one)
-        with outputs(out):
-            written += write_fit_plots(run, out / name if len(folders) > 1 else out)
+        with writing_into(out):
+            written += write_svgs(out / name if len(folders) > 1 else out, charts_of_run(run))
     return written

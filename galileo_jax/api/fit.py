@@ -3,19 +3,21 @@
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
-from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of
-from galileo_jax.api.fit_options import (
+from galileo_jax.api.effect_choice import EffectsLike, chosen_effects, names_of, resolved
+from galileo_jax.api.fit_result import Fit, make_fit
+from galileo_jax.api.options import (
     BLOCK_STEPS,
     OF_THESIS,
     Discrepancy,
     FitOptions,
+    check_choices,
     ignored_options,
+    options_of,
 )
-from galileo_jax.api.fit_result import Fit, make_fit
 from galileo_jax.api.precompile import precompile
 from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.schema import Clip
@@ -118,24 +120,12 @@ def fit(
       >>> abs(fit.parameters["k1"]["mean"] - made.truths[0]["k1"]) < 0.01
       True
     """
-    options = FitOptions(
-        method=method,
+    options = options_of(
+        FitOptions,
+        locals(),
         effects=names_of(effects),
-        effects_from=tuple(str(path) for path in effects_from),
+        effects_from=tuple(map(str, effects_from)),
         free=names_of(free),
-        discrepancy=discrepancy,
-        motion=motion,
-        engine=engine,
-        noise=noise,
-        seed=seed,
-        sampler=sampler,
-        max_steps=max_steps,
-        chains=chains,
-        init=init,
-        preset=preset,
-        similarity=similarity,
-        acceptance=acceptance,
-        selection=selection,
     )
     _check(options)
     with progress.scope(on_progress, cancel):
@@ -155,8 +145,7 @@ def _check(options: FitOptions) -> None:
     """
     from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
 
-    check_known("--method", "method", options.method, ("grad", "mh", "cnn"))
-    check_known("--discrepancy", "discrepancy", options.discrepancy, get_args(Discrepancy))
+    check_choices(options)
     if options.discrepancy == "rough" and not _has_imperfections(options):
         raise InputError(
             "--discrepancy rough: of --method grad or mh, --motion planar, --init grad and "
@@ -164,8 +153,6 @@ def _check(options: FitOptions) -> None:
         )
     check_known("--engine", "engine", options.engine, ENGINES)
     check_known("--motion", "motion", options.motion, MOTIONS)
-    check_known("--init", "init", options.init, ("grad", "cnn"))
-    check_known("--preset", "preset", options.preset, ("galileo", "thesis"))
     _refuse_ignored(options)
     if options.method == "mh":
         from galileo_jax.inference.samplers import sampler_names
@@ -173,9 +160,8 @@ def _check(options: FitOptions) -> None:
         check_known("--sampler", "sampler", options.sampler, sampler_names())
     if options.max_steps < BLOCK_STEPS or options.max_steps % BLOCK_STEPS:
         raise InputError(
-            f"--max-steps: {options.max_steps} is not a multiple of {BLOCK_STEPS}, "
-            f"{BLOCK_STEPS} or "
-            "more"
+            f"--max-steps: {options.max_steps} is not a multiple of {BLOCK_STEPS}, {BLOCK_STEPS} "
+            "or more"
         )
     if options.motion == "free":
         if options.engine == "mjx":
@@ -298,7 +284,21 @@ def _fitted(
                 "sampling": dict(posterior.stats),
             }
     timings["fit"] = time.perf_counter() - began
-    notes |= extra | {"motion": options.motion}
+    notes |= extra | _notes(options, clips, problem, posterior, gradient)
+    made = finish(posterior, z_best, notes)
+    progress.report("fitted", 1.0, made)
+    return made
+
+
+def _notes(
+    options: FitOptions,
+    clips: Sequence[Clip],
+    problem: JointProblem,
+    posterior: Posterior,
+    gradient: GradientFit | None,
+) -> dict[str, Any]:
+    """What result.json says beside the numbers: doubts, imperfections, what was asked for."""
+    notes: dict[str, Any] = {"motion": options.motion}
     said: list[str | None] = []
     if gradient is not None and options.method != "mh":
         said = [two_solutions(problem, gradient, posterior.flat()), uncertain_width(posterior)]
@@ -309,13 +309,10 @@ def _fitted(
     if options.free:
         notes["free"] = sorted(options.free)
     if options.effects_from:
-        notes["effects_from"] = [str(Path(path).resolve()) for path in options.effects_from]
+        notes["effects_from"] = resolved(options.effects_from)
     if gradient is not None and gradient.sizes is not None:
         notes["imperfections"] = imperfections(problem, gradient.sizes, posterior)
-    notes["discrepancy_asked"] = options.discrepancy
-    made = finish(posterior, z_best, notes)
-    progress.report("fitted", 1.0, made)
-    return made
+    return notes | {"discrepancy_asked": options.discrepancy}
 
 
 def _gradient(

@@ -1,7 +1,7 @@
 """`Fit`, the result of `fit`: the posterior, and tables, figures and files derived from it."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.parameters import inverse
 from galileo_jax.results.run import BEST, CHECKPOINT, POSTERIOR, RESULT, Run, save_run
 from galileo_jax.results.stale_outputs import remove_single_clip_run, remove_stale_prediction
-from galileo_jax.runtime.atomic_write import write_json
+from galileo_jax.runtime.atomic_write import check_folder, write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 
@@ -88,15 +88,15 @@ class Fit:
         `identified` is False where the clip does not determine the parameter: the interval is
         then the prior's.
         """
-        import pandas as pd
+        from galileo_jax.results.export import parameter_table
 
-        rows = {
-            name: {"kind": kind, **entry}
-            for kind in ("parameters", "derived", "nuisances")
-            for name, entry in self.result[kind].items()
-        }
         columns = ["kind", "mean", "sd", "q025", "q975", "unit", "identified"]
-        return pd.DataFrame.from_dict(rows, orient="index").reindex(columns=columns)
+        return (
+            parameter_table(self.result)
+            .set_index("name")
+            .rename_axis(None)
+            .reindex(columns=columns)
+        )
 
     @property
     @in_float64
@@ -217,16 +217,8 @@ class Fit:
         Returns:
           the pages.
         """
-        from galileo_jax.report.fit_page import write_report
-
         path = Path(path)
-        runs = self.runs(self.folder or path.parent)
-        if len(runs) == 1:
-            return (write_report(runs[0], path),)
-        return tuple(
-            write_report(run, path.with_name(f"{path.stem}_{run.problem.name}{path.suffix}"))
-            for run in runs
-        )
+        return write_pages(self.runs(self.folder or path.parent), path)
 
     @in_float64
     def save(self, folder: str | Path, *, report: bool = True) -> "Fit":
@@ -245,8 +237,7 @@ class Fit:
         from galileo_jax.report.fit_page import PAGE, write_report
 
         folder = Path(folder)
-        if folder.exists() and not folder.is_dir():
-            raise InputError(f"--out: {folder} is a file; a folder expected")
+        check_folder(folder)
         remove_stale_prediction(folder)
         several = len(self.measurements) > 1
         if several:
@@ -274,6 +265,26 @@ class Fit:
 
     def _repr_html_(self) -> str:
         return self.summary()._repr_html_()  # pyright: ignore
+
+
+def write_pages(
+    runs: Sequence[Run], path: Path, lead: str = "", beside: Mapping[str, str] | None = None
+) -> tuple[Path, ...]:
+    """Writes the page of each run; of several NAME.html becomes NAME_CLIP.html.
+
+    Args:
+      runs: of the fit's clips.
+      path: the page.
+      lead: the result in words, for its top.
+      beside: titles of other pages to their places, for links.
+    """
+    from galileo_jax.report.fit_page import write_report
+
+    names = [path.stem if len(runs) == 1 else f"{path.stem}_{run.problem.name}" for run in runs]
+    return tuple(
+        write_report(run, path.with_name(f"{name}{path.suffix}"), lead, beside)
+        for run, name in zip(runs, names, strict=True)
+    )
 
 
 def make_fit(

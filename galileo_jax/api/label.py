@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from galileo_jax.api.options import options_of
 from galileo_jax.clip.declaration import Declaration
 from galileo_jax.clip.label import LabelledClip, label_clip
 
@@ -43,21 +44,22 @@ def label(
     Args:
       clip: the video, the track file or the yaml.
       scenario: what the clip shows, such as ramp, incline or fall.
-      fps: true frames per second; a new yaml takes the video's otherwise.
+      fps: true frames per second; None: unchanged, in a new yaml the video's.
       point: object name to its centre in its first frame, (x, y), px; a new name adds an
         object, as do the next three.
       size: object name to its size, m. box: length, depth, height; cylinder: radius, length;
         torus: radii; sphere: radius.
-      shape: object name to box (default of a new object), cylinder, torus or sphere.
+      shape: object name to box (what a new object is otherwise), cylinder, torus or sphere.
       first_frame: object name to the first frame in which it moves by itself, from 0; None: to
         be found.
       last_frame: object name to the last frame that is used; None: that of the clip.
       correct: object name to (frame, x, y): where it is, px, in frames in which it was lost; it is
-        followed on from there. (frame,) takes that back.
+        followed on from there; (frame,) takes that back.
       pixels_per_metre: of the picture.
       pixels_per_metre_sd: how well that is known (one standard deviation); None: of a `scale`,
         what half a pixel at either end makes of it.
-      scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
+      scale: (x1, y1, x2, y2, metres): two pixels and the distance between them, in place of
+        pixels_per_metre.
       rectangle: (x, y) of the four corners, px, of a rectangle in the plane of the motion, from the
         bottom left one counter-clockwise, then its width and height, m: in place of a scale where
         the camera is not square to the plane. Its bottom side is level.
@@ -65,7 +67,8 @@ def label(
         drawn at r (1 + k1 r^2).
       ramp_angle: of the ramp, degrees.
       ramp_angle_sd: how well that is known, degrees; None: of a `ramp`, by half a pixel.
-      ramp: (x1, y1, x2, y2): two pixels on the ramp: its angle and direction.
+      ramp: (x1, y1, x2, y2): two pixels on the ramp: its angle and direction, in place of
+        ramp_angle.
       track_units: of a track file: m, cm, mm, in, ft or px.
       track_y: of a track file: whether y points up or down.
       track_origin: of a track file: the foot of the ramp, (x, y), in its unit and along its
@@ -73,7 +76,7 @@ def label(
       direction: of the travel: right or left.
       origin: the foot of the ramp, (x, y), px.
       origin_sd: how well either coordinate is known, px; None: of an `origin`, half a pixel.
-      gravity: m/s^2.
+      gravity: m/s^2; None: unchanged, in a new yaml 9.81.
       level: of a clip in folders of Physics 101: about which of them this is declared:
         scenario, setup, object or trial (points are always of the trial, sizes of the object).
 
@@ -89,32 +92,4 @@ def label(
       >>> gx.label("slide.csv", gravity=9.8).clip.gravity
       9.8
     """
-    return label_clip(
-        Path(clip),
-        Declaration(
-            scenario=scenario,
-            fps=fps,
-            point=point or {},
-            size=size or {},
-            shape=shape or {},
-            first_frame=first_frame or {},
-            last_frame=last_frame or {},
-            correct=correct or {},
-            pixels_per_metre=pixels_per_metre,
-            pixels_per_metre_sd=pixels_per_metre_sd,
-            scale=scale,
-            rectangle=rectangle,
-            lens=lens,
-            ramp_angle=ramp_angle,
-            ramp_angle_sd=ramp_angle_sd,
-            ramp=ramp,
-            track_units=track_units,
-            track_y=track_y,
-            track_origin=track_origin,
-            direction=direction,
-            origin=origin,
-            origin_sd=origin_sd,
-            gravity=gravity,
-            level=level,
-        ),
-    )
+    return label_clip(Path(clip), options_of(Declaration, locals()))

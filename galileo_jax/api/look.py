@@ -46,9 +46,10 @@ class Look:
         """Writes the places in time as a figure, by the file's suffix (png, svg, pdf)."""
         if self.seen is None or self.table is None:
             raise InputError(f"{self.path}: a film has no table to plot; galileo track shows it")
-        from galileo_jax.report.look_figure import write_look_figure
+        from galileo_jax.report.draw import write_picture
+        from galileo_jax.report.look_chart import look_chart
 
-        return write_look_figure(Path(path), self.seen, self.table)
+        return write_picture(Path(path), look_chart(self.seen, self.table))
 
 
 def look(file: str | Path, *, fps: float | None = None) -> Look:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from galileo_jax import __version__
 from galileo_jax.api.diagnose import DOCUMENT, Diagnosis, diagnose, with_library
 from galileo_jax.api.run import load_run
-from galileo_jax.api.track import Track
+from galileo_jax.api.track import Track, tracks_of
 from galileo_jax.clip.schema import Clip
 from galileo_jax.experiment.belief import FILE, Beliefs, beliefs_of, read_beliefs
 from galileo_jax.experiment.choose import (
@@ -244,8 +244,7 @@ def _read(folder: Path) -> tuple[Clip, JointProblem, Beliefs, list[str]]:
 
 def _tracks(run: Found) -> list[Track]:
     if isinstance(run, Diagnosis):
-        return [Track(one.clip, one.pixels, one) for one in run.measurements]
+        return tracks_of(run.measurements)
     folder = Path(run)
     place = _diagnosis_folder(folder)
-    fit = load_run(place / "model" if place else folder)
-    return [Track(one.clip, None, one) for one in fit.measurements]
+    return tracks_of(load_run(place / "model" if place else folder).measurements)

@@ -12,7 +12,7 @@ from galileo_jax.api.run import load_run
 from galileo_jax.prediction.extrapolate import Motions, answers, extrapolate
 from galileo_jax.results.run import Run
 from galileo_jax.runtime import progress
-from galileo_jax.runtime.atomic_write import write_json, write_text
+from galileo_jax.runtime.atomic_write import write_json, write_text, writing_into
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
@@ -96,17 +96,13 @@ class Prediction:
         from galileo_jax.report.prediction_chart import prediction_chart
 
         out = Path(folder)
-        if out.exists() and not out.is_dir():
-            raise InputError(f"--out: {out} is a file; a folder expected")
         chart = prediction_chart(self.run, self.motions)
         picture = out / "first_and_last.png"
-        try:
+        with writing_into(out):
             write_first_and_last(self.run, self.motions, picture)
             write_text(out / "prediction.svg", to_svg(chart))
             page = write_prediction(out, self.run, self.document, chart)
             write_json(out / "prediction.json", self.document)
-        except OSError as error:
-            raise InputError(f"--out: {out}: {error.strerror or error}") from error
         return out / "prediction.json", out / "prediction.svg", picture, page
 
     def __repr__(self) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from galileo_jax.api.options import options_of
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
@@ -157,41 +158,13 @@ def simulate(
       >>> made.truths[0]["m1"]
       0.2
     """
-    settings = Settings(
-        seed=seed,
-        scenario=scenario,
-        shapes=shapes,
-        angle=angle,
-        seconds=seconds,
-        fps=fps,
-        m1=m1,
-        k1=k1,
-        m2=m2,
-        k2=k2,
-        motion=motion,
-        z2=z2,
-        solver=solver,
-        values=values or {},
-        floor=floor,
-        walls=walls,
-        release=release,
-        like=like,
-        series=series,
-        track_only=track_only,
-        track_noise=track_noise,
+    one_file = isinstance(effects_from, str | Path)
+    settings = options_of(
+        Settings,
+        locals(),
         effects=_by_name(effects),
-        strength=strength,
-        effects_from=(effects_from,) if isinstance(effects_from, str | Path) else effects_from,
-        faults=faults,
-        size=size,
-        direction=direction,
-        no_points=no_points,
-        hand=hand,
+        effects_from=(effects_from,) if one_file else effects_from,
         camera_fault=(camera_fault,) if isinstance(camera_fault, str) else camera_fault,
-        noise=noise,
-        exposure=exposure,
-        defocus=defocus,
-        missed_frames=missed_frames,
     )
     with progress.scope(on_progress, cancel):
         clips = write_clips(Path(out), settings)

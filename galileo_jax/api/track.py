@@ -2,7 +2,7 @@
 
 import itertools
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -113,6 +113,18 @@ class Track:
             raise InputError(f"{path}: {error.strerror or error}") from error
         return path
 
+    def save_tables(self, folder: str | Path) -> tuple[Path, ...]:
+        """Writes track_px.csv of a video and, where the scale in metres is known, track_m.csv."""
+        folder = Path(folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        written: tuple[Path, ...] = ()
+        if self.pixels is not None:
+            written = (folder / "track_px.csv",)
+            write_pixel_csv(written[0], self.pixels)
+        if self.clip.pixels_per_metre is not None and not self.clip.is_scale_assumed:
+            written += (self.save(folder / "track_m.csv"),)
+        return written
+
     def save_overlay(self, folder: str | Path) -> tuple[Path, ...]:
         """Draws the paths over the video: `overlay.png` and `overlay.mp4` in `folder`.
 
@@ -154,6 +166,11 @@ class Track:
 
 
 TrackLike = Track | ClipLike
+
+
+def tracks_of(measured: Iterable[Measurement]) -> list[Track]:
+    """The tracks of clips that were measured, for another call."""
+    return [Track(one.clip, one.pixels, one) for one in measured]
 
 
 @in_float64
@@ -198,8 +215,7 @@ def track(
 def _tracked(clip: Clip) -> Track:
     if SCENARIOS[clip.scenario].has_table and not clip.is_scale_known and clip.video is not None:
         return Track(clip, track_once(clip), None)
-    measured = measure(clip)
-    return Track(measured.clip, measured.pixels, measured)
+    return tracks_of([measure(clip)])[0]
 
 
 def as_measurements(

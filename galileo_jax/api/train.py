@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 from galileo_jax.files.package_data import config_path
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
-from galileo_jax.runtime.atomic_write import write_json, write_text
+from galileo_jax.runtime.atomic_write import check_folder, write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
@@ -86,21 +86,15 @@ def train(
     check_known("--preset", "preset", preset, PRESETS)
     if engine is not None:
         check_known("--engine", "engine", engine, ENGINES)
-    overrides = {
-        "samples": samples,
-        "frames": frames,
-        "seed": seed,
-        "engine": engine,
-        "max_epochs": max_epochs,
-    }
+    arguments = locals()
+    overrides = {name: arguments[name] for name in (*LEAST, "engine")}
     for name, least in LEAST.items():
         value = overrides[name]
         if value is not None and not (isinstance(value, int) and value >= least):
             option = name.replace("_", "-")
             raise InputError(f"--{option}: '{value}' is not a whole number, {least} or more")
     out = Path(out)
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out: {out} is a file; a folder expected")
+    check_folder(out)
     from galileo_jax.neural.config import load_config
 
     path = Path(config) if config else config_path(f"train_{preset}.yaml")

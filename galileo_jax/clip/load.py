@@ -20,6 +20,8 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 
 YAML_SUFFIXES = (".yaml", ".yml")
+FILM_SUFFIXES = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".mts")
+FILM_SUFFIXES += (".wmv", ".3gp")
 
 
 def load_clip(path: str | Path, **overrides: Any) -> Clip:

@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 from galileo_jax.commands import command
 from galileo_jax.commands.options import adder
 from galileo_jax.rollout.engine_names import ENGINES
+from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
+    from galileo_jax.api.fit_result import Fit
     from galileo_jax.clip.schema import Clip
+    from galileo_jax.measurement.measure import Measurement
 
 
 def add_clip_options(parser: command.Parser, function: str, out: str) -> None:
@@ -35,7 +38,22 @@ def load_clips(call_clips: Sequence[str], pixels_per_metre: float | None) -> "li
 def warn(lines: Iterable[str]) -> None:
     """Prints warnings to stderr, each once."""
     for line in dict.fromkeys(lines):
-        command.console().print(f"warning: {line}", soft_wrap=True, markup=False)
+        command.say(f"warning: {line}")
+
+
+def warn_of_tracks(measured: "Sequence[Measurement]", more: Iterable[str] = ()) -> None:
+    """Warns of what is to be known of the tracks, and of `more`."""
+    warn([*(line for one in measured for line in (*one.remarks, *one.doubts)), *more])
+
+
+def notes_on(fit: "Fit", out: Path) -> None:
+    """Prints to stderr what is to be known of a fit in `out` before it is trusted."""
+    from galileo_jax.results.stale_outputs import stale_documents
+
+    stale = stale_documents(out, [one.observation for one in fit.measurements])
+    warn_of_tracks(fit.measurements, [*stale, *fit.warnings])
+    for line in fit.taken_as_exact:
+        command.say(f"note: {line}")
 
 
 def out_folder(out: str | None, clips: "Sequence[Clip]", below: str = "") -> Path:
@@ -45,8 +63,7 @@ def out_folder(out: str | None, clips: "Sequence[Clip]", below: str = "") -> Pat
       InputError: it is a file.
     """
     folder = Path(out) if out else Path("runs") / "+".join(clip.path.stem for clip in clips)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out: {folder} is a file; a folder expected")
+    check_folder(folder)
     return folder if out else folder / below
 
 

@@ -3,7 +3,7 @@
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from galileo_jax.runtime.errors import InputError
@@ -61,6 +61,12 @@ def refuse_ignored(argv: Sequence[str], options: Sequence[str], why: str) -> Non
     for option in options:
         if option in given:
             raise InputError(f"{option}: {why}")
+
+
+def in_columns(known: Mapping[Any, Any]) -> str:
+    """Names and what they mean, a line each."""
+    width = max(map(len, known))
+    return "\n".join(f"{name:<{width}}  {meaning}" for name, meaning in known.items())
 
 
 def console() -> "Console":

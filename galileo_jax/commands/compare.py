@@ -6,7 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.clip_options import (
+    add_clip_options,
+    load_clips,
+    out_folder,
+    warn_of_tracks,
+)
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.runtime.errors import InputError
@@ -35,7 +40,7 @@ def main(argv: Sequence[str]) -> int | None:
         compared = compare(runs[0] if runs else clips, **asked, on_progress=display)
         display("writing the page", 1.0)
         compared.save(out)
-    warn(line for one in compared.fit.measurements for line in (*one.remarks, *one.doubts))
+    warn_of_tracks(compared.fit.measurements)
     print("\n".join(_lines(compared)))
     command.say(f"{out}/compare.json, {out}/report.html")
     return None

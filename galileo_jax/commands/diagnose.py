@@ -5,9 +5,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.clip_options import (
+    add_clip_options,
+    load_clips,
+    out_folder,
+    warn_of_tracks,
+)
 from galileo_jax.commands.options import adder
-from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
+from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.truth import hidden_effect
 
 if TYPE_CHECKING:
@@ -28,29 +33,22 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.api.diagnose import diagnose
 
     with progress_display() as display:
-        found = diagnose(clips, **asked, on_progress=_RoundPrinter(display))
+        rows: list[Mapping[str, Any]] = []
+
+        def show(partial: Mapping[str, Any]) -> None:
+            if "round" in partial:
+                rows.append(partial["round"])
+                if len(rows) == 1:
+                    display.print(_round_head(rows[0]))
+                display.print(_round_line(rows))
+
+        found = diagnose(clips, **asked, on_progress=display.showing(show))
         print("\n".join(_lines(found, hidden, out)))
         display("writing the page", 1.0)
         found.save(out, svg=svg)
-    warn(line for one in found.measurements for line in (*one.remarks, *one.doubts))
+    warn_of_tracks(found.measurements)
     command.say(f"{out}/diagnosis.json, {out}/report.html, {out}/model")
     return None
-
-
-class _RoundPrinter:
-    """Prints each round when it is done; shows progress otherwise."""
-
-    def __init__(self, display: ProgressDisplay):
-        self._display = display
-        self._rows: list[Mapping[str, Any]] = []
-
-    def __call__(self, stage: str, share_done: float, partial: Any) -> None:
-        self._display(stage, share_done)
-        if isinstance(partial, dict) and "round" in partial:
-            self._rows.append(partial["round"])
-            if len(self._rows) == 1:
-                self._display.print(_round_head(self._rows[0]))
-            self._display.print(_round_line(self._rows))
 
 
 def _round_head(first: Mapping[str, Any]) -> str:
@@ -62,13 +60,14 @@ def _round_head(first: Mapping[str, Any]) -> str:
 def _round_line(rows: Sequence[Mapping[str, Any]]) -> str:
     """The last of the rounds, and how the friction coefficients changed since the one before."""
     from galileo_jax.report import diagnosis_text
+    from galileo_jax.results.shown_digits import value_text
 
     row = rows[-1]
     frictions = ""
     for name in FRICTIONS:
         if name not in row:
             continue
-        value = diagnosis_text.value_text(row[name])
+        value = value_text(row[name], "+-")
         if len(rows) > 1:
             value += f" ({row[name]['mean'] - rows[-2][name]['mean']:+.4f})"
         frictions += f"  {value:<28}"

@@ -6,7 +6,7 @@ from typing import Any
 
 from galileo_jax.commands import command
 from galileo_jax.commands.options import adder
-from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
+from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.experiment.settings import text_of
 
 
@@ -17,25 +17,18 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.api.discover import discover
 
     with progress_display() as display:
-        found = discover(**asked, out=out, on_progress=_Printer(display))
+
+        def show(partial: Mapping[str, Any]) -> None:
+            if "experiment" in partial:
+                display.print(_experiment(partial["experiment"]))
+            elif "clips" in partial.get("round", {}):
+                display.print(f"  {partial['round']['sentence']}")
+
+        found = discover(**asked, out=out, on_progress=display.showing(show))
     print(found.sentence)
     print(f"It ended because {found.document['ended']}.")
     command.say(f"{out}/discover.json, {out}/report.html")
     return None
-
-
-class _Printer:
-    """Prints what was done; shows progress otherwise."""
-
-    def __init__(self, display: ProgressDisplay):
-        self._display = display
-
-    def __call__(self, stage: str, share_done: float, partial: Any) -> None:
-        self._display(stage, share_done)
-        if isinstance(partial, dict) and "experiment" in partial:
-            self._display.print(_experiment(partial["experiment"]))
-        elif isinstance(partial, dict) and "clips" in partial.get("round", {}):
-            self._display.print(f"  {partial['round']['sentence']}")
 
 
 def _experiment(row: Mapping[str, Any]) -> str:

@@ -12,9 +12,7 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.api.catalogue import effects
 
     known = effects(call.effects_from)
-    width = max(map(len, known.index))
-    for name, meaning in known["meaning"].items():
-        print(f"{name:<{width}}  {meaning}")
+    print(command.in_columns(known["meaning"].to_dict()))
     return None
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import out_folder, warn
+from galileo_jax.commands.clip_options import notes_on, out_folder, warn
 from galileo_jax.commands.fit_table import table
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
@@ -47,19 +47,12 @@ def main(argv: Sequence[str]) -> int | None:
     out = out_folder(to, clips)
     warn(warning for clip in clips for warning in clip.warnings)
     from galileo_jax.api.explain import explain
-    from galileo_jax.results.stale_outputs import stale_documents
 
     with progress_display() as display:
         found = explain(clips, out=out, engine=engine, seed=seed, on_progress=display)
     print(textwrap.fill(found.paragraph, min(WIDTH, shutil.get_terminal_size().columns)))
     print(f"\n{table(found.fit, true_parameters(clips[0]))}")
-    measured = found.fit.measurements
-    warn(line for one in measured for line in (*one.remarks, *one.doubts))
-    doubts = {doubt for one in measured for doubt in one.doubts}
-    warn(line for line in found.fit.warnings if line not in doubts)
-    warn(stale_documents(out, [one.observation for one in measured]))
-    for line in found.fit.taken_as_exact:
-        command.say(f"note: {line}")
+    notes_on(found.fit, out)
     command.say(", ".join(map(str, found.files)))
     return None
 

@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from typing import get_args
 
-from galileo_jax.api.fit_options import Discrepancy, ignored_options
+from galileo_jax.api.options import Discrepancy, ignored_options
 from galileo_jax.commands import command
-from galileo_jax.commands.clip_options import add_clip_options, load_clips, out_folder, warn
+from galileo_jax.commands.clip_options import add_clip_options, load_clips, notes_on, out_folder
 from galileo_jax.commands.fit_table import table
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
@@ -29,28 +29,21 @@ def main(argv: Sequence[str]) -> int | None:
     truth = true_parameters(clips[0])
     from galileo_jax.api.fit import fit
     from galileo_jax.results.run import CHECKPOINT
-    from galileo_jax.results.stale_outputs import PREDICTION, stale_documents
+    from galileo_jax.results.stale_outputs import PREDICTION
 
     with progress_display() as display:
         found = fit(clips, **asked, checkpoint=out / CHECKPOINT, on_progress=display)
         display("writing the report", 1.0)
         had_prediction = (out / PREDICTION).is_file()
         found.save(out)
-    measured = found.measurements
-    warn(line for one in measured for line in (*one.remarks, *one.doubts))
     print(table(found, truth))
     if had_prediction and not (out / PREDICTION).is_file():
         command.say(
             f"{out}: the prediction of the earlier fit was removed; make it again: galileo "
-            f"predict {out} "
-            "--seconds S"
+            f"predict {out} --seconds S"
         )
-    warn(stale_documents(out, [one.observation for one in measured]))
-    doubts = {doubt for one in measured for doubt in one.doubts}
-    warn(line for line in found.warnings if line not in doubts)
-    for line in found.taken_as_exact:
-        command.say(f"note: {line}")
-    pages = [out] if len(measured) == 1 else [out / one.name for one in measured]
+    notes_on(found, out)
+    pages = [out] if len(found.names) == 1 else [out / name for name in found.names]
     command.say(", ".join([f"{out}/result.json", *(f"{page}/report.html" for page in pages)]))
     return None
 

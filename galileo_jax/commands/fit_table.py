@@ -11,7 +11,7 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
     """What the user asked for, in a few lines; with a column for the truth if it is known."""
     from galileo_jax.inference.per_mass import SUFFIX
     from galileo_jax.report.fit_text import chi2_text, fit_quality
-    from galileo_jax.results.shown_digits import shown
+    from galileo_jax.results.shown_digits import shown, unit_text
     from galileo_jax.results.shown_parameters import shown_parameters
 
     result: Mapping[str, Any] = found.result
@@ -19,9 +19,8 @@ def table(found: "Fit", truth: Mapping[str, float]) -> str:
     title = f"{'':<18}{'truth' if truth else '':>10}{'mean':>10}{'sd':>10}   95 % interval"
     lines = [title] if entries else []
     for name, entry in entries.items():
-        unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
         mean, sd, low, high = (shown(entry, key) for key in ("mean", "sd", "q025", "q975"))
-        interval = f"[{low}, {high}]{unit}"
+        interval = f"[{low}, {high}]{unit_text(entry)}"
         true = f"{truth[name]:.4g}" if name in truth else ""
         known = f"{mean:>10}{sd:>10}   {interval}"
         if f"{name}{SUFFIX}" in result["derived"]:

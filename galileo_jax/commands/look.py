@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from galileo_jax.commands import command
+from galileo_jax.commands.clip_options import warn
 
 
 def main(argv: Sequence[str]) -> int | None:
@@ -13,8 +14,7 @@ def main(argv: Sequence[str]) -> int | None:
 
     found = look(asked.file, fps=asked.fps)
     print(found.summary())
-    for warning in found.warnings:
-        command.console().print(f"warning: {warning}", soft_wrap=True, markup=False)
+    warn(found.warnings)
     if asked.plot is not None:
         print(found.plot(asked.plot))
     return None

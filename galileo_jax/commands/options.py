@@ -61,26 +61,30 @@ def arguments_of(name: str) -> Mapping[str, Argument]:
     return arguments
 
 
-def adder(parser: Any, function: str) -> Callable[..., None]:
+def adder(parser: Any, function: str, without: str = "none") -> Callable[..., None]:
     """A function that adds options of a public function to a parser, or to a group of it.
 
     `add("engine", "seed")` adds --engine and --seed. What else it is given goes to argparse's
-    `add_argument` in place of what was read; `option` is another name for the option.
+    `add_argument` in place of what was read; `option` is another name for the option. `without` is
+    what a default of None or () means where the docstring does not say it.
     """
     arguments = arguments_of(function)
 
     def add(*names: str, option: str = "", **given: Any) -> None:
         for name in names:
             written = option or f"--{name.replace('_', '-')}"
-            parser.add_argument(written, **{"dest": name, **_described(arguments[name]), **given})
+            described = _described(arguments[name], without) | given
+            if described.get("action") == "append":
+                described["help"] += "; may be given several times"
+            parser.add_argument(written, dest=name, **described)
 
     return add
 
 
-def _described(argument: Argument) -> dict[str, Any]:
+def _described(argument: Argument, without: str) -> dict[str, Any]:
     """What argparse is told of an option."""
     annotation = argument.annotation.removesuffix(" | None")
-    without = WITHOUT.search(argument.meaning)
+    found = WITHOUT.search(argument.meaning)
     meaning = WITHOUT.sub("", argument.meaning).replace("`", "").replace("%", "%%")
     if annotation == "bool":
         return {"action": "store_true", "help": f"{meaning} (default: off)"}
@@ -89,12 +93,11 @@ def _described(argument: Argument) -> dict[str, Any]:
     if argument.default is REQUIRED:
         shown, described = "", {"required": True}
     elif argument.default in (None, (), ""):
-        shown = f" (default: {without[1] if without else 'none'})"
+        shown = f" (default: {found[1] if found else without})"
     described["help"] = f"{meaning}{shown}"
     if annotation.startswith("Literal["):
         return described | {"choices": ast.literal_eval(annotation.removeprefix("Literal"))}
     if "Sequence[" in annotation:
-        described["help"] += "; may be given several times"
         return described | {"action": "append", "default": []}
     metavar = METAVARS.get(annotation, "NAME")
     return described | {"type": TYPES.get(annotation, str), "metavar": metavar}

@@ -2,11 +2,12 @@
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
+from galileo_jax.runtime.progress import OnProgress
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -33,6 +34,16 @@ class ProgressDisplay:
             self._next_line = now + NEXT_LINE_S
             spent = f"{now - self._begun:.0f} s"
             print(f"{stage}: {100 * share_done:.0f} % done, {spent}", file=sys.stderr, flush=True)
+
+    def showing(self, show: Callable[[Mapping[str, Any]], None]) -> OnProgress:
+        """The same, with `show` called with what there is of the result, where it is a mapping."""
+
+        def on_progress(stage: str, share_done: float, partial: Any) -> None:
+            self(stage, share_done)
+            if isinstance(partial, dict):
+                show(partial)
+
+        return on_progress
 
     def print(self, line: str) -> None:
         """Prints a line of the result to stdout, which a live bar would swallow."""

@@ -11,9 +11,7 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.api.catalogue import scenarios
 
     known = scenarios()
-    width = max(map(len, known.index))
-    for name, meaning in known["meaning"].items():
-        print(f"{name:<{width}}  {meaning}")
+    print(command.in_columns(known["meaning"].to_dict()))
     return None
 
 

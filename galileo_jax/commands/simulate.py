@@ -52,7 +52,7 @@ def _parser() -> command.Parser:
         default=[],
         metavar="NAME=VALUE",
         help="a parameter of the scenario, such as k3=0.2 or floor_restitution=0.7 (default: "
-        "drawn; may be given several times)",
+        "drawn)",
     )
     add("floor", "walls", "track_only", "track_noise")
     add = adder(parser.add_argument_group("on a ramp"), "simulate")
@@ -68,8 +68,7 @@ def _parser() -> command.Parser:
         option="--effect",
         type=_effect,
         metavar="NAME[:PARAMETER=VALUE,...]",
-        help="an effect, in SI units; what is left out is drawn (default: none; may be given "
-        "several times)",
+        help="an effect, in SI units; what is left out is drawn (default: none)",
         action="append",
         default=[],
     )

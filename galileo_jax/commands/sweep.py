@@ -1,12 +1,13 @@
 """`galileo sweep`: evaluate many clips, with several methods; can be stopped and resumed."""
 
+import itertools
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from galileo_jax.commands import command
 from galileo_jax.commands.options import adder
-from galileo_jax.commands.progress_display import ProgressDisplay, progress_display
+from galileo_jax.commands.progress_display import progress_display
 
 MAX_LINES = 10  # failures that are printed one by one
 
@@ -17,32 +18,20 @@ def main(argv: Sequence[str]) -> int | None:
     from galileo_jax.sweeping.sweep import sweep
 
     with progress_display() as display:
-        found = sweep(**vars(call), on_progress=_FailurePrinter(display))
+        failures = itertools.count(1)
+
+        def show(partial: Mapping[str, Any]) -> None:
+            if "failed" not in partial:
+                cells = f"{partial['cells']} cells, {partial['done']} of them done"
+                command.say(f"{cells}; {partial['folder']}")
+            elif next(failures) <= MAX_LINES:
+                command.say(f"failed: {partial['failed']}: {partial['why']}")
+
+        found = sweep(**vars(call), on_progress=display.showing(show))
     count = Counter(row["status"] for row in found.summary)
     print(f"{count['done']} cells done, {count['failed']} failed")
     command.say(", ".join(map(str, [*found.tables, found.report_path])))
     return None
-
-
-class _FailurePrinter:
-    """Prints what is to be done and the first failures; shows progress otherwise."""
-
-    def __init__(self, display: ProgressDisplay):
-        self._display = display
-        self._failures = 0
-
-    def __call__(self, stage: str, share_done: float, partial: Any) -> None:
-        self._display(stage, share_done)
-        if not isinstance(partial, dict):
-            return
-        if "failed" in partial:
-            self._failures += 1
-            if self._failures <= MAX_LINES:
-                command.say(f"failed: {partial['failed']}: {partial['why']}")
-        else:
-            command.say(
-                f"{partial['cells']} cells, {partial['done']} of them done; {partial['folder']}"
-            )
 
 
 def _parser() -> command.Parser:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from galileo_jax.commands import command
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.results.shown_digits import unit_text
 
 if TYPE_CHECKING:
     from galileo_jax.api.fit_tosses import TossFit
@@ -30,8 +31,7 @@ def _lines(found: "TossFit") -> list[str]:
     """The parameters; how the second half was predicted; what did not fly."""
     lines = [f"{'':<14}{'mean':>10}{'sd':>10}   95 % interval"]
     for name, told in found.parameters.items():
-        unit = "" if told["unit"] == "1" else f" {told['unit']}"
-        interval = f"[{told['q025']:.4g}, {told['q975']:.4g}]{unit}"
+        interval = f"[{told['q025']:.4g}, {told['q975']:.4g}]{unit_text(told)}"
         lines.append(f"{name:<14}{told['mean']:>10.4g}{told['sd']:>10.2g}   {interval}")
     left_out = len(found.document["clips"]) - len(found.solution.names)
     if left_out:

@@ -10,8 +10,8 @@ from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import corrections, warn
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.runtime.atomic_write import writing_into
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.tracking.pixel_csv import write_pixel_csv
 from galileo_jax.tracking.track import Track
 
 
@@ -28,26 +28,18 @@ def main(argv: Sequence[str]) -> int | None:
     with progress_display() as display:
         found = track(clip, correct=corrections(call.correct), on_progress=display)
         assert found.pixels is not None  # of a video
-        try:
-            out.mkdir(parents=True, exist_ok=True)
-            write_pixel_csv(out / "track_px.csv", found.pixels)
-            written = ["track_px.csv"]
-            if clip.pixels_per_metre is not None:
-                found.save(out / "track_m.csv")
-                written.append("track_m.csv")
+        with writing_into(out):
+            written = found.save_tables(out)
             display("drawing the overlay", 1.0)
-            found.save_overlay(out)
-        except OSError as error:
-            raise InputError(f"--out: {out}: {error.strerror or error}") from error
+            written += found.save_overlay(out)
     warn(found.warnings[len(clip.warnings) :])
     for line in _summary(found.pixels):
         command.say(line)
-    if clip.pixels_per_metre is None:
+    if out / "track_m.csv" not in written:
         command.say(
             "note: no csv in metres, because pixels_per_metre is not known; give --pixels-per-metre"
         )
-    for name in [*written, "overlay.png", "overlay.mp4"]:
-        print(out / name)
+    print("\n".join(map(str, written)))
     return None
 
 

@@ -3,18 +3,19 @@
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
-from galileo_jax.experiment.belief import Belief, Beliefs
+from galileo_jax.diagnosis.diagnosis import Diagnosis
+from galileo_jax.experiment.belief import Belief, Beliefs, beliefs_of
 from galileo_jax.experiment.gain import about_hypotheses, about_parameter
 from galileo_jax.experiment.proposal import height_m, propose
 from galileo_jax.experiment.rehearsal import Rehearsed, rehearse
-from galileo_jax.experiment.settings import text_of
+from galileo_jax.experiment.settings import grid, parse_can, text_of
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.per_mass import is_any_weighed
 from galileo_jax.runtime import progress
@@ -22,6 +23,7 @@ from galileo_jax.runtime.errors import InputError
 
 RATIO = "mass_ratio"
 LITTLE = 0.05  # nats; less is not worth an experiment
+MOST_SETTINGS = 9  # that a diagnosis looks at in passing; `galileo next` looks at more
 
 
 @dataclass(frozen=True)
@@ -168,3 +170,20 @@ def _check_about(trials: JointProblem, beliefs: Beliefs, about: str) -> None:
         raise InputError(
             f"--about: {about}: a motion shows only the ratio of the masses; {RATIO} expected"
         )
+
+
+def with_next(found: Diagnosis, clip: Clip, trials: JointProblem, seed: int) -> Diagnosis:
+    """The diagnosis whose advice begins with what to measure next, where that helps.
+
+    Clips as long as the first are rehearsed, so that nothing is compiled anew.
+    """
+    if found.verdict.status != "ambiguous" or not SCENARIOS[clip.scenario].has_ramp:
+        return found
+    settings = grid(parse_can(default_can(clip, trials)), seed, MOST_SETTINGS)
+    seconds = float(trials.problems[0].observation.times_s[-1])
+    beliefs = beliefs_of(found)
+    best = best_first(expect(clip, trials, beliefs, settings, None, seed, seconds))[0]
+    if best.gain_nats < LITTLE:
+        return found
+    advice = (f"measure next: {sentence_of(best)}", *found.verdict.advice)
+    return replace(found, verdict=replace(found.verdict, advice=advice))

@@ -6,8 +6,7 @@ from typing import Any
 from galileo_jax.clip.declaration import Declaration
 from galileo_jax.clip.label import LabelledClip, updated_file
 from galileo_jax.clip.yaml_file import yaml_text
-from galileo_jax.physics101.check import check_place
-from galileo_jax.physics101.place import BY_OBJECT, Labels, Place, read_labels
+from galileo_jax.physics101.place import BY_OBJECT, Labels, Place, check_place, read_labels
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 

@@ -22,7 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.clip.fields import short
+from galileo_jax.clip.load import check_clip
 from galileo_jax.clip.scenarios import SCENARIOS
+from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
@@ -184,3 +186,25 @@ def _mapping(path: Path, key: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InputError(f"{path}: {key}: {short(value)} is not a mapping")
     return value
+
+
+def check_place(place: Place, labels: Labels, given: dict[str, Any] | None = None) -> Clip:
+    """Checks a clip of Physics 101, which its folders and its labels declare.
+
+    Args:
+      place: where it is.
+      labels: of the data set.
+      given: values that win over both.
+
+    Raises:
+      InputError: one line, which names the labels, for whatever is wrong.
+    """
+    content, warnings = content_of(place, labels)
+    given = given or {}
+    try:
+        clip = check_clip(place.yaml, content | given, overridden=frozenset(given))
+    except InputError as error:
+        named = f"{place.labels}: clips: {place.levels[-1]}"
+        raise InputError(str(error).replace(str(place.yaml), named)) from None
+    noted = () if "pixels_per_metre" in given else warnings
+    return clip.model_copy(update={"warnings": clip.warnings + noted})

@@ -8,9 +8,8 @@ from galileo_jax.clip.declaration import Declaration
 from galileo_jax.clip.label import LabelledClip
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import SOURCES, ClipSource, SourceFiles
-from galileo_jax.physics101.check import check_place
 from galileo_jax.physics101.label import label_place
-from galileo_jax.physics101.place import Place, place_of, read_labels
+from galileo_jax.physics101.place import Place, check_place, place_of, read_labels
 from galileo_jax.runtime.errors import InputError
 
 

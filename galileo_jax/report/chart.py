@@ -105,7 +105,7 @@ class Panel:
       is_log_y: the y axis is logarithmic; it has no `ylim` then.
       has_y_ticks: whether the y axis has numbers.
       phases: named on top; passages between phases are shaded.
-      highlight: of x, where the model fails.
+      highlights: of x, where the model fails; None: nowhere.
       level: of y, drawn as a line.
       divider: x at which a line with a name is drawn.
     """
@@ -119,7 +119,7 @@ class Panel:
     is_log_y: bool = False
     has_y_ticks: bool = True
     phases: tuple[Phase, ...] = ()
-    highlight: tuple[float, float] | None = None
+    highlights: tuple[tuple[float, float] | None, ...] = ()
     level: float | None = None
     divider: tuple[float, str] | None = None
 
@@ -127,7 +127,7 @@ class Panel:
     def spans(self) -> list[tuple[float, float, str, float]]:
         """What is shaded: start and end in x, colour, opacity."""
         found = [(p.start_s, p.end_s, "ink", 0.06) for p in self.phases if p.name in SHADED_PHASES]
-        return found + ([(*self.highlight, "fails", 0.3)] if self.highlight else [])
+        return found + [(*one, "fails", 0.3) for one in self.highlights if one is not None]
 
     @property
     def names(self) -> list[tuple[float, str]]:
@@ -193,7 +193,7 @@ def stacked(name: str, label: str, panels: Iterable[Panel], panel_px: int | None
     return Chart(name, label, joined, panel_px=panel_px)
 
 
-def time_limits(times_s: np.ndarray) -> tuple[float, float]:
+def time_limits(times_s: np.ndarray | Sequence[float]) -> tuple[float, float]:
     """The clip's time with a little room."""
     spare = 0.02 * float(times_s[-1] - times_s[0])
     return float(times_s[0]) - spare, float(times_s[-1]) + spare

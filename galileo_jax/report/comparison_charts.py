@@ -25,7 +25,7 @@ def failure_chart(one: PathResiduals) -> Chart:
             Line(one.times_s, one.predicted_m, colour, "fitted"),
             Points(one.times_s, one.measured_m, "ink", "measured"),
         ),
-        highlight=one.failing_s,
+        highlights=(one.failing_s,),
     )
     speed = Panel(
         ylabel="speed, m/s",
@@ -33,7 +33,7 @@ def failure_chart(one: PathResiduals) -> Chart:
             Line(middle, np.diff(one.predicted_m) / step, colour, "fitted"),
             Points(middle, np.diff(one.measured_m) / step, "ink", "measured"),
         ),
-        highlight=one.failing_s,
+        highlights=(one.failing_s,),
     )
     label = f"{one.title}: position, speed and residuals of the fit, against time"
     panels = (position, speed, _residuals(one, one.largest))

@@ -1,6 +1,6 @@
 """Charts of a diagnosis: how the error falls, the candidates, and the missing force."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -49,37 +49,46 @@ def candidates_chart(candidates: Sequence[Candidate]) -> Chart:
     return Chart("candidates", label, (panel,))
 
 
-def is_known(missing: MissingForce, index: int) -> bool:
-    """Whether anything is known of what this object lacks: it was tracked while it moved."""
-    return bool(np.isfinite(missing.acceleration_m_s2[index]).any())
+def known_objects(missing: MissingForce, names: Sequence[str]) -> dict[int, str]:
+    """By index the objects that were tracked while they moved: of others nothing is known."""
+    known = [bool(np.isfinite(one).any()) for one in missing.acceleration_m_s2]
+    return {
+        i: name for i, (name, is_known) in enumerate(zip(names, known, strict=True)) if is_known
+    }
 
 
-def missing_force_chart(missing: MissingForce, index: int, name: str) -> Chart:
-    """The acceleration of one object that the model lacks, with its 95 % band."""
-    value, sd = missing.acceleration_m_s2[index], missing.sd_m_s2[index]
-    known = np.flatnonzero(np.isfinite(value))
-    chosen = known[:: max(1, len(known) // NUM_POINTS)]
-    colour = object_colour(index)
-    spread = 3 * float(np.median(sd[known]))
-    ylim = (min(0.0, value[known].min()) - spread, max(0.0, value[known].max()) + spread)
+def missing_force_chart(missing: MissingForce, names: Mapping[int, str]) -> Chart:
+    """The acceleration that the model lacks, with its 95 % band, against time, speed and place.
 
-    def against(values: np.ndarray, xlabel: str, *marks: Mark, title: str = "") -> Panel:
-        points = Points(values[chosen], value[chosen], colour, "missing", sd=sd[chosen])
-        return Panel(
-            "missing, m/s²", marks or (points,), title=title, xlabel=xlabel, ylim=ylim, level=0.0
+    Args:
+      missing: of all objects.
+      names: of the objects that are drawn, by their index.
+    """
+    objects = list(names)
+    value, sd = missing.acceleration_m_s2[objects], missing.sd_m_s2[objects]
+    spread = 3 * float(np.nanmedian(np.where(np.isfinite(value), sd, np.nan)))
+    ylim = (min(0.0, np.nanmin(value)) - spread, max(0.0, np.nanmax(value)) + spread)
+    of_time: list[Mark] = []
+    of_speed: list[Mark] = []
+    of_path: list[Mark] = []
+    for index, name, own, own_sd in zip(objects, names.values(), value, sd, strict=True):
+        colour, time = object_colour(index), missing.time_s
+        known = np.flatnonzero(np.isfinite(own))
+        chosen = known[:: max(1, len(known) // NUM_POINTS)]
+        label = "missing" if len(names) == 1 else name
+        of_time.append(Band(time, own - 1.96 * own_sd, own + 1.96 * own_sd, colour, "95 %", 0.25))
+        of_time.append(Line(time, own, colour, label))
+        for marks, across in ((of_speed, missing.speed_m_s), (of_path, missing.path_m)):
+            at = across[index][chosen]
+            marks.append(Points(at, own[chosen], colour, label, sd=own_sd[chosen]))
+    panels = tuple(
+        Panel("missing, m/s²", tuple(marks), title=title, xlabel=xlabel, ylim=ylim, level=0.0)
+        for marks, xlabel, title in (
+            (of_time, "time since the release, s", ", ".join(names.values())),
+            (of_speed, "speed, m/s", ""),
+            (of_path, "along the path, m", ""),
         )
-
-    time = missing.time_s
-    panels = (
-        against(
-            time,
-            "time since the release, s",
-            Band(time, value - 1.96 * sd, value + 1.96 * sd, colour, "95 %", 0.25),
-            Line(time, value, colour, "missing"),
-            title=name,
-        ),
-        against(missing.speed_m_s[index], "speed, m/s"),
-        against(missing.path_m[index], "along the path, m"),
     )
-    label = f"acceleration that the model of {name} lacks, against time, speed and position"
-    return Chart(f"missing_{name}", label, panels)
+    listed = ", ".join(names.values())
+    label = f"acceleration that the model of {listed} lacks, against time, speed and position"
+    return Chart(f"missing_{'_'.join(names.values())}", label, panels)

@@ -15,7 +15,7 @@ from galileo_jax.report import diagnosis_text
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.comparison_charts import before_after_chart
 from galileo_jax.report.comparison_page import cells, failures, motion
-from galileo_jax.report.diagnosis_charts import is_known, missing_force_chart, rounds_chart
+from galileo_jax.report.diagnosis_charts import known_objects, missing_force_chart, rounds_chart
 from galileo_jax.report.html_page import chart_section, document, header, items, legend, table
 from galileo_jax.report.provenance import provenance
 from galileo_jax.results.shown_digits import shown
@@ -214,11 +214,8 @@ def _missing(report: DiagnosisReport, names: Sequence[str]) -> str:
     missing = report.diagnosis.missing
     if missing is None:
         return ""
-    charts = [
-        missing_force_chart(missing, i, name)
-        for i, name in enumerate(names)
-        if is_known(missing, i)
-    ]
+    known = known_objects(missing, names)
+    charts = [missing_force_chart(missing, {i: name}) for i, name in known.items()]
     found = diagnosis_text.formula_text(report.record)
     return chart_section(
         "The missing force",

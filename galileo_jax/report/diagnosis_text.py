@@ -1,6 +1,5 @@
 """The results of a comparison and of a diagnosis as sentences, for the terminal and the pages."""
 
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,9 @@ from galileo_jax.diagnosis.reasons import p_text as p_text
 from galileo_jax.diagnosis.verdict import UNEVEN
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.results.shown_digits import shown
+from galileo_jax.report.phrases import listed
+from galileo_jax.results.command_line import command_line
+from galileo_jax.results.shown_digits import value_text
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.statespace.term import TERMS
 
@@ -32,12 +33,6 @@ def round_text(row: Mapping[str, Any]) -> str:
     """What the model of a round has, of a row of `history` in diagnosis.json."""
     text = effects_text(row["effects"])
     return f"{text}, imperfect" if row.get("imperfect") and not row["effects"] else text
-
-
-def value_text(entry: Mapping[str, Any]) -> str:
-    """A parameter's mean, standard deviation and unit."""
-    unit = "" if entry["unit"] == "1" else f" {entry['unit']}"
-    return f"{shown(entry)} +- {shown(entry, 'sd')}{unit}"
 
 
 def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
@@ -127,8 +122,8 @@ def ambiguity(rivals: Sequence[str]) -> str:
     common = [name for name in hypotheses[0] if all(name in own for own in hypotheses)]
     if not common:
         alone, beside = _without_company(hypotheses)
-        names = " and ".join([", ".join(alone[:-1]), alone[-1]])
-        together = f", alone or together with {_any_of(beside)}" if beside else ""
+        names = listed(alone)
+        together = f", alone or together with {listed(beside, 'or')}" if beside else ""
         return (
             f"This clip cannot distinguish between {names}; each of them explains the data"
             f"{together}."
@@ -137,7 +132,7 @@ def ambiguity(rivals: Sequence[str]) -> str:
     others = [name for name in rest if name]
     alone = "" if len(others) == len(rest) else "alone or "
     return (
-        f"{' and '.join(common)} explains the data {alone}together with {_any_of(others)}; "
+        f"{' and '.join(common)} explains the data {alone}together with {listed(others, 'or')}; "
         f"this clip cannot tell which."
     )
 
@@ -158,10 +153,6 @@ def _without_company(hypotheses: Sequence[Sequence[str]]) -> tuple[list[str], li
     if len(least) < 2:
         return ["+".join(own) for own in hypotheses], []
     return ["+".join(own) for own in least], list(dict.fromkeys(beside))
-
-
-def _any_of(names: Sequence[str]) -> str:
-    return " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
 
 
 def formula_text(record: Mapping[str, Any]) -> str:
@@ -230,25 +221,25 @@ def next_command(
     folder: Path = Path(),
 ) -> str:
     """The command to run next; `folder`: where the diagnosis is saved."""
-    files = shlex.join(clips)
-    more = "".join(f" --effects-from {shlex.quote(path)}" for path in effects_from)
-    found = diagnosis.verdict
+    files, found = tuple(effects_from), diagnosis.verdict
     if found.status == "none" or found.effects in UNEVEN:
-        return f"galileo fit {files}"
+        return command_line("fit", clips)
     effects: Sequence[str] = found.effects
     if found.status == "ambiguous":
         effects = found.effects[0].split("+")
     if found.status == "unknown":
         formula = proposed_formula(found, diagnosis.candidates)
         if formula is None:
-            return f"galileo diagnose {files}{more} --effects-from my_effect.py"
+            return command_line("diagnose", clips, effects_from=(*files, "my_effect.py"))
         effects = formula.effects
     if found.status in ("law", "unknown"):
-        more += f" --effects-from {shlex.quote(str(folder / PROPOSED))}"
-    return f"galileo fit {files}{more} --effects {','.join(effects)}"
+        files = (*files, str(folder / PROPOSED))
+    return command_line("fit", clips, effects_from=files, effects=",".join(effects))
 
 
-def strength_texts(effects: Sequence[str], entry: Mapping[str, Any]) -> dict[str, str]:
+def strength_texts(
+    effects: Sequence[str], entry: Mapping[str, Any], sign: str = "+-"
+) -> dict[str, str]:
     """The strengths of a candidate's effects as text, by name.
 
     Where no object was weighed, a force is given per mass: only that is determined.
@@ -256,12 +247,14 @@ def strength_texts(effects: Sequence[str], entry: Mapping[str, Any]) -> dict[str
     Args:
       effects: of the candidate.
       entry: of the candidate in diagnosis.json.
+      sign: before a standard deviation.
     """
     derived = entry.get("derived", {})
     found = {}
     for name, strength in strengths(effects, entry["parameters"]).items():
         per_mass = derived.get(f"{name}{SUFFIX}")
-        found[name] = f"{value_text(per_mass)} (over m1)" if per_mass else value_text(strength)
+        text = value_text(per_mass or strength, sign)
+        found[name] = f"{text} (over m1)" if per_mass else text
     return found
 
 

@@ -1,10 +1,12 @@
-"""Draws a `Chart`: as a Plotly figure for notebooks, as SVG for papers and slides.
+"""Draws a `Chart`: as a Plotly figure for notebooks, as a still picture for papers and slides.
 
 Two libraries, because neither does both: Plotly's figures are interactive and need no network,
 but its still pictures need Chrome; Matplotlib's SVG needs nothing. Both follow one `Layout`. Pages
 have Plotly's figures as plain JSON (`plotly_figure.py`).
 """
 
+from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +15,15 @@ from galileo_jax.report.chart import Band, Bars, Boxes, Chart, Line, Mark, Panel
 from galileo_jax.report.layout import CELL_PX, RIGHT_PX, SLANT_DEG, layout_of
 from galileo_jax.report.plotly_figure import figure
 from galileo_jax.report.style import matplotlib_style, palette, save_svg
+from galileo_jax.runtime.atomic_write import replacing, write_text
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 PX_PER_INCH, POINTS_PER_PX = 100, 0.72
+PICTURE_DPI = 150
 SVG_LEFT_PX = 22  # more: the letters of its numbers are wider
 MOST_NAMES = 6  # in a legend over the marks
 MANY = 300  # points; an SVG has so many as a picture
@@ -38,6 +43,26 @@ def to_plotly(chart: Chart, has_legend: bool = True) -> "go.Figure":
 
 def to_svg(chart: Chart) -> str:
     """The chart as an SVG document; the same text for the same chart."""
+    return save_svg(_drawn(chart), chart.name)
+
+
+def write_svgs(folder: Path, charts: Iterable[Chart]) -> list[Path]:
+    """Writes each chart as NAME.svg into a folder, which is made; returns the files."""
+    written = []
+    for chart in charts:
+        written.append(folder / f"{chart.name}.svg")
+        write_text(written[-1], to_svg(chart))
+    return written
+
+
+def write_picture(path: Path, chart: Chart) -> Path:
+    """Writes the chart in the format of the path's suffix, and returns the path."""
+    with matplotlib_style(chart.name), replacing(path) as temporary:
+        _drawn(chart).savefig(temporary, dpi=PICTURE_DPI)
+    return path
+
+
+def _drawn(chart: Chart) -> "Figure":
     from matplotlib.figure import Figure
 
     size = layout_of(chart)
@@ -65,7 +90,7 @@ def to_svg(chart: Chart) -> str:
             look = {"loc": "best", "handlelength": 1.4, "labelspacing": 0.25}
             grid[0, 0].legend(named.values(), named.keys(), **look)
         drawn.align_ylabels()
-        return save_svg(drawn, chart.name)
+        return drawn
 
 
 def _draw_panel(axes: "Axes", panel: Panel) -> None:

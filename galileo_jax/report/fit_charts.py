@@ -147,7 +147,7 @@ def residual_panel(
         xlim=xlim,
         ylim=with_room(-bound, bound),
         phases=phases,
-        highlight=highlight,
+        highlights=(highlight,),
         level=0.0,
     )
 

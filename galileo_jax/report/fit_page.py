@@ -28,7 +28,7 @@ from galileo_jax.report.posterior_charts import pair_chart, trace_chart
 from galileo_jax.report.provenance import provenance
 from galileo_jax.report.style import object_colour
 from galileo_jax.results.run import Run
-from galileo_jax.results.shown_digits import number, shown
+from galileo_jax.results.shown_digits import interval_text, number, shown, unit_text
 from galileo_jax.results.shown_parameters import shown_parameters
 from galileo_jax.runtime.atomic_write import write_text
 
@@ -51,6 +51,12 @@ def write_report(
     fitted = posterior_predictive(run, seed=int(run.result["seed"]))
     write_text(page, _render(run, fitted, fit_charts(run, fitted), lead, beside or {}))
     return page
+
+
+def charts_of_run(run: Run) -> list[Chart]:
+    """All figures of a fit's page."""
+    fitted = posterior_predictive(run, seed=int(run.result["seed"]))
+    return [chart for some in fit_charts(run, fitted).values() for chart in some]
 
 
 def fit_charts(run: Run, fitted: PosteriorPredictive) -> dict[str, list[Chart]]:
@@ -168,8 +174,7 @@ def _headlines(run: Run) -> str:
             continue
         label = escape(meaning(name) or name)
         if entry["identified"]:
-            low, high = (shown(entry, key) for key in ("q025", "q975"))
-            value, note = shown(entry), f"{low} to {high} (95 %)"
+            value, note = shown(entry), f"{interval_text(entry)} (95 %)"
         else:
             value, note = "not determined", "see below"
         cards.append(
@@ -237,15 +242,13 @@ def _table(heading: str, entries: Mapping[str, Mapping[str, Any]], note: str = "
         return f"<h2>{escape(heading)}</h2>\n<p>The model of this motion has none to determine.</p>"
     rows = []
     for name, entry in entries.items():
-        low, high = shown(entry, "q025"), shown(entry, "q975")
-        unit = "" if entry["unit"] == "1" else escape(entry["unit"])
         rows.append(
             [
                 f"<code>{escape(name)}</code>",
                 escape(meaning(name) or ""),
-                f"{shown(entry)} {unit}",
+                f"{shown(entry)}{escape(unit_text(entry))}",
                 shown(entry, "sd"),
-                f"{low} to {high}",
+                interval_text(entry),
                 "yes" if entry["identified"] else "no",
             ]
         )

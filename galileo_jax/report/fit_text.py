@@ -9,7 +9,9 @@ from typing import Any
 from galileo_jax.inference.confounded import confounded_with_gravity
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
+from galileo_jax.report.phrases import sentence
 from galileo_jax.results.run import CLIP, Run
+from galileo_jax.results.shown_digits import unit_text
 from galileo_jax.results.shown_parameters import shown_parameters
 
 MEANINGS = {
@@ -188,10 +190,9 @@ def imperfection_text(found: Mapping[str, Any]) -> list[str]:
     for entry in found.values():
         shows = entry["q975"] < TOLD_FACTOR * entry["q025"]
         if shows or not entry["ordinary"]:
-            size = f"{entry['mean']:.2g}{'' if entry['unit'] == '1' else ' ' + entry['unit']}"
+            size = f"{entry['mean']:.2g}{unit_text(entry)}"
             usual = "as is usual" if entry["ordinary"] else "which is more than usual"
-            text = entry["meaning"].format(size=size)
-            said.append(f"{text[0].upper()}{text[1:]}, {usual}.")
+            said.append(sentence(f"{entry['meaning'].format(size=size)}, {usual}"))
     return said or ["How large each imperfection is does not show."]
 
 
@@ -218,16 +219,14 @@ def _of_chi2(error: Mapping[str, Any]) -> str:
 def pull_text(pull: Mapping[str, Any]) -> str:
     """What a nuisance outside its prior says of the clip, in a sentence."""
     name, value = str(pull["parameter"]), float(pull["value"])
-    text = (
-        f"{meaning(name) or name} is {value:.3g}{'' if pull['unit'] == '1' else ' ' + pull['unit']}"
-    )
+    text = f"{meaning(name) or name} is {value:.3g}{unit_text(pull)}"
     for pattern, phrase in OUTSIDE:
         if found := pattern.fullmatch(name):
             side = "before" if value < 0 else "after"
             text = phrase.format(*found.groups(), value=value, size=1e3 * abs(value), side=side)
     return (
-        f"{text[0].upper()}{text[1:]}, {abs(pull['z']):.0f} standard deviations from the "
-        "expected value; galileo diagnose looks for the cause."
+        f"{sentence(text)[:-1]}, {abs(pull['z']):.0f} standard deviations from the expected value; "
+        "galileo diagnose looks for the cause."
     )
 
 
@@ -246,7 +245,7 @@ def convergence(run: Run) -> str:
     status = run.result.get("status")
     text = status if isinstance(status, str) else run.posterior.status.value
     if run.result["converged"] and "converged" in text:
-        return f"{text[0].upper()}{text[1:]}."
+        return sentence(text)
     word = "Converged" if run.result["converged"] else "Not converged"
     return f"{word}: {text}."
 

@@ -7,6 +7,7 @@ from typing import Any
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.fit_text import imperfection_text, meaning
+from galileo_jax.report.phrases import listed, sentence
 from galileo_jax.results.shown_digits import shown
 from galileo_jax.results.shown_parameters import shown_parameters
 
@@ -53,24 +54,22 @@ def paragraph(
         _only_if(result, diagnosis),
         _unseen(diagnosis),
     ]
-    return " ".join(sentence for sentence in said if sentence)
+    return " ".join(filter(None, said))
 
 
-def value_text(entry: Mapping[str, Any]) -> str:
-    """A value, its standard deviation and its unit, as a lab report writes them."""
-    return f"{shown(entry)} ± {shown(entry, 'sd')}{_unit(entry['unit'])}"
-
-
-def words(name: str) -> str:
+def _words(name: str) -> str:
     """An effect's name in words."""
     return name.replace("_", " ")
 
 
+def _value(entry: Mapping[str, Any]) -> str:
+    """A value, its standard deviation and its unit, as a lab report writes them."""
+    return f"{shown(entry)} ± {shown(entry, 'sd')}{_unit(entry['unit'])}"
+
+
 def _unit(unit: str) -> str:
-    if unit == "1":
-        return ""
-    plain = unit.replace("^2", "²")
-    return f" {plain.removeprefix('1')}"
+    plain = unit.replace("^2", "²").removeprefix("1")
+    return f" {plain}" if plain else ""
 
 
 def _frictions(known: Mapping[str, Any], body: str, shapes: Sequence[str]) -> str:
@@ -83,16 +82,16 @@ def _frictions(known: Mapping[str, Any], body: str, shapes: Sequence[str]) -> st
         round_one = number <= len(shapes) and shapes[number - 1] != "box"
         who = f"the {body}" if number == 1 else f"object {number}"
         verb = f"{who} {'moved' if round_one else 'slid'} with a friction coefficient of"
-        value = value_text(entry)
+        value = _value(entry)
         parts.append(f"{who} with {value}" if parts else f"{verb} {value}")
-    return _sentence(", ".join(parts))
+    return sentence(", ".join(parts))
 
 
 def _ratio(name: str, entry: Mapping[str, Any], body: str) -> str:
     found = RATIO.fullmatch(name)
     one, other = (found[1], found[2]) if found and found[1] else ("1", "2")
     who = f"the {body}" if one == "1" else f"object {one}"
-    return _sentence(f"{who} is {value_text(entry)} times as heavy as object {other}")
+    return sentence(f"{who} is {_value(entry)} times as heavy as object {other}")
 
 
 def _is_of(name: str, effects: Sequence[str]) -> bool:
@@ -105,15 +104,15 @@ def _values(entries: Mapping[str, Any]) -> str:
     parts = []
     for name, entry in entries.items():
         what = _called(name)
-        parts.append(f"the {what}{',' if ',' in what else ''} is {value_text(entry)}")
-    return _sentence("; ".join(parts)) if parts else ""
+        parts.append(f"the {what}{',' if ',' in what else ''} is {_value(entry)}")
+    return sentence("; ".join(parts)) if parts else ""
 
 
 def _called(name: str) -> str:
     """A parameter in a phrase without an article."""
     if name.endswith(SUFFIX):
-        return f"{words(name.removesuffix(SUFFIX))} over the mass"
-    return meaning(name) or words(name)
+        return f"{_words(name.removesuffix(SUFFIX))} over the mass"
+    return meaning(name) or _words(name)
 
 
 def _unknown(names: Sequence[str], known: Mapping[str, Any]) -> str:
@@ -121,9 +120,7 @@ def _unknown(names: Sequence[str], known: Mapping[str, Any]) -> str:
     open_ones = [name for name in names if f"{name}{SUFFIX}" not in known]
     if not open_ones:
         return ""
-    return (
-        f"This clip does not determine {_listed([f'the {_called(name)}' for name in open_ones])}."
-    )
+    return f"This clip does not determine {listed([f'the {_called(name)}' for name in open_ones])}."
 
 
 def _status(diagnosis: Mapping[str, Any] | None) -> str:
@@ -134,7 +131,7 @@ def _model(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> st
     """What the model is called that the values are of."""
     if not result["effects"]:
         return "The model"
-    effects = _listed([words(one) for one in result["effects"]])
+    effects = listed([_words(one) for one in result["effects"]])
     return f"The model with {'a law' if _status(diagnosis) == 'law' else effects}"
 
 
@@ -159,7 +156,7 @@ def _verdict(
     result: Mapping[str, Any], check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None
 ) -> str:
     if diagnosis is not None:
-        text = words(str(diagnosis["sentence"]))  # names of effects, in words
+        text = _words(str(diagnosis["sentence"]))  # names of effects, in words
         return f"{text[:1].upper()}{text[1:]}"
     if check.get("adequate") is None or result.get("no_verdict"):
         return f"{result.get('no_verdict') or 'Whether the model is right cannot be told'}."
@@ -177,7 +174,7 @@ def _only_if(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> 
     """That the values hang on one of several explanations."""
     if _status(diagnosis) != "ambiguous" or not result["effects"]:
         return ""
-    return f"All values are those with {_listed([words(one) for one in result['effects']])}."
+    return f"All values are those with {listed([_words(one) for one in result['effects']])}."
 
 
 def _unseen(diagnosis: Mapping[str, Any] | None) -> str:
@@ -189,15 +186,7 @@ def _unseen(diagnosis: Mapping[str, Any] | None) -> str:
     asked = [row["effect"] for row in diagnosis["candidates"] if row["effect"] not in in_question]
     told = [name for name in asked if name in found and found[name]["strength"] is not None]
     parts = [
-        f"{words(name)} below {found[name]['strength']:.2g}{_unit(found[name]['unit'])}"
+        f"{_words(name)} below {found[name]['strength']:.2g}{_unit(found[name]['unit'])}"
         for name in told[:MOST_UNSEEN]
     ]
-    return _sentence(f"{_listed(parts)} could not have been seen") if parts else ""
-
-
-def _listed(parts: Sequence[str]) -> str:
-    return " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
+    return sentence(f"{listed(parts)} could not have been seen") if parts else ""

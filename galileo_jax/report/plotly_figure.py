@@ -89,10 +89,27 @@ def _domains(chart: Chart, size: Layout, row: int, column: int) -> tuple[list[fl
     return [left, min(left + width, 1.0)], [low, min(low + height, 1.0)]
 
 
+def dark(drawn: Any) -> Any:
+    """A figure, or a part of one, in the colours of dark pages, as page.js paints it."""
+    if isinstance(drawn, dict):
+        return {key: dark(part) for key, part in drawn.items()}
+    if isinstance(drawn, list):
+        return [dark(part) for part in drawn]
+    if isinstance(drawn, str) and drawn.startswith("rgba("):
+        plain, _, opacity = drawn.rpartition(",")
+        others = {_rgb(name): _rgb(name, is_dark=True) for name in palette()}
+        return f"{others.get(plain, plain)},{opacity}"
+    return drawn
+
+
+def _rgb(colour: str, is_dark: bool = False) -> str:
+    red, green, blue = bytes.fromhex(palette(is_dark)[colour][1:])
+    return f"rgba({red},{green},{blue}"
+
+
 def _rgba(colour: str, opacity: float = 1.0) -> str:
-    """A colour of the palette; page.js exchanges it for that of dark pages."""
-    red, green, blue = bytes.fromhex(palette()[colour][1:])
-    return f"rgba({red},{green},{blue},{opacity:g})"
+    """A colour of the palette; page.js and `dark` exchange it for that of dark pages."""
+    return f"{_rgb(colour)},{opacity:g})"
 
 
 def _template() -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.fit_page import PAGE
 from galileo_jax.report.html_page import chart_section, document, header, legend, table, with_plotly
+from galileo_jax.report.phrases import sentence
 from galileo_jax.report.style import object_colour
 from galileo_jax.results.run import Run
 from galileo_jax.runtime.atomic_write import write_text
@@ -127,8 +128,8 @@ def _section(run: Run, found: Mapping[str, Any], chart: Chart, picture: bytes) -
         [f"<code>{escape(name)}</code>", *(own.get(question, "") for question in columns)]
         for name, own in answers.items()
     ]
-    hit = f"<p>{escape(_sentence(_hit(found)))}</p>\n" if found["hit"] is not None else ""
-    over = f"<p>{_sentence(OVER)}</p>\n" if is_over(found) else ""
+    hit = f"<p>{escape(sentence(_hit(found)))}</p>\n" if found["hit"] is not None else ""
+    over = f"<p>{sentence(OVER)}</p>\n" if is_over(found) else ""
     encoded = base64.b64encode(picture).decode("ascii")
     stills = f'<img src="data:image/png;base64,{encoded}" style="max-width:100%" alt="the stills">'
     motion = chart_section(
@@ -151,7 +152,3 @@ def _section(run: Run, found: Mapping[str, Any], chart: Chart, picture: bytes) -
         f'<section id="prediction">\n{motion}\n{over}{table(("", *columns), rows)}\n{hit}'
         f"<figure><figcaption>{caption}</figcaption>{stills}</figure>\n</section>\n"
     )
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."

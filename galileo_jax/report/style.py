@@ -18,11 +18,11 @@ OBJECTS = ("object1", "object2", "object3")
 
 
 @cache
-def palette() -> dict[str, str]:
-    """`#rrggbb` by name, as the style sheet has it for light pages."""
+def palette(is_dark: bool = False) -> dict[str, str]:
+    """`#rrggbb` by name, as the style sheet has it for light or for dark pages."""
     css = resources.files("galileo_jax.report").joinpath("page.css").read_text(encoding="utf-8")
-    light = css[: css.index("}")]
-    return dict(re.findall(r"--(\w+): (#[0-9a-f]{6});", light))
+    rule = css.split("}")[1 if is_dark else 0]
+    return dict(re.findall(r"--(\w+): (#[0-9a-f]{6});", rule))
 
 
 def object_colour(index: int) -> str:

@@ -12,14 +12,15 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-import cv2
 import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
 from galileo_jax.report.fit_text import fits, meaning
 from galileo_jax.report.style import object_colour
-from galileo_jax.results.shown_digits import number, shown
+from galileo_jax.report.video_frames import jpeg
+from galileo_jax.results.shown_digits import number, shown, unit_text, value_text
+from galileo_jax.results.shown_parameters import point_estimate
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 
@@ -76,13 +77,7 @@ def thumbnail(clip: Clip, observation: Observation) -> bytes | None:
                 break
     except InputError:  # a picture is no reason to fail
         return None
-    if picture is None:
-        return None
-    height, width = picture.shape[:2]
-    smaller = min(1.0, PICTURE_PX / max(height, width))
-    size = (max(1, round(width * smaller)), max(1, round(height * smaller)))
-    small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes()
+    return None if picture is None else jpeg(picture, PICTURE_PX, QUALITY)
 
 
 def middle_frame(observation: Observation) -> int:
@@ -138,10 +133,7 @@ def _values(row: ClipRow) -> dict[str, Mapping[str, Any]]:
     """By name: frictions and mass ratios; of a motion that has none what it does determine."""
     if row.fit is not None:
         entries = {**row.fit["parameters"], **row.fit["derived"]}
-        # A method with an answer of its own: its draws are no posterior.
-        best = dict(row.fit.get("best") or {})
-        if {"m1", "m2"} <= set(best):
-            best["mass_ratio"] = best["m1"] / best["m2"]
+        best = point_estimate(row.fit)
         for name in set(best) & set(entries):
             entries[name] = {**entries[name], "mean": best[name], "sd": None, "identified": True}
     elif row.diagnosis is not None:
@@ -182,9 +174,7 @@ def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str]) -> str
 def _value(entry: Mapping[str, Any]) -> str:
     if not entry["identified"]:
         return '<span class="soft">not determined</span>'
-    unit = "" if entry["unit"] == "1" else f" {escape(entry['unit'])}"
-    value = shown(entry)
-    return f"{value} &plusmn; {shown(entry, 'sd')}{unit}" if entry["sd"] else f"{value}{unit}"
+    return escape(value_text(entry) if entry["sd"] else f"{shown(entry)}{unit_text(entry)}")
 
 
 def _model(row: ClipRow) -> str:

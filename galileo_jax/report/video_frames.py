@@ -46,12 +46,12 @@ def sample_frames(video: Path, num_frames: int) -> VideoFrames:
         if index % stride:
             continue
         if not size[0]:
-            size = _size(frame)
+            size = smaller_size(frame, LARGEST_PX)
             quality = next(
-                (q for q in QUALITIES if len(_jpeg(frame, size, q)) <= share), QUALITIES[-1]
+                (q for q in QUALITIES if len(jpeg(frame, LARGEST_PX, q)) <= share), QUALITIES[-1]
             )
         frames.append(index)
-        encoded = base64.b64encode(_jpeg(frame, size, quality)).decode("ascii")
+        encoded = base64.b64encode(jpeg(frame, LARGEST_PX, quality)).decode("ascii")
         pictures.append(f"data:image/jpeg;base64,{encoded}")
     return VideoFrames(tuple(frames), tuple(pictures), size)
 
@@ -65,14 +65,16 @@ def first_and_last_frame(video: Path) -> list[np.ndarray]:
     return [frame[..., ::-1] for frame in (first, *deque(stream, maxlen=1))]
 
 
-def _size(frame: np.ndarray) -> tuple[int, int]:
+def smaller_size(frame: np.ndarray, largest_px: int) -> tuple[int, int]:
+    """(width, height) of a frame whose longer side has at most so many pixels."""
     height, width = frame.shape[:2]
-    smaller = min(1.0, LARGEST_PX / max(height, width))
-    return round(width * smaller), round(height * smaller)
+    smaller = min(1.0, largest_px / max(height, width))
+    return max(1, round(width * smaller)), max(1, round(height * smaller))
 
 
-def _jpeg(frame: np.ndarray, size: tuple[int, int], quality: int) -> bytes:
+def jpeg(frame: np.ndarray, largest_px: int, quality: int) -> bytes:
+    """A frame as JPEG, of that size at most."""
     import cv2
 
-    small = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
+    small = cv2.resize(frame, smaller_size(frame, largest_px), interpolation=cv2.INTER_AREA)
     return cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, quality])[1].tobytes()

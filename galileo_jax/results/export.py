@@ -1,8 +1,7 @@
 """Tracks and fits as csv, parquet or netCDF, for other programs."""
 
 import shutil
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from galileo_jax.files.tables import TABLE_FORMATS, write_table
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results.run import OBSERVATION, POSTERIOR, load_run, read_result
-from galileo_jax.runtime.atomic_write import replacing
+from galileo_jax.runtime.atomic_write import replacing, writing_into
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,7 +48,7 @@ def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path
         raise InputError(f"{posterior}: no such file; a folder written by `galileo fit` expected")
     if to == "netcdf":
         path = out / f"{folder.resolve().name}.nc"
-        with outputs(out), replacing(path) as temporary:
+        with writing_into(out), replacing(path) as temporary:
             shutil.copyfile(posterior, temporary)
             for name, observation in tracks.items():
                 group = "observed_data" if len(tracks) == 1 else f"observed_data/{name}"
@@ -59,7 +58,7 @@ def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path
         return [path]
     tables = {
         TRACK: _track_table(tracks, fitted),
-        PARAMETERS: _parameter_table(result),
+        PARAMETERS: parameter_table(result),
         DRAWS: _draw_table(posterior),
     }
     return _write(tables, out, to)
@@ -72,7 +71,7 @@ def export_tracks(tracks: Mapping[str, Observation], out: Path, to: str) -> list
     written = []
     for name, observation in tracks.items():
         path = out / f"{name}.nc"
-        with outputs(out), replacing(path) as temporary:
+        with writing_into(out), replacing(path) as temporary:
             _dataset(observation, None).to_netcdf(
                 temporary, mode="w", group="observed_data", engine="h5netcdf"
             )
@@ -84,19 +83,10 @@ def _write(tables: Mapping[str, "pd.DataFrame"], out: Path, to: str) -> list[Pat
     written = []
     for name, table in tables.items():
         path = out / f"{name}.{to}"
-        with outputs(out):
+        with writing_into(out):
             write_table(path, table)
         written.append(path)
     return written
-
-
-@contextmanager
-def outputs(out: Path) -> Iterator[None]:
-    """Turns what goes wrong with writing to `out` into one line that names it."""
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"--out: {out}: {error.strerror or error}") from error
 
 
 def clip_folders(folder: Path, result: dict[str, Any]) -> dict[str, Path]:
@@ -139,7 +129,7 @@ def _track_table(
     return pd.concat(parts, ignore_index=True)
 
 
-def _parameter_table(result: dict[str, Any]) -> "pd.DataFrame":
+def parameter_table(result: Mapping[str, Any]) -> "pd.DataFrame":
     """One row per parameter, with the part of result.json in which it stands."""
     import pandas as pd
 

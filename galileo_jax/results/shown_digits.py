@@ -36,3 +36,18 @@ def shown(entry: Mapping[str, Any], key: str = "mean") -> str:
       key: "mean", "sd", "q025" or "q975".
     """
     return number(entry[key], entry["sd"], max(entry.get("mcse", {"": 0.0}).values()))
+
+
+def interval_text(entry: Mapping[str, Any]) -> str:
+    """The ends of the 95 % interval."""
+    return f"{shown(entry, 'q025')} to {shown(entry, 'q975')}"
+
+
+def unit_text(entry: Mapping[str, Any]) -> str:
+    """The unit after a blank; empty of a pure number."""
+    return "" if entry["unit"] == "1" else f" {entry['unit']}"
+
+
+def value_text(entry: Mapping[str, Any], sign: str = "±") -> str:
+    """Mean, standard deviation and unit."""
+    return f"{shown(entry)} {sign} {shown(entry, 'sd')}{unit_text(entry)}"

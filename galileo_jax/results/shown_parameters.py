@@ -27,3 +27,13 @@ def shown_parameters(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     if len(masses) == 1 and not any(per_mass_unit(unit) for unit in units):
         del entries[masses[0]]
     return entries
+
+
+def point_estimate(result: Mapping[str, Any]) -> dict[str, float]:
+    """The estimate of a method whose draws are no posterior, by name; else empty.
+
+    Args:
+      result: result.json.
+    """
+    best = dict(result.get("best") or {})
+    return best | {"mass_ratio": best["m1"] / best["m2"]} if {"m1", "m2"} <= set(best) else best

@@ -34,7 +34,7 @@ def digest(observation: Observation) -> str:
 
 def remove_stale_prediction(folder: Path) -> bool:
     """Removes what `predict` wrote of the fit that lay in `folder`; returns whether it had."""
-    found = _document(folder / PREDICTION)
+    found = document(folder / PREDICTION)
     if not found.keys() >= PREDICTION_KEYS:
         return False
     for name in (PREDICTION, *PICTURES):
@@ -54,9 +54,9 @@ def stale_documents(folder: Path, observations: Sequence[Observation]) -> list[s
     now = [digest(observation) for observation in observations]
     sentences = []
     for verb, name in DOCUMENTS.items():
-        document = _document(folder / name)
-        if document.get(TRACKS, now) != now:
-            clips = " ".join(map(str, document.get("clips", [])))
+        made = document(folder / name)
+        if made.get(TRACKS, now) != now:
+            clips = " ".join(map(str, made.get("clips", [])))
             sentences.append(
                 f"{(folder / name).parent}: made from an earlier track; "
                 f"make it again: galileo {verb} {clips}"
@@ -64,7 +64,7 @@ def stale_documents(folder: Path, observations: Sequence[Observation]) -> list[s
     return sentences
 
 
-def _document(path: Path) -> dict[str, Any]:
+def document(path: Path) -> dict[str, Any]:
     """A JSON document; empty where there is none."""
     try:
         found = json.loads(path.read_text(encoding="utf-8"))

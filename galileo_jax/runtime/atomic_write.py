@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.runtime.errors import InputError
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
@@ -31,6 +33,26 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def writing_into(out: Path) -> Iterator[None]:
+    """Turns what goes wrong with writing into a folder into one line that names it.
+
+    Raises:
+      InputError: it is a file, or it cannot be written to.
+    """
+    check_folder(out)
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"--out: {out}: {error.strerror or error}") from error
+
+
+def check_folder(out: Path) -> None:
+    """Raises `InputError` where something that is no folder stands in a folder's place."""
+    if out.exists() and not out.is_dir():
+        raise InputError(f"--out: {out} is a file; a folder expected")
 
 
 def write_text(path: Path, text: str) -> None:

@@ -4,8 +4,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-import cv2
-
+from galileo_jax.report.video_frames import jpeg
 from galileo_jax.video import decode
 
 LARGEST_PX = 1280
@@ -38,13 +37,7 @@ class Frames:
     def _decode(self) -> None:
         try:
             for index, frame in enumerate(decode.frames(self._video)):
-                height, width = frame.shape[:2]
-                smaller = min(1.0, LARGEST_PX / max(width, height))
-                if smaller < 1:
-                    size = (round(width * smaller), round(height * smaller))
-                    frame = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
-                jpeg = cv2.imencode(".jpg", frame, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1]
-                self._path(index).write_bytes(jpeg.tobytes())
+                self._path(index).write_bytes(jpeg(frame, LARGEST_PX, QUALITY))
                 with self._changed:
                     self._ready = index + 1
                     self._changed.notify_all()

@@ -12,8 +12,10 @@ import queue
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from typing import Any, Literal
+
+from galileo_jax.runtime.child_process import end_with_parent
 
 NICENESS = 5
 PATIENCE_S = 20.0  # for work that was cancelled to stop by itself, before its process is ended
@@ -167,7 +169,7 @@ class _Cancel:
 
 def serve(pipe: Connection, folder: str) -> None:
     """What the process does: jobs in its main thread, questions in another."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     with contextlib.suppress(OSError, AttributeError):
         os.nice(NICENESS)
     os.chdir(folder)
@@ -236,10 +238,3 @@ def _run(
 
         traceback.print_exc()
         send(Message(number, task, "error", f"{type(error).__name__}: {error}"))
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        os._exit(0)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 from galileo_jax.studio.marks import Correction, Marks, ObjectMark, Point
@@ -120,38 +120,6 @@ def labels(before: Marks | None, after: Marks) -> dict[str, Any]:
         if new or gone:
             found.setdefault("correct", {})[one.name] = [*new, *((f,) for f in sorted(gone))]
     return found
-
-
-def to_json(marks: Marks) -> dict[str, Any]:
-    """Plain data."""
-    return asdict(marks)
-
-
-def from_json(found: Mapping[str, Any]) -> Marks:
-    """What `to_json` made.
-
-    Raises:
-      KeyError, TypeError, ValueError: it is something else.
-    """
-    objects = tuple(
-        ObjectMark(
-            str(one["name"]),
-            _pair(one["point"]),
-            str(one["shape"]),
-            tuple(one["size_m"]) if one["size_m"] else None,
-            _corrections(one.get("corrections")),
-        )
-        for one in found["objects"]
-    )
-    stick = found["stick"]
-    ends = (_point(stick[0]), _point(stick[1])) if stick else None
-    points = {key: _pair(found[key]) for key in ("upper", "foot")}
-    plain = {key: found[key] for key in ("scenario", "fps", "stick_m", "first_frame")}
-    corners = found.get("rectangle")
-    plain["rectangle"] = tuple(_point(corner) for corner in corners) if corners else None
-    plain["rectangle_m"] = _point(found.get("rectangle_m", (0.0, 0.0)))
-    plain["last_frame"] = found.get("last_frame")
-    return Marks(objects=objects, stick=ends, **points, **plain)
 
 
 def _line(marks: Marks) -> Point | None:

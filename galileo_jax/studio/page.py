@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -81,6 +81,11 @@ class Tab:
         self.session.mark(marks)
         self.redraw()
 
+    def change(self, **given: Any) -> None:
+        """Draws the active clip's marks with other values."""
+        if self.session.sheet is not None:
+            self.mark(replace(self.session.sheet.marks, **given))
+
     def preview(self, candidate: str) -> None:
         """Looks at a candidate's curve."""
         if candidate != self.candidate:
@@ -92,116 +97,130 @@ def build_page(session: Session) -> None:
     """Builds the page of a new tab."""
     ui.add_head_html(f"<style>{(HERE / 'studio.css').read_text(encoding='utf-8')}</style>")
     ui.add_body_html(f"<script>{(HERE / 'studio.js').read_text(encoding='utf-8')}</script>")
-    tab = Tab(session, _first_stage(session))
     ui.colors(primary="#b34d25")
-    dark = ui.dark_mode(None)
-    seen: dict[str, int] = {}
-    drawn: dict[str, Any] = {}
-
-    with ui.element("header").classes("bar"):
-        ui.label("galileo studio").classes("brand")
-        stages = ui.element("nav").classes("stages").props('aria-label="stages"')
-        with ui.element("div").classes("end"):
-            _icon("undo", "Undo", session.undo)
-            _icon("redo", "Redo", session.redo)
-            _icon("contrast", "Light or dark", lambda: _turn(tab, dark, show))
-    with ui.element("main").classes("work"):
-        with ui.element("section").classes("left"):
-            viewer = Viewer()
-            strip = ui.element("div").classes("strip timed")
-            with strip:
-                chart = ui.plotly(charts._figure([], "", "", False))
-        panel = ui.element("aside").classes("right")
-    job = ui.element("div")
-
-    def on_moved(event: Any) -> None:
-        sheet, given = session.sheet, event.args
-        if sheet is not None:
-            tab.mark(moved(sheet.marks, given["handle"], (given["x"], given["y"])))
-
-    def on_place(event: Any) -> None:
-        if session.sheet is None or not tab.placing:
-            return
-        (x, y, frame), name, tab.placing = event.args, tab.placing, ""
-        if name == marks.NEW:
-            tab.mark(with_object(session.sheet.marks, (x, y)))
-        else:
-            tab.mark(corrected(session.sheet.marks, name, int(frame), (x, y)))
-            session.track()
-
-    def on_frame(event: Any) -> None:
-        tab.frame = int(event.args)
-
-    viewer.on("moved", on_moved)
-    viewer.on("place", on_place)
-    viewer.on("frame", on_frame)
-
-    def show() -> None:
-        seen.update(session.versions)
-        lamps()
-        viewer.show(session, tab.stage, bool(tab.placing))
-        if tab.drawn == (now := _shown(tab)):
-            tab.refresh()
-        else:
-            tab.refresh = lambda: None
-            panel.clear()
-            with panel:
-                _panel(tab)
-            tab.drawn = now
-        bar()
-        # A browser that draws curves shows nothing else meanwhile: the click's answer goes first.
-        asyncio.get_running_loop().call_later(CURVES_AFTER_S, curves)
-
-    def lamps() -> None:
-        task = session.job.task if session.job is not None else ""
-        now = (tab.stage, task, *session.states.values())
-        if now == tab.lamps:
-            return
-        tab.lamps = now
-        stages.clear()
-        with stages:
-            _stage_buttons(tab)
-
-    def curves() -> None:
-        viewer.show(session, tab.stage, bool(tab.placing))
-        figure = _figure(tab)
-        strip.classes(add="" if figure else "none", remove="none" if figure else "")
-        if figure is not None and figure != drawn.get("figure"):
-            chart.update_figure(figure)
-            drawn["figure"] = figure
-
-    def bar() -> None:
-        job.clear()
-        if session.job is not None:
-            with job:
-                _job_bar(session)
-
-    def look() -> None:
-        now = session.versions
-        new = {part for part in now if seen.get(part) != now[part]}
-        seen.update(now)
-        if new & PARTS.get(tab.stage, {"clips", "marks", "results"}):
-            show()
-        elif new & {"clips", "marks", "results"}:
-            lamps()
-            curves()
-        elif "live" in new:
-            curves()
-        if "job" in new:
-            bar()
-            now_said = (session.job.task if session.job else "", session.error, session.note)
-            if now_said != tab.said:
-                tab.said = now_said
-                show()
-
-    tab.redraw, tab.redraw_curves = show, curves
-    seen.update(session.versions)
-    show()
+    tab = Tab(session, _first_stage(session))
+    page = _Page(tab)
+    tab.redraw, tab.redraw_curves = page.show, page.curves
+    page.show()
     if tab.stage in ("fit", "compare", "diagnose", "predict"):
         session.open_run()
     if session.sheet is not None and not session.sheet.is_drawn and session.job is None:
         ui.timer(0.2, lambda: _propose_once(session), once=True)
-    ui.timer(POLL_S, look)
+    ui.timer(POLL_S, page.look)
+
+
+class _Page:
+    """The elements of a tab's page, and what they show by now.
+
+    Args:
+      tab: what is shown.
+    """
+
+    def __init__(self, tab: Tab):
+        self._tab, self._session = tab, tab.session
+        self._seen = dict(tab.session.versions)
+        self._figure: Any = None
+        dark = ui.dark_mode(None)
+        with ui.element("header").classes("bar"):
+            ui.label("galileo studio").classes("brand")
+            self._stages = ui.element("nav").classes("stages").props('aria-label="stages"')
+            with ui.element("div").classes("end"):
+                _icon("undo", "Undo", self._session.undo)
+                _icon("redo", "Redo", self._session.redo)
+                _icon("contrast", "Light or dark", lambda: _turn(tab, dark, self.show))
+        with ui.element("main").classes("work"):
+            with ui.element("section").classes("left"):
+                self._viewer = Viewer()
+                self._strip = ui.element("div").classes("strip timed")
+                with self._strip:
+                    self._chart = ui.plotly(charts.EMPTY)
+            self._panel = ui.element("aside").classes("right")
+        self._job = ui.element("div")
+        self._viewer.on("moved", self._on_moved)
+        self._viewer.on("place", self._on_place)
+        self._viewer.on("frame", self._on_frame)
+
+    def _on_moved(self, event: Any) -> None:
+        sheet, given = self._session.sheet, event.args
+        if sheet is not None:
+            self._tab.mark(moved(sheet.marks, given["handle"], (given["x"], given["y"])))
+
+    def _on_place(self, event: Any) -> None:
+        tab, sheet = self._tab, self._session.sheet
+        if sheet is None or not tab.placing:
+            return
+        (x, y, frame), name, tab.placing = event.args, tab.placing, ""
+        if name == marks.NEW:
+            tab.mark(with_object(sheet.marks, (x, y)))
+        else:
+            tab.mark(corrected(sheet.marks, name, int(frame), (x, y)))
+            self._session.track()
+
+    def _on_frame(self, event: Any) -> None:
+        self._tab.frame = int(event.args)
+
+    def show(self) -> None:
+        """Shows everything anew."""
+        tab = self._tab
+        self._seen.update(self._session.versions)
+        self._lamps()
+        self._viewer.show(self._session, tab.stage, bool(tab.placing))
+        if tab.drawn == (now := _shown(tab)):
+            tab.refresh()
+        else:
+            tab.refresh = lambda: None
+            self._panel.clear()
+            with self._panel:
+                _panel(tab)
+            tab.drawn = now
+        self._bar()
+        # A browser that draws curves shows nothing else meanwhile: the click's answer goes first.
+        asyncio.get_running_loop().call_later(CURVES_AFTER_S, self.curves)
+
+    def _lamps(self) -> None:
+        tab, job = self._tab, self._session.job
+        now = (tab.stage, job.task if job else "", *self._session.states.values())
+        if now == tab.lamps:
+            return
+        tab.lamps = now
+        self._stages.clear()
+        with self._stages:
+            _stage_buttons(tab)
+
+    def curves(self) -> None:
+        """Shows the video and what is below it anew."""
+        self._viewer.show(self._session, self._tab.stage, bool(self._tab.placing))
+        figure = _figure(self._tab)
+        self._strip.classes(add="" if figure else "none", remove="none" if figure else "")
+        if figure is not None and figure != self._figure:
+            self._chart.update_figure(figure)
+            self._figure = figure
+
+    def _bar(self) -> None:
+        self._job.clear()
+        if self._session.job is not None:
+            with self._job:
+                _job_bar(self._session)
+
+    def look(self) -> None:
+        """Shows what has changed since it was looked last."""
+        session, tab = self._session, self._tab
+        now = session.versions
+        new = {part for part in now if self._seen.get(part) != now[part]}
+        self._seen.update(now)
+        if new & PARTS.get(tab.stage, {"clips", "marks", "results"}):
+            self.show()
+        elif new & {"clips", "marks", "results"}:
+            self._lamps()
+            self.curves()
+        elif "live" in new:
+            self.curves()
+        if "job" in new:
+            self._bar()
+            said = (session.job.task if session.job else "", session.error, session.note)
+            if said != tab.said:
+                tab.said = said
+                self.show()
 
 
 def _shown(tab: Tab) -> Any:
@@ -296,7 +315,7 @@ def _figure(tab: Tab) -> Any:
         count = tab.session.sheet.info.frame_count
         return charts.track_figure(track, dark, count / tab.session.sheet.marks.fps)
     if tab.stage == "fit":
-        return charts.fit_figure(motion, None, dark)
+        return charts.fit_figure(motion, dark)
     is_of_this_model = found.compare is not None and tab.session.states["compare"] == "done"
     stretches = found.compare["stretches"] if found.compare and is_of_this_model else ()
     own = [one for one in stretches if one["clip"] == tab.session.active]
@@ -307,7 +326,7 @@ def _figure(tab: Tab) -> Any:
     ahead = (found.prediction or {"clips": {}})["clips"].get(tab.session.active)
     if tab.stage == "predict" and ahead is not None:
         return charts.prediction_figure(ahead, dark)
-    return charts.fit_figure(motion, None, dark) if tab.stage == "predict" else None
+    return charts.fit_figure(motion, dark) if tab.stage == "predict" else None
 
 
 def _candidate(tab: Tab) -> tuple[str, Any] | None:

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.clip.load import FILM_SUFFIXES
 from galileo_jax.runtime.errors import InputError
 
-VIDEOS = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm", ".mpg", ".mpeg", ".mts", ".3gp")
 NAME = re.compile(r"[\w][\w .()+-]{0,79}", re.UNICODE)
 
 
@@ -39,7 +39,7 @@ def videos(root: Path) -> dict[str, Path]:
     """The videos that lie in a folder, by name without suffix; links out of it are left out."""
     found: dict[str, Path] = {}
     for path in sorted(root.iterdir()):
-        is_video = path.suffix.lower() in VIDEOS and not path.name.startswith(".")
+        is_video = path.suffix.lower() in FILM_SUFFIXES and not path.name.startswith(".")
         if not is_video or path.stem in found or not NAME.fullmatch(path.stem):
             continue
         if path.is_file() and path.resolve().is_relative_to(root.resolve()):

@@ -1,23 +1,14 @@
 """What lies in a run's folder, as the page shows it; nothing in it is run or trusted."""
 
 import csv
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.paths import below, check_declared
-
-
-def document(path: Path) -> dict[str, Any]:
-    """A JSON document; empty where there is none."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return found if isinstance(found, dict) else {}
 
 
 def program_of(run: Path) -> str | None:

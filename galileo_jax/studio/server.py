@@ -10,9 +10,9 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.guard import Guard
-from galileo_jax.studio.paths import VIDEOS
 from galileo_jax.studio.session import Session
 from galileo_jax.studio.upload import LARGEST_BYTES, receive
 
@@ -145,7 +145,7 @@ def _source(path: Path) -> tuple[Path, str | None]:
         return path.resolve(), None
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
-    if path.suffix.lower() in (".yaml", ".yml", *VIDEOS):
+    if path.suffix.lower() in (*YAML_SUFFIXES, *FILM_SUFFIXES):
         return path.parent.resolve(), path.stem
     raise InputError(f"{path}: a video, its yaml or a folder with videos expected")
 

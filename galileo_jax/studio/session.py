@@ -1,7 +1,6 @@
 """What all tabs look at: the clips, their marks, the results, and the job that runs."""
 
 import asyncio
-import itertools
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.report.diagnosis_text import PROPOSED
+from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
 from galileo_jax.studio.frames import Frames
@@ -60,7 +60,6 @@ class Session:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._asked: Mapping[str, float] | None = None  # the sliders, while an answer is awaited
         self._waiting: Mapping[str, float] | None = None
-        self._ids = itertools.count()
         self._context: dict[str, Any] = {}
         self.worker = Worker(str(self.root), self._from_worker)
         self._effects_left: tuple[str, ...] = ()  # in the result that lies there
@@ -337,7 +336,7 @@ class Session:
         if path.is_file():
             entry[task] = made(path, mark)
         if task == "fit":
-            new = results.round_of(results.document(trials.run / "result.json"))
+            new = results.round_of(document(trials.run / "result.json"))
             is_shown = trials.name == self.trials.name  # with rounds that commands have left
             known = entry.get("rounds") or (list(self.results.rounds) if is_shown else [])
             entry["rounds"] = results.with_round(known, new)
@@ -401,9 +400,9 @@ class Session:
     def _show_stored(self) -> None:
         run = self.trials.run
         entry = self.store.get("runs", self.trials.name)
-        fitted = results.document(run / FILES["fit"]).get("effects")
+        fitted = document(run / FILES["fit"]).get("effects")
         self._effects_left = tuple(map(str, fitted)) if isinstance(fitted, list) else ()
-        found = results.document(run / FILES["diagnose"])
+        found = document(run / FILES["diagnose"])
         last = entry.get("diagnose", {}).get("at") if found else None
         is_own = found and last == (run / FILES["diagnose"]).stat().st_mtime_ns  # not a command's
         curves = entry.get("diagnose_view", {}).get("curves", {}) if is_own else {}
@@ -424,7 +423,7 @@ class Session:
     def _rounds(self, known: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """With that of the fit that lies there, whoever made it."""
         try:
-            last = results.round_of(results.document(self.trials.run / FILES["fit"]))
+            last = results.round_of(document(self.trials.run / FILES["fit"]))
         except (KeyError, TypeError):
             return known
         is_last = bool(known) and set(known[-1]["effects"]) == set(last["effects"])

@@ -1,8 +1,10 @@
 """One clip being marked: its marks, undo and redo, each step on disk before it is shown."""
 
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from galileo_jax.api.label import label
 from galileo_jax.clip.label import updated_file
@@ -12,7 +14,7 @@ from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.check import Remark, remarks_on
 from galileo_jax.studio.marks import Marks
-from galileo_jax.studio.marks_yaml import blank, declared, from_json, labels, to_json
+from galileo_jax.studio.marks_yaml import blank, declared, labels
 from galileo_jax.studio.paths import check_declared
 from galileo_jax.studio.store import Store, yaml_content
 from galileo_jax.video.decode import VideoInfo, probe
@@ -33,6 +35,9 @@ class Step:
     marks: Marks
     yaml: str | None
     problem: str | None = None
+
+
+STORED = TypeAdapter(Step)
 
 
 @dataclass(frozen=True)
@@ -184,22 +189,19 @@ def said(error: Exception, sheet: Sheet) -> str:
 
 def _stored(sheet: Sheet, store: Store) -> Sheet:
     entry = {
-        "present": _plain(sheet.present),
-        "past": [_plain(step) for step in sheet.past],
-        "future": [_plain(step) for step in sheet.future],
+        "present": asdict(sheet.present),
+        "past": [asdict(step) for step in sheet.past],
+        "future": [asdict(step) for step in sheet.future],
     }
     store.put("clips", sheet.name, store.get("clips", sheet.name) | entry)
     return sheet
 
 
-def _plain(step: Step) -> dict[str, Any]:
-    return {"marks": to_json(step.marks), "yaml": step.yaml, "problem": step.problem}
-
-
 def _step(entry: Any) -> Step | None:
+    """A step as it was stored; None where it is no such thing."""
     try:
-        return Step(from_json(entry["marks"]), entry["yaml"], entry["problem"])
-    except (KeyError, TypeError, ValueError, IndexError):
+        return STORED.validate_python(entry)
+    except ValidationError:
         return None
 
 

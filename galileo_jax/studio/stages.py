@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from galileo_jax.results.run import RESULT
+from galileo_jax.results.stale_outputs import DOCUMENTS, PREDICTION
 from galileo_jax.studio.sheet import Sheet
 from galileo_jax.studio.store import Store, fingerprint, yaml_content
 
@@ -18,12 +20,7 @@ STAGES = {
     "diagnose": "What is missing",
     "predict": "Predict",
 }
-FILES = {
-    "fit": "result.json",
-    "compare": "compare/compare.json",
-    "diagnose": "diagnosis/diagnosis.json",
-    "predict": "prediction.json",
-}
+FILES = {"fit": RESULT, **DOCUMENTS, "predict": PREDICTION}
 
 
 @dataclass(frozen=True)

@@ -4,15 +4,15 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
+from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES
 from galileo_jax.clip.schema import ClipFile
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.studio.paths import VIDEOS, below, check_declared, safe_name
+from galileo_jax.studio.paths import below, check_declared, safe_name
 from galileo_jax.video.decode import probe
 
 LARGEST_BYTES = 1_000_000_000
 LARGEST_TEXT_BYTES = 1_000_000
-YAMLS = (".yaml", ".yml")
 
 
 async def receive(
@@ -32,12 +32,12 @@ async def receive(
     """
     safe_name(name)
     suffix = Path(name).suffix.lower()
-    if suffix not in (*VIDEOS, *YAMLS):
+    if suffix not in (*FILM_SUFFIXES, *YAML_SUFFIXES):
         raise InputError(f"{name}: a video or a yaml expected")
     target = below(root, name)
     if target.exists():
         raise InputError(f"{name}: there is such a file already; rename one of them")
-    limit = min(limit, LARGEST_TEXT_BYTES) if suffix in YAMLS else limit
+    limit = min(limit, LARGEST_TEXT_BYTES) if suffix in YAML_SUFFIXES else limit
     with NamedTemporaryFile(dir=root, prefix=".upload_", suffix=suffix, delete=False) as file:
         part = Path(file.name)
         try:
@@ -59,7 +59,7 @@ async def receive(
 def _check(root: Path, part: Path, name: str) -> None:
     """Raises `InputError`, with the name that the person gave it."""
     try:
-        if part.suffix in YAMLS:
+        if part.suffix in YAML_SUFFIXES:
             content = read_mapping(part)
             if unknown := [key for key in content if key not in ClipFile.model_fields]:
                 raise InputError(f"{unknown[0]}: unknown key; a clip's yaml expected")

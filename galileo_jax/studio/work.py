@@ -12,7 +12,6 @@ from typing import Any
 import galileo_jax as gx
 from galileo_jax.runtime import progress
 from galileo_jax.studio import views
-from galileo_jax.tracking.pixel_csv import write_pixel_csv
 
 Partial = Callable[[Mapping[str, Any]], None]
 
@@ -43,12 +42,7 @@ def track(*, clips: Sequence[str], partial: Partial) -> dict[str, Any]:
             names = [item.name for item in loaded.objects]
             partial({"tracking": {"clip": loaded.path.stem, "objects": names, "fps": loaded.fps}})
             found = gx.track(loaded)
-        folder = Path(f"{Path(clip).stem}_track")
-        folder.mkdir(exist_ok=True)
-        assert found.pixels is not None  # of a video
-        write_pixel_csv(folder / "track_px.csv", found.pixels)
-        if found.clip.pixels_per_metre is not None:
-            found.save(folder / "track_m.csv")
+        found.save_tables(f"{Path(clip).stem}_track")
         view = views.track_view(found)
         shown.append(view)
         partial({"track": view})

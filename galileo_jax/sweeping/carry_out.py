@@ -1,7 +1,7 @@
 """Carrying out a sweep: tracks the clips, computes the cells, keeps each as it comes."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from typing import Any
 
 from galileo_jax.runtime import progress
 from galileo_jax.sweeping.cell import Cell
@@ -10,27 +10,16 @@ from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.task import Engine, Failure, Outcome, Task
 from galileo_jax.sweeping.work import measure_files, run_cell
 
-
-@dataclass(frozen=True)
-class Watch:
-    """Who is notified how far a sweep is.
-
-    Attributes:
-      on_begin: called with "tracking" or "cells", and how many there are.
-      on_done: called after each.
-      on_failure: called with a cell's name and why it has no result.
-    """
-
-    on_begin: Callable[[str, int], None] = lambda what, count: None
-    on_done: Callable[[], None] = lambda: None
-    on_failure: Callable[[str, Failure], None] = lambda name, failure: None
+TRACKED, COMPUTED = 0.2, 0.98  # shares of a sweep's work, for progress
+Report = Callable[[str, float, Any], None]
+"""Called with a stage, the share done and, of a cell that fails, its name and why."""
 
 
 def carry_out(
     cells: Sequence[Cell],
     store: Store,
     engine: Engine,
-    watch: Watch = Watch(),
+    report: Report = lambda stage, share, partial: None,
     *,
     with_page: Collection[str] = (),
     computed_again: Collection[str] = (),
@@ -41,7 +30,7 @@ def carry_out(
       cells: of the sweep.
       store: where results are and go; each is written before the next is waited for.
       engine: carries out the tasks.
-      watch: is notified.
+      report: is told how far it is.
       with_page: names of the cells that get a page of their own.
       computed_again: names of cells that are computed though they have a result.
 
@@ -55,16 +44,12 @@ def carry_out(
         or (not store.has_result(cell.name) and store.failure(cell.name) is None)
     ]
     clips = {clip.key: clip for cell in left for clip in cell.clips}
-    wrong = _track(clips, store, engine, watch)
-
-    def fail(name: str, failure: Failure) -> None:
-        store.save_failure(name, failure)
-        watch.on_failure(name, failure)
-
+    wrong = _track(clips, store, engine, report)
     to_compute = []
     for cell in left:
         if first := next((wrong[c.key] for c in cell.clips if c.key in wrong), None):
-            fail(cell.name, first)
+            store.save_failure(cell.name, first)
+            report("tracking", TRACKED, {"failed": cell.name, "why": first.line})
         else:
             to_compute.append(cell)
 
@@ -74,34 +59,58 @@ def carry_out(
             folder = store.cell_folder(cell.name) if cell.name in with_page else None
             yield Task(cell.name, run_cell, (cell.settings, measured, folder))
 
-    watch.on_begin("cells", len(to_compute))
-    for outcome in _each(engine, tasks()):
+    def keep(outcome: Outcome) -> Any:
         if outcome.failure is None:
             store.save_result(outcome.key, outcome.value)
-        else:
-            fail(outcome.key, outcome.failure)
-        watch.on_done()
+            return None
+        store.save_failure(outcome.key, outcome.failure)
+        return {"failed": outcome.key, "why": outcome.failure.line}
+
+    stage = ("cells", len(to_compute), TRACKED, COMPUTED)
+    _carry_out(tasks(), engine, keep, report, stage)
 
 
 def _track(
-    clips: dict[str, ClipFiles], store: Store, engine: Engine, watch: Watch
+    clips: dict[str, ClipFiles], store: Store, engine: Engine, report: Report
 ) -> dict[str, Failure]:
     """Tracks the clips that are not yet; returns what is wrong with some of them."""
     left = [clip for key, clip in clips.items() if not store.has_clip(key)]
     wrong: dict[str, Failure] = {}
-    watch.on_begin("tracking", len(left))
-    tasks = (Task(clip.key, measure_files, (clip.packed(),)) for clip in left)
-    for outcome in _each(engine, tasks):
+
+    def keep(outcome: Outcome) -> None:
         if outcome.failure is None:
             store.save_clip(outcome.key, outcome.value)
         else:
             wrong[outcome.key] = outcome.failure
-        watch.on_done()
+
+    tasks = (Task(clip.key, measure_files, (clip.packed(),)) for clip in left)
+    _carry_out(tasks, engine, keep, report, ("tracking", len(left), 0.0, TRACKED))
     return wrong
 
 
-def _each(engine: Engine, tasks: Iterable[Task]) -> Iterator[Outcome]:
-    """The outcomes, until the caller asks to stop."""
-    for outcome in engine.outcomes(tasks):
-        yield outcome
+def _carry_out(
+    tasks: Iterable[Task],
+    engine: Engine,
+    keep: Callable[[Outcome], Any],
+    report: Report,
+    stage: tuple[str, int, float, float],
+) -> None:
+    """Keeps every outcome as it comes, until the caller asks to stop.
+
+    Args:
+      tasks: to be carried out.
+      engine: that does it.
+      keep: writes an outcome; what it returns is reported.
+      report: is told how far it is.
+      stage: its name, how many tasks it has, the shares of the sweep at its begin and end.
+    """
+    name, count, start, end = stage
+
+    def tell(done: int, partial: Any = None) -> None:
+        share = done / count if count else 1.0
+        report(f"{name}, {done} of {count} done", start + (end - start) * share, partial)
+
+    tell(0)
+    for done, outcome in enumerate(engine.outcomes(tasks), 1):
+        tell(done, keep(outcome))
         progress.check_cancelled()

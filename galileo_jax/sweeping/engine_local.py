@@ -16,12 +16,12 @@ import multiprocessing
 import os
 import signal
 import sys
-import threading
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from galileo_jax.runtime.child_process import end_with_parent
 from galileo_jax.sweeping.resources import Resources, environment_of
 from galileo_jax.sweeping.task import MAX_TRIES, Outcome, Task, attempt, died
 
@@ -149,17 +149,10 @@ def _serve(connection: Connection, environment: dict[str, str]) -> None:
     os.environ.update(environment)
     sys.stderr = open(os.devnull, "w")  # noqa: SIM115  # progress bars of many at once
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which ends workers
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     while True:
         try:
             task: Any = connection.recv()
         except EOFError:
             return
         connection.send(attempt(task))
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)

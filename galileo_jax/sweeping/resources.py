@@ -4,6 +4,10 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
+
+from galileo_jax.api.options import check_choices
+from galileo_jax.runtime.errors import InputError
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,48 @@ class Resources:
         return threads | platform | ({"XLA_FLAGS": flags} if flags else {})
 
 
+@dataclass(frozen=True)
+class Computing:
+    """Where a sweep is computed; the arguments of `sweep` of the same names."""
+
+    engine: Literal["local", "ray"] = "local"
+    address: str | None = None
+    workers: int | None = None
+    cpus_per_worker: int = 1
+    gpus_per_worker: int = 0
+    together: int | None = None
+
+    @property
+    def each(self) -> Resources:
+        """What one worker may use."""
+        return Resources(self.cpus_per_worker, self.gpus_per_worker)
+
+    def check(self) -> None:
+        """Raises `InputError` where the options are wrong or do not go together."""
+        check_choices(self)
+        if self.address and self.engine != "ray":
+            raise InputError("--address: for --engine ray only")
+        for name, least in LEAST.items():
+            value = getattr(self, name)
+            if value is not None and value < least:
+                option = name.replace("_", "-")
+                raise InputError(f"--{option}: {value} is not a whole number, {least} or more")
+        in_workers = self.engine != "local" or self.workers or self.gpus_per_worker
+        if self.together is not None and self.together > 1 and in_workers:
+            raise InputError(
+                "--together: cells are computed together in one process; leave out --engine, "
+                "--workers and --gpus-per-worker"
+            )
+
+    def num_together(self) -> int:
+        """How many cells one process computes together: where it is not said, 1 on a CPU."""
+        if self.together is not None:
+            return self.together
+        is_free = self.engine == "local" and self.workers is None and not self.gpus_per_worker
+        return num_together() if is_free else 1
+
+
+LEAST = {"workers": 0, "cpus_per_worker": 1, "gpus_per_worker": 0, "together": 1}
 NUM_TOGETHER = 64  # cells whose program calls an accelerator makes at once
 SINGLE_THREAD = "--xla_cpu_multi_thread_eigen=false"
 

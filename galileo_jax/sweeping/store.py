@@ -27,7 +27,7 @@ from galileo_jax.measurement.path_direction import OtherWay
 from galileo_jax.measurement.segments.astray import Astray
 from galileo_jax.measurement.segments.segments import Cut, Segments
 from galileo_jax.observation.observation import Observation
-from galileo_jax.runtime.atomic_write import replacing, write_json
+from galileo_jax.runtime.atomic_write import check_folder, replacing, write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.task import Failure
 from galileo_jax.sweeping.work import PAGE, CellResult, MeasuredClip
@@ -55,8 +55,7 @@ class Store:
         Raises:
           InputError: another sweep is at work there, or the folder is a file.
         """
-        if self.folder.exists() and not self.folder.is_dir():
-            raise InputError(f"--out: {self.folder} is a file; a folder expected")
+        check_folder(self.folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         with (self.folder / ".lock").open("w") as lock:
             try:

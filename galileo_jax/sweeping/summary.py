@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.files.tables import TABLE_FORMATS, write_table
+from galileo_jax.results.shown_parameters import point_estimate
 from galileo_jax.sweeping.cell import Cell
 from galileo_jax.sweeping.settings import Diagnose
 from galileo_jax.sweeping.store import Store
@@ -90,10 +91,7 @@ def _row(cell: Cell, store: Store, truth: dict[str, Any]) -> Row:
 
 def _of_fit(result: dict[str, Any], truth: dict[str, Any]) -> Row:
     entries = result["parameters"] | result["derived"]
-    # A point estimate, where the method has one of its own: its draws are no posterior.
-    best = result.get("best", {})
-    if best:
-        best = best | {"mass_ratio": best["m1"] / best["m2"]}
+    best = point_estimate(result)
     row: Row = {"converged": result["converged"]}
     for name in QUANTITIES:
         if name in entries:

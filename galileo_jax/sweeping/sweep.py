@@ -1,9 +1,8 @@
 """`sweep`: evaluate many clips, with several methods; can be stopped and resumed."""
 
 import os
-import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,33 +11,32 @@ from typing import TYPE_CHECKING, Any, Literal
 import yaml
 
 from galileo_jax import __version__
+from galileo_jax.api.options import options_of
 from galileo_jax.files.package_data import config_path
 from galileo_jax.report.sweep_page import write_sweep_page
+from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
-from galileo_jax.sweeping.carry_out import Watch, carry_out
+from galileo_jax.sweeping.carry_out import COMPUTED, Report, carry_out
 from galileo_jax.sweeping.cell import Cell, make_cells
 from galileo_jax.sweeping.clip_files import ClipFiles
 from galileo_jax.sweeping.clip_rows import make_clip_rows
 from galileo_jax.sweeping.config import SweepConfig, load_config, make_configs
 from galileo_jax.sweeping.engine_local import EngineHere, EngineLocal
-from galileo_jax.sweeping.resources import Resources, num_together, num_workers
+from galileo_jax.sweeping.resources import Computing, num_workers
 from galileo_jax.sweeping.simulated import simulated_clips
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.summary import COLUMNS, Row, make_rows, write_tables
-from galileo_jax.sweeping.task import Engine, Failure
+from galileo_jax.sweeping.task import Engine
 from galileo_jax.sweeping.work import PAGE
 
 if TYPE_CHECKING:
     import pandas as pd
 
-ENGINES = ("local", "ray")
 MOST_PAGES = 60  # cells up to which each gets a page of its own, where the config does not say
-TRACKED, COMPUTED = 0.2, 0.98  # shares of the work, for progress
 CONFIG = "config.yaml"  # in the sweep's folder, of a config that was no file
-Report = Callable[[str, float, Any], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,10 +149,8 @@ def sweep(
       ['done']
     """
     _check_not_imported_by_worker()
-    _check(engine, address, workers, cpus_per_worker, gpus_per_worker, together)
-    if together is None and engine == "local" and workers is None and not gpus_per_worker:
-        together = num_together()
-    each = Resources(cpus_per_worker, gpus_per_worker)
+    computing = options_of(Computing, locals())
+    computing.check()
     if isinstance(config, Mapping):
         name, plain = Path(out).name if out is not None else "sweep", _plain(config)
         configs = make_configs("config", plain, set, multirun)
@@ -173,41 +169,42 @@ def sweep(
             write_text(store.folder / CONFIG, yaml.safe_dump(plain, sort_keys=False))
         report("simulating", 0.0, None)
         cells, with_page, again = _cells(configs, groups, store)
-        words = ["galileo", "sweep", str(config if plain is None else store.folder / CONFIG)]
-        for option, values in (("--set", set), ("--multirun", multirun)):
-            words += [word for value in values for word in (option, value)]
-        if out is not None or plain is not None:
-            words += ["--out", str(store.folder)]
-        if engine != "local":
-            words += ["--engine", engine, *(["--address", address] if address else [])]
-        command = shlex.join(words)
-        write_json(
-            store.folder / "sweep.json",
-            {
-                "command": command,
-                "configs": [one.model_dump(mode="json") for one in configs],
-                "cells": [cell.name for cell in cells],
-                "version": __version__,
-            },
+        command = command_line(
+            "sweep",
+            [str(config) if plain is None else store.folder / CONFIG],
+            set=tuple(set),
+            multirun=tuple(multirun),
+            out=None if out is None and plain is None else store.folder,
+            engine=None if engine == "local" else engine,
+            address=address,
         )
+        document = {
+            "command": command,
+            "configs": [one.model_dump(mode="json") for one in configs],
+            "cells": [cell.name for cell in cells],
+            "version": __version__,
+        }
+        write_json(store.folder / "sweep.json", document)
         if retry:
             for cell in cells:
                 store.forget_failure(cell.name)
         done = sum(store.has_result(cell.name) and cell.name not in again for cell in cells)
         report("starting", 0.0, {"cells": len(cells), "done": done, "folder": store.folder})
-        with _engine(engine, address, workers, each, together or 1) as worker:
-            carry_out(
-                cells, store, worker, _watch(report), with_page=with_page, computed_again=again
-            )
+        with _engine(computing) as worker:
+            carry_out(cells, store, worker, report, with_page=with_page, computed_again=again)
         report("writing the page", COMPUTED, None)
-        rows = make_rows(cells, store)
-        tables = write_tables(store.folder, rows)
-        write_sweep_page(
-            store.folder / PAGE, name, rows, command, make_clip_rows(cells, store, rows)
-        )
-        made = Sweep(store.folder, tuple(tables), tuple(rows))
+        made = _written(name, cells, store, command)
         report("done", 1.0, made)
     return made
+
+
+def _written(name: str, cells: Sequence[Cell], store: Store, command: str) -> Sweep:
+    """The finished sweep, with its tables and its page."""
+    rows = make_rows(cells, store)
+    tables = write_tables(store.folder, rows)
+    clips = make_clip_rows(cells, store, rows)
+    write_sweep_page(store.folder / PAGE, name, rows, command, clips)
+    return Sweep(store.folder, tuple(tables), tuple(rows))
 
 
 def _check_not_imported_by_worker() -> None:
@@ -217,34 +214,6 @@ def _check_not_imported_by_worker() -> None:
         raise InputError(
             'sweep: workers import your script; put the call below if __name__ == "__main__":, or '
             "call it with workers=0"
-        )
-
-
-def _check(
-    engine: str,
-    address: str | None,
-    workers: int | None,
-    cpus: int,
-    gpus: int,
-    together: int | None,
-) -> None:
-    if engine not in ENGINES:
-        raise InputError(f"--engine: unknown {engine!r}; known: {', '.join(ENGINES)}")
-    if address and engine != "ray":
-        raise InputError("--address: for --engine ray only")
-    for name, value, least in (
-        ("workers", 0 if workers is None else workers, 0),
-        ("cpus-per-worker", cpus, 1),
-        ("gpus-per-worker", gpus, 0),
-        ("together", 1 if together is None else together, 1),
-    ):
-        if value < least:
-            raise InputError(f"--{name}: {value} is not a whole number, {least} or more")
-
-    if together is not None and together > 1 and (engine != "local" or workers or gpus):
-        raise InputError(
-            "--together: cells are computed together in one process; leave out --engine, --workers "
-            "and --gpus-per-worker"
         )
 
 
@@ -264,33 +233,6 @@ def _reporter(on_progress: OnProgress | None) -> Report:
             on_progress(stage, share, partial)
 
     return report
-
-
-def _watch(report: Report) -> Watch:
-    """Reports each clip and each cell as it is done."""
-    what, count, done = "tracking", 0, 0
-
-    def share() -> float:
-        start, end = (0.0, TRACKED) if what == "tracking" else (TRACKED, COMPUTED)
-        return start + (end - start) * (done / count if count else 1.0)
-
-    def stage() -> str:
-        return f"{what}, {done} of {count} done"
-
-    def begin(stage_name: str, number: int) -> None:
-        nonlocal what, count, done
-        what, count, done = stage_name, number, 0
-        report(stage(), share(), None)
-
-    def advance() -> None:
-        nonlocal done
-        done += 1
-        report(stage(), share(), None)
-
-    def fail(name: str, failure: Failure) -> None:
-        report(stage(), share(), {"failed": name, "why": failure.line})
-
-    return Watch(begin, advance, fail)
 
 
 def _config_file(name: str) -> Path:
@@ -353,21 +295,20 @@ def _cells(
 
 
 @contextmanager
-def _engine(
-    name: str, address: str | None, workers: int | None, each: Resources, together: int
-) -> Iterator[Engine]:
-    if name == "ray":
+def _engine(computing: Computing) -> Iterator[Engine]:
+    each = computing.each
+    if computing.engine == "ray":
         from galileo_jax.sweeping.engine_ray import EngineRay
 
-        engine = EngineRay(address, each)
-    elif together > 1:
+        engine = EngineRay(computing.address, each)
+    elif (together := computing.num_together()) > 1:
         from galileo_jax.sweeping.engine_together import EngineTogether
 
         engine = EngineTogether(together)
-    elif workers == 0:
+    elif computing.workers == 0:
         engine = EngineHere()
     else:
-        engine = EngineLocal(workers or num_workers(each), each)
+        engine = EngineLocal(computing.workers or num_workers(each), each)
     try:
         yield engine
     finally:

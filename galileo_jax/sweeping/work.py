@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from galileo_jax.api.track import Track
+from galileo_jax.api.track import tracks_of
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import Measurement, measure
 from galileo_jax.report.sweep_clips import thumbnail
@@ -84,7 +84,7 @@ def run_cell(
     from galileo_jax.api.diagnose import diagnose
     from galileo_jax.api.fit import fit
 
-    tracks = [Track(one.clip, None, one) for one in measured]
+    tracks = tracks_of(measured)
     options = settings.model_dump(exclude={"method"})
     with tempfile.TemporaryDirectory(prefix="galileo.") as name:
         folder = Path(name)

@@ -275,7 +275,7 @@ class TestSampling:
         monkeypatch.setattr(ProgressDisplay, "__call__", stop_at_the_second_block)
         words = [str(simulated[0]), "--out", str(out), *self.SHORT]
         assert command.run(fit_command.main, words) == 130
-        assert "what was finished is kept" in capsys.readouterr().err
+        assert "what was finished is saved" in capsys.readouterr().err
         assert not (out / "result.json").exists()
         assert list(out.iterdir()), "the checkpoint"
         monkeypatch.setattr(ProgressDisplay, "__call__", shows)

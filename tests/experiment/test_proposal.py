@@ -8,9 +8,8 @@ import pytest
 
 from galileo_jax.api.diagnose import Diagnosis
 from galileo_jax.api.next_experiment import next_experiment
-from galileo_jax.experiment.advise import with_next
 from galileo_jax.experiment.belief import beliefs_of, read_beliefs, write_beliefs
-from galileo_jax.experiment.choose import best_first, expect
+from galileo_jax.experiment.choose import best_first, expect, with_next
 from galileo_jax.experiment.proposal import MOST_FRAMES, height_m, propose, release_m
 from galileo_jax.experiment.rehearsal import rehearse
 from galileo_jax.measurement.measure import Measurement

@@ -15,8 +15,12 @@ from galileo_jax.diagnosis.diagnosis import Law, Reason, Verdict
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.comparison_page import ComparisonReport, write_comparison_page
-from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
-from galileo_jax.report.diagnosis_plots import write_diagnosis_plots
+from galileo_jax.report.diagnosis_page import (
+    DiagnosisReport,
+    before_after_charts,
+    write_diagnosis_page,
+)
+from galileo_jax.report.draw import write_svgs
 from galileo_jax.report.provenance import digest
 from tests.found import LAW, comparison_of, diagnosis_of, fit_of, make_trials
 from tests.precision import in_64_bit
@@ -88,7 +92,7 @@ def test_tells_the_verdict_and_needs_nothing_from_outside(status, trials, clip, 
 
 @pytest.mark.parametrize("status", ["named", "unknown"])
 def test_draws_what_each_effect_changed(status, trials, tmp_path):
-    plots = write_diagnosis_plots(tmp_path, trials, diagnosis_of(trials, status), 0)
+    plots = write_svgs(tmp_path, before_after_charts(trials, diagnosis_of(trials, status), 0))
     added = [f"before_after_oracle_object{i}_air_drag.svg" for i in (1, 2)]
     assert [plot.name for plot in plots] == (added if status == "named" else [])
     assert all("before" in plot.read_text() or "no effects" in plot.read_text() for plot in plots)

@@ -45,7 +45,7 @@ def test_plotly_has_every_mark_with_its_values():
 
 
 def test_phases_failing_times_levels_and_dividers_are_drawn_by_both():
-    one = panel(phases=PHASES, highlight=(0.4, 0.6), level=0.0, divider=(1.5, "the end"))
+    one = panel(phases=PHASES, highlights=((0.4, 0.6),), level=0.0, divider=(1.5, "the end"))
     figure = plotly_of(chart(one))
     rectangles = [(s.x0, s.x1) for s in figure.layout.shapes if s.type == "rect"]
     assert rectangles == [(1.0, 1.1), (0.4, 0.6)], "the foot, and where the model fails"

@@ -12,8 +12,9 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.prediction.posterior_predictive import posterior_predictive
 from galileo_jax.report import write_report
 from galileo_jax.report.animation import animation
+from galileo_jax.report.draw import write_svgs
 from galileo_jax.report.fit_charts import failing_interval_of
-from galileo_jax.report.fit_plots import write_fit_plots
+from galileo_jax.report.fit_page import charts_of_run
 from galileo_jax.report.fit_text import fit_quality, undetermined
 from galileo_jax.report.html_page import document
 from galileo_jax.report.provenance import digest
@@ -143,7 +144,7 @@ def test_states_the_numbers(run, page):
 
 def test_has_every_figure_and_writes_them_as_files_when_asked(run, page, tmp_path):
     assert not list(run.folder.rglob("*.svg")), "they take as long as a fit"
-    written = write_fit_plots(run, tmp_path / "plots")
+    written = write_svgs(tmp_path / "plots", charts_of_run(run))
     names = {path.stem for path in written}
     assert set(written) == set((tmp_path / "plots").glob("*.svg"))
     objects = run.problem.observation.names

@@ -47,9 +47,9 @@ def test_values_and_what_is_not_determined():
     text = clips_section(
         [ClipRow("a", fit=fit_of(), pages=(("report", Path("cells/a b/r.html")),))]
     )
-    assert 'data-label="k1">0.250 &plusmn; 0.020<' in text
+    assert 'data-label="k1">0.250 ± 0.020<' in text
     assert 'data-label="k2"><span class="soft">not determined</span>' in text
-    assert 'data-label="m1/m2">2.00 &plusmn; 0.10<' in text
+    assert 'data-label="m1/m2">2.00 ± 0.10<' in text
     assert ">m1<" not in text and ">phi<" not in text
     assert '<a href="cells/a%20b/r.html">report</a>' in text
 
@@ -69,7 +69,7 @@ def test_a_motion_without_friction_shows_what_it_determines():
     speed = {**ENTRY, "mean": 3.5, "unit": "m/s"}
     flight["parameters"] = {"m1": UNKNOWN, "start_speed": speed, "start_angle": UNKNOWN}
     text = clips_section([ClipRow("a", fit=flight)])
-    assert 'data-label="start_speed">3.500 &plusmn; 0.020 m/s<' in text
+    assert 'data-label="start_speed">3.500 ± 0.020 m/s<' in text
     assert "start_angle" not in text and "start_speed: speed in the first frame" in text
 
 
@@ -77,7 +77,7 @@ def test_a_point_estimate_has_no_standard_deviation():
     best = {"m1": 0.3, "k1": 0.2, "m2": 0.1, "k2": 0.4}
     text = clips_section([ClipRow("a", fit=fit_of(best=best))])
     assert 'data-label="k1">0.2<' in text and 'data-label="m1/m2">3<' in text
-    assert "plusmn" not in text
+    assert "±" not in text
 
 
 @pytest.mark.parametrize(

@@ -106,12 +106,32 @@ def test_figures_are_plain_data_that_a_page_can_take():
     extra = ("air_drag", {"times": [0.0], "model_x": [[0.0]], "white": [[0.1]]})
     for dark in (False, True):
         for figure in (
-            charts.fit_figure(MOTION, None, dark, extra),
+            charts.fit_figure(MOTION, dark),
             charts.residual_figure(MOTION, [stretch], dark, extra),
         ):
             assert json.loads(json.dumps(figure)) == figure
     shaded = charts.residual_figure(MOTION, [stretch], False)["layout"]["shapes"]
-    assert [(one["x0"], one["x1"]) for one in shaded if one.get("yref") == "paper"] == [(0.0, 0.1)]
+    assert [(one["x0"], one["x1"]) for one in shaded if one["type"] == "rect"] == [(0.0, 0.1)]
+
+
+def test_a_missing_force_is_drawn_of_all_objects_in_one_figure_in_the_colours_of_the_page():
+    known, unknown = [0.1, None, 0.3], [None, None, None]
+    keys = ("acceleration_m_s2", "sd_m_s2", "path_m", "speed_m_s")
+    objects = {"ball": dict.fromkeys(keys, known), "wall": dict.fromkeys(keys, unknown)}
+    record = {"time_s": [0.0, 0.1, 0.2], "objects": objects}
+    light, dark = (charts.missing_figure(record, is_dark) for is_dark in (False, True))
+    assert {one["xaxis"] for one in light["data"]} == {"x", "x2", "x3"}
+    assert {one["name"] for one in light["data"]} == {"95 %", "missing"}, "of one object"
+    assert json.loads(json.dumps(light)) == light
+    inks = [one["layout"]["template"]["layout"]["font"]["color"] for one in (light, dark)]
+    assert inks == ["rgba(35,37,43,1)", "rgba(232,229,223,1)"]
+
+
+def test_a_prediction_has_the_clips_end():
+    keys = ("time_s", "x_m", "x_q025_m", "x_q975_m")
+    found = {"objects": {"ball": dict.fromkeys(keys, (0.0, 1.0))}, "clip_end": 0.5}
+    (end,) = charts.prediction_figure(found, True)["layout"]["shapes"]
+    assert (end["x0"], end["x1"]) == (0.5, 0.5)
 
 
 @pytest.mark.video

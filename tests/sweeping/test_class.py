@@ -47,7 +47,7 @@ def test_a_row_and_a_link_for_each(swept, tmp_path):
         (link,) = links
         own = (moved / unquote(link)).read_text()
         assert name in own and "<h1>" in own
-        assert "not determined" in row or "&plusmn;" in row
+        assert "not determined" in row or "±" in row
         assert "fits" in row
 
 

@@ -130,7 +130,7 @@ def test_a_fit_that_is_cancelled_is_no_failure(clips, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("given", "line"),
     [
-        ({"engine": "slurm"}, "--engine: unknown 'slurm'; known: local, ray"),
+        ({"engine": "slurm"}, "--engine: unknown engine 'slurm'; known: local, ray"),
         ({"address": "a:1"}, "--address: for --engine ray only"),
         ({"workers": -1}, "--workers: -1 is not a whole number, 0 or more"),
         ({"cpus_per_worker": 0}, "--cpus-per-worker: 0 is not a whole number, 1 or more"),

@@ -126,8 +126,7 @@ def _strength(row: Mapping[str, Any]) -> str:
         from galileo_jax.report.diagnosis_text import strength_texts
 
         effects = str(row["effect"]).split("+")
-        found = strength_texts(effects, row)  # pyright: ignore[reportArgumentType]
-        return ", ".join(found.values()).replace("+-", "±")
+        return ", ".join(strength_texts(effects, row, "±").values())
     return f"velocity error {row['rmse']:.4f} m/s"
 
 

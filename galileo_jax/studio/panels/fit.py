@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 
 from galileo_jax.report.fit_text import distance
-from galileo_jax.results.shown_digits import shown
+from galileo_jax.results.shown_digits import interval_text, shown, unit_text
 from galileo_jax.studio.panels.parts import main_button, plain_button, remark, title
 from galileo_jax.studio.results import program_of
 
@@ -66,14 +66,14 @@ def _misfit(tab: "Tab") -> str:
 
 
 def _parameter(tab: "Tab", one: Mapping[str, Any], values: dict[str, float]) -> None:
-    unit = "" if one["unit"] == "1" else f" {one['unit']}"
     is_known = one["identified"]
     with ui.element("div").classes("parameter" + ("" if is_known else " unknown")):
         ui.label(one["name"]).classes("name")
         with ui.element("div").classes("value"):
-            ui.label(f"{shown(one)}{unit}")
-            interval = f"{shown(one, 'q025')} to {shown(one, 'q975')}"
-            ui.label(interval if is_known else "not determined by this clip").classes("small soft")
+            ui.label(f"{shown(one)}{unit_text(one)}")
+            ui.label(interval_text(one) if is_known else "not determined by this clip").classes(
+                "small soft"
+            )
         if one["kind"] != "parameters":
             ui.label("follows from the others").classes("small soft")
             return

@@ -42,7 +42,7 @@ def build(tab: "Tab") -> None:
     with ui.element("div").classes("rowline"):
         scene = ui.select(sorted(SCENARIOS), value=marks.scenario, label="scenario")
         scene.props("outlined dense options-dense").style("min-width: 130px")
-        scene.on_value_change(lambda event: _mark(tab, scenario=event.value))
+        scene.on_value_change(lambda event: tab.change(scenario=event.value))
         lengths = _lengths(tab, marks)
         is_laid = marks.rectangle is not None
         text = "Ruler instead" if is_laid else "Rectangle instead"
@@ -87,7 +87,7 @@ def _lengths(tab: "Tab", marks: Marks) -> list[Any]:
         return made
 
     if marks.rectangle is None:
-        write = lambda value: _mark(tab, stick_m=value or None)  # noqa: E731
+        write = lambda value: tab.change(stick_m=value or None)  # noqa: E731
         return [field("ruler, m", marks.stick_m, "data-stick", write)]
     return [
         field(label, value, f"data-side={i}", partial(_side, tab, i))
@@ -107,7 +107,7 @@ def _side(tab: "Tab", which: int, value: float | None) -> None:
     if tab.session.sheet is not None:
         sides = list(tab.session.sheet.marks.rectangle_m)
         sides[which] = value or 0.0
-        _mark(tab, rectangle_m=tuple(sides))
+        tab.change(rectangle_m=tuple(sides))
 
 
 def _turn(tab: "Tab", to_rectangle: bool) -> None:
@@ -169,20 +169,14 @@ def _size(tab: "Tab", name: str, text: str) -> None:
 
 
 def _change(tab: "Tab", name: str, **given: Any) -> None:
-    sheet = tab.session.sheet
-    if sheet is not None:
-        objects = tuple(replace(o, **given) if o.name == name else o for o in sheet.marks.objects)
-        tab.mark(replace(sheet.marks, objects=objects))
+    if (sheet := tab.session.sheet) is not None:
+        objects = (replace(o, **given) if o.name == name else o for o in sheet.marks.objects)
+        tab.change(objects=tuple(objects))
 
 
 def _drop(tab: "Tab", name: str) -> None:
     if tab.session.sheet is not None:
         tab.mark(without_object(tab.session.sheet.marks, name))
-
-
-def _mark(tab: "Tab", **given: Any) -> None:
-    if tab.session.sheet is not None:
-        tab.mark(replace(tab.session.sheet.marks, **given))
 
 
 def _place(tab: "Tab") -> None:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 from nicegui import ui
 
+from galileo_jax.results.command_line import command_line
 from galileo_jax.studio.panels.parts import main_button, plain_button, title
 
 if TYPE_CHECKING:
@@ -50,18 +51,14 @@ def build(tab: "Tab") -> None:
 
 def _commands(tab: "Tab") -> str:
     session = tab.session
-    clips, effects = shlex.join(session.trials.files), ",".join(session.effects)
-    added = f" --effects {effects}" if effects else ""
-    run = shlex.quote(f"runs/{session.trials.name}")
+    clips, run = session.trials.files, f"runs/{session.trials.name}"
     lines = [f"cd {shlex.quote(str(session.root))}"]
     if session.results.diagnosis is not None:
-        lines.append(f"galileo diagnose {clips} --add none")
-    lines += [f"galileo fit {clips}{added}", f"galileo compare {run}"]
-    if len(session.chosen) == 1:
-        lines.append(f"galileo predict {run} --seconds {SECONDS:g}")
-    else:
-        each = (shlex.quote(f"runs/{session.trials.name}/{name}") for name in session.chosen)
-        lines += [f"galileo predict {one} --seconds {SECONDS:g}" for one in each]
+        lines.append(command_line("diagnose", clips, add="none"))
+    lines.append(command_line("fit", clips, effects=",".join(session.effects)))
+    lines.append(command_line("compare", [run]))
+    runs = [run] if len(session.chosen) == 1 else [f"{run}/{name}" for name in session.chosen]
+    lines += [command_line("predict", [one], seconds=f"{SECONDS:g}") for one in runs]
     return "\n".join(lines)
 
 

@@ -1,8 +1,7 @@
 """Video: which clip, or which trials; its frame rate, and from which frame on it counts."""
 
-from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nicegui import ui
 
@@ -42,12 +41,12 @@ def build(tab: "Tab") -> None:
     with ui.element("div").classes("rowline"):
         rate = ui.number("true frames per second", value=sheet.marks.fps, min=1)
         rate.props("outlined dense data-fps step=any")
-        on_number(rate, lambda value: _mark(tab, fps=value))
+        on_number(rate, lambda value: tab.change(fps=value) if value else None)
     with ui.element("div").classes("rowline"):
         first = ui.number("counts from frame", value=sheet.marks.first_frame, min=0, precision=0)
         first.props("outlined dense data-first").style("width: 150px")
-        on_number(first, lambda value: _mark(tab, first_frame=int(value or 0)))
-        plain_button("this frame", lambda: _mark(tab, first_frame=tab.frame), "from-here")
+        on_number(first, lambda value: tab.change(first_frame=int(value or 0)))
+        plain_button("this frame", lambda: tab.change(first_frame=tab.frame), "from-here")
     with ui.element("div").classes("rowline"):
         end = info.frame_count - 1
         shown = end if sheet.marks.last_frame is None else sheet.marks.last_frame
@@ -91,10 +90,4 @@ def _to(tab: "Tab", frame: float | None) -> None:
     sheet = tab.session.sheet
     if sheet is not None:
         is_last = frame is None or int(frame) == sheet.info.frame_count - 1
-        tab.mark(replace(sheet.marks, last_frame=None if is_last else int(frame or 0)))
-
-
-def _mark(tab: "Tab", **given: Any) -> None:
-    sheet = tab.session.sheet
-    if sheet is not None and None not in given.values():
-        tab.mark(replace(sheet.marks, **given))
+        tab.change(last_frame=None if is_last else int(frame or 0))
