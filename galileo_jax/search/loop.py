@@ -29,6 +29,7 @@ from galileo_jax.search.table import BASE, Entry, Key, Table, ask
 MOST_ROUNDS = 4
 CHANGED_NATS = 1.0  # by which the evidence of what may decide has changed
 NUM_AT_ONCE = 8  # refined in one batch: the sooner the first can be shown
+MOST_WITH_CARE = 6  # hypotheses whose every end is refined until it has settled
 MOST_REFINED = 24  # hypotheses of several effects in a round, those that come nearest
 MAY_STILL_GAIN = 5.0  # nats that a valley with more cost in the race may yet have the better of
 
@@ -92,7 +93,9 @@ def _round(
     table: Table, starts: Sequence[Start], on_entry: Callable[[Table, Entry], None]
 ) -> Table:
     """The table after one round of the loop."""
-    scores = _scores(table, starts)
+    ends = _raced(table, [one for one in starts if not one.is_near])
+    first = _first_of_each(table, ends)
+    scores = _scores(table, first)
 
     def take(table: Table, effects: tuple[str, ...], fit: GradientFit) -> Table:
         key = frozenset(effects)
@@ -106,11 +109,9 @@ def _round(
             on_entry(table, entry)
         return table
 
-    ends = _raced(table, [one for one in starts if not one.is_near])
-    first = _first_of_each(table, ends)
     for end, fit in _refined_in_turn(table, first):
         table = take(table, end.effects, fit)
-    deciding = set(table.deciding()) | {BASE}
+    deciding = {BASE, *table.deciding()[:MOST_WITH_CARE]}
     near = [_End(one.effects, one.z, one.parent, np.nan, np.nan) for one in starts if one.is_near]
     # What was refined in its turn was so roughly: it goes on.
     rough = [
@@ -124,15 +125,13 @@ def _round(
     return _weighed(table, on_entry)
 
 
-def _scores(table: Table, starts: Sequence[Start]) -> dict[Key, float]:
+def _scores(table: Table, ends: Sequence[_End]) -> dict[Key, float]:
     """How many standard deviations the slope of each new hypothesis' last effect explains."""
-    new: dict[int, list[Start]] = {}
-    seen: set[Key] = set()
-    for start in starts:
-        is_added = set(start.effects[:-1]) == set(start.parent.effects)
-        if is_added and start.effects and start.key not in (*table.entries, *seen):
-            seen.add(start.key)
-            new.setdefault(id(start.parent), []).append(start)
+    new: dict[int, list[_End]] = {}
+    for end in ends:
+        is_added = set(end.effects[:-1]) == set(end.parent.effects)
+        if is_added and end.effects and end.key not in table.entries:
+            new.setdefault(id(end.parent), []).append(end)
     scores: dict[Key, float] = {}
     for own in new.values():
         found = score_tests(table.trials, own[0].parent.fit, [one.effects for one in own])

@@ -8,7 +8,7 @@ from galileo_jax.search.start import Start
 from galileo_jax.search.table import BASE, Table
 
 NAME = "jolt"
-MOST_JOLTED = 6
+MOST_JOLTED = 6  # those that the loop refines with care
 
 
 def propose(table: Table, most: int) -> list[Start]:
