@@ -1,7 +1,7 @@
 """What a camera, a coder and bodies that are no points add to the network's drawn motions.
 
 In a fit the same imperfections are covariance (`similarity/discrepancy.py`,
-`similarity/py`, `measurement/errors_at_rest.py`); here they are drawn.
+`similarity/hit_discrepancy.py`, `measurement/errors_at_rest.py`); here they are drawn.
 """
 
 from collections.abc import Callable
@@ -11,18 +11,10 @@ import jax
 import jax.numpy as jnp
 
 from galileo_jax.measurement.errors_at_rest import LEAST_SCALE, SHIFT_SHARE
-from galileo_jax.similarity import discrepancy
-from galileo_jax.similarity.hit_steps import STEP_SD_M
-from galileo_jax.statespace.kinematics import STILL_M_S
+from galileo_jax.similarity import discrepancy, hit_discrepancy
 
 NUM_WAVES = 8
 RESTS_M_S = 1e-4  # what is slower rests, in a motion without noise
-IMPULSE_SD = 0.001  # of a hit's impulse: faces are never quite square to the travel
-HIT_END_S = 0.005  # a soft hit takes so long to end, while friction pulls the bodies apart
-HIT_DRIFT_SD_M, HIT_DRIFT_S = 2e-4, 0.15  # trackers are pulled along by what they pass
-OWN_DRIFT_SD_M = 5e-5  # ours less
-PUSH_SD_M_S2, PUSH_S = 0.05, 0.2  # of boxes that turn a little at a hit while they are close
-CLOSE_M = 0.008  # half of a box 60 mm deep, against another, each turned by some eight degrees
 
 Normal = Callable[..., jax.Array]
 """Independent standard normal numbers of a shape; new ones with each call."""
@@ -70,13 +62,15 @@ def measured(
     gone = jnp.abs(x[1] - x[1, 0])
     is_after = gone > 1e-6
     at_hit = jnp.where(is_after.any(), x[:, jnp.argmax(is_after)], x[:, -1])
-    along = IMPULSE_SD * normal((2, 1)) * (x - at_hit[:, None])
-    step = STEP_SD_M * normal((2, 1))
+    along = hit_discrepancy.IMPULSE_SD * normal((2, 1)) * (x - at_hit[:, None])
+    step = hit_discrepancy.HIT_STEP_SD_M * normal((2, 1))
     # What moves no more drifts no more, and nothing pushes it any further.
     moves = jnp.abs(jnp.diff(x, prepend=x[:, :1])) > 1e-7
     moving_s = jax.lax.cummax(jnp.where(moves, times, 0.0), axis=1)
-    drift_sd_m = jnp.where(is_tracked_here > 0, OWN_DRIFT_SD_M, HIT_DRIFT_SD_M)
-    wave = _wave(moving_s / HIT_DRIFT_S, (2,), normal)
+    drift_sd_m = jnp.where(
+        is_tracked_here > 0, hit_discrepancy.OWN_DRIFT_SD_M, hit_discrepancy.HIT_DRIFT_SD_M
+    )
+    wave = _wave(moving_s / hit_discrepancy.HIT_DRIFT_S, (2,), normal)
     drift = is_filmed * drift_sd_m * wave
     further = _apart_after_hit(x, times, is_after, bodies, normal)
     m1, m2 = bodies.mass_kg
@@ -124,11 +118,11 @@ def _apart_after_hit(
     steps = jnp.diff(times, prepend=times[:1] - (times[1] - times[0]))
     apart = x[1] - x[0] - bodies.half_length_m.sum()
     speed = jnp.diff(x, append=x[:, -1:]) / steps
-    is_close = is_after & (apart < CLOSE_M)
-    is_close &= (speed > STILL_M_S).all(axis=0)
+    is_close = is_after & (apart < hit_discrepancy.CLOSE_M)
+    is_close &= (speed > hit_discrepancy.STILL_M_S).all(axis=0)
     # Once they are apart, or one rests, it is over.
     is_over = jax.lax.cummax((is_after & ~is_close).astype(x.dtype)) > 0
-    push = PUSH_SD_M_S2 * _wave(times / PUSH_S, (), normal)
+    push = hit_discrepancy.PUSH_SD_M_S2 * _wave(times / hit_discrepancy.PUSH_S, (), normal)
     push = jnp.where(is_close & ~is_over, push, 0.0)
     gained = jnp.cumsum(push * steps)
     further = jnp.cumsum((gained - push * steps / 2) * steps)
@@ -136,7 +130,7 @@ def _apart_after_hit(
     first = jnp.argmax(is_after)
     return (
         further
-        - HIT_END_S
+        - hit_discrepancy.HIT_END_S
         * _pulled_apart(speed, first, steps)
         * jnp.where(is_after, times - times[first], 0.0)
         * normal()
@@ -146,7 +140,7 @@ def _apart_after_hit(
 def _pulled_apart(speed: jax.Array, first: jax.Array, steps: jax.Array) -> jax.Array:
     """By friction after a hit, m/s^2, from the two frames after it; 0 where it presses together."""
     ahead = speed[1] - speed[0]
-    is_moving = (speed > STILL_M_S).all(axis=0)
+    is_moving = (speed > hit_discrepancy.STILL_M_S).all(axis=0)
     rate = (ahead[first + 1] - ahead[first]) / steps[first + 1]
     return jnp.where(is_moving[first + 1], jnp.maximum(rate, 0.0), 0.0)
 

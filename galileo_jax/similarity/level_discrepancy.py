@@ -6,8 +6,11 @@ round it. All of the wander counts: at hundreds of frames per second even its fa
 as the scatter, and neighbouring errors of what lies still go together.
 """
 
+from itertools import combinations, product
+
 import numpy as np
 
+from galileo_jax.clip.walls import bounces
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.observation.observation import Observation
 from galileo_jax.similarity.discrepancy import (
@@ -17,8 +20,9 @@ from galileo_jax.similarity.discrepancy import (
     offsets,
     wander,
 )
-from galileo_jax.similarity.hit_steps import hit_steps
+from galileo_jax.similarity.hit_discrepancy import HIT_STEP_SD_M
 
+NEAR = 1.15  # of the sum of the radii: so near are pucks that hit each other in some frame
 CENTRE_SHARE = 0.1  # of a radius: how far a followed point may be from the centre
 
 
@@ -33,7 +37,25 @@ def level_modes(observation: Observation, scene: Surroundings, is_filmed: bool) 
             found.append(own)
         size_m = WOBBLE_SD_M if observation.wander_m is None else observation.wander_m
         found.extend(wander(observation, size_m, WOBBLE_S, smallest=0.0))
-    found.extend(hit_steps(observation, scene))
+    for i, j in combinations(range(len(position)), 2):
+        both = observation.mask[i] & observation.mask[j]
+        apart = np.linalg.norm(position[j, :2] - position[i, :2], axis=0)
+        apart = np.where(both, apart, np.inf)
+        if apart.min() > NEAR * (scene.half_length_m[i] + scene.half_length_m[j]):
+            continue
+        hit = int(np.argmin(apart))
+        for k in (i, j):
+            for axis in range(2):
+                step = np.zeros_like(position)
+                step[k, axis, hit + 1 :] = HIT_STEP_SD_M
+                found.append(step)
+    for i, ends in product(range(len(position)), scene.walls_m):
+        seen = observation.mask[i]
+        for hit in bounces(position[i, :2], seen, ends, scene.half_length_m[i]):
+            for axis in range(2):
+                step = np.zeros_like(position)
+                step[i, axis, hit + 1 :] = HIT_STEP_SD_M
+                found.append(step)
     turned = position[:, 2] if observation.is_turning else observation.turned_rad
     if turned is not None:
         found.extend(_off_centre(position, turned, scene))

@@ -12,7 +12,7 @@ from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood, White
 from tests.ramp_model import HIT, make_surroundings
 
 FRAMES = 7
-NUM_DRAWS = 40_000
+NUM_DRAWS = 16_000
 SCENE = make_surroundings(HIT)
 
 

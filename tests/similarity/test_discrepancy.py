@@ -1,4 +1,4 @@
-"""What the modes may explain and what not: wobble across the path, a bent picture."""
+"""What the modes may explain and what not: wobble across the path, nothing before a hit."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.observation.observation import Observation
+from galileo_jax.similarity import hit_discrepancy
 from galileo_jax.similarity.discrepancy import (
     LENS_SD,
     ROUGH_SD_M,
@@ -16,7 +17,13 @@ from galileo_jax.similarity.discrepancy import (
     modes,
 )
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
-from galileo_jax.similarity.hit_steps import STEP_SD_M, hit_steps
+from galileo_jax.similarity.hit_discrepancy import (
+    CLOSE_M,
+    HIT_END_S,
+    PUSH_SD_M_S2,
+    _pushes,
+    _speeds_at,
+)
 from galileo_jax.similarity.level_discrepancy import level_modes
 from galileo_jax.similarity.noise_scale import fitted_noise_scale
 from tests.oracle_trials import observe
@@ -24,6 +31,12 @@ from tests.ramp_model import HIT, make_surroundings
 from tests.reference_ramp import solve
 
 SCENE = make_surroundings(HIT)
+STOPS = replace(HIT, friction=(0.34, 0.2))  # before object 2
+
+
+def covariance(observation):
+    """`[object, 2, frame, object, 2, frame]`, m^2."""
+    return covariance_of(modes(observation, SCENE))
 
 
 def covariance_of(patterns):
@@ -96,11 +109,28 @@ def test_ideal_tracks_have_the_noise_that_they_are_drawn_with():
     assert 0.93 < np.mean(found) < 1.02
 
 
+def test_a_hit_loosens_only_what_follows(hit):
+    """Object 2 stands still until then: nothing of a hit's modes is in its first frames."""
+    stops = observe(STOPS, 0, noise_m=0.0)
+    assert len(modes(hit, SCENE)) > len(modes(stops, SCENE))
+    hit_s = solve(HIT, hit.times_s).hit_s
+    assert hit_s is not None
+    frame = 1 / 30
+    calm, moved = hit.times_s < hit_s - frame, hit.times_s > hit_s + 2 * frame
+    x = covariance(hit)[1, 0, :, 1, 0, :]
+    # Of displacements from the first frame: offsets and keystone are common to both.
+    spread = np.diag(x) - 2 * x[0] + x[0, 0]
+    assert np.abs(spread[calm]).max() < 1e-4**2
+    assert spread[moved].min() > 1e-4**2
+
+
 def test_without_a_camera_only_the_bodies_are_left(hit):
-    """No keystone, roll and scale."""
+    """No keystone, roll, scale and drift: of both objects after the hit, else of all."""
     both, bodies = modes(hit, SCENE), modes(hit, SCENE, is_filmed=False)
     kept = np.array([any(np.array_equal(mode, other) for other in bodies) for mode in both])
-    assert len(bodies) == kept.sum() == len(both) - 4
+    assert len(bodies) == kept.sum() < len(both) - 4
+    is_everywhere = (both[~kept][..., 0] != 0).any(axis=(1, 2))
+    assert is_everywhere.sum() == 4, "two keystones, roll, scale; the others begin at the hit"
 
 
 def test_a_scale_that_says_how_well_it_is_known_is_not_widened_again(hit):
@@ -149,6 +179,83 @@ def test_a_lens_that_bends_a_flight_is_no_misfit():
     assert cost(ripple) > 100
 
 
+def soft_ends(experiment, monkeypatch):
+    """What of the modes is only there because hits end late."""
+    seen = observe(experiment, 0, noise_m=0.0)
+    whole = modes(seen, SCENE, is_filmed=False)
+    monkeypatch.setattr("galileo_jax.similarity.hit_discrepancy.HIT_END_S", 0.0)
+    less = modes(seen, SCENE, is_filmed=False)
+    return seen.times_s, [a - b for a, b in zip(whole, less, strict=True) if (a != b).any()]
+
+
+def test_a_hit_that_ends_late_parts_bodies_slower(monkeypatch):
+    """By what friction does to their relative speed meanwhile; momentum is kept."""
+    parts = replace(HIT, friction=(0.2, 0.1))
+    times, (mode,) = soft_ends(parts, monkeypatch)
+    hit_s = solve(parts, times).hit_s
+    assert hit_s is not None
+    after = (times > hit_s + 0.05) & (times < hit_s + 0.25)
+    rear, ahead = (np.polyfit(times[after], x[after], 1)[0] for x in mode[:, 0])
+    lacks = 9.81 * (0.2 - 0.1) * HIT_END_S
+    assert rear - ahead == pytest.approx(lacks, rel=0.15)
+    m1, m2 = parts.mass_kg
+    assert m1 * rear + m2 * ahead == pytest.approx(0.0, abs=0.1 * m1 * rear)
+    assert not mode[:, :, times < hit_s - 1 / 30].any()
+
+
+def test_bodies_that_friction_presses_together_do_not_part(monkeypatch):
+    _, found = soft_ends(replace(HIT, friction=(0.1, 0.2)), monkeypatch)
+    assert found == []
+
+
+def pushes(experiment):
+    """The modes of a push between bodies that are close, and when they come apart."""
+    seen = observe(experiment, 0, noise_m=0.0)
+    after = int(np.argmax(seen.times_s > solve(experiment, seen.times_s).hit_s)) + 1
+    hit = _speeds_at(after - 2, 1, seen.position_m, seen)
+    assert hit is not None
+    return seen.times_s, hit, np.array(_pushes(hit, seen.position_m, seen))
+
+
+@pytest.mark.parametrize("friction", [(0.2, 0.1), (0.1, 0.2)])
+def test_a_push_between_close_bodies_conserves_momentum(friction):
+    experiment = replace(HIT, friction=friction)
+    times, hit, found = pushes(experiment)
+    before = times < times[hit.frame]
+    assert found.any() and not found[..., before].any() and not found[:, :, 1].any()
+    m1, m2 = experiment.mass_kg
+    both = hit.both[:-1]
+    moved = m1 * found[:, 0, 0][:, both] + m2 * found[:, 1, 0][:, both]
+    assert np.abs(moved).max() < 0.1 * m1 * np.abs(found[:, 0, 0]).max()
+    # Their squares sum to what a random push of that size does: sd t^2 / 2 while it lasts.
+    apart = found[:, 1, 0] - found[:, 0, 0]
+    soon = times[both[3]] - (times[both[0]] + times[both[0] - 1]) / 2
+    expected = PUSH_SD_M_S2 * soon**2 / 2
+    assert np.sqrt((apart[:, both[3]] ** 2).sum()) == pytest.approx(expected, rel=0.1)
+
+
+def test_bodies_that_are_far_apart_no_longer_push():
+    """Friction pulls these apart: when they are, nothing but the speed then gained goes on."""
+    parts = replace(HIT, friction=(0.15, 0.01))
+    times, hit, found = pushes(parts)
+    apart = np.diff(solve(parts, times).position_m[:, 0], axis=0)[0]
+    far = hit.both[apart[hit.both] - apart[hit.both[0]] > 2 * CLOSE_M][:-1]
+    assert len(far) >= 4
+    gained = (found[:, 1, 0] - found[:, 0, 0])[:, far]
+    speed = np.diff(gained, axis=1) / np.diff(times[far])
+    assert np.abs(speed).max() > 1e-4
+    assert np.abs(np.diff(speed, axis=1)).max() < 1e-6
+
+
+def test_bodies_that_close_in_by_more_than_that_in_one_frame_do_not_push():
+    seen = observe(HIT, 0, noise_m=0.0)
+    after = int(np.argmax(seen.times_s > solve(HIT, seen.times_s).hit_s)) + 1
+    hit = _speeds_at(after - 2, 1, seen.position_m, seen)
+    assert hit is not None
+    seen.position_m[1, 0, hit.both[0]] += 2 * CLOSE_M
+    assert _pushes(hit, seen.position_m, seen) == []
+
+
 def test_pucks_wander_in_full_however_fast():
     """Between neighbouring frames, too, the wander changes as much as it says."""
     count, fps = 200, 240.0
@@ -166,13 +273,20 @@ def test_pucks_wander_in_full_however_fast():
     assert np.sum(step**2, axis=0) == pytest.approx(np.full(count - 1, expected), rel=0.01)
 
 
-def test_a_hit_shifts_only_what_follows(hit):
-    """Of both bodies, along the way, by a tenth of a millimetre; nobody is hit, no step."""
-    hit_s = solve(HIT, hit.times_s).hit_s
-    assert hit_s is not None
-    first, second = hit_steps(hit, SCENE)
-    for i, step in enumerate((first, second)):
-        assert not step[1 - i].any() and not step[i, 1].any()
-        assert not step[..., hit.times_s < hit_s - 1 / 30].any()
-        np.testing.assert_array_equal(step[i, 0, hit.times_s > hit_s + 2 / 30], STEP_SD_M)
-    assert hit_steps(observe(replace(HIT, friction=(0.34, 0.2)), 0, noise_m=0.0), SCENE) == []
+def test_a_video_tracked_here_drifts_past_a_hit_by_a_quarter_of_what_others_do():
+    frames = 60
+    times = np.arange(frames) / 60
+    x = np.stack([0.3 * times, 0.15 + 0.2 * np.maximum(times - 0.5, 0.0)])
+    seen = Observation(
+        names=("object1", "object2"),
+        times_s=times,
+        position_m=np.stack([x, 0 * x], axis=1),
+        covariance_m2=1e-8 * np.tile(np.eye(2)[None, ..., None], (2, 1, 1, frames)),
+        mask=np.ones((2, frames), bool),
+    )
+    hit, both = 30, (0, 1)
+    others, own = (
+        np.stack(hit_discrepancy._drift(hit, both, seen.position_m, one))
+        for one in (seen, replace(seen, noise_known_to=0.15))
+    )
+    np.testing.assert_allclose(np.sum(own**2), np.sum(others**2) / 16, rtol=0.01)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from galileo_jax.statespace.kinematics import NEAR_M, kinematics
+from galileo_jax.statespace.kinematics import kinematics
 from galileo_jax.statespace.path_deviation import deviations
 from galileo_jax.statespace.term import TERMS, Seen
 from tests.oracle_trials import observe
@@ -89,23 +89,3 @@ def test_times_that_are_late_shift_bodies_along_their_velocity():
     steady = steady[(steady > 4) & (steady < len(speed) - 4) & (speed[steady] > 0.2)]
     assert len(steady) > 5
     np.testing.assert_allclose(np.linalg.norm(shifts[0], axis=0)[steady], speed[steady], rtol=0.1)
-
-
-def test_bodies_that_are_far_apart_no_longer_push():
-    """Friction pulls these apart: when they are, nothing but the speed then gained goes on."""
-    parts = replace(HIT, friction=(0.15, 0.01))
-    seen = observe(parts, 0, noise_m=1e-6)
-    motion = kinematics(seen, SCENE)
-    assert motion is not None
-    [hit] = motion.hits
-    patterns = TERMS["contact_push"].patterns(Seen(seen, SCENE, motion))
-    gap = np.diff(seen.position_m[:, 0], axis=0)[0]
-    is_far = gap > gap[hit.step + 1 :].min() + 2 * NEAR_M
-    far = np.flatnonzero(
-        is_far[1:] & motion.moves.all(axis=0) & (np.arange(len(gap) - 1) > hit.step)
-    )
-    assert len(far) > 4
-    gained = (patterns[:, 1, 0] - patterns[:, 0, 0])[:, far]
-    speed = np.diff(gained, axis=1) / np.diff(motion.times_s[far])
-    assert np.abs(speed).max() > 1e-3
-    assert np.abs(np.diff(speed, axis=1)).max() < 1e-6 * np.abs(speed).max()
