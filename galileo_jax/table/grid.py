@@ -55,7 +55,9 @@ def read_grid(path: Path) -> Grid:
     lines = _lines(path, text)
     separator = _named(lines) or _separator([line for _, line in lines])
     rows = _split(path, lines, separator)
-    if all(not any(row[1:]) for _, row in rows) and any(m in rows[-1][1][0] for m in "\t;,"):
+    if all(not any(row[1:]) for _, row in rows) and any(
+        m in row[0] for _, row in rows for m in "\t;,"
+    ):
         # A spreadsheet that took each line for one cell puts quotes round it, or empty cells after.
         lines = [(number, row[0]) for number, row in rows]
         separator = _named(lines) or _separator([line for _, line in lines])

@@ -144,7 +144,7 @@ def _is_units(row: list[str]) -> bool:
 def _with_markers(above: Rows, counts: list[int]) -> tuple[Rows, list[int]]:
     """With titles for the three columns of each marker, where only the markers are named."""
     for line, row in above:
-        if row[0].lower() == MARKERS and not any(counts):
+        if row and row[0].lower() == MARKERS and not any(counts):
             titles = [f"{name} {axis}" for name in row[1:] if name for axis in "XYZ"]
             return [*above, (line, titles)], [*counts, len(titles)]
     return above, counts

@@ -248,6 +248,18 @@ def test_what_a_spreadsheet_saves_again_is_the_same(
         np.testing.assert_array_equal(getattr(back, field), getattr(written, field))
 
 
+def test_rows_in_one_cell_of_which_the_last_has_only_a_time(tmp_path: Path) -> None:
+    path = tmp_path / "saved.csv"
+    write_observation_csv(path, make_observation(1, False, 20))
+    written = read_observation_csv(path)
+    *lines, last = path.read_text().splitlines()
+    lines.append(last.split(",")[0])
+    path.write_text("".join(f'"{line}"\n' for line in lines))
+    back = read_observation_csv(path)
+    np.testing.assert_array_equal(back.times_s, written.times_s)
+    assert not back.mask[:, -1].any()
+
+
 def test_a_saved_track_is_known_for_ours(tmp_path: Path) -> None:
     """Also as a clip: by its titles, whatever separates them."""
     path = build_good_track(tmp_path)
