@@ -84,7 +84,7 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
 
     diagnosis, record = found.found, found.document
     shown = list(zip(diagnosis.candidates, record["candidates"], strict=True))[:NUM_CANDIDATES]
-    width = max(NAME_WIDTH, *(len(entry["effect"]) + 2 for _, entry in shown))
+    width = max([NAME_WIDTH, *(len(entry["effect"]) + 2 for _, entry in shown)])
     lines = ["", f"{'candidates':<{width}}{'probability':>12}{'evidence':>12}{'p':>9}  strength"]
     for made, entry in shown:
         strengths = diagnosis_text.strength_texts(made.effects, entry).values()
@@ -98,7 +98,7 @@ def _lines(found: "Diagnosis", hidden: str | None, out: Path) -> list[str]:
         )
     p_none = diagnosis_text.p_text(diagnosis.base.p_value)
     lines.append(f"{'none':<{width}}{record['probability_none']:>12.3f}{'+0.0':>12}{p_none:>9}")
-    lines += ["", found.sentence]
+    lines = [*(lines if shown else []), "", found.sentence]
     if hidden is not None:
         lines.append(f"truth: {hidden}")
     lines += [f"why: {sentence}" for sentence in diagnosis_text.why(found.verdict.reasons)]

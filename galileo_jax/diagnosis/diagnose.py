@@ -1,6 +1,6 @@
 """The loop: compare, ask which effect is missing, add it, and watch the error fall.
 
-1. Fit the model without effects; compare it with the data.
+1. Fit the model without effects; compare it with the data. Where nothing moves, that is all.
 2. Search for every effect of the library beside it, and for the forms without a physical name
    (`galileo_jax.search`, `model/effects/forms`). Rank all by log odds: the evidence, which charges
    for every parameter, and the prior, which charges for how many were tried. The model without
@@ -108,6 +108,10 @@ def diagnose(
     on_stage("comparing it with the data")
     first = Round(base, compare(trials, base.fit, seed))
     on_round(first)
+
+    if add in ("auto", "none") and not is_any_moving(trials):
+        still = Verdict("none", (), reasons=(reasons.nothing_moves(),))
+        return Diagnosis((first,), (), still)
 
     def on_entry(table: Table, entry: Entry) -> None:
         on_candidate(candidate_so_far(table, entry))
@@ -349,6 +353,15 @@ def _instead(
         said = reasons.imperfections_fail(rough.comparison)
         return None, replace(verdict, reasons=(*verdict.reasons, said))
     return None, verdict
+
+
+def is_any_moving(trials: JointProblem) -> bool:
+    """Whether any object is seen to leave where it stood."""
+    return any(
+        problem.observation.first_away(index) is not None
+        for problem in trials.problems
+        for index in range(len(problem.observation.names))
+    )
 
 
 def fitter_of(trials: JointProblem) -> GradientFitter:

@@ -7,6 +7,7 @@ from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.model.effects.forms.form import Form
+from galileo_jax.observation.observation import AWAY_M, AWAY_SD
 
 SMALLEST_P = 1e-12  # beyond it the tail is only extrapolated
 NOTABLE_NATS = 1.0  # a prior that is more of a lead than this is mentioned
@@ -32,6 +33,16 @@ def times_text(nats: float) -> str:
     if nats < log(PLAIN_ODDS):
         return f"{float(f'{exp(nats):.2g}'):g} times"  # 130, not 1.3e+02
     return f"10^{nats / log(10):.0f} times"
+
+
+def nothing_moves() -> Reason:
+    """No object is seen to move, so that no effect can show."""
+    return Reason(
+        "nothing_moves",
+        f"No object leaves its place by more than {AWAY_SD:g} times the error of its marks and "
+        f"{1e3 * AWAY_M:g} mm: what does not move shows no effect.",
+        {"least_sds": AWAY_SD, "least_m": AWAY_M},
+    )
 
 
 def without_effects(comparison: Comparison) -> tuple[Reason, ...]:

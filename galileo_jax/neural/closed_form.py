@@ -21,9 +21,9 @@ import jax
 import jax.numpy as jnp
 
 from galileo_jax.neural.seen import Seen
+from galileo_jax.observation.observation import AWAY_M, AWAY_SD
 
 AT_FOOT = 1.2  # half lengths either side of the foot where an object stands on two edges
-MOVED_SD, MOVED_M = 6.0, 3e-4  # beyond doubt
 LEAST_FRAMES = 4
 # What a camera does to the two kinds of slopes (discrepancy.py), so that errors start realistic.
 CAMERA_SD_M_S2 = 0.01
@@ -313,7 +313,7 @@ def _setting(seen: Seen) -> Setting:
         along_m=x1 * cos - y1 * sin,
         corner_m=seen.half_height_m * jnp.tan(seen.angle_rad / 2),
         margin_m=AT_FOOT * seen.half_length_m[0],
-        moved_m=jnp.maximum(MOVED_SD * seen.noise_m, MOVED_M),
+        moved_m=jnp.maximum(AWAY_SD * seen.noise_m, AWAY_M),
     )
 
 

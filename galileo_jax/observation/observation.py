@@ -11,6 +11,8 @@ UNMEASURED_SD_M = 10.0
 """Across the way of a motion of which one coordinate was measured: the error says nothing, and is
 still small enough for the other's to keep its digits in one covariance."""
 
+AWAY_SD, AWAY_M = 6.0, 3e-4  # an object farther than both from where it stood has moved
+STANDING_FRAMES = 5  # that say where it stood
 LEAST_SD_M = 1e-6
 """Smaller errors do not keep their digits beside it."""
 
@@ -133,6 +135,21 @@ class Observation:
         axes = 2 if self.is_turning else self.position_m.shape[1]
         place = self.position_m[index, :axes][:, seen]
         return PointPath(seen, self.times_s[seen], place, self.variance_m2[index, seen])
+
+    def first_away(self, index: int) -> int | None:
+        """The frame, among those in which it is seen, from which on an object is away.
+
+        Away from where it stood in the first frames, by more than the errors of its marks; in two
+        frames in a row, for one may be an outlier. None where it never is.
+        """
+        path = self.path(index)
+        if not len(path):
+            return None
+        stood = np.median(path.place_m[:, :STANDING_FRAMES], axis=1, keepdims=True)
+        away_m = np.linalg.norm(path.place_m - stood, axis=0)
+        is_away = away_m > np.maximum(AWAY_SD * np.sqrt(path.variance_m2), AWAY_M)
+        found = path.frames[:-1][is_away[:-1] & is_away[1:]]
+        return int(found[0]) if found.size else None
 
     def without(self, frames: slice, objects: slice | int = slice(None)) -> "Observation":
         """The observation in which objects count as not seen in some frames."""

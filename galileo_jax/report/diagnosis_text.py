@@ -68,6 +68,8 @@ def why(found: Sequence[Reason]) -> list[str]:
 def verdict(diagnosis: Diagnosis) -> str:
     """Which effect the model lacks, in one sentence."""
     found, first = diagnosis.verdict, diagnosis.base
+    if any(why.rule == "nothing_moves" for why in found.reasons):
+        return "Nothing moves: no effect can be told."
     if found.status == "none":
         noise = [why.sentence for why in found.reasons if why.rule == "noise_misstated"]
         adequate = f"The model is adequate: no effect is missing ({p_equals(first.p_value)})."

@@ -1,5 +1,6 @@
 """The whole loop on tracks that the package simulates: a strong effect is named, none is none."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +9,14 @@ import yaml
 
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import write_observation_csv
+from galileo_jax.diagnosis import diagnose as diagnose_module
 from galileo_jax.diagnosis.diagnose import diagnose
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.observation.observation import Observation
+from galileo_jax.report import diagnosis_text
 from galileo_jax.simulation.hidden import Hidden
 from galileo_jax.simulation.series import draw_series
 from tests.precision import in_64_bit
@@ -133,3 +136,17 @@ def test_noise_of_twice_the_stated_size_is_told_as_that(tmp_path):
     first = found.verdict.reasons[0]
     assert first.rule == "noise_misstated"
     assert first.numbers["noise_scale_largest"] == pytest.approx(2.0, abs=0.25)
+
+
+def test_where_nothing_moves_that_is_said_and_nothing_is_searched(tmp_path, monkeypatch):
+    """However little the model without effects describes what the camera did."""
+    trials = simulated(tmp_path, stated_m=1e-6, noise_m=1e-6)
+    (problem,) = trials.problems
+    seen = problem.observation
+    creeps = seen.position_m[..., :1] + 2e-6 * np.arange(len(seen.times_s))
+    still = replace(problem, observation=replace(seen, position_m=creeps))
+    monkeypatch.setattr(diagnose_module, "search", None)
+    found = diagnose(JointProblem((still,)))
+    assert found.verdict.status == "none" and found.candidates == ()
+    assert [why.rule for why in found.verdict.reasons] == ["nothing_moves"]
+    assert diagnosis_text.verdict(found) == "Nothing moves: no effect can be told."

@@ -90,3 +90,32 @@ def test_nothing_seen_is_said(tmp_path, track):
     hidden = replace(track, is_visible=np.zeros((1, 3), bool))
     with pytest.raises(InputError, match="object1 is not seen in any frame"):
         observe(clip(tmp_path, origin_px=None), hidden)
+
+
+def standing(sd_m: float, num: int = 30) -> Observation:
+    """One object that stands still, with the errors that are stated."""
+    errors = sd_m * np.random.default_rng(3).standard_normal((1, 2, num))
+    covariance = np.tile(sd_m**2 * np.eye(2)[None, ..., None], (1, 1, 1, num))
+    return Observation(
+        ("object1",), np.arange(num) / 30, errors, covariance, np.ones((1, num), bool)
+    )
+
+
+@pytest.mark.parametrize("sd_m", [1e-6, 1e-3])
+def test_the_frame_in_which_an_object_leaves_its_place(sd_m):
+    """By more than its errors and a third of a millimetre; one outlier is no motion."""
+    seen = standing(sd_m)
+    assert seen.first_away(0) is None
+    outlier = seen.position_m.copy()
+    outlier[0, 0, 12] += 0.1
+    assert replace(seen, position_m=outlier).first_away(0) is None
+    moved = seen.position_m.copy()
+    moved[0, 0, 20:] += 0.02
+    assert replace(seen, position_m=moved).first_away(0) == 20
+    creeps = seen.position_m + 2e-6 * np.arange(30)
+    assert replace(seen, position_m=creeps).first_away(0) is None
+
+
+def test_what_is_never_seen_leaves_no_place():
+    seen = standing(1e-3)
+    assert replace(seen, mask=np.zeros_like(seen.mask)).first_away(0) is None

@@ -18,8 +18,6 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.laws.pucks import START
 
-MOVED_SD, MOVED_M = 6.0, 3e-4  # an object farther than both from where it stood has moved
-STANDING_FRAMES = 5  # that say where it stood
 MOST_BOUNCES = 4  # off walls, before which a search stops on its way
 LEAST_FRAMES = 4  # before it moves: from fewer nothing is fitted
 
@@ -89,18 +87,9 @@ def before_moving(trials: JointProblem, index: int) -> JointProblem | None:
 
 def _before_moving(problem: Problem, index: int) -> Problem | None:
     seen = problem.observation
-    mask, position = seen.mask[index], seen.position_m[index]
-    there = np.flatnonzero(mask)
-    if there.size < LEAST_FRAMES:
+    if seen.mask[index].sum() < LEAST_FRAMES:
         return None
-    stood = np.median(position[:, there[:STANDING_FRAMES]], axis=1, keepdims=True)
-    variance = np.trace(seen.covariance_m2[index])[there] / 2
-    moved_m = np.maximum(MOVED_SD * np.sqrt(variance), MOVED_M)
-    is_away = np.linalg.norm((position - stood)[:, there], axis=0) > moved_m
-    # Sure only of two frames in a row: one may be an outlier.
-    away = there[:-1][is_away[:-1] & is_away[1:]]
+    away = seen.first_away(index)
     # It has been on its way for less than a frame when that is first seen.
-    first = int(away[0]) - 1 if away.size else len(seen.times_s)
-    if first < LEAST_FRAMES:
-        return None
-    return _until(problem, first)
+    first = len(seen.times_s) if away is None else away - 1
+    return None if first < LEAST_FRAMES else _until(problem, first)
