@@ -28,8 +28,8 @@ from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import ranked
-from galileo_jax.experiment.belief import beliefs_of
 from galileo_jax.experiment.choose import best_first, expect
+from galileo_jax.experiment.hypothesis_probabilities import beliefs_of
 from galileo_jax.experiment.measured import write_clip
 from galileo_jax.experiment.plan import middle
 from galileo_jax.experiment.settings import Can, Range, grid

@@ -24,8 +24,8 @@ from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.laws.source import proposed_file
 from galileo_jax.diagnosis.restricted_fit import restricted_fit
-from galileo_jax.experiment.belief import FILE, beliefs_of, write_beliefs
 from galileo_jax.experiment.choose import with_next
+from galileo_jax.experiment.hypothesis_probabilities import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior
 from galileo_jax.inference.fits.gradient import Code

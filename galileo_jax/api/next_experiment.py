@@ -12,7 +12,6 @@ from galileo_jax.api.diagnose import DOCUMENT, Diagnosis, diagnose, with_library
 from galileo_jax.api.run import load_run
 from galileo_jax.api.track import Track, tracks_of
 from galileo_jax.clip.schema import Clip
-from galileo_jax.experiment.belief import FILE, Beliefs, beliefs_of, read_beliefs
 from galileo_jax.experiment.choose import (
     Expected,
     best_first,
@@ -20,6 +19,7 @@ from galileo_jax.experiment.choose import (
     expect,
     sentence_of,
 )
+from galileo_jax.experiment.hypothesis_probabilities import FILE, Beliefs, beliefs_of, read_beliefs
 from galileo_jax.experiment.settings import check_can, grid, parse_can
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import effect_names, load_file

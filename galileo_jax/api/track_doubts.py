@@ -11,7 +11,7 @@ from galileo_jax.clip.declaration import CLICK_SD_PX
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import UNCERTAINTY_OF
 from galileo_jax.measurement.measure import Measurement
-from galileo_jax.measurement.segments.astray import longest_absence
+from galileo_jax.measurement.segments.track_failure import longest_absence
 
 FAR = 1000.0
 """chi2 per degree of freedom: residuals of thirty standard deviations on average. Few effects

@@ -11,10 +11,10 @@ import numpy as np
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnosis import Diagnosis
-from galileo_jax.experiment.belief import Belief, Beliefs, beliefs_of
 from galileo_jax.experiment.gain import about_hypotheses, about_parameter
+from galileo_jax.experiment.hypothesis_probabilities import Belief, Beliefs, beliefs_of
+from galileo_jax.experiment.predicted_experiment import Rehearsed, rehearse
 from galileo_jax.experiment.proposal import height_m, propose
-from galileo_jax.experiment.rehearsal import Rehearsed, rehearse
 from galileo_jax.experiment.settings import grid, parse_can, text_of
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.per_mass import is_any_weighed

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import log_softmax
 
-from galileo_jax.experiment.rehearsal import Rehearsed
+from galileo_jax.experiment.predicted_experiment import Rehearsed
 
 NUM_TRACKS = 256  # drawn from each hypothesis
 

@@ -28,7 +28,6 @@ from galileo_jax.measurement.infer_radii import (
 from galileo_jax.measurement.infer_sizes import SIZE_SD_M, infer_sizes, needs_sizes
 from galileo_jax.measurement.infer_slope import Slope, infer_slope, needs_slope
 from galileo_jax.measurement.path_direction import OtherWay, other_way, turned_back, way_text
-from galileo_jax.measurement.segments.astray import Astray, leaves_picture
 from galileo_jax.measurement.segments.segments import (
     HELD,
     Cut,
@@ -38,6 +37,7 @@ from galileo_jax.measurement.segments.segments import (
     segment,
 )
 from galileo_jax.measurement.segments.start_speed import on_ramp, start_speed
+from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.measurement.turning import with_turning
 from galileo_jax.measurement.wander_size import with_wander

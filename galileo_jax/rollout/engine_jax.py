@@ -15,7 +15,7 @@ from galileo_jax.rollout.devices import over_devices
 from galileo_jax.rollout.events import Motion, RollOut
 from galileo_jax.runtime.batching import MOTIONS, in_chunks, rounded_up
 from galileo_jax.runtime.batching import RECORDS as LONG
-from galileo_jax.runtime.on_device import OnDevice
+from galileo_jax.runtime.device_cache import OnDevice
 from galileo_jax.runtime.trace_cache import trace_cached
 
 RECORDS = 128  # rollouts' lengths are rounded up to multiples, so that clips share programs

@@ -10,7 +10,7 @@ from typing import Any
 import jax
 import numpy as np
 
-from galileo_jax.runtime import together
+from galileo_jax.runtime import call_merging
 
 # Sizes are rounded up to multiples of these, so that few programs serve all clips.
 FRAMES, RECORDS = 64, 512
@@ -64,7 +64,7 @@ def in_chunks(sizes: Sequence[int], function: Callable[..., Any], *batches: Any)
 
     if len(cuts) == 1:
         return jax.tree.map(np.array, part(*cuts[0]))  # JAX's own cannot be written to
-    if together.current() is not None:  # its calls are made with those of other threads
+    if call_merging.current() is not None:  # its calls are made with those of other threads
         parts = [part(*cut) for cut in cuts]
     else:  # XLA runs small operations, one after the other, on a single core
         parts = list(_pool(os.getpid()).map(lambda cut: part(*cut), cuts))
@@ -103,7 +103,7 @@ def one_at_a_time(function: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     def alone(*args: Any) -> Any:
-        if together.current() is not None:  # one thread makes all calls, and all others wait
+        if call_merging.current() is not None:  # one thread makes all calls, and all others wait
             return function(*args)
         with _LAPACK:
             return jax.block_until_ready(function(*args))

@@ -23,7 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
 
-from galileo_jax.runtime import together
+from galileo_jax.runtime import call_merging
 from galileo_jax.runtime.atomic_write import replacing
 
 FOLDER = "traces"  # in that of JAX's cache
@@ -63,7 +63,7 @@ class TraceCached:
         leaves, key = self._split(args)
         if any(isinstance(leaf, Tracer) for leaf in leaves):
             return self._jitted(*args)
-        group = together.current()
+        group = call_merging.current()
         if group is not None:
             return group.call(self, args)
         return self._held(key)([_array(leaf) for leaf in leaves])

@@ -12,12 +12,12 @@ from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
+from galileo_jax.studio.clip_state import Sheet, changed, opened, redone, undone
 from galileo_jax.studio.frames import Frames
 from galileo_jax.studio.jobs import Message, Worker
 from galileo_jax.studio.marks import Marks
 from galileo_jax.studio.marks_yaml import proposed
 from galileo_jax.studio.paths import videos
-from galileo_jax.studio.sheet import Sheet, changed, opened, redone, undone
 from galileo_jax.studio.shown import Results, with_partial
 from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import Store

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from galileo_jax.results.run import RESULT
 from galileo_jax.results.stale_outputs import DOCUMENTS, PREDICTION
-from galileo_jax.studio.sheet import Sheet
+from galileo_jax.studio.clip_state import Sheet
 from galileo_jax.studio.store import Store, fingerprint, yaml_content
 
 State = Literal["locked", "open", "done", "stale"]

@@ -5,9 +5,9 @@ from typing import Any
 
 from nicegui.element import Element
 
+from galileo_jax.studio.clip_state import Sheet
 from galileo_jax.studio.marks import CORNERS, handles
 from galileo_jax.studio.session import Session
-from galileo_jax.studio.sheet import Sheet
 
 WORDS = {"upper": "ramp", "foot": "foot", "stick1": "stick", "stick2": "stick"}
 WORDS |= {name: name[-1] for name in CORNERS}

@@ -9,7 +9,7 @@ import queue
 import threading
 from collections.abc import Iterable, Iterator
 
-from galileo_jax.runtime.together import Together
+from galileo_jax.runtime.call_merging import Together
 from galileo_jax.sweeping.task import Outcome, Task, attempt
 
 

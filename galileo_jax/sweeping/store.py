@@ -24,8 +24,8 @@ from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.measurement.path_direction import OtherWay
-from galileo_jax.measurement.segments.astray import Astray
 from galileo_jax.measurement.segments.segments import Cut, Segments
+from galileo_jax.measurement.segments.track_failure import Astray
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import check_folder, replacing, write_json
 from galileo_jax.runtime.errors import InputError

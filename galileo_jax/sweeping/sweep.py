@@ -19,13 +19,13 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
-from galileo_jax.sweeping.carry_out import COMPUTED, Report, carry_out
 from galileo_jax.sweeping.cell import Cell, make_cells
 from galileo_jax.sweeping.clip_files import ClipFiles
 from galileo_jax.sweeping.clip_rows import make_clip_rows
 from galileo_jax.sweeping.config import SweepConfig, load_config, make_configs
 from galileo_jax.sweeping.engine_local import EngineHere, EngineLocal
 from galileo_jax.sweeping.resources import Computing, num_workers
+from galileo_jax.sweeping.run_cells import COMPUTED, Report, carry_out
 from galileo_jax.sweeping.simulated import simulated_clips
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.summary import COLUMNS, Row, make_rows, write_tables

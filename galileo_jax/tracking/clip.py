@@ -12,8 +12,8 @@ from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
 from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.motion_compensation import Coding
-from galileo_jax.tracking.pieces import Start
 from galileo_jax.tracking.square_view import square_view
 from galileo_jax.tracking.template import Outline, grey
 from galileo_jax.tracking.track import Track

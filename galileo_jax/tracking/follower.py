@@ -8,9 +8,7 @@ from galileo_jax.tracking.exposure import MIN_SPEED_PX, Exposure, distinct, own_
 from galileo_jax.tracking.lucas_kanade import follow
 from galileo_jax.tracking.picture import Picture
 from galileo_jax.tracking.pose import patch_at, rotation
-from galileo_jax.tracking.refine import FINE_PX, Fit, align
-from galileo_jax.tracking.rigid import rigid_motion
-from galileo_jax.tracking.search import (
+from galileo_jax.tracking.redetect import (
     SURE,
     TURNS_RAD,
     Guess,
@@ -19,6 +17,8 @@ from galileo_jax.tracking.search import (
     candidate_poses,
     is_alike,
 )
+from galileo_jax.tracking.refine import FINE_PX, Fit, align
+from galileo_jax.tracking.rigid import rigid_motion
 from galileo_jax.tracking.template import Template, median_template
 
 FOUND, FOUND_AGAIN = 0.75, 0.85

@@ -6,9 +6,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from galileo_jax.observation.observation import stretches
-from galileo_jax.tracking.finish import Finished
+from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.noise import motion_variance, sudden
-from galileo_jax.tracking.pieces import Start
+from galileo_jax.tracking.poses_to_track import Finished
 from galileo_jax.tracking.refiner import velocities_at
 from galileo_jax.tracking.silhouette import MOST_MISSED, Path
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.tracking.exposure import LEARNT_FRAMES, Exposure
-from galileo_jax.tracking.finish import Finished, finished, joined
 from galileo_jax.tracking.follower import Follower
+from galileo_jax.tracking.fragments import Piece, Start, follow_on, keep_apart
 from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.picture import Picture
-from galileo_jax.tracking.pieces import Piece, Start, follow_on, keep_apart
+from galileo_jax.tracking.poses_to_track import Finished, finished, joined
 from galileo_jax.tracking.refiner import Refined, refine_pose, velocities_at
 from galileo_jax.tracking.second_opinion import needs_silhouette, with_silhouette
 from galileo_jax.tracking.silhouette import paths_of

@@ -14,8 +14,8 @@ from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.commands import command
 from galileo_jax.commands import fit as fit_command
 from galileo_jax.measurement.measure import Measurement
-from galileo_jax.measurement.segments.astray import Astray
 from galileo_jax.measurement.segments.segments import Segments
+from galileo_jax.measurement.segments.track_failure import Astray
 from galileo_jax.observation.observation import Observation
 
 ANGLE_DEG, SCALE = 20.0, 500.0

@@ -7,7 +7,7 @@ import pytest
 
 from galileo_jax.commands import command, sweep
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.sweeping import carry_out
+from galileo_jax.sweeping import run_cells
 from galileo_jax.sweeping.work import CellResult
 from tests.clip.broken_clips import build_good_track
 from tests.missing import needed_module
@@ -56,7 +56,7 @@ def calls(monkeypatch):
         document = {"converged": True, "parameters": quantities, "derived": derived}
         return CellResult(document | {"error": row}, page)
 
-    monkeypatch.setattr(carry_out, "run_cell", compute)
+    monkeypatch.setattr(run_cells, "run_cell", compute)
     return made
 
 
@@ -105,7 +105,7 @@ def test_goes_on_where_it_was_stopped(tmp_path, clips, calls, monkeypatch, capsy
     text = "grid: {seed: [0, 1, 2, 13]}"
     assert run(tmp_path, clips[:2], text, out="whole") == 0
     assert len(calls) == 8
-    compute, left = carry_out.run_cell, 3
+    compute, left = run_cells.run_cell, 3
 
     def stopped(*arguments):
         nonlocal left
@@ -116,7 +116,7 @@ def test_goes_on_where_it_was_stopped(tmp_path, clips, calls, monkeypatch, capsy
 
     calls.clear()
     with monkeypatch.context() as patched:
-        patched.setattr(carry_out, "run_cell", stopped)
+        patched.setattr(run_cells, "run_cell", stopped)
         assert run(tmp_path, clips[:2], text) == 130
     assert run(tmp_path, clips[:2], text) == 0
     assert len(calls) == len(set(calls)) == 8, "none is lost, and none computed twice"

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.special import log_softmax, logsumexp
 
-from galileo_jax.experiment import rehearsal
-from galileo_jax.experiment.belief import Belief
+from galileo_jax.experiment import predicted_experiment
 from galileo_jax.experiment.gain import about_hypotheses, about_parameter, log_density
+from galileo_jax.experiment.hypothesis_probabilities import Belief
+from galileo_jax.experiment.predicted_experiment import Rehearsed, rehearse
 from galileo_jax.experiment.proposal import propose
-from galileo_jax.experiment.rehearsal import Rehearsed, rehearse
 from galileo_jax.inference.joint_problem import JointProblem
 from tests.found import fit_of, make_trials
 from tests.precision import in_64_bit
@@ -140,15 +140,15 @@ def test_the_gain_is_that_of_brute_force(trials, height, monkeypatch, tmp_path):
     proposal = propose(clip_of(trials), trials, 1.0, {"height": height})
     ours = about_hypotheses(rehearse(proposal, trials, both, 0), np.zeros(2), MARGIN, 0)
 
-    monkeypatch.setattr(rehearsal, "NUM_DRAWS", 1023)
+    monkeypatch.setattr(predicted_experiment, "NUM_DRAWS", 1023)
     white = []
-    summary = rehearsal._summary
+    summary = predicted_experiment._summary
 
     def keep(u, rows, *rest):
         white.append(rows)
         return summary(u, rows, *rest)
 
-    monkeypatch.setattr(rehearsal, "_summary", keep)
+    monkeypatch.setattr(predicted_experiment, "_summary", keep)
     rehearse(proposal, trials, both, 1)
     generator = np.random.default_rng(5)
     gains = []

@@ -8,10 +8,10 @@ import pytest
 
 from galileo_jax.api.diagnose import Diagnosis
 from galileo_jax.api.next_experiment import next_experiment
-from galileo_jax.experiment.belief import beliefs_of, read_beliefs, write_beliefs
 from galileo_jax.experiment.choose import best_first, expect, with_next
+from galileo_jax.experiment.hypothesis_probabilities import beliefs_of, read_beliefs, write_beliefs
+from galileo_jax.experiment.predicted_experiment import rehearse
 from galileo_jax.experiment.proposal import MOST_FRAMES, height_m, propose, release_m
-from galileo_jax.experiment.rehearsal import rehearse
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.runtime.errors import InputError
 from tests.found import diagnosis_of, make_trials

@@ -9,7 +9,7 @@ from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.measurement.measure import inferred, measure
 from galileo_jax.measurement.segments.blow import arrest_frame, blow_frame
-from galileo_jax.measurement.segments.hand import hand_frame
+from galileo_jax.measurement.segments.handling import hand_frame
 from galileo_jax.measurement.segments.segments import HELD, STOPPED, STRUCK, Segments, segment
 from galileo_jax.observation.observation import Observation
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from galileo_jax.measurement.segments.hand import thrown_frame
+from galileo_jax.measurement.segments.handling import thrown_frame
 from galileo_jax.observation.observation import Observation
 
 G = np.array([0.0, -9.81])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from galileo_jax.measurement.segments.hand import let_go_frame
+from galileo_jax.measurement.segments.handling import let_go_frame
 from galileo_jax.measurement.segments.rest import standstill_frame
 from galileo_jax.observation.observation import Observation
 

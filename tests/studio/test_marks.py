@@ -7,6 +7,7 @@ import pytest
 import galileo_jax as gx
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.check import remarks_on
+from galileo_jax.studio.clip_state import Step, _step, changed, opened, redone, undone
 from galileo_jax.studio.marks import (
     CORNERS,
     Marks,
@@ -19,7 +20,6 @@ from galileo_jax.studio.marks import (
     without_object,
 )
 from galileo_jax.studio.marks_yaml import blank, declared, labels, proposed
-from galileo_jax.studio.sheet import Step, _step, changed, opened, redone, undone
 from galileo_jax.studio.stages import Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import FILE, Store
 from tests.studio.clips import clip_in

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from galileo_jax.measurement.segments.astray import Astray
 from galileo_jax.measurement.segments.segments import Segments
+from galileo_jax.measurement.segments.track_failure import Astray
 from galileo_jax.runtime.atomic_write import write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.cell import Cell, make_cells

@@ -8,7 +8,7 @@ import pytest
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import Cancelled
-from galileo_jax.sweeping import carry_out
+from galileo_jax.sweeping import run_cells
 from galileo_jax.sweeping import sweep as sweeping
 from galileo_jax.sweeping.sweep import sweep
 from galileo_jax.sweeping.work import CellResult
@@ -43,7 +43,7 @@ def computed(monkeypatch):
         page = {} if page_folder is None else {"report.html": b"<title>a page</title>"}
         return CellResult(DOCUMENT, page)
 
-    monkeypatch.setattr(carry_out, "run_cell", compute)
+    monkeypatch.setattr(run_cells, "run_cell", compute)
     return made
 
 
@@ -121,7 +121,7 @@ def test_a_fit_that_is_cancelled_is_no_failure(clips, tmp_path, monkeypatch):
     def compute(settings, measured, page_folder):
         raise Cancelled("cancelled")
 
-    monkeypatch.setattr(carry_out, "run_cell", compute)
+    monkeypatch.setattr(run_cells, "run_cell", compute)
     with pytest.raises(Cancelled):
         sweep({"clips": clips}, out=tmp_path / "out", workers=0)
     assert not list((tmp_path / "out").glob("cells/*"))

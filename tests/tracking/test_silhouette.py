@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from galileo_jax.tracking.finish import Finished, finished
+from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.motion_compensation import Coding
-from galileo_jax.tracking.pieces import Start
+from galileo_jax.tracking.poses_to_track import Finished, finished
 from galileo_jax.tracking.refiner import Refined
 from galileo_jax.tracking.second_opinion import ON_OBJECT, with_silhouette
 from galileo_jax.tracking.silhouette import Part, Path, paths_of

@@ -9,7 +9,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.parameters import PriorTable
 from galileo_jax.runtime.batching import FRAMES, SPARE_MODES, rounded_up
-from galileo_jax.runtime.on_device import OnDevice
+from galileo_jax.runtime.device_cache import OnDevice
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 

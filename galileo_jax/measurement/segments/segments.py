@@ -29,7 +29,6 @@ from jaxtyping import Int
 from galileo_jax.clip.poses_csv import read_poses_csv
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
-from galileo_jax.measurement.segments.astray import Astray, find_astray
 from galileo_jax.measurement.segments.blow import (
     SMEARED_FRAMES,
     arrest_frame,
@@ -37,7 +36,8 @@ from galileo_jax.measurement.segments.blow import (
     goes_on,
 )
 from galileo_jax.measurement.segments.bounce import bounce_frame
-from galileo_jax.measurement.segments.hand import (
+from galileo_jax.measurement.segments.foreign_impact import stranger_frame
+from galileo_jax.measurement.segments.handling import (
     hand_frame,
     let_go_frame,
     pushed_frame,
@@ -46,7 +46,7 @@ from galileo_jax.measurement.segments.hand import (
 from galileo_jax.measurement.segments.ramp_ends import ramp_end
 from galileo_jax.measurement.segments.rate_change import rate_change
 from galileo_jax.measurement.segments.rest import placed_frames, rest_frame, standstill_frame
-from galileo_jax.measurement.segments.strangers import stranger_frame
+from galileo_jax.measurement.segments.track_failure import Astray, find_astray
 from galileo_jax.measurement.toss_flight import last_free_frame
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track

@@ -19,7 +19,7 @@ import numpy as np
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.clip.walls import distance_to_wall
-from galileo_jax.measurement.segments.strangers import jumps
+from galileo_jax.measurement.segments.foreign_impact import jumps
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 

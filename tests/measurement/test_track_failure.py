@@ -11,7 +11,7 @@ import pytest
 import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import Measurement, measure
-from galileo_jax.measurement.segments.astray import longest_absence
+from galileo_jax.measurement.segments.track_failure import longest_absence
 from galileo_jax.observation.observation import Observation
 from galileo_jax.video import decode
 

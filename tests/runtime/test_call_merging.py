@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from galileo_jax.runtime.call_merging import Together, current
 from galileo_jax.runtime.progress import Cancelled
-from galileo_jax.runtime.together import Together, current
 from galileo_jax.runtime.trace_cache import trace_cached
 
 

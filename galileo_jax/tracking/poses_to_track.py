@@ -8,6 +8,7 @@ import numpy as np
 
 from galileo_jax.clip.declaration import CLICK_SD_PX
 from galileo_jax.observation.observation import stretches
+from galileo_jax.tracking.fragments import Piece
 from galileo_jax.tracking.motion_compensation import Coding, without_coding_shift
 from galileo_jax.tracking.noise import (
     BLOW_KNOWN_TO,
@@ -21,7 +22,6 @@ from galileo_jax.tracking.noise import (
     slow_scale2,
     speed_scale2,
 )
-from galileo_jax.tracking.pieces import Piece
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.tracking.refiner import Refined
 

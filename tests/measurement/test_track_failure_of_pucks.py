@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from galileo_jax.clip.schema import Clip, ClipObject
-from galileo_jax.measurement.segments.astray import Astray, find_astray
 from galileo_jax.measurement.segments.segments import Segments
+from galileo_jax.measurement.segments.track_failure import Astray, find_astray
 from galileo_jax.observation.observation import Observation
 from galileo_jax.tracking.track import Track
 

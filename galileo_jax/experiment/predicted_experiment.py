@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import jax.numpy as jnp
 import numpy as np
 
-from galileo_jax.experiment.belief import Belief
+from galileo_jax.experiment.hypothesis_probabilities import Belief
 from galileo_jax.experiment.proposal import Proposal, seen_as
 from galileo_jax.inference.fits.normal_matrix import symmetric_root
 from galileo_jax.inference.joint_problem import JointProblem
