@@ -49,6 +49,7 @@ from galileo_jax.diagnosis.verdict import (
     PAIR_P,
     UNEVEN,
     best_named,
+    decisive_margin,
     explains,
     form_that_leads,
     is_about_pairs,
@@ -100,105 +101,188 @@ def diagnose(
     Raises:
       ValueError: `add` names no effect of the trials' models.
     """
-    fitter = fitter_of(trials)
-    if add not in ("auto", "none"):
+    is_given = add not in ("auto", "none")
+    if is_given:
         trials.free([add])  # raises for unknown names
-    on_stage("fitting the model without effects")
-    base = Hypothesis((), fitter.fit(seed, on_stage, effects=()))
-    on_stage("comparing it with the data")
-    first = Round(base, compare(trials, base.fit, seed))
-    on_round(first)
-
-    if add in ("auto", "none") and not is_any_moving(trials):
+    listener = _Listener(on_stage, on_round, on_candidate)
+    fitter = fitter_of(trials)
+    base, first = _without_effects(fitter, seed, listener)
+    if not is_given and not is_any_moving(trials):
         still = Verdict("none", (), reasons=(reasons.nothing_moves(),))
         return Diagnosis((first,), (), still)
-
-    def on_entry(table: Table, entry: Entry) -> None:
-        on_candidate(candidate_so_far(table, entry))
-
-    stakes = VerdictStakes(trials, first.comparison.is_adequate)
-    table = Table.of(fitter, stakes, seed, base)
-    on_stage(f"fitting {len(table.library)} candidates")
-    table = search(table, 1, on_entry)
-    if table.base.fit is not base.fit:
-        on_stage("comparing a better fit without effects with the data")
-        base = table.base
-        first = Round(base, compare(trials, base.fit, seed))
-        on_round(first)
-        stakes = replace(stakes, is_adequate=first.comparison.is_adequate)
-        table = search(replace(table, stakes=stakes), 1, on_entry)
-    rounds, is_adequate, decisive = [first], stakes.is_adequate, stakes.decisive
-    candidates = candidates_of(table)
+    table, first = _with_one_effect(fitter, base, first, seed, listener)
+    rounds, candidates = [first], candidates_of(table)
     for candidate in candidates:
         on_candidate(candidate)
-    if add not in ("auto", "none"):
+    if is_given:
         chosen = next(c for c in candidates if c.effects == (add,))
-        rounds.append(Round(chosen.hypothesis, compare(trials, chosen.hypothesis.fit, seed)))
-        on_round(rounds[-1])
+        rounds.append(_round_of(trials, chosen, seed, {}, listener))
     why = reasons.without_effects(first.comparison)
-    if is_nothing_missing(is_adequate, candidates):
+    if is_nothing_missing(first.comparison.is_adequate, candidates):
         why = (*why, reasons.nothing_convinces(best_named(candidates), CONVINCING))
         return Diagnosis(tuple(rounds), candidates, Verdict("none", (), reasons=why))
-
-    on_stage("comparing the best candidates with the data")
     compared: Comparisons = {}
-    candidates = _compared(trials, candidates, decisive, seed, compared)
-    rough, verdict = None, None
-    if not is_adequate:
-        on_stage("allowing for imperfections")
-        rough = imperfect_world(trials, base, decisive, seed)
-    if rough is not None and not rough.is_beaten_by(candidates):
-        rough = rough.with_candidates(trials, candidates, seed)
-        verdict = _in_imperfect_world(trials, rough, on_stage)
-        if verdict.status == "unknown" or set(verdict.effects) & set(AS_EFFECTS.values()):
-            verdict = None  # a pair or a formula may explain it
-    views: list[View] = []
-    if verdict is None:
-        found = _searched(table, candidates, decisive, compared, on_stage, on_entry)
-        verdict, candidates, views = found.verdict, found.candidates, found.views
-        why = (*why, *found.reasons)
-        if not is_adequate and (verdict.status in ("unknown", "law") or is_about_pairs(verdict)):
-            rough, verdict = _instead(trials, rough, verdict, candidates, seed, on_stage)
-        else:
-            rough = None
-    if rough is not None:
-        candidates = rough.with_the_rest(candidates)
-        first = Round(rough.base, rough.comparison)
-        if verdict.status == "none":
-            rounds = [first, *rounds[1:]]
-            on_round(first)
+    found = _concluded(table, first, candidates, compared, listener)
+    verdict, candidates, rough = found.verdict, found.candidates, found.rough
+    if rough is not None and verdict.status == "none":
+        rounds = [Round(rough.base, rough.comparison), *rounds[1:]]
+        on_round(rounds[0])
     verdict = with_known_constants(trials, verdict, candidates, seed)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     if rough is not None and verdict.effects in UNEVEN:
-        rounds.append(replace(first, called=verdict.effects))
+        rounds.append(Round(rough.base, rough.comparison, called=verdict.effects))
         on_round(rounds[-1])
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
-        fit, comparison = compared.get(chosen.effects, (None, None))
-        if comparison is None or fit is not chosen.hypothesis.fit:
-            comparison = compare(chosen.hypothesis.of(trials), chosen.hypothesis.fit, seed)
-        rounds.append(Round(chosen.hypothesis, comparison))
-        on_round(rounds[-1])
+        known = compared if rough is None else {}
+        rounds.append(_round_of(trials, chosen, seed, known, listener))
     scene = trials.problems[0].model.scene.surroundings
     verdict = replace(verdict, advice=advice(verdict, scene, len(trials.problems)))
     missing = None
     if verdict.status in ("unknown", "law"):
         formula = best_formula(candidates)
-        around = formula.hypothesis if formula is not None and explains(formula) else base
-        missing = infer_missing_force(trials, around, seed, views)
+        around = formula.hypothesis if formula is not None and explains(formula) else table.base
+        missing = infer_missing_force(trials, around, seed, found.views)
+    left_out, each = _clip_by_clip(trials, table.base, rounds, listener)
+    return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each)
+
+
+@dataclass(frozen=True)
+class _Listener:
+    """Who is told of what is done and found, see `diagnose`."""
+
+    on_stage: Callable[[str], None]
+    on_round: Callable[[Round], None]
+    on_candidate: Callable[[Candidate], None]
+
+    def on_entry(self, table: Table, entry: Entry) -> None:
+        """Tells of a row of a search."""
+        self.on_candidate(candidate_so_far(table, entry))
+
+
+def _without_effects(
+    fitter: GradientFitter, seed: int, listener: _Listener
+) -> tuple[Hypothesis, Round]:
+    """The model without effects, and its comparison with the data."""
+    listener.on_stage("fitting the model without effects")
+    base = Hypothesis((), fitter.fit(seed, listener.on_stage, effects=()))
+    listener.on_stage("comparing it with the data")
+    first = Round(base, compare(fitter.trials, base.fit, seed))
+    listener.on_round(first)
+    return base, first
+
+
+def _with_one_effect(
+    fitter: GradientFitter, base: Hypothesis, first: Round, seed: int, listener: _Listener
+) -> tuple[Table, Round]:
+    """The table of single effects; the first round again, if its model was fitted better."""
+    trials = fitter.trials
+    stakes = VerdictStakes(trials, first.comparison.is_adequate)
+    table = Table.of(fitter, stakes, seed, base)
+    listener.on_stage(f"fitting {len(table.library)} candidates")
+    table = search(table, 1, listener.on_entry)
+    if table.base.fit is base.fit:
+        return table, first
+    listener.on_stage("comparing a better fit without effects with the data")
+    first = Round(table.base, compare(trials, table.base.fit, seed))
+    listener.on_round(first)
+    stakes = VerdictStakes(trials, first.comparison.is_adequate)
+    return search(replace(table, stakes=stakes), 1, listener.on_entry), first
+
+
+@dataclass(frozen=True)
+class _Conclusion:
+    """The verdict, and the world in which it is true.
+
+    Attributes:
+      verdict: without what is said of the model without effects.
+      candidates: on which it is, ranked.
+      views: of the missing force, where formulas were looked for.
+      rough: the imperfect world; None: the exact one.
+    """
+
+    verdict: Verdict
+    candidates: tuple[Candidate, ...]
+    views: Sequence[View] = ()
+    rough: ImperfectWorld | None = None
+
+
+def _concluded(
+    table: Table,
+    first: Round,
+    candidates: tuple[Candidate, ...],
+    compared: Comparisons,
+    listener: _Listener,
+) -> _Conclusion:
+    """What is missing, where something is.
+
+    Args:
+      table: of the search for single effects.
+      first: the model without effects, compared with the data.
+      candidates: of the table, ranked.
+      compared: comparisons by effects; those made here are added.
+      listener: told what is being done.
+    """
+    trials, seed, on_stage = table.trials, table.seed, listener.on_stage
+    is_adequate = first.comparison.is_adequate
+    decisive = decisive_margin(is_adequate)
+    on_stage("comparing the best candidates with the data")
+    candidates = _compared(trials, candidates, decisive, seed, compared)
+    rough = None
+    if not is_adequate:
+        on_stage("allowing for imperfections")
+        rough = imperfect_world(trials, table.base, decisive, seed)
+    if rough is not None and not rough.is_beaten_by(candidates):
+        rough = rough.with_candidates(trials, candidates, seed)
+        verdict = _in_imperfect_world(trials, rough, on_stage)
+        is_uneven = bool(set(verdict.effects) & set(AS_EFFECTS.values()))
+        if verdict.status != "unknown" and not is_uneven:
+            return _Conclusion(verdict, rough.with_the_rest(candidates), (), rough)
+    # A pair or a formula may explain it.
+    found = _searched(table, candidates, decisive, compared, listener)
+    verdict, candidates = found.verdict, found.candidates
+    if is_adequate or not (verdict.status in ("unknown", "law") or is_about_pairs(verdict)):
+        rough = None
+    else:
+        rough, verdict = _instead(trials, rough, verdict, candidates, seed, on_stage)
+    if rough is not None:
+        candidates = rough.with_the_rest(candidates)
+    verdict = replace(verdict, reasons=(*found.reasons, *verdict.reasons))
+    return _Conclusion(verdict, candidates, found.views, rough)
+
+
+def _round_of(
+    trials: JointProblem,
+    chosen: Candidate,
+    seed: int,
+    compared: Comparisons,
+    listener: _Listener,
+) -> Round:
+    """A candidate as it is added to the model, compared with the data."""
+    fit, comparison = compared.get(chosen.effects, (None, None))
+    if comparison is None or fit is not chosen.hypothesis.fit:
+        comparison = compare(chosen.hypothesis.of(trials), chosen.hypothesis.fit, seed)
+    added = Round(chosen.hypothesis, comparison)
+    listener.on_round(added)
+    return added
+
+
+def _clip_by_clip(
+    trials: JointProblem, base: Hypothesis, rounds: Sequence[Round], listener: _Listener
+) -> tuple[tuple[tuple[str, float, float], ...], tuple[EachClip, ...]]:
+    """How each clip is predicted from the others, and what it is by itself; none of one clip."""
+    if len(trials.problems) == 1:
+        return (), ()
     left_out: tuple[tuple[str, float, float], ...] = ()
-    if len(trials.problems) > 1 and len(rounds) > 1:
-        on_stage("predicting each clip from the others")
+    if len(rounds) > 1:
+        listener.on_stage("predicting each clip from the others")
         before, after = (
             leave_one_out_rmse(one.hypothesis.of(trials), one.hypothesis)
             for one in (rounds[0], rounds[-1])
         )
         left_out = tuple(zip((p.name for p in trials.problems), before, after, strict=True))
-    each: tuple[EachClip, ...] = ()
-    if len(trials.problems) > 1:
-        on_stage("looking at each clip by itself")
-        each = each_clip(trials, base.fit, rounds[0].comparison)
-    return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each)
+    listener.on_stage("looking at each clip by itself")
+    return left_out, each_clip(trials, base.fit, rounds[0].comparison)
 
 
 @dataclass(frozen=True)
@@ -223,8 +307,7 @@ def _searched(
     candidates: tuple[Candidate, ...],
     decisive: float,
     compared: Comparisons,
-    on_stage: Callable[[str], None],
-    on_entry: Callable[[Table, Entry], None],
+    listener: _Listener,
 ) -> _Searched:
     """Pairs and, where these or what they say is not enough, formulas, in an exact world.
 
@@ -233,10 +316,10 @@ def _searched(
       candidates: these, ranked, compared with the data.
       decisive: nats by which one hypothesis must be ahead of another.
       compared: comparisons by effects; those made here are added.
-      on_stage: told what is being done.
-      on_entry: see `search`.
+      listener: told what is being done and found.
     """
     trials, seed = table.trials, table.seed
+    on_stage, on_entry = listener.on_stage, listener.on_entry
     single, form = best_named(candidates), form_that_leads(candidates)
     is_needed = needs_pairs(candidates)
     on_stage("fitting pairs of effects")
