@@ -24,10 +24,9 @@ from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.moves import MOVES
 from galileo_jax.search.score_tests import score_tests
 from galileo_jax.search.start import Start
-from galileo_jax.search.table import BASE, Entry, Key, Table, ask
+from galileo_jax.search.table import BASE, CHANGED_NATS, Entry, Key, Table, ask
 
 MOST_ROUNDS = 4
-CHANGED_NATS = 1.0  # by which the evidence of what may decide has changed
 NUM_AT_ONCE = 8  # refined in one batch: the sooner the first can be shown
 MOST_WITH_CARE = 6  # hypotheses whose every end is refined until it has settled
 MOST_REFINED = 24  # hypotheses of several effects in a round, those that come nearest

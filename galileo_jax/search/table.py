@@ -14,6 +14,7 @@ from galileo_jax.search.hypothesis import Hypothesis
 
 BASE: frozenset[str] = frozenset()
 Key = frozenset[str]
+CHANGED_NATS = 1.0  # by which the evidence of what may decide has changed
 SAME_NATS = 3.0  # by which the evidence of a parent differs that is worth asking again
 
 
@@ -53,14 +54,18 @@ class Entry:
     score_z: float
 
     def with_fits(self, fits: Sequence[GradientFit], by: float = 0.0) -> "Entry":
-        """The same with more fits; one that is better `by` nats takes the place of the old one."""
-        every = (*self.fits, *fits)
+        """The same with more fits; one that is better `by` nats takes the place of the old one.
+
+        Evidence by rollouts is that of the posterior, whatever was refined: it goes where the new
+        fit is better by `CHANGED_NATS`, for its valley was not known.
+        """
+        every, known = (*self.fits, *fits), self.hypothesis
         best = max(every, key=lambda fit: fit.log_evidence)
-        if best.log_evidence <= self.hypothesis.fit.log_evidence + by:
+        gain = best.log_evidence - known.fit.log_evidence
+        if gain <= by:
             return replace(self, fits=every)
-        return replace(
-            self, fits=every, hypothesis=replace(self.hypothesis, fit=best, weighed=None)
-        )
+        weighed = known.weighed if gain < CHANGED_NATS else None
+        return replace(self, fits=every, hypothesis=replace(known, fit=best, weighed=weighed))
 
 
 @dataclass(frozen=True, eq=False)
