@@ -62,8 +62,9 @@ def search(
       on_entry: called with a table and each of its rows that is new or better, as soon as that is.
       starts: where to look first, beside what the moves propose.
     """
+    table = replace(table, most_effects=most)
     for _ in range(MOST_ROUNDS):
-        proposed = [*starts, *(one for move in MOVES.values() for one in move(table, most))]
+        proposed = [*starts, *(one for move in MOVES.values() for one in move(table))]
         if not proposed:
             break
         before = table

@@ -79,6 +79,7 @@ class Table:
       entries: by the effects, in no order; that without effects is always there.
       asked: what moves proposed already: name of the move, of what, from which evidence.
       num_rounds: of the loop, so far.
+      most_effects: at once, of the hypotheses that are looked for.
     """
 
     fitter: GradientFitter
@@ -87,6 +88,7 @@ class Table:
     entries: Mapping[Key, Entry]
     asked: frozenset[tuple[str, Key, Key, float]] = field(default=frozenset())
     num_rounds: int = 0
+    most_effects: int = 1
 
     @classmethod
     def of(cls, fitter: GradientFitter, stakes: Stakes, seed: int, base: Hypothesis) -> "Table":

@@ -63,6 +63,11 @@ def only(table: Table, *sets: tuple[str, ...]) -> Table:
     return replace(table, entries={k: e for k, e in table.entries.items() if k in keys})
 
 
+def of_two(table: Table) -> Table:
+    """The table when hypotheses of two effects are looked for."""
+    return replace(table, most_effects=2)
+
+
 def test_every_file_of_the_folder_is_a_move():
     assert set(MOVES) == {"add", "copy_shape", "drop", "jolt", "scatter", "swap"}
 
@@ -70,13 +75,13 @@ def test_every_file_of_the_folder_is_a_move():
 def test_every_effect_is_added_once_and_every_pair_to_the_better_of_its_effects(table):
     with in_64_bit():
         some = only(table, LIBRARY[:1], LIBRARY[1:])
-        singles = add.propose(some, 1)
-        both = add.propose(with_evidence(some, LIBRARY[1:], 1e6), 2)
+        singles = add.propose(some)
+        both = add.propose(of_two(with_evidence(some, LIBRARY[1:], 1e6)))
         base = some.base
         asked = {
             ("add", base.key, frozenset([name]), base.fit.log_evidence // 3) for name in LIBRARY
         }
-        again = add.propose(replace(some, asked=frozenset(asked)), 1)
+        again = add.propose(replace(some, asked=frozenset(asked)))
     assert {start.effects for start in singles} == {(name,) for name in LIBRARY}
     pairs = {(start.parent.effects, start.effects) for start in both if len(start.effects) == 2}
     assert pairs == {(LIBRARY[1:], (LIBRARY[1], LIBRARY[0]))}
@@ -88,7 +93,7 @@ def test_every_effect_is_added_once_and_every_pair_to_the_better_of_its_effects(
 def test_the_leader_s_effect_is_swapped_for_every_other(table):
     with in_64_bit():
         leading = with_evidence(only(table, LIBRARY[:1], LIBRARY[1:]), LIBRARY[:1], 1e6)
-        starts = swap.propose(leading, 1)
+        starts = swap.propose(leading)
     assert {start.effects for start in starts} == {LIBRARY[1:]}
     m1 = leading.trials.names.index("m1")
     leader = leading.entries[frozenset(LIBRARY[:1])].hypothesis
@@ -97,7 +102,7 @@ def test_the_leader_s_effect_is_swapped_for_every_other(table):
 
 def test_jolts_are_of_positive_nuisances_alone(table):
     with in_64_bit():
-        starts = jolt.propose(only(table, LIBRARY[:1]), 1)
+        starts = jolt.propose(only(table, LIBRARY[:1]))
     fit = table.entries[frozenset(LIBRARY[:1])].hypothesis.fit
     moved = np.any([start.z != fit.z[: len(start.z)] for start in starts], axis=0)
     roles = {
@@ -109,10 +114,10 @@ def test_jolts_are_of_positive_nuisances_alone(table):
 def test_pairs_are_scattered_where_nothing_explains_the_data(table, monkeypatch):
     with in_64_bit():
         monkeypatch.setattr(GradientFitter, "is_explained", lambda *_: False)
-        starts = scatter.propose(table, 2)
-        assert scatter.propose(table, 1) == []
+        starts = scatter.propose(of_two(table))
+        assert scatter.propose(table) == []
         monkeypatch.setattr(GradientFitter, "is_explained", lambda *_: True)
-        assert scatter.propose(table, 2) == []
+        assert scatter.propose(of_two(table)) == []
     assert {start.key for start in starts} == {frozenset(LIBRARY)}
     assert len(starts) == scatter.NUM_STARTS
 
@@ -126,7 +131,7 @@ def test_a_missed_valley_of_the_model_without_effects_is_found(table):
     missed = replace(base, z=worse, log_evidence=base.log_evidence - BEHIND)
     some = only(table, LIBRARY[:1]).with_entry(Entry(Hypothesis((), missed), (missed,), 0.0))
     with in_64_bit():
-        starts = drop.propose(some, 1)
+        starts = drop.propose(some)
         found = search(some, 1, starts=starts).base
     assert {start.effects for start in starts} == {()}
     assert found.fit.log_evidence == pytest.approx(base.log_evidence, abs=FOUND)
@@ -135,7 +140,7 @@ def test_a_missed_valley_of_the_model_without_effects_is_found(table):
 
 def test_a_good_fit_is_not_looked_for_again(table):
     with in_64_bit():
-        assert drop.propose(only(table, LIBRARY[:1]), 1) == []
+        assert drop.propose(only(table, LIBRARY[:1])) == []
 
 
 def test_the_others_make_up_for_the_effect(table):

@@ -1,7 +1,7 @@
 """Moves: each looks at the table of hypotheses and proposes where to look next.
 
-A move is a file of this folder with a function `propose(table, most)`, pure: of so many effects at
-most, the starts that the table has not been asked for yet. A file that is here is used.
+A move is a file of this folder with a pure function `propose(table)`: the starts that the table has
+not been asked for yet. A file that is here is used.
 """
 
 import importlib
@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from galileo_jax.search.start import Start
 from galileo_jax.search.table import Table
 
-Move = Callable[[Table, int], list[Start]]
+Move = Callable[[Table], list[Start]]
 
 MOVES: Mapping[str, Move] = {
     module.name: importlib.import_module(f"{__name__}.{module.name}").propose

@@ -9,11 +9,11 @@ from galileo_jax.search.table import Table
 NAME = "add"
 
 
-def propose(table: Table, most: int) -> list[Start]:
+def propose(table: Table) -> list[Start]:
     """Starts that match what the hypothesis without the effect leaves, and scattered ones."""
     base = table.base
     wanted = [(base, (name,)) for name in table.trials.all_effects]
-    if most > 1:
+    if table.most_effects > 1:
         wanted += [
             (one, (*one.effects, *other.effects)) for one, other in combinations(table.named(1), 2)
         ]

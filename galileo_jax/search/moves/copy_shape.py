@@ -17,9 +17,8 @@ NAME = "copy_shape"
 NUM_LEADERS = 2
 
 
-def propose(table: Table, most: int) -> list[Start]:
+def propose(table: Table) -> list[Start]:
     """The leading hypotheses with another effect that has the same kind of shape."""
-    del most
     trials, starts = table.trials, list[Start]()
     for leader in table.leaders(NUM_LEADERS):
         for one in leader.effects:

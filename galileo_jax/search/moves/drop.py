@@ -27,9 +27,8 @@ LEAD_NATS = 3.0  # by which the evidence without it is behind: less needs no bet
 STEP_Z = 1e-4
 
 
-def propose(table: Table, most: int) -> list[Start]:
+def propose(table: Table) -> list[Start]:
     """The leading hypotheses without one of their effects: as they are, and made up for."""
-    del most
     starts: list[Start] = []
     for leader in table.leaders(NUM_LEADERS):
         wanted = [(leader, tuple(n for n in leader.effects if n != one)) for one in leader.effects]

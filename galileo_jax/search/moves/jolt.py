@@ -11,9 +11,8 @@ NAME = "jolt"
 MOST_JOLTED = 6  # those that the loop refines with care
 
 
-def propose(table: Table, most: int) -> list[Start]:
+def propose(table: Table) -> list[Start]:
     """Of the hypotheses that may decide, the fit with hardly any, a little and a lot of each."""
-    del most
     rows = [table.entries[key].hypothesis for key in table.deciding() if key != BASE]
     wanted = table.not_asked(NAME, [(one, one.effects) for one in rows[:MOST_JOLTED]])
     return [

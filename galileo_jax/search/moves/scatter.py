@@ -15,11 +15,15 @@ NUM_LEADERS, NUM_CROSSED = 3, 4
 NUM_STARTS, NUM_FOLLOWED = 128, 8
 
 
-def propose(table: Table, most: int) -> list[Start]:
+def propose(table: Table) -> list[Start]:
     """The leading pairs, and all pairs of the best single effects; none while one explains."""
     pairs = table.named(2)
     every = [entry.hypothesis for entry in table.entries.values()]
-    if most < 2 or not pairs or any(table.fitter.is_explained(one.fit) for one in every):
+    if (
+        table.most_effects < 2
+        or not pairs
+        or any(table.fitter.is_explained(one.fit) for one in every)
+    ):
         return []
     crossed = combinations(table.named(1)[:NUM_CROSSED], 2)
     sets = [

@@ -9,9 +9,8 @@ NAME = "swap"
 NUM_LEADERS = 1
 
 
-def propose(table: Table, most: int) -> list[Start]:
+def propose(table: Table) -> list[Start]:
     """Starts that match what the leading hypothesis, without one of its effects, leaves."""
-    del most
     wanted: list[tuple[Hypothesis, tuple[str, ...]]] = []
     for leader in table.leaders(NUM_LEADERS):
         for one in leader.effects:
