@@ -324,6 +324,8 @@ def _searched(
     is_needed = needs_pairs(candidates)
     on_stage("fitting pairs of effects")
     table = search(table, 2, on_entry)
+    for candidate in candidates_of(table):
+        listener.on_candidate(candidate)
     on_stage("comparing the best pairs with the data")
     candidates = _compared(trials, candidates_of(table), decisive, seed, compared)
     why = _why_pairs(table, candidates, single, form if is_needed else None, is_needed)
@@ -338,6 +340,8 @@ def _searched(
         on_stage("looking for a law: comparing formulas with the missing force")
         num = len(table.library)
         laws = law_candidates(trials, table.base, start, views, num, candidates, on_stage)
+        for candidate in ranked(laws):
+            listener.on_candidate(candidate)
         both = _compared(trials, (*candidates, *laws), decisive, seed, compared)
         law = law_to_doubt(both)
         if law is not None:

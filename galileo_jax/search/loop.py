@@ -10,7 +10,7 @@
 It ends when a round changes nothing on which the conclusion may hang.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,19 +93,20 @@ def _round(
     table: Table, starts: Sequence[Start], on_entry: Callable[[Table, Entry], None]
 ) -> Table:
     """The table after one round of the loop."""
-    ends = _raced(table, [one for one in starts if not one.is_near])
-    first = _first_of_each(table, ends)
+    known = _known_costs(table)
+    ends = _raced(table, [one for one in starts if not one.is_near], known)
+    first = _first_of_each(ends, min(known.values()))
     scores = _scores(table, first)
 
     def take(table: Table, effects: tuple[str, ...], fit: GradientFit) -> Table:
         key = frozenset(effects)
-        known = table.entries.get(key)
-        if known is None:
+        old = table.entries.get(key)
+        if old is None:
             entry = Entry(Hypothesis(effects, fit), (fit,), scores.get(key, 0.0))
         else:
-            entry = known.with_fits([fit], CHANGED_NATS if key == BASE else 0.0)
+            entry = old.with_fits([fit], CHANGED_NATS if key == BASE else 0.0)
         table = table.with_entry(entry)
-        if known is None or entry.hypothesis.fit is fit:
+        if old is None or entry.hypothesis.fit is fit:
             on_entry(table, entry)
         return table
 
@@ -139,10 +140,11 @@ def _scores(table: Table, ends: Sequence[_End]) -> dict[Key, float]:
     return scores
 
 
-def _raced(table: Table, starts: Sequence[Start]) -> list[_End]:
+def _raced(table: Table, starts: Sequence[Start], known: Mapping[Key, float]) -> list[_End]:
     """Where starts come to in a race, the best end of every valley of each hypothesis.
 
-    Without those that are far behind, and those in valleys that are known.
+    Without those that are far behind, and those in valleys that are known; `known`: the costs of
+    the table's fits.
     """
     if not starts:
         return []
@@ -155,9 +157,7 @@ def _raced(table: Table, starts: Sequence[Start]) -> list[_End]:
     rows = np.array(sorted(best.values()))
     keys = list(dict.fromkeys(starts[i].key for i in rows))
     owner = np.array([keys.index(starts[i].key) for i in rows])
-    known = _known_costs(table)
-    lowest = min(known.values())
-    found = fitter.race(z[rows], free[rows], owner, lowest)
+    found = fitter.race(z[rows], free[rows], owner, min(known.values()))
     volume = -0.5 * np.linalg.slogdet(found.best.normal)[1]
     ends = []
     for number, key in enumerate(keys):
@@ -190,12 +190,15 @@ def _is_no_news(entry: Entry, known: float, found: Descended, row: int) -> bool:
     return bool(far.min() < SAME_VALLEY_NATS and cost > known - SAME_VALLEY_NATS)
 
 
-def _first_of_each(table: Table, ends: Sequence[_End]) -> list[_End]:
-    """The best end of each hypothesis, by promise; of several effects only what comes near."""
+def _first_of_each(ends: Sequence[_End], lowest: float) -> list[_End]:
+    """The best end of each hypothesis, by promise; of several effects only what comes near.
+
+    `lowest`: the least cost of the table's fits.
+    """
     best: dict[Key, _End] = {}
     for end in sorted(ends, key=lambda end: end.cost):
         best.setdefault(end.key, end)
-    lowest = min([*(end.cost for end in ends), *_known_costs(table).values()])
+    lowest = min([lowest, *(end.cost for end in ends)])
     near = [end for end in best.values() if end.cost < lowest + BEHIND_IN_SEARCH]
     kept = {end.key for end in near[:MOST_REFINED]}
     chosen = [end for key, end in best.items() if len(key) <= 1 or key in kept]

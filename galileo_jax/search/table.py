@@ -1,7 +1,7 @@
 """The table of all hypotheses that a search has fitted so far."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -86,7 +86,7 @@ class Table:
     stakes: Stakes
     seed: int
     entries: Mapping[Key, Entry]
-    asked: frozenset[tuple[str, Key, Key, float]] = field(default=frozenset())
+    asked: frozenset[tuple[str, Key, Key, float]] = frozenset()
     num_rounds: int = 0
     most_effects: int = 1
 

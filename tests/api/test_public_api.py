@@ -93,7 +93,7 @@ def test_fit_compare_predict_are_the_commands(video, folder, capfd):
     loaded = gx.load_run(folder / "run")
     assert loaded.parameters == json.loads(json.dumps(fit.parameters))
     left = (loaded.residuals.x_white - fit.residuals.x_white).abs().max()
-    assert left < 1e-7  # of eigenvectors of covariances that a csv keeps to rounding
+    assert left < 1e-9
     assert check.p_value >= 0.01 and check.is_adequate
     assert {"clip", "object", "axis", "phase", "z"} <= set(check.cells.columns)
     assert fit.summary().loc["k1", "identified"]
