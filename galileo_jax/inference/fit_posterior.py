@@ -20,8 +20,8 @@ from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import ESS, Posterior, Status
 from galileo_jax.inference.resampled import resampled
 
-# At once, and in all until they are worth `ENOUGH` draws: a mean is then good to .03 sd.
-NUM_AT_ONCE, MOST, ENOUGH = 512, 8192, 1200.0
+# At once, and in all until they are worth `ENOUGH` draws: a mean is then good to .02 sd.
+NUM_AT_ONCE, MOST, ENOUGH = 512, 8192, 2000.0
 # Worth so few, widths are good to a tenth, and it is said; to a quarter, and slopes know as much.
 FEW, TOO_FEW = 100.0, 10.0
 

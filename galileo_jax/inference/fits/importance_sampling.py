@@ -24,6 +24,7 @@ Bayesian inference in econometric models using Monte Carlo integration, Economet
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float
@@ -71,6 +72,20 @@ class Weighed:
     def is_sure(self) -> bool:
         """Whether it is better than Laplace's."""
         return self.ess >= LEAST_ESS
+
+
+class Part(Protocol):
+    """A part of q, or all of it."""
+
+    def draw(
+        self, generator: np.random.Generator, num: int
+    ) -> tuple[Float[np.ndarray, "draw parameter"], Float[np.ndarray, " draw"]]:
+        """Points, and their log density in this part."""
+        ...
+
+    def log_density(self, z: Float[np.ndarray, "draw parameter"]) -> Float[np.ndarray, " draw"]:
+        """Of points, whoever drew them."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -137,7 +152,7 @@ def weighed(
     # The prior's constant; that of the data is the same for all hypotheses.
     constant = np.sum(fit.free) / 2 * np.log(2 * np.pi)
     modes = np.stack([one.z for one in fits])
-    best, better, made = -np.inf, None, _Mixture(parts)
+    best, better, made = -np.inf, None, Mixture(parts)
     while len(made.z) < num or (made.ess < enough and len(made.z) < most):
         new = made.draw(generator, num, shares, fit.free)
         both = density(np.concatenate([new, modes]))
@@ -149,7 +164,7 @@ def weighed(
     return Weighed(log_evidence, made.log_weights, made.ess, made.z, made.log_density, better)
 
 
-class _Mixture:
+class Mixture:
     """Draws from parts along valleys and, after the first, from clouds that fit those before.
 
     Attributes:
@@ -159,7 +174,7 @@ class _Mixture:
       ess: how many draws of the posterior itself these are worth.
     """
 
-    def __init__(self, parts: Sequence[_Part | Ridge]):
+    def __init__(self, parts: Sequence[Part]):
         self._parts, self._clouds = tuple(parts), list[Cloud]()
         self.z, self.log_weights, self.ess = np.empty((0, 0)), np.empty(0), 0.0
         self._of, self._own, self.log_density = np.empty(0, int), np.empty(0), np.empty(0)

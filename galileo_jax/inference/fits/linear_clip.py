@@ -7,8 +7,8 @@ are log-normal before the data: x_k = log(size_k / median_k) / log(factor_k) ~ N
 the noise scales s. With the parameters integrated out, e ~ N(0, C + J J^T). The most probable x
 come by Newton steps with the average information, from where all sizes are at their medians and
 from where one is larger and the others are smaller: an error may be brief or last long, and hardly
-any track tells. What x may be is drawn by importance, from the prior and normal distributions round
-these modes.
+any track tells. What x may be is drawn by importance, from the prior, normal distributions round
+these modes, and what fits these draws (`importance_sampling.py`).
 
 Each clip of several is taken with parameters of its own, so that what differs from trial to trial
 is not taken for roughness within one.
@@ -27,6 +27,7 @@ import scipy.linalg
 from jaxtyping import Float
 from scipy.special import logsumexp
 
+from galileo_jax.inference.fits.importance_sampling import Mixture
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
@@ -44,7 +45,9 @@ LONGEST_STEP = 1.5  # of a log size, in units of its prior's width
 LARGEST = 6.0
 ASIDE = 1.5  # from the medians, of starts: one size larger, all others smaller
 APART = 0.5  # modes that are nearer are one
-NUM_TRIED, NUM_DRAWS = 96, 128  # of each part of the proposal; of what is kept
+NUM_TRIED, MOST_TRIED = 256, 2048  # at once, and in all where few of them count
+ENOUGH_ESS = 200.0  # a quantile of a size, and of what hangs on it, is then good to .2 sd
+NUM_DRAWS = 512  # that are kept
 NUM_SCALES = 121  # of noise, over which is integrated
 WIDER = 1.3  # than the normal approximation round a mode is what is drawn there
 
@@ -258,19 +261,43 @@ def integrated(clips: Sequence[LinearClip], terms: Sequence[Term], modes: Sequen
     roots = [WIDER * symmetric_root(inverse(mode.information)) for mode in modes]
     wide = np.eye(len(best.both))  # of the prior; noise scales are known much better than by it
     wide[count:, count:] = 2 * roots[0][count:, count:]
-    middles = [np.append(np.zeros(count), best.both[count:]), *(mode.both for mode in modes)]
-    normal = np.random.default_rng(0).standard_normal((len(middles), NUM_TRIED, len(best.both)))
-    parts = list(zip(middles, [wide, *roots], strict=True))
-    tried = np.concatenate([m + one @ root for one, (m, root) in zip(normal, parts, strict=True)])
-    log_q = logsumexp([_log_normal(tried, m, root) for m, root in parts], axis=0)
-    values = np.array([_value(marginal, terms, each) for each in tried])
-    log_weights = values - 0.5 * tried.shape[1] * np.log(2 * np.pi)
-    log_weights -= log_q - np.log(len(parts))
+    prior = _Normal(np.append(np.zeros(count), best.both[count:]), wide)
+    parts = [prior, *(_Normal(mode.both, root) for mode, root in zip(modes, roots, strict=True))]
+    generator, made = np.random.default_rng(0), Mixture(parts)
+    shares, free = np.full(len(parts), 1 / len(parts)), np.ones(len(wide), bool)
+    while made.ess < ENOUGH_ESS and len(made.z) < MOST_TRIED:
+        new = made.draw(generator, NUM_TRIED, shares, free)
+        values = np.array([_value(marginal, terms, each) for each in new])
+        made.add(values - 0.5 * new.shape[1] * np.log(2 * np.pi))
     noise = np.linalg.slogdet(best.information[count:, count:])[1]
     at_best = best.value + 0.5 * float(best.x @ best.x) - 0.5 * float(noise)
-    evidence = float(np.asarray(logsumexp(log_weights))) - np.log(len(tried)) - at_best
-    which = resampled(log_weights, NUM_DRAWS, np.random.default_rng(1))
-    return Sizes(tuple(term.name for term in terms), best.x, tried[which], evidence)
+    evidence = float(np.asarray(logsumexp(made.log_weights))) - np.log(len(made.z)) - at_best
+    which = resampled(made.log_weights, NUM_DRAWS, np.random.default_rng(1))
+    return Sizes(tuple(term.name for term in terms), best.x, made.z[which], evidence)
+
+
+@dataclass(frozen=True)
+class _Normal:
+    """A normal distribution of log sizes and log noise scales.
+
+    Attributes:
+      mean: `[term and clip]`.
+      root: `[term and clip, term and clip]`, symmetric; its square is the covariance.
+    """
+
+    mean: Float[np.ndarray, " size"]
+    root: Float[np.ndarray, "size size"]
+
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
+        """Points `[draw, term and clip]`, and their log density."""
+        points = self.mean + generator.standard_normal((num, len(self.mean))) @ self.root
+        return points, self.log_density(points)
+
+    def log_density(self, z: Float[np.ndarray, "draw size"]) -> Float[np.ndarray, " draw"]:
+        """Of points, `[draw]`."""
+        white = np.linalg.solve(self.root, (z - self.mean).T)
+        log_volume = np.linalg.slogdet(self.root)[1] + 0.5 * len(self.mean) * np.log(2 * np.pi)
+        return -0.5 * np.sum(white**2, axis=0) - log_volume
 
 
 def _value(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray) -> float:
@@ -297,9 +324,3 @@ def log_likelihood(
         each = -0.5 * np.sum(np.log(cover) + along2 / cover, axis=1) - 0.5 * log_scale**2
         total += float(np.asarray(logsumexp(each)))
     return total
-
-
-def _log_normal(values: np.ndarray, middle: np.ndarray, root: np.ndarray) -> np.ndarray:
-    white = np.linalg.solve(root, (values - middle).T)
-    log_volume = np.linalg.slogdet(root)[1] + 0.5 * len(middle) * np.log(2 * np.pi)
-    return -0.5 * np.sum(white**2, axis=0) - log_volume
