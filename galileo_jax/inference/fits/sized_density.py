@@ -19,7 +19,8 @@ from galileo_jax.inference.fits.linear_clip import linear_clips, log_likelihood
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
-NUM_SIZES = 32  # of the draws of sizes
+# Of the draws of sizes; of few measured values all, for these cost the square of the values' number.
+LEAST_SIZES, MOST_SQUARES = 32, 500_000
 
 
 class SizedDensity:
@@ -28,7 +29,8 @@ class SizedDensity:
     def __init__(self, trials: JointProblem, fit: GradientFit, clips: Sequence[FittedClip]):
         assert fit.sizes is not None
         self._clips, self._fit = clips, fit
-        draws = fit.sizes.draws[:: -(-len(fit.sizes.draws) // NUM_SIZES), : len(fit.sizes.x)]
+        num = max(LEAST_SIZES, MOST_SQUARES // fit.num_values**2)
+        draws = fit.sizes.draws[:num, : len(fit.sizes.x)]
         linear = linear_clips(trials, fit)
         self._of_sizes = [log_likelihood(linear, trials.terms, x) for x in draws]
         self._data = [
