@@ -19,7 +19,7 @@ from galileo_jax.inference.fits.linear_clip import linear_clips, log_likelihood
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
 from galileo_jax.similarity.gaussian_likelihood import Whitening
 
-# Of the draws of sizes; of few measured values all, for these cost the square of the values' number.
+# Of the draws of sizes: more of few measured values, whose squared number is what each costs.
 LEAST_SIZES, MOST_SQUARES = 32, 500_000
 
 
