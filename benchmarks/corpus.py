@@ -117,13 +117,14 @@ def _outcome(path: Path, task: str) -> dict[str, Any]:
         check = gx.compare(path)
         return {"log_evidence": {"p": math.log(check.p_value)}, "verdict": check.p_value > 0.01}
     found = gx.diagnose(path)
-    best = max(candidate["score"] for candidate in found.candidates)
+    candidates = found.document["candidates"]
+    best = max(candidate["score"] for candidate in candidates)
     return {
         "log_evidence": {
             "+".join(candidate["effects"]) if "effects" in candidate else candidate["effect"]: (
                 candidate["score"] - best
             )
-            for candidate in found.candidates
+            for candidate in candidates
         },
         "verdict": f"{found.verdict.status} {' '.join(sorted(found.verdict.effects))}",
     }

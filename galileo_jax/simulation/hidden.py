@@ -53,7 +53,9 @@ STRENGTHS = {
     "viscous_drag": Range(0.3, 1.5, is_per_mass=True),
 }
 OTHERS = {
+    "friction_patch_edge": Range(0.005, 0.02),
     "friction_patch_length": Range(0.08, 0.20),
+    "magnetic_brake_edge": Range(0.005, 0.02),
     "magnetic_brake_length": Range(0.08, 0.20),
     "spring_tether_straightness": Range(1.0, 1.0),  # a free band
     "stribeck_speed": Range(0.2, 0.6),

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from galileo_jax.model.effects import make_effects
 from galileo_jax.model.effects.effect import State
+from galileo_jax.model.effects.zone import share_inside
 from tests.model.effects.motion import (
     ALONE,
     LONG_RAMP,
@@ -211,8 +212,17 @@ def test_on_the_table_a_constant_force_is_level(levelness):
     assert np.diff(moving) == pytest.approx(-0.2 / M1 / 240, abs=1e-6)
 
 
-PATCH = {"friction_patch_start": 0.2, "friction_patch_length": 0.1}
-BRAKE = {"magnetic_brake_start": 0.2, "magnetic_brake_length": 0.1}
+PATCH = {"friction_patch_start": 0.2, "friction_patch_length": 0.1, "friction_patch_edge": 0.005}
+BRAKE = {"magnetic_brake_start": 0.2, "magnetic_brake_length": 0.1, "magnetic_brake_edge": 0.005}
+
+
+def test_a_zone_lies_under_a_body_as_long_as_three_edges():
+    """The share of a body over a step grows in proportion; its zone is so within 0.07."""
+    body, at = 0.06, np.linspace(-0.1, 0.4, 501)
+    edge = {"zone_start": np.array(0.1), "zone_length": np.array(0.15), "zone_edge": body / 3}
+    theta = {name: np.asarray(value) for name, value in edge.items()}
+    over = [np.clip((at - start) / body + 0.5, 0.0, 1.0) for start in (0.1, 0.25)]
+    assert share_inside(at, "zone", theta) == pytest.approx(over[0] - over[1], abs=0.07)
 
 
 @settings(max_examples=15)
@@ -232,11 +242,21 @@ def test_friction_patch_takes_its_work(release, rougher):
 @pytest.mark.parametrize("rougher", [-0.05, -0.5])
 def test_smooth_patch_is_at_best_without_friction(rougher):
     rough = replace(LONG_TABLE, friction=(0.1, 0.0), release_m=0.6)
-    given = {"friction_patch": rougher, "friction_patch_start": 0.1, "friction_patch_length": 0.2}
+    zone = {"start": 0.1, "length": 0.2, "edge": 0.005}
+    given = {"friction_patch": rougher} | {f"friction_patch_{k}": v for k, v in zone.items()}
     x, speed = on_table(move(rough, given))
     inside = (x > CORNER_M + 0.15) & (x < CORNER_M + 0.25)
     loss = np.diff(speed[inside] ** 2) / np.diff(x[inside]) / 2
     assert loss == pytest.approx(-max(0.0, 0.1 + rougher) * G, abs=1e-6)
+
+
+@pytest.mark.parametrize("edge", [0.01, 0.025])
+def test_soft_edges_take_the_same_work(edge):
+    x, speed = on_table(
+        move(LONG_TABLE, {"friction_patch": 0.2} | PATCH | {"friction_patch_edge": edge})
+    )
+    assert x[-1] > 0.4
+    assert 0.5 * (speed[0] ** 2 - speed[-1] ** 2) == pytest.approx(0.2 * G * 0.1, rel=ZONE_RTOL)
 
 
 def test_friction_patch_brakes_whatever_slides_over_it():

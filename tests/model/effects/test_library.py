@@ -84,7 +84,7 @@ def test_parameters(name):
 @pytest.mark.parametrize("scene", SCENES)
 def test_zones_cover_the_path(scene):
     for name in ("friction_patch", "magnetic_brake"):
-        _, start, _ = make_effects([name])[0].parameters(SCENES[scene])
+        _, start, *_ = make_effects([name])[0].parameters(SCENES[scene])
         low, high = (float(start.prior.forward(jnp.asarray(z))) for z in (-6.0, 6.0))
         assert low == pytest.approx(SCENES[scene].start_path_m[0], abs=1e-6)
         assert high == pytest.approx(0.3 if scene != "incline" else 0.5, abs=1e-6)

@@ -3,10 +3,10 @@
     k(q) = max(0, k + friction_patch)  for  start < q < start + length
 
 of every object that slides over it (seen from above, where each object has a way of its own, of
-object 1), with smooth edges, tanh(q / 5 mm), q along the path, 0 at the foot.
+object 1), q along the path, 0 at the foot; both edges are as soft as the body is long (`zone.py`).
 
 Source: Coulomb, Théorie des machines simples (1785), with a coefficient that depends on the
-place; the smooth edges are ours.
+place; the shape of the edges is ours.
 Confused with: surface_friction where the strip begins at the foot and is long;
 magnetic_brake where the speed hardly changes inside.
 """
@@ -28,7 +28,7 @@ class FrictionPatch(Effect):
     name: ClassVar[str] = "friction_patch"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """How much rougher it is there, where it starts and how long it is; none in a fall."""
+        """How much rougher it is there, and the zone; none in a fall."""
         if not scene.has_surface:
             return ()
         strength = Parameter("friction_patch", "1", PRIOR, 0.0, "effect", 0.05)

@@ -2,8 +2,8 @@
 
     F = -b v  for  start < q < start + length
 
-with smooth edges, tanh(q / 5 mm). The speed lost is the same however fast the object comes:
-dv/dq = -b / m.
+where the field fades over some distance (`zone.py`). The speed lost is the same however fast the
+object comes: dv/dq = -b / m.
 
 Source: Wiederick, Gauthier, Campbell, Rochon (1987), Magnetic braking: simple theory and
 experiment, Am. J. Phys. 55, 500.
@@ -28,7 +28,7 @@ class MagneticBrake(Effect):
     name: ClassVar[str] = "magnetic_brake"
 
     def parameters(self, scene: Surroundings) -> tuple[Parameter, ...]:
-        """The drag constant b, where the zone starts and how long it is; none in a fall."""
+        """The drag constant b, and the zone; none in a fall."""
         if not scene.has_surface:
             return ()
         strength = Parameter("magnetic_brake", "kg/s", PRIOR, 0.0, "effect", 0.1)
