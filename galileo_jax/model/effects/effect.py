@@ -106,6 +106,7 @@ _ARRAYS = (
     "start_path_m",
     "mass_kg",
     "roll_inertia",
+    "is_box",
     "release_s",
     "expected",
     "walls_m",
@@ -152,6 +153,7 @@ class Surroundings:
       mass_kg: `[object]`, as weighed, None where not; empty: none is.
       rolls: `[object]`, whether it is round and may turn; empty: none does.
       roll_inertia: `[object]`, beta = J / (m r^2) of what rolls; empty: none does.
+      is_box: `[object]`, whether it is declared to be one; empty: none is.
       moves_in_plane: whether the path is not given, but bends with the motion.
       laws: names of the laws that are always there (`effects/laws/`).
       expected: by name the two numbers of a prior: of the laws' parameters what a look at the
@@ -179,6 +181,7 @@ class Surroundings:
     mass_kg: tuple[float | None, ...] = ()
     rolls: tuple[bool, ...] = ()
     roll_inertia: tuple[float, ...] = ()
+    is_box: tuple[bool, ...] = ()
     moves_in_plane: bool = False
     laws: tuple[str, ...] = ()
     expected: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -175,6 +175,7 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         has_surface=has_surface,
         mass_kg=tuple(declared.mass_kg for declared in clip.objects),
         **(rolling(clip.objects) if scenario.has_ramp else {}),
+        is_box=tuple(declared.shape == "box" for declared in clip.objects),
         moves_in_plane=scenario.moves_in_plane,
         laws=laws_of(clip),
         expected=expected(clip, observation, half[0][int(not scenario.is_level)]),

@@ -5,7 +5,7 @@
 beta is 2/5 for a ball, 1/2 for a cylinder, 2/3 for a hollow ball, 1 for a ring; the
 friction k is then the rolling resistance. It is the hypothesis that something turns; where the
 clip declares that it does (`rolls`, or a sphere), the contact decides and the share is known, so
-that the effect has no place.
+that the effect has no place. What is declared a box rolls only on wheels.
 
 Source: Crawford (1996), Rolling and slipping down Galileo's inclined plane, Am. J. Phys. 64,
 541; Kleppner and Kolenkow, An Introduction to Mechanics (1973), chapter 6.
@@ -20,6 +20,7 @@ from galileo_jax.model.effects.registry import register
 from galileo_jax.model.parameters import LogNormal, Parameter
 
 PRIOR = LogNormal(median=0.45, sd=0.4)
+ON_WHEELS = 0.05  # odds that a box has some: a toy car, a cart
 
 
 @register
@@ -33,6 +34,10 @@ class Rolling(Effect):
         if not self._has_place(scene):
             return ()
         return (Parameter("rolling", "1", PRIOR, 0.0, "effect", 0.1),)
+
+    def odds(self, theta: Theta, scene: Surroundings) -> float:
+        """Low of a box."""
+        return ON_WHEELS if any(scene.is_box[:1]) else 1.0
 
     def inertia(self, theta: Theta, scene: Surroundings) -> Array | None:
         """The share, of object 1."""
