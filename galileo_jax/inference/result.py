@@ -236,46 +236,18 @@ def make_result(
       timings_s: by stage.
       notes: what else the method has to say ("engine", "status", warnings).
     """
-    draws = posterior.flat()
-    spread = inverse(trials.parameters, np.asarray(draws)).std(axis=0)
-    table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
-    for i, parameter in enumerate(trials.parameters):
-        if parameter.role in UNSHOWN:
-            continue
-        entry: dict[str, Any] = summary_of(posterior, draws[:, i])
-        entry["unit"] = parameter.unit
-        entry["identified"] = bool(spread[i] < IDENTIFIED_SD_Z)
-        room = "nuisances" if parameter.role == "nuisance" else "parameters"
-        table[room][parameter.name] = entry
-    derived = {}
-    masses = [name for name in posterior.names if re.fullmatch(r"m\d+", name)]
-    ratios = mass_ratios([posterior[name].reshape(-1) for name in masses])
-    for name, values in ratios.items():
-        # Of two masses that nothing determines.
-        prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
-        logs = np.log(ratios["mass_ratio"] if name == "phi" else values)
-        is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
-        entry = summary_of(posterior, values)
-        derived[name] = {**entry, "unit": "1", "identified": is_identified}
-    derived |= _derived_by_laws(trials, posterior)
+    spread = inverse(trials.parameters, np.asarray(posterior.flat())).std(axis=0)
+    table, derived = _entries(trials, posterior, spread)
     forces = per_mass_entries(trials, posterior)
     derived |= forces
     for name in undetermined_by_mass(trials, forces):
         if name in table["parameters"]:
             table["parameters"][name]["identified"] = False
-    has_surface = trials.problems[0].model.scene.surroundings.has_surface
-    confounded, reason = confounded_with_gravity(table["parameters"], has_surface)
-    for name in confounded:
+    untold, reason = _untold(table["parameters"], trials)
+    for name in untold:
         table["parameters"][name]["identified"] = False
     if reason is not None:
-        notes = notes | {"warnings": [*notes.get("warnings", []), reason]}
-    elif not table["parameters"].get("pixels_per_metre", {}).get("identified", True):
-        # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.
-        for name, entry in table["parameters"].items():
-            is_friction = re.fullmatch(r"k\d+", name) is not None
-            entry["identified"] = entry["identified"] and not is_friction
-        unscaled = SCALE_WARNING if has_surface else FREE_SCALE_WARNING
-        said = [*notes.get("warnings", []), unscaled]
+        said = [*notes.get("warnings", []), reason]
         notes = notes | {"warnings": list(dict.fromkeys(said))}
     # Every parameter takes from the residuals what the data say of it.
     is_fitted = np.array([p.role not in ("nuisance", "given") for p in trials.model_parameters])
@@ -302,3 +274,51 @@ def make_result(
         "version": __version__,
         "seed": seed,
     }
+
+
+def _entries(
+    trials: JointProblem, posterior: Posterior, spread: np.ndarray
+) -> tuple[dict[str, dict[str, dict[str, Any]]], dict[str, dict[str, Any]]]:
+    """Of the parameters and nuisances, and of what is derived from them.
+
+    Args:
+      trials: what was fitted.
+      posterior: draws in the parameters' units.
+      spread: `[parameter]`, sds of the draws in z.
+    """
+    draws = posterior.flat()
+    table: dict[str, dict[str, dict[str, Any]]] = {"parameters": {}, "nuisances": {}}
+    for i, parameter in enumerate(trials.parameters):
+        if parameter.role in UNSHOWN:
+            continue
+        entry: dict[str, Any] = summary_of(posterior, draws[:, i])
+        entry["unit"] = parameter.unit
+        entry["identified"] = bool(spread[i] < IDENTIFIED_SD_Z)
+        room = "nuisances" if parameter.role == "nuisance" else "parameters"
+        table[room][parameter.name] = entry
+    derived = {}
+    masses = [name for name in posterior.names if re.fullmatch(r"m\d+", name)]
+    ratios = mass_ratios([posterior[name].reshape(-1) for name in masses])
+    for name, values in ratios.items():
+        # Of two masses that nothing determines.
+        prior_sd = np.sqrt(2) * trials.parameters[trials.names.index("m1")].prior.sd  # pyright: ignore
+        logs = np.log(ratios["mass_ratio"] if name == "phi" else values)
+        is_identified = bool(logs.std() < IDENTIFIED_SD_Z * prior_sd)
+        entry = summary_of(posterior, values)
+        derived[name] = {**entry, "unit": "1", "identified": is_identified}
+    return table, derived | _derived_by_laws(trials, posterior)
+
+
+def _untold(
+    parameters: dict[str, dict[str, Any]], trials: JointProblem
+) -> tuple[tuple[str, ...], str | None]:
+    """Parameters that others make up for, and why: a line for the user, or None."""
+    has_surface = trials.problems[0].model.scene.surroundings.has_surface
+    confounded, reason = confounded_with_gravity(parameters, has_surface)
+    is_scaled = parameters.get("pixels_per_metre", {}).get("identified", True)
+    if reason is not None or is_scaled:
+        return tuple(confounded), reason
+    # Lengths in pixels tell the scale times (sin a - k cos a), and neither alone.
+    frictions = tuple(name for name in parameters if re.fullmatch(r"k\d+", name))
+    unscaled = SCALE_WARNING if has_surface else FREE_SCALE_WARNING
+    return (*confounded, *frictions), unscaled
