@@ -15,7 +15,7 @@ A nuisance parameter that lies many prior standard deviations from its prior mea
 failure, because the residuals no longer show that misfit.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,17 +129,7 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
     ]
     labels = [phases(each, trials.of_clip(theta, c)) for c, each in enumerate(trials.problems)]
     drawn = replicates(trials, fit, scales, sizes, labels, NUM_REPLICATES, seed)
-    cells = []
-    for clip, (problem, label) in enumerate(zip(trials.problems, labels, strict=True)):
-        observation = problem.observation
-        absorbed = GaussianLikelihood.absorbed(scales[clip], problem.data)
-        cells.extend(
-            cell
-            for cell in find_cells(
-                clip, observation.names, observation.mask, label, observation.axes
-            )
-            if absorbed[cell.index].mean() < ABSORBED
-        )
+    cells = _cells(trials, labels, scales)
     pulls = _pulls(trials, fit, theta)
 
     num_values = np.array([problem.data.num_values for problem in trials.problems], dtype=float)
@@ -185,6 +175,23 @@ def compare(trials: JointProblem, fit: GradientFit, seed: int) -> Comparison:
         is_noise_misstated=p >= ADEQUATE_P and not is_usual,
         unusual=() if fit.sizes is None else tuple(fit.sizes.unusual),
     )
+
+
+def _cells(trials: JointProblem, labels: Sequence[np.ndarray], scales: np.ndarray) -> list[Cell]:
+    """Where and when it is tested, but for cells most of whose errors the modes take up.
+
+    Args:
+      trials: what was fitted.
+      labels: of each clip, the phases `[object, frame]`.
+      scales: `[clip]`, of its noise.
+    """
+    found = list[Cell]()
+    for clip, (problem, label) in enumerate(zip(trials.problems, labels, strict=True)):
+        seen = problem.observation
+        absorbed = GaussianLikelihood.absorbed(scales[clip], problem.data)
+        every = find_cells(clip, seen.names, seen.mask, label, seen.axes)
+        found += [cell for cell in every if absorbed[cell.index].mean() < ABSORBED]
+    return found
 
 
 def _at_own_scale(
