@@ -1,7 +1,7 @@
 """The sentences that say why a verdict is what it is: one for each rule that fired."""
 
 from collections.abc import Mapping, Sequence
-from math import exp, log
+from math import exp, floor, log
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason
@@ -142,10 +142,13 @@ def no_pair_contests(single: Candidate, pair: str, behind: float, num_near: int)
       behind: by how much it is behind, nats.
       num_near: how many pairs were fitted roughly.
     """
+    at_least = floor(behind / log(10)) * log(
+        10
+    )  # which of many far ones is nearest, chance decides
     return Reason(
         "no_pair_contests",
-        f"{num_near} pairs of effects that come near {single.title} were fitted roughly; the most "
-        f"probable of them, {pair}, is {times_text(behind)} less probable.",
+        f"{num_near} pairs of effects that come near {single.title} were fitted roughly; each of "
+        f"them is more than {times_text(at_least)} less probable.",
         {
             "hypothesis": single.name,
             "rival": pair,

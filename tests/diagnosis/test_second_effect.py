@@ -14,8 +14,10 @@ def test_the_reasons_say_which_pairs_were_looked_at():
     assert "the 3 most probable of them with care" in why.sentence
     assert (why.numbers["num_near"], why.numbers["num_pairs"]) == (16, 3)
     why = reasons.no_pair_contests(NAMED, "air_drag+rolling", 4.4, 16)
-    assert "air_drag+rolling, is 81 times less probable" in why.sentence
-    assert why.numbers["log_odds_behind"] == 4.4
+    assert "each of them is more than 10 times less probable" in why.sentence  # 81 times
+    assert (why.numbers["rival"], why.numbers["log_odds_behind"]) == ("air_drag+rolling", 4.4)
+    far = reasons.no_pair_contests(NAMED, "air_drag+rolling", 9.3, 16)
+    assert "more than 10^4 times less" in far.sentence
 
 
 NAMED = candidate("air_drag", 40.0)
