@@ -142,9 +142,8 @@ def no_pair_contests(single: Candidate, pair: str, behind: float, num_near: int)
       behind: by how much it is behind, nats.
       num_near: how many pairs were fitted roughly.
     """
-    at_least = floor(behind / log(10)) * log(
-        10
-    )  # which of many far ones is nearest, chance decides
+    # Which of many far ones is the nearest, chance decides.
+    at_least = log(10) * floor(behind / log(10))
     return Reason(
         "no_pair_contests",
         f"{num_near} pairs of effects that come near {single.title} were fitted roughly; each of "

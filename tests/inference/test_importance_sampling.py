@@ -178,7 +178,7 @@ def test_a_cloud_has_the_mean_and_the_covariance_of_what_was_drawn():
 def test_a_draw_from_which_no_map_finds_back_has_the_density_it_was_drawn_with(monkeypatch):
     # Tails of a valley that bends much are thrown so far that doubles cannot undo it.
     nowhere = staticmethod(lambda z: np.full(len(z), -np.inf))
-    monkeypatch.setattr(weighed_module._Part, "log_density", nowhere)
+    monkeypatch.setattr(weighed_module._AlongValley, "log_density", nowhere)
     found = weighed([BENT.best((0.3, 0.1))], BENT, 0, num=4096)
     assert found.log_evidence == pytest.approx(BENT.exact(), abs=AGREES_NATS)
 

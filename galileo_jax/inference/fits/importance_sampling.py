@@ -13,27 +13,25 @@ than the one without its last effect, a quarter of the draws come from there: al
 one's valley, the effect's own parameters from their priors. While an effect is too weak to show,
 its place or its speed may be anything, and Laplace at the best of them sees nothing of that.
 
-Where few draws count all the same, half of the further ones come from a t that fits those that were
-made (`t_proposal.py`), a new one every time. Every draw is weighed by the mixture of all that drew.
+Where few draws count all the same, further ones learn from them (`adaptive_mixture.py`).
 
-Source: A. B. Owen, Monte Carlo theory, methods and examples (2013), ch. 9 (mixtures); J. Geweke,
-Bayesian inference in econometric models using Monte Carlo integration, Econometrica 57 (1989), 1317
-(the t).
+Source: J. Geweke, Bayesian inference in econometric models using Monte Carlo integration,
+Econometrica 57 (1989), 1317 (the t).
 """
 
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
 
+from galileo_jax.inference.fits.adaptive_mixture import AdaptiveMixture, Part
 from galileo_jax.inference.fits.laplace import GradientFit
-from galileo_jax.inference.fits.profile_proposal import Ridge, bent_direction, ridge_along
+from galileo_jax.inference.fits.profile_proposal import bent_direction, ridge_along
 from galileo_jax.inference.fits.residuals import Batch, Residuals
-from galileo_jax.inference.fits.t_proposal import Cloud, log_student_t, student_t
+from galileo_jax.inference.fits.t_proposal import log_student_t, student_t
 from galileo_jax.inference.fits.transport_map import Valley, valley_round
 from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
@@ -44,7 +42,6 @@ LEAST_ESS = 10.0  # of so many the error is a third of a nat; of fewer nobody kn
 BETTER_NATS = 0.5  # by which a draw beats all fits where these are not at their best
 SHARE_WITHOUT = 0.25  # of the draws, from the hypothesis without its last effect
 SHARE_RIDGE = 0.75  # of a valley's draws, where it bends too much
-SHARE_ADAPTED = 0.5  # of further draws, from where those before say that the posterior is
 HARDLY_BETTER = 10.0  # nats: beyond, an effect too weak to show is e^-10 of the evidence
 
 
@@ -74,22 +71,8 @@ class Weighed:
         return self.ess >= LEAST_ESS
 
 
-class Part(Protocol):
-    """A part of q, or all of it."""
-
-    def draw(
-        self, generator: np.random.Generator, num: int
-    ) -> tuple[Float[np.ndarray, "draw parameter"], Float[np.ndarray, " draw"]]:
-        """Points, and their log density in this part."""
-        ...
-
-    def log_density(self, z: Float[np.ndarray, "draw parameter"]) -> Float[np.ndarray, " draw"]:
-        """Of points, whoever drew them."""
-        ...
-
-
 @dataclass(frozen=True)
-class _Part:
+class _AlongValley:
     """A part of q: a t along a valley; parameters that have none there, from their priors."""
 
     valley: Valley
@@ -152,9 +135,9 @@ def weighed(
     # The prior's constant; that of the data is the same for all hypotheses.
     constant = np.sum(fit.free) / 2 * np.log(2 * np.pi)
     modes = np.stack([one.z for one in fits])
-    best, better, made = -np.inf, None, Mixture(parts)
+    best, better, made = -np.inf, None, AdaptiveMixture(parts, shares, fit.free)
     while len(made.z) < num or (made.ess < enough and len(made.z) < most):
-        new = made.draw(generator, num, shares, fit.free)
+        new = made.draw(generator, num)
         both = density(np.concatenate([new, modes]))
         made.add(both[:num] - constant)
         best = max(best, both[num:].max() + BETTER_NATS)
@@ -164,61 +147,11 @@ def weighed(
     return Weighed(log_evidence, made.log_weights, made.ess, made.z, made.log_density, better)
 
 
-class Mixture:
-    """Draws from parts along valleys and, after the first, from clouds that fit those before.
-
-    Attributes:
-      z: `[draw, parameter]`.
-      log_weights: `[draw]`; each by the mixture of all that have drawn.
-      log_density: `[draw]`, of what they are weighed for.
-      ess: how many draws of the posterior itself these are worth.
-    """
-
-    def __init__(self, parts: Sequence[Part]):
-        self._parts, self._clouds = tuple(parts), list[Cloud]()
-        self.z, self.log_weights, self.ess = np.empty((0, 0)), np.empty(0), 0.0
-        self._of, self._own, self.log_density = np.empty(0, int), np.empty(0), np.empty(0)
-
-    def draw(
-        self, generator: np.random.Generator, num: int, shares: np.ndarray, free: np.ndarray
-    ) -> np.ndarray:
-        """Further draws, `[draw, parameter]`; `shares`: of the parts, `free`: of the clouds."""
-        which = np.arange(len(self._parts))
-        if self.log_density.size:
-            self._clouds.append(Cloud.of(self.z, self.log_weights, free))
-            which = np.append(which, len(self._parts) + len(self._clouds) - 1)
-            shares = np.append((1 - SHARE_ADAPTED) * shares, SHARE_ADAPTED)
-        counts = np.diff(np.rint(num * np.append(0.0, np.cumsum(shares))).astype(int))
-        drawn = [p.draw(generator, n) for p, n in zip(self._parts, counts, strict=False)]
-        if self._clouds:
-            points = self._clouds[-1].draw(generator, int(counts[-1]))
-            drawn.append((points, np.zeros(len(points))))  # their density is computed with all
-        new = np.concatenate([points for points, _ in drawn])
-        self.z = np.concatenate([self.z.reshape(-1, new.shape[1]), new])
-        self._own = np.append(self._own, np.concatenate([density for _, density in drawn]))
-        self._of = np.append(self._of, np.repeat(which, counts))
-        return new
-
-    def add(self, log_p: np.ndarray) -> None:
-        """The log density of the draws made last, `[draw]`: all are weighed anew."""
-        self.log_density = np.append(self.log_density, log_p)
-        log_parts = np.stack([q.log_density(self.z) for q in (*self._parts, *self._clouds)])
-        # A valley that bends much takes a draw so far that no map finds its way back from there.
-        along = np.flatnonzero(self._of < len(self._parts))
-        log_parts[self._of[along], along] = self._own[along]
-        shares = np.bincount(self._of, minlength=len(log_parts)) / len(self.z)
-        self.log_weights = self.log_density - np.asarray(
-            logsumexp(log_parts, axis=0, b=shares[:, None])
-        )
-        weights = np.exp(self.log_weights - self.log_weights.max())
-        self.ess = float(weights.sum() ** 2 / np.sum(weights**2))
-
-
 def _parts(
     fits: Sequence[GradientFit], residuals: Residuals, width: float
-) -> tuple[list[_Part | Ridge], np.ndarray]:
+) -> tuple[list[Part], np.ndarray]:
     """Those of the valleys, and which shares of the draws they have."""
-    parts, shares = list[_Part | Ridge](), list[float]()
+    parts, shares = list[Part](), list[float]()
     for one in fits:
         part = _part(one, fits[0], residuals, width)
         parts.append(part)
@@ -231,9 +164,9 @@ def _parts(
     return parts, np.array(shares)
 
 
-def _part(one: GradientFit, whose: GradientFit, residuals: Residuals, width: float) -> _Part:
+def _part(one: GradientFit, whose: GradientFit, residuals: Residuals, width: float) -> _AlongValley:
     others = np.flatnonzero(whose.free & ~one.free)
-    return _Part(valley_round(one, residuals), one.free, others, width)
+    return _AlongValley(valley_round(one, residuals), one.free, others, width)
 
 
 def _log_densities(fit: GradientFit, residuals: Residuals, z: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ the noise scales s. With the parameters integrated out, e ~ N(0, C + J J^T). The
 come by Newton steps with the average information, from where all sizes are at their medians and
 from where one is larger and the others are smaller: an error may be brief or last long, and hardly
 any track tells. What x may be is drawn by importance, from the prior, normal distributions round
-these modes, and what fits these draws (`importance_sampling.py`).
+these modes, and what fits these draws (`adaptive_mixture.py`).
 
 Each clip of several is taken with parameters of its own, so that what differs from trial to trial
 is not taken for roughness within one.
@@ -27,7 +27,7 @@ import scipy.linalg
 from jaxtyping import Float
 from scipy.special import logsumexp
 
-from galileo_jax.inference.fits.importance_sampling import Mixture
+from galileo_jax.inference.fits.adaptive_mixture import AdaptiveMixture
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.normal_matrix import inverse, symmetric_root
 from galileo_jax.inference.joint_problem import NOISE_SD, JointProblem
@@ -263,10 +263,10 @@ def integrated(clips: Sequence[LinearClip], terms: Sequence[Term], modes: Sequen
     wide[count:, count:] = 2 * roots[0][count:, count:]
     prior = _Normal(np.append(np.zeros(count), best.both[count:]), wide)
     parts = [prior, *(_Normal(mode.both, root) for mode, root in zip(modes, roots, strict=True))]
-    generator, made = np.random.default_rng(0), Mixture(parts)
-    shares, free = np.full(len(parts), 1 / len(parts)), np.ones(len(wide), bool)
+    shares, generator = np.full(len(parts), 1 / len(parts)), np.random.default_rng(0)
+    made = AdaptiveMixture(parts, shares, np.ones(len(wide), bool))
     while made.ess < ENOUGH_ESS and len(made.z) < MOST_TRIED:
-        new = made.draw(generator, NUM_TRIED, shares, free)
+        new = made.draw(generator, NUM_TRIED)
         values = np.array([_value(marginal, terms, each) for each in new])
         made.add(values - 0.5 * new.shape[1] * np.log(2 * np.pi))
     noise = np.linalg.slogdet(best.information[count:, count:])[1]

@@ -54,11 +54,11 @@ class Cloud:
         far = own - mean
         return cls(mean, symmetric_root((weights * far.T) @ far, LEAST_VARIANCE), free)
 
-    def draw(self, generator: np.random.Generator, num: int) -> np.ndarray:
-        """Points, `[draw, parameter]`, z."""
+    def draw(self, generator: np.random.Generator, num: int) -> tuple[np.ndarray, np.ndarray]:
+        """Points, `[draw, parameter]`, z, and their log density."""
         z = np.zeros((num, len(self.free)))
         z[:, self.free] = self.mean + student_t(generator, num, len(self.mean)) @ self.root
-        return z
+        return z, self.log_density(z)
 
     def log_density(self, z: Float[np.ndarray, "draw parameter"]) -> np.ndarray:
         """Of the free parameters, `[draw]`."""
