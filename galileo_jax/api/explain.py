@@ -1,14 +1,14 @@
 """`explain`: everything about a film or table in one call, as a lab report says it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from galileo_jax.api.clips import ClipLike, as_list, load
 from galileo_jax.api.compare import Comparison, compare
-from galileo_jax.api.diagnose import Diagnosis, diagnose
+from galileo_jax.api.diagnose import Diagnosis, diagnose, with_library
 from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
@@ -19,6 +19,10 @@ from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_c
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
+from galileo_jax.diagnosis.could_not_see import could_not_see
+from galileo_jax.diagnosis.restricted_fit import extended_fit
+from galileo_jax.diagnosis.stakes import VerdictStakes
+from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.report.paragraph import paragraph
 from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
@@ -26,6 +30,7 @@ from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.search.hypothesis import Hypothesis
 
 UNDERSTOOD, FITTED, COMPARED = 0.1, 0.35, 0.4  # shares of the work, for progress
 
@@ -39,6 +44,8 @@ class Explanation:
       check: the model without missing effects against the data; `check.fit` is its fit.
       diagnosis: what is missing; None where nothing is, or where the clip cannot tell.
       command: the command that does the same.
+      could_not_see: where nothing is missing, of each effect the smallest strength that would have
+        shown; as in diagnosis.json, which has it where there is one.
       files: that were written.
     """
 
@@ -46,6 +53,7 @@ class Explanation:
     check: Comparison
     diagnosis: Diagnosis | None
     command: str
+    could_not_see: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     files: tuple[Path, ...] = ()
 
     @cached_property
@@ -64,7 +72,12 @@ class Explanation:
         """The result in the words of a lab report."""
         shapes = [item.shape for item in self.fit.measurements[0].clip.objects]
         found = None if self.diagnosis is None else self.diagnosis.document
-        return paragraph(self.fit.result, self.check.document, found, shapes)
+        return paragraph(self.fit.result, self._check_document, found, shapes)
+
+    @property
+    def _check_document(self) -> dict[str, Any]:
+        seen = {"could_not_see": self.could_not_see} if self.could_not_see else {}
+        return {**self.check.document, **seen}
 
     @in_float64
     def report(self, path: str | Path, beside: Mapping[str, str] | None = None) -> tuple[Path, ...]:
@@ -90,7 +103,7 @@ class Explanation:
         fit = self.fit.save(folder, report=False)
         beside: dict[str, str] = {}
         files = [folder / "result.json"]
-        write_json(folder / "compare" / "compare.json", self.check.document)
+        write_json(folder / "compare" / "compare.json", self._check_document)
         files.append(folder / "compare" / "compare.json")
         if self.diagnosis is not None:
             self.diagnosis.save(folder / "diagnosis")
@@ -248,9 +261,25 @@ def _explained(clips: Sequence[Clip], engine: str, seed: int) -> Explanation:
     command = command_line(
         "explain", [clip.source for clip in clips], engine=engine, seed=seed or None
     )
-    if check.is_adequate or check.found.no_verdict is not None:
+    if check.found.no_verdict is not None:
         return Explanation(first, check, None, command)
+    if check.is_adequate:
+        with progress.part(COMPARED, 0.95):
+            progress.report("what could not have been seen", 0.0)
+            return Explanation(first, check, None, command, _could_not_see(check, engine, seed))
     with progress.part(COMPARED, 0.95):
         found = diagnose(tracks_of(first.measurements), engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)
         return Explanation(found.best, check, found, command)
+
+
+def _could_not_see(check: Comparison, engine: str, seed: int) -> dict[str, dict[str, Any]]:
+    """Of each effect the smallest strength that would have shown beside a model without any."""
+    measured, part = check.fit.measurements, check.fit.problem
+    whole = with_library([one.clip for one in measured], [o.observation for o in measured], engine)
+    whole = whole.with_sizes(part.sizes)
+    fit = extended_fit(check.gradient, part, whole)
+    stakes = VerdictStakes(whole, is_adequate=True)
+    library = [name for name in whole.all_effects if name not in FORM_NAMES]
+    log_priors = {name: stakes.log_prior(Hypothesis((name,), fit)) for name in library}
+    return could_not_see(whole, Hypothesis((), fit), log_priors, seed)

@@ -111,10 +111,12 @@ def _points(known: Understood) -> Question | None:
         f"{n} is at {x:.0f} {y:.0f}, {width:.0f} x {height:.0f} pixels"
         for n, ((x, y), (width, height)) in enumerate(known.things.items(), 1)
     )
-    default = "both" if known.is_pair else "1"
+    likeliest = list(known.things).index(known.likeliest) + 1 if known.likeliest else 1
+    x, y = list(known.things)[likeliest - 1]
+    default = "both" if known.is_pair else str(likeliest)
     why = f"{len(known.things)} things move, in the order in which they set out: {listed}"
     text = "Which thing is to be followed? A number, both (one runs into the other), or x y"
-    return Question("points", text, why, "--point 312 221", default)
+    return Question("points", text, why, f"--point {x:.0f} {y:.0f}", default)
 
 
 def _scenario(known: Understood, answers: Answers) -> Question | None:

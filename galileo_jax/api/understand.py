@@ -72,11 +72,23 @@ class Understood:
     def points(self, answers: Answers) -> Sequence[Point]:
         """Where a film's objects are in its first frame, in their order; empty where nobody knows.
 
-        All things that move as a pair, else the first, where a person said no other.
+        All things that move as a pair, else the likeliest, where a person said no other.
         """
         if "points" in answers:
             return answers["points"]
-        return list(self.things)[: 2 if self.is_pair else 1]
+        return list(self.things)[:2] if self.is_pair else list(filter(None, [self.likeliest]))
+
+    @property
+    def likeliest(self) -> Point | None:
+        """The first thing that moves as one kind of motion alone does; else the first that moves.
+
+        A hand that lets something go moves, too, and before it.
+        """
+        every = list(self.things)
+        if len(every) < 2:
+            return every[0] if every else None
+        kinds = ((point, self.path(point).likely) for point in every)
+        return next((point for point, kind in kinds if kind and kind.is_clear), every[0])
 
     def likely(self, answers: Answers) -> Likely | None:
         """The likeliest kind of motion, of a film of the thing that was chosen; None: unknown."""

@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from galileo_jax.diagnosis.diagnosis import Diagnosis
 from galileo_jax.diagnosis.verdict import CONVINCING
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
@@ -34,33 +33,26 @@ PRIOR_Z = np.linspace(-6.0, 4.0, 401)  # strengths that are looked at, in their 
 
 
 def could_not_see(
-    trials: JointProblem, diagnosis: Diagnosis, seed: int
+    trials: JointProblem, last: Hypothesis, log_priors: Mapping[str, float], seed: int
 ) -> dict[str, dict[str, Any]]:
-    """The smallest strength of each effect that the clips would have shown, beside the last model.
+    """The smallest strength of each effect that the clips would have shown, beside a model.
 
     Args:
-      trials: those diagnosed, with the whole library.
-      diagnosis: what was found.
+      trials: with the whole library.
+      last: the model, which describes the clips: else nobody knows their noise.
+      log_priors: of the effects of the library, over that of the model without effects.
       seed: of the places and lengths at which effects that have them are tried.
 
     Returns:
-      effect to `strength` and `unit`, as diagnosis.json has them; strength None where not even the
-      largest that anybody expects would show. Of effects of the library that are not in the last
-      model; empty where that does not describe the clips, for then nobody knows their noise.
+      effect to `strength` and `unit`, as diagnosis.json has them, the most probable beforehand
+      first; strength None where not even the largest that anybody expects would show. Of effects
+      that are not in the model; empty where it has parameters of its own, as that of a law.
     """
-    last = diagnosis.rounds[-1]
-    own = last.hypothesis.of(trials)  # with imperfections, perhaps
-    if not last.comparison.is_adequate or own.names != trials.names:
+    own = last.of(trials)  # with imperfections, perhaps
+    if own.names != trials.names:
         return {}
-    log_priors = {
-        one.effects[0]: one.log_prior
-        for one in diagnosis.candidates
-        if len(one.effects) == 1 and one.law is None and not one.is_form
-    }
-    asked = [name for name in log_priors if name not in last.hypothesis.effects]
-    return {
-        name: _entry(own, last.hypothesis, name, log_priors[name], seed) for name in sorted(asked)
-    }
+    asked = sorted(set(log_priors) - set(last.effects), key=lambda name: (-log_priors[name], name))
+    return {name: _entry(own, last, name, log_priors[name], seed) for name in asked}
 
 
 def smallest_shown(

@@ -63,7 +63,7 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             {"rule": why.rule, "sentence": why.sentence, **why.numbers}
             for why in diagnosis.verdict.reasons
         ],
-        "could_not_see": could_not_see(trials, diagnosis, seed),
+        "could_not_see": _could_not_see(trials, diagnosis, seed),
         "history": [_history_row(one, entries) for one, (entries, _) in rounds],
     }
     last = diagnosis.rounds[-1].hypothesis
@@ -95,6 +95,19 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             ],
         }
     return document
+
+
+def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:
+    """See `could_not_see`; beside the last model, where that describes the clips."""
+    last = diagnosis.rounds[-1]
+    if not last.comparison.is_adequate:
+        return {}
+    log_priors = {
+        one.effects[0]: one.log_prior
+        for one in diagnosis.candidates
+        if len(one.effects) == 1 and one.law is None and not one.is_form
+    }
+    return could_not_see(trials, last.hypothesis, log_priors, seed)
 
 
 def history_row(trials: JointProblem, one: Round, seed: int) -> dict[str, Any]:

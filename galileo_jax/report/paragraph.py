@@ -52,7 +52,7 @@ def paragraph(
         _verdict(result, check, diagnosis),
         "" if _status(diagnosis) == "law" else _values(effects),  # the law's text has them
         _only_if(result, diagnosis),
-        _unseen(diagnosis),
+        _unseen(check, diagnosis),
     ]
     return " ".join(filter(None, said))
 
@@ -177,16 +177,19 @@ def _only_if(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> 
     return f"All values are those with {listed([_words(one) for one in result['effects']])}."
 
 
-def _unseen(diagnosis: Mapping[str, Any] | None) -> str:
+def _unseen(check: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:
     """The smallest strengths that would have shown, of the likeliest of all other effects."""
-    if diagnosis is None:
-        return ""
-    found = diagnosis.get("could_not_see") or {}
-    in_question = {name for one in diagnosis["verdict"]["effects"] for name in one.split("+")}
-    asked = [row["effect"] for row in diagnosis["candidates"] if row["effect"] not in in_question]
-    told = [name for name in asked if name in found and found[name]["strength"] is not None]
-    parts = [
-        f"{_words(name)} below {found[name]['strength']:.2g}{_unit(found[name]['unit'])}"
-        for name in told[:MOST_UNSEEN]
-    ]
+    found = (diagnosis or check).get("could_not_see") or {}
+    asked, in_question = list(found), set()
+    if diagnosis is not None:
+        in_question = {name for one in diagnosis["verdict"]["effects"] for name in one.split("+")}
+        asked = [row["effect"] for row in diagnosis["candidates"]]
+    told = [name for name in asked if name not in in_question and name in found]
+    parts = [_too_weak(name, **found[name]) for name in told[:MOST_UNSEEN]]
     return sentence(f"{listed(parts)} could not have been seen") if parts else ""
+
+
+def _too_weak(name: str, strength: float | None, unit: str) -> str:
+    if strength is None:
+        return f"{_words(name)} of any usual strength"
+    return f"{_words(name)} below {float(f'{strength:.2g}'):g}{_unit(unit)}"

@@ -49,6 +49,19 @@ def test_the_paragraph_tells_the_friction_of_the_fit(plain):
     assert plain.paragraph in repr(plain)
 
 
+def test_what_could_not_have_been_seen_is_what_a_diagnosis_says(plain):
+    """No effect is fitted for it, and it is the same to the last digit but for roundings."""
+    assert "could not have been seen" in plain.paragraph
+    found = gx.diagnose(plain.fit.measurements[0].clip)
+    told = found.document["could_not_see"]
+    assert found.verdict.status == "none" and set(told) == set(plain.could_not_see)
+    for name, one in plain.could_not_see.items():
+        assert one["unit"] == told[name]["unit"]
+        assert (one["strength"] is None) == (told[name]["strength"] is None)
+        if one["strength"] is not None:
+            assert one["strength"] == pytest.approx(told[name]["strength"], rel=0.05)
+
+
 def test_what_is_saved_is_a_run_whose_page_begins_with_the_paragraph(plain, tmp_path):
     saved = plain.save(tmp_path / "out")
     assert all(path.is_file() for path in saved.files)

@@ -217,6 +217,27 @@ def test_of_two_things_a_person_chooses(tmp_path):
 
 
 @pytest.mark.video
+def test_of_a_hand_and_what_it_lets_go_the_latter_is_the_default(tmp_path):
+    """The hand moves first, to and fro; the other thing goes down a slope."""
+    time = np.arange(40.0)
+    hand, run = np.clip(time - 2, 0, 24), 4.0 * np.clip(time - 8, 0, 20)
+    path = filmed(
+        tmp_path,
+        np.stack([150 + 12 * np.sin(hand / 2), 30 + 8 * np.cos(hand / 3), 0 * time], axis=1),
+        np.stack([50 + run, 60 + 0.5 * run, 0 * time], axis=1),
+    )
+    known = understand(path)
+    assert len(known.things) == 2 and known.likeliest is not None
+    asked = questions(known, {})
+    assert [one.key for one in asked][:1] == ["points"]
+    number = int(asked[0].default or 0)
+    x, y = list(known.things)[number - 1]
+    assert np.hypot(x - 50, y - 60) < 8
+    assert asked[0].option == f"--point {x:.0f} {y:.0f}", "a call that would do"
+    assert "scenario" not in [one.key for one in asked], "that of the default"
+
+
+@pytest.mark.video
 def test_a_film_in_which_nothing_moves_asks_for_a_point(tmp_path):
     still = np.tile([[50.0, 40.0, 0.0]], (20, 1))
     known = understand(filmed(tmp_path, still))

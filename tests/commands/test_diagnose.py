@@ -11,7 +11,7 @@ from galileo_jax.api import diagnose as api
 from galileo_jax.api.simulate import simulate
 from galileo_jax.commands import command, diagnose
 from galileo_jax.diagnosis.document import diagnosis_document
-from galileo_jax.diagnosis.restricted_fit import restricted_fit
+from galileo_jax.diagnosis.restricted_fit import extended_fit, restricted_fit
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
@@ -101,6 +101,9 @@ def test_a_hypothesis_by_itself_moves_as_in_the_library(trials, tmp_path):
     two = restricted_fit(replace(fit, beside=(fit,)), trials, part)
     np.testing.assert_array_equal(two.beside[0].z, alone.z)
     assert laplace_posterior(part, two, seed=1).draws.shape[-1] == len(part.parameters)
+    again = extended_fit(alone, part, trials)
+    for name in ("z", "free", "covariance", "jacobian"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(fit, name), name)
     with pytest.raises(ValueError, match="has not"):
         restricted_fit(fit_of(trials, ("viscous_drag",)), trials, part)
 

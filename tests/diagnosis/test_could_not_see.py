@@ -11,6 +11,7 @@ from galileo_jax.api.diagnose import with_library
 from galileo_jax.api.simulate import simulate
 from galileo_jax.diagnosis.could_not_see import could_not_see, smallest_shown
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
+from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.diagnosis.verdict import CONVINCING
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
@@ -64,16 +65,13 @@ def made(folder: Path, noise: float) -> JointProblem:
     return with_library([seen.clip], [seen.observation], "rigid", EFFECTS)
 
 
-def found_of(trials: JointProblem, p_value: float) -> Diagnosis:
+def seen_in(trials: JointProblem) -> dict:
     base = Hypothesis((), GradientFitter(trials).fit(0, effects=()))
-    rounds = (Round(base, comparison_of(trials, p_value)),)
-    candidates = tuple(replace(candidate_of(trials, name, 0.1), log_prior=-3.0) for name in EFFECTS)
-    return Diagnosis(rounds, candidates, Verdict("none", ()))
+    return could_not_see(trials, base, dict.fromkeys(EFFECTS, -3.0), 0)
 
 
 def test_each_effect_of_the_library_has_a_strength_and_a_unit(tmp_path):
-    trials = made(tmp_path, 0.0003)
-    seen = could_not_see(trials, found_of(trials, 0.5), 0)
+    seen = seen_in(made(tmp_path, 0.0003))
     assert set(seen) == set(EFFECTS)
     assert seen["air_drag"]["unit"] == "1/m", "nobody weighed it"
     assert 0.001 < seen["air_drag"]["strength"] < 1.0
@@ -81,13 +79,18 @@ def test_each_effect_of_the_library_has_a_strength_and_a_unit(tmp_path):
 
 
 def test_larger_errors_hide_more(tmp_path):
-    strengths = []
-    for noise in (0.0002, 0.002):
-        trials = made(tmp_path, noise)
-        strengths.append(could_not_see(trials, found_of(trials, 0.5), 0)["air_drag"]["strength"])
-    assert 3.0 < strengths[1] / strengths[0] < 30.0
+    few, many = (seen_in(made(tmp_path, noise))["air_drag"] for noise in (0.0002, 0.002))
+    assert 3.0 < many["strength"] / few["strength"] < 30.0
 
 
-def test_nothing_is_said_where_the_last_model_does_not_describe_the_clip(tmp_path):
+@pytest.mark.parametrize(("p_value", "is_said"), [(0.5, True), (1e-9, False)])
+def test_nothing_is_said_where_the_last_model_does_not_describe_the_clip(
+    tmp_path, p_value, is_said
+):
     trials = made(tmp_path, 0.0003)
-    assert could_not_see(trials, found_of(trials, 1e-9), 0) == {}
+    base = Hypothesis((), GradientFitter(trials).fit(0, effects=()))
+    rounds = (Round(base, comparison_of(trials, p_value)),)
+    candidates = tuple(replace(candidate_of(trials, name, 0.1), log_prior=-3.0) for name in EFFECTS)
+    found = Diagnosis(rounds, candidates, Verdict("none", ()))
+    seen = diagnosis_document(trials, found, 0)["could_not_see"]
+    assert set(seen) == (set(EFFECTS) if is_said else set())

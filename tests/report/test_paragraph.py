@@ -102,10 +102,20 @@ def test_an_effect_that_is_named_has_its_strength_and_others_their_limits():
     assert "The model with air drag follows" in said
     assert "does not determine" not in said, "it is known per mass"
     assert said.endswith(
-        "Table tilt below 0.011 rad, magnus below 0.05 /m and stribeck below 0.2 could not have "
-        "been seen."
+        "Rolling of any usual strength, table tilt below 0.011 rad and magnus below 0.05 /m could "
+        "not have been seen."
     )
-    assert "rolling" not in said, "no strength of it would have shown"
+
+
+def test_where_nothing_is_missing_it_is_said_what_could_not_have_been_seen():
+    unseen = {
+        "air_drag": {"strength": 0.0186, "unit": "1/m"},
+        "magnetic_brake": {"strength": 278.4, "unit": "1/s"},
+    }
+    said = paragraph(result(k1=entry(0.29, 0.004)), {**CHECK, "could_not_see": unseen}, None)
+    assert said.endswith(
+        "Air drag below 0.019 /m and magnetic brake below 280 /s could not have been seen."
+    )
 
 
 def test_of_several_explanations_the_values_are_those_with_one_of_them():
