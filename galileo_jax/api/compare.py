@@ -211,7 +211,7 @@ def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
     sizes = fit.result.get("imperfections", {})
     if fit.problem.sizes is not None and not all(one["ordinary"] for one in sizes.values()):
         # With imperfections so large the model fails nowhere; without them it is seen where.
-        fit = replace(fit, problem=fit.problem.with_sizes(None), gradient=None)
+        fit = replace(fit, problem=fit.problem.with_sizes(None), gradient=fit.exact)
     gradient = fit.gradient
     if gradient is None or seed != int(fit.result["seed"]):
         progress.report("fitting", 0.0)

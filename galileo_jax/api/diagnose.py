@@ -23,7 +23,7 @@ from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.laws.source import proposed_file
-from galileo_jax.diagnosis.restricted_fit import restricted_fit
+from galileo_jax.diagnosis.restricted_fit import extended_fit, restricted_fit
 from galileo_jax.experiment.choose import with_next
 from galileo_jax.experiment.hypothesis_probabilities import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
@@ -362,6 +362,20 @@ def diagnose(
             return _diagnosed(measured, options, track_s, command)
 
 
+def diagnose_fitted(fit: Fit, *, engine: str = "auto", seed: int = 0) -> Diagnosis:
+    """As `diagnose` of a fit's tracks; the model without effects is not searched for again.
+
+    Args:
+      fit: of that model, with the options that `fit` has where nothing is said, and this seed.
+      engine: what simulates the motion.
+      seed: of all random numbers.
+    """
+    sources = [one.clip.source for one in fit.measurements]
+    command = command_line("diagnose", sources, engine=engine, seed=seed or None)
+    options = DiagnoseOptions(engine=engine, seed=seed)
+    return _diagnosed(fit.measurements, options, 0.0, command, fit)
+
+
 def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
     def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
         fitter_of(with_library(some, seen, engine)).compile(with_races=True)
@@ -398,8 +412,13 @@ def with_library(
 
 
 def _diagnosed(
-    measured: Sequence[Measurement], options: DiagnoseOptions, track_s: float, command: str
+    measured: Sequence[Measurement],
+    options: DiagnoseOptions,
+    track_s: float,
+    command: str,
+    before: Fit | None = None,
 ) -> Diagnosis:
+    """The diagnosis of tracks; `before`: a fit of them without effects, if there is one."""
     clips, observations = [one.clip for one in measured], [one.observation for one in measured]
     seed, files, began = options.seed, options.effects_from, time.perf_counter()
     problem = with_library(clips, observations, options.engine)
@@ -436,10 +455,14 @@ def _diagnosed(
     def trials_of(one: Candidate) -> JointProblem:
         return one.hypothesis.of(problem)
 
+    base = None
+    if before is not None and before.exact is not None:
+        base = extended_fit(before.exact, before.problem, problem)
     found = run_loop(
         problem,
         seed=seed,
         add=options.add,
+        base=base,
         on_stage=on_stage,
         on_round=on_round,
         on_candidate=on_candidate,

@@ -8,12 +8,11 @@ from typing import Any
 
 from galileo_jax.api.clips import ClipLike, as_list, load
 from galileo_jax.api.compare import Comparison, compare
-from galileo_jax.api.diagnose import Diagnosis, diagnose, with_library
+from galileo_jax.api.diagnose import Diagnosis, diagnose_fitted, with_library
 from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
 from galileo_jax.api.proposed_clip import clip_of
-from galileo_jax.api.track import tracks_of
 from galileo_jax.api.understand import Understood, is_declared, understand
 from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_clip
 from galileo_jax.clip.schema import Clip
@@ -268,7 +267,7 @@ def _explained(clips: Sequence[Clip], engine: str, seed: int) -> Explanation:
             progress.report("what could not have been seen", 0.0)
             return Explanation(first, check, None, command, _could_not_see(check, engine, seed))
     with progress.part(COMPARED, 0.95):
-        found = diagnose(tracks_of(first.measurements), engine=engine, seed=seed)
+        found = diagnose_fitted(first, engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)
         return Explanation(found.best, check, found, command)
 

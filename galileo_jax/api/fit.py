@@ -239,6 +239,7 @@ def _fitted(
     timings = {"track": track_s, "compile": 0.0, "fit": 0.0}
     notes: dict[str, Any] = {"engine": problem.problems[0].engine.name}
     gradient: GradientFit | None = None
+    exact: GradientFit | None = None
 
     def finish(posterior: Posterior, z_best: np.ndarray, notes: dict[str, Any]) -> Fit:
         return make_fit(
@@ -247,6 +248,7 @@ def _fitted(
             posterior,
             z_best,
             gradient,
+            exact=exact,
             method=options.method,
             seed=options.seed,
             timings=timings,
@@ -265,7 +267,7 @@ def _fitted(
         timings["compile"] = time.perf_counter() - began
         began = time.perf_counter()
         worlds, starts, extra = _gradient(fitter, options)
-        problem, gradient = worlds.best.trials, worlds.best.fit
+        problem, gradient, exact = worlds.best.trials, worlds.best.fit, worlds.exact
         if gradient.code is Code.FAILED:
             raise InputError(f"{clips[0].path}: {gradient.code}")
         make = laplace_posterior if options.method == "mh" else fit_posterior
@@ -325,7 +327,7 @@ def _gradient(
 
         chains = options.chains or NUM_CHAINS
         start = start_from_network(fitter.trials, options.seed, chains)
-        return Worlds(World(fitter.trials, start.fit)), start.z, start.notes
+        return Worlds(World(fitter.trials, start.fit), start.fit), start.z, start.notes
     shares = {"searching": 0.1, "refining": 0.3, "searching on": 0.3}
 
     def on_stage(stage: str) -> None:
@@ -336,7 +338,8 @@ def _gradient(
         worlds = fit_worlds(fitter.trials, options.seed, on_stage, may_be_exact=is_open)
         share = worlds.share if worlds.best.fit.sizes is None else 1 - worlds.share
         return worlds, None, {"probability_imperfect": share} if is_open else {}
-    return Worlds(World(fitter.trials, fitter.fit(options.seed, on_stage))), None, {}
+    exact = fitter.fit(options.seed, on_stage)
+    return Worlds(World(fitter.trials, exact), exact), None, {}
 
 
 def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:

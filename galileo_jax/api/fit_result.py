@@ -41,6 +41,8 @@ class Fit:
       z_best: `[parameter]`, the best fit, in the search space; None of a run that an
         earlier version wrote.
       gradient: the gradient fit that the posterior came from; None where there was none.
+      exact: the gradient fit in an exact world, whether or not that is what is told; None of a run
+        that was read.
       folder: where the run lies; None until it is saved.
     """
 
@@ -50,6 +52,7 @@ class Fit:
     result: Mapping[str, Any]
     z_best: np.ndarray | None = None
     gradient: GradientFit | None = None
+    exact: GradientFit | None = None
     folder: Path | None = None
 
     @property
@@ -294,6 +297,7 @@ def make_fit(
     z_best: np.ndarray,
     gradient: GradientFit | None,
     *,
+    exact: GradientFit | None = None,
     method: str,
     seed: int,
     timings: Mapping[str, float],
@@ -307,6 +311,7 @@ def make_fit(
       posterior: draws in the parameters' units.
       z_best: `[parameter]`, the best fit.
       gradient: where it came from, if it is a gradient fit.
+      exact: the gradient fit in an exact world, if there is one.
       method: of the fit.
       seed: of everything random.
       timings: by stage, s.
@@ -339,9 +344,9 @@ def make_fit(
     friction = result["parameters"].get("k1", {}).get("mean")
     if others := [text for one in measurements if (text := with_other_angle(one, friction))]:
         result["warnings"] = [*result.get("warnings", []), *others]
-    if exact := [text for one in measurements if (text := taken_as_exact(one, friction))]:
-        result["taken_as_exact"] = exact
-    return Fit(measurements, problem, posterior, result, z_best, gradient)
+    if taken := [text for one in measurements if (text := taken_as_exact(one, friction))]:
+        result["taken_as_exact"] = taken
+    return Fit(measurements, problem, posterior, result, z_best, gradient, exact)
 
 
 OF_RESULT = {

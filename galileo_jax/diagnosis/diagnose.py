@@ -65,7 +65,7 @@ from galileo_jax.diagnosis.verdict import (
     within_luck,
     without_a_name,
 )
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
+from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.search.hypothesis import Hypothesis, reduced
 from galileo_jax.search.loop import search
@@ -81,6 +81,7 @@ def diagnose(
     *,
     seed: int = 0,
     add: str = "auto",
+    base: GradientFit | None = None,
     on_stage: Callable[[str], None] = lambda _: None,
     on_round: Callable[[Round], None] = lambda _: None,
     on_candidate: Callable[[Candidate], None] = lambda _: None,
@@ -93,6 +94,7 @@ def diagnose(
       seed: of starts and replicates; the same seed gives the same diagnosis.
       add: "auto": add what the verdict names, until the model is adequate or nothing helps;
         "none": only say what is missing; a name: add that effect, whatever the verdict.
+      base: of the model without effects, in an exact world, where that was fitted before.
       on_stage: told what is being done.
       on_round: called with each round of the loop.
       on_candidate: called with each candidate as soon as it is fitted, and once more with each in
@@ -106,11 +108,11 @@ def diagnose(
         trials.free([add])  # raises for unknown names
     listener = _Listener(on_stage, on_round, on_candidate)
     fitter = fitter_of(trials)
-    base, first = _without_effects(fitter, seed, listener)
+    none, first = _without_effects(fitter, base, seed, listener)
     if not is_given and not is_any_moving(trials):
         still = Verdict("none", (), reasons=(reasons.nothing_moves(),))
         return Diagnosis((first,), (), still)
-    table, first = _with_one_effect(fitter, base, first, seed, listener)
+    table, first = _with_one_effect(fitter, none, first, seed, listener)
     rounds, candidates = [first], candidates_of(table)
     for candidate in candidates:
         on_candidate(candidate)
@@ -161,11 +163,13 @@ class _Listener:
 
 
 def _without_effects(
-    fitter: GradientFitter, seed: int, listener: _Listener
+    fitter: GradientFitter, known: GradientFit | None, seed: int, listener: _Listener
 ) -> tuple[Hypothesis, Round]:
-    """The model without effects, and its comparison with the data."""
-    listener.on_stage("fitting the model without effects")
-    base = Hypothesis((), fitter.fit(seed, listener.on_stage, effects=()))
+    """The model without effects, and its comparison with the data; `known`: see `diagnose`."""
+    if known is None or not (known.code is Code.MISFIT or fitter.is_explained(known)):
+        listener.on_stage("fitting the model without effects")
+        known = fitter.fit(seed, listener.on_stage, effects=())  # all valleys were not looked for
+    base = Hypothesis((), known)
     listener.on_stage("comparing it with the data")
     first = Round(base, compare(fitter.trials, base.fit, seed))
     listener.on_round(first)

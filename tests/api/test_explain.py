@@ -9,7 +9,6 @@ import pytest
 import galileo_jax as gx
 from galileo_jax.api import explain as module
 from galileo_jax.api.compare import compare
-from galileo_jax.api.track import Track
 from galileo_jax.runtime.errors import InputError
 
 
@@ -30,7 +29,7 @@ def plain(board) -> gx.Explanation:
 def test_what_nothing_is_missing_in_is_fitted_once_and_not_diagnosed(board, monkeypatch):
     import galileo_jax.api.compare as compare_module
 
-    monkeypatch.setattr(module, "diagnose", None)
+    monkeypatch.setattr(module, "diagnose_fitted", None)
     monkeypatch.setattr(compare_module, "GradientFitter", None)  # would fit again
     before = sorted(board.parent.iterdir())
     stages: list[str] = []
@@ -73,22 +72,21 @@ def test_what_is_saved_is_a_run_whose_page_begins_with_the_paragraph(plain, tmp_
 
 
 def test_where_the_check_fails_the_same_track_is_diagnosed(board, plain, monkeypatch):
-    """The clip is neither tracked nor read again, and the fit that is told is the diagnosis's."""
+    """The clip is not fitted without effects again; the fit that is told is the diagnosis's."""
     handed = []
 
     def failed(fit):
         made = compare(fit)
         return replace(made, found=replace(made.found, p_value=1e-9))
 
-    def diagnosed(tracks, **options):
-        handed.extend(tracks)
+    def diagnosed(fit, **options):
+        handed.append(fit)
         return SimpleNamespace(best=plain.fit, document={})
 
     monkeypatch.setattr(module, "compare", failed)
-    monkeypatch.setattr(module, "diagnose", diagnosed)
+    monkeypatch.setattr(module, "diagnose_fitted", diagnosed)
     found = gx.explain(board, seed=0)
-    (track,) = handed
-    assert isinstance(track, Track) and track.measurement is found.check.fit.measurements[0]
+    assert handed == [found.check.fit]
     assert found.fit is plain.fit and found.diagnosis is not None
 
 
@@ -98,7 +96,7 @@ def test_a_clip_that_cannot_tell_is_not_diagnosed(board, plain, monkeypatch):
         return replace(made, found=replace(made.found, p_value=1e-9, no_verdict="too few frames"))
 
     monkeypatch.setattr(module, "compare", failed)
-    monkeypatch.setattr(module, "diagnose", None)
+    monkeypatch.setattr(module, "diagnose_fitted", None)
     assert gx.explain(board).diagnosis is None
 
 

@@ -38,11 +38,13 @@ class Worlds:
 
     Attributes:
       best: the more probable.
+      exact: the fit in an exact world, whatever the data say of it.
       other: the less probable; None where it has no part in the posterior.
       share: the probability of the less probable.
     """
 
     best: World
+    exact: GradientFit
     other: World | None = None
     share: float = 0.0
 
@@ -78,19 +80,19 @@ def fit_worlds(
         modes = most_probable(clips, trials.terms, None, exact.fit)
         lead = expected_lead(clips, modes, exact.fit)
         if lead < HOPELESS:
-            return Worlds(exact, share=float(expit(lead)))
+            return Worlds(exact, exact.fit, share=float(expit(lead)))
         x = [mode.x for mode in modes]
     rough = with_imperfections(trials, exact.fit, x)
     if not may_be_exact or rough.fit.sizes is None:
-        return Worlds(rough)
+        return Worlds(rough, exact.fit)
     if rough.fit.code is not Code.CONVERGED:
-        return Worlds(exact)
+        return Worlds(exact, exact.fit)
     probability = float(expit(rough.fit.log_evidence - exact.fit.log_evidence))
     if exact.fit.code is not Code.CONVERGED:
-        return Worlds(rough)
+        return Worlds(rough, exact.fit)
     best, other = (rough, exact) if probability > 0.5 else (exact, rough)
     share = min(probability, 1 - probability)
-    return Worlds(best, other if share > EXCLUDED else None, share)
+    return Worlds(best, exact.fit, other if share > EXCLUDED else None, share)
 
 
 def is_usual(world: World) -> bool:
