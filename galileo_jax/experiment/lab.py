@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import IO, Any, Protocol
+from typing import IO, Any, Protocol, runtime_checkable
 
 from galileo_jax.experiment.settings import Can, Choices, parse_can
 from galileo_jax.runtime.errors import InputError
@@ -60,6 +60,7 @@ class Described:
         return {"settings": settings, "clip": dict(self.clip)}
 
 
+@runtime_checkable
 class Lab(Protocol):
     """Anything that makes experiments."""
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -74,7 +74,9 @@ class Posterior:
         """All draws `[chain * draw, parameter]`, chain after chain."""
         return self.draws.reshape(-1, len(self.names))
 
-    def mapped(self, function: Callable[[np.ndarray], np.ndarray], names: tuple[str, ...]) -> Self:
+    def mapped(
+        self, function: Callable[[np.ndarray], np.ndarray], names: tuple[str, ...]
+    ) -> "Posterior":
         """The posterior of `function` of the parameters (such as z to theta).
 
         Arguments:
@@ -83,11 +85,11 @@ class Posterior:
         """
         return replace(self, draws=np.asarray(function(self.draws)), names=tuple(names))
 
-    def chosen(self, columns: np.ndarray, names: tuple[str, ...]) -> Self:
+    def chosen(self, columns: np.ndarray, names: tuple[str, ...]) -> "Posterior":
         """The marginal of some parameters, under other names."""
         return replace(self, draws=self.draws[..., columns], names=tuple(names))
 
-    def mixed_with(self, other: Self, share: float) -> Self:
+    def mixed_with(self, other: "Posterior", share: float) -> "Posterior":
         """Draws of two posteriors of the same parameters, one of which is right, in any order.
 
         Args:
@@ -159,7 +161,7 @@ class Posterior:
             file["posterior"].attrs["galileo_jax"] = json.dumps(self._notes())
 
     @classmethod
-    def from_netcdf(cls, path: Path) -> Self:
+    def from_netcdf(cls, path: Path) -> "Posterior":
         """Reads what `to_netcdf` wrote.
 
         Raises:
@@ -176,7 +178,7 @@ class Posterior:
             raise InputError(f"{path}: not a netCDF file of draws ({error})") from error
 
     @classmethod
-    def _read(cls, path: Path) -> Self:
+    def _read(cls, path: Path) -> "Posterior":
         import h5netcdf
 
         with h5netcdf.File(path, "r") as file:

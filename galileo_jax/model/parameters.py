@@ -9,7 +9,7 @@ ignorance the data have taken away.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol, runtime_checkable
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +21,7 @@ Role = Literal["main", "nuisance", "effect", "latent", "given"]
 STRETCHED_TO = 6.0  # z, by a long tail
 
 
+@runtime_checkable
 class Prior(Protocol):
     """A distribution of one number, as a map from the standard normal."""
 

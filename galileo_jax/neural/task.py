@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from galileo_jax.runtime.registry import Registry
 
@@ -17,6 +17,7 @@ else:
     Arrays = dict  # NumPy is left out: every command registers presets here, also for a --help
 
 
+@runtime_checkable
 class Trainable(Protocol):
     """Data, network and loss: what the training loop needs.
 

@@ -6,7 +6,7 @@ takes differences of whole batches at the posterior's scale, with every engine.
 """
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +24,7 @@ Motion = tuple[Places, Places]
 """Centres (m) and velocities (m/s), from the release on, every `Model.record_dt_s`."""
 
 
+@runtime_checkable
 class Engine(Protocol):
     """Something that rolls out a batch of parameter vectors."""
 

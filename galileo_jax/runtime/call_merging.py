@@ -15,13 +15,14 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import jax
 
 from galileo_jax.runtime.progress import Cancelled
 
 
+@runtime_checkable
 class Mergeable(Protocol):
     """A compiled program."""
 

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 OnProgress = Callable[[str, float, Any], object]
 """Called with the stage, the share of the whole call that is done (0 to 1), and what there is of
@@ -27,6 +27,7 @@ class Cancelled(Exception):  # noqa: N818 - an outcome that the caller asked for
     """Work was stopped between two batches because its caller asked for it."""
 
 
+@runtime_checkable
 class CancelFlag(Protocol):
     """Anything with `is_set`, such as `threading.Event`."""
 

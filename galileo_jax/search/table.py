@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -18,6 +18,7 @@ CHANGED_NATS = 1.0  # by which the evidence of what may decide has changed
 SAME_NATS = 3.0  # by which the evidence of a parent differs that is worth asking again
 
 
+@runtime_checkable
 class Stakes(Protocol):
     """What hangs on a hypothesis: how probable it is beforehand, and when it may decide."""
 

@@ -3,7 +3,7 @@
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import Cancelled
@@ -49,6 +49,7 @@ class Outcome:
     failure: Failure | None = None
 
 
+@runtime_checkable
 class Engine(Protocol):
     """Something that carries out tasks."""
 

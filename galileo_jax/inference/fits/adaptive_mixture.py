@@ -12,7 +12,7 @@ J.-M. Marin, A. Mira, C. P. Robert, Adaptive multiple importance sampling, Scand
 """
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -26,6 +26,7 @@ Points = Float[np.ndarray, "draw parameter"]
 Values = Float[np.ndarray, " draw"]
 
 
+@runtime_checkable
 class Part(Protocol):
     """A distribution of which draws and the density are known."""
 

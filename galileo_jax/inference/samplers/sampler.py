@@ -6,7 +6,7 @@ traced value and never compiles anything anew. It owns no loop, no key and no ou
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple
 
 import equinox as eqx
 import jax
@@ -57,11 +57,11 @@ class AbstractTunedSampler(AbstractSampler):
 
     @classmethod
     @abstractmethod
-    def from_gaussian(cls, mean: jax.Array, covariance: jax.Array) -> Self:
+    def from_gaussian(cls, mean: jax.Array, covariance: jax.Array) -> "AbstractTunedSampler":
         """The sampler for a density near N(mean, covariance): a Laplace fit, or a guess."""
 
     @abstractmethod
-    def fitted(self, mean: jax.Array, covariance: jax.Array) -> Self:
+    def fitted(self, mean: jax.Array, covariance: jax.Array) -> "AbstractTunedSampler":
         """The same sampler with a new mean and covariance; its learned scale is kept."""
 
     @property
@@ -70,7 +70,7 @@ class AbstractTunedSampler(AbstractSampler):
         """The density's covariance `[dim, dim]` as believed now."""
 
     @abstractmethod
-    def rescaled(self, info: Any, gain: jax.Array) -> Self:
+    def rescaled(self, info: Any, gain: jax.Array) -> "AbstractTunedSampler":
         """One Robbins-Monro step of the scale: log s += gain (acceptance - target).
 
         Arguments:

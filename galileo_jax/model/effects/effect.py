@@ -166,7 +166,7 @@ class Surroundings:
 
     names: tuple[str, ...]
     angle_rad: float
-    gravity: float
+    gravity: float | Array
     half_length_m: tuple[float, ...]
     half_height_m: tuple[float, ...]
     corner_m: tuple[float, ...]
@@ -226,10 +226,11 @@ class Surroundings:
 
     @classmethod
     def tree_unflatten(cls, facts, leaves):
-        """The inverse."""
-        return cls(
-            **dict(zip(_ARRAYS, leaves, strict=True)), **dict(zip(_STATIC, facts, strict=True))
-        )
+        """The inverse; past the constructor, for JAX puts anything in the place of a number."""
+        made = object.__new__(cls)
+        for key, value in zip((*_ARRAYS, *_STATIC), (*leaves, *facts), strict=True):
+            object.__setattr__(made, key, value)
+        return made
 
     def mass(self, theta: Theta) -> list[Array]:
         """The objects' masses, kg, each `[...]`."""

@@ -168,7 +168,9 @@ def build_scene(clip: Clip, observation: Observation) -> Scene:
         start_m=tuple(starts),
         start_path_m=start_paths(tuple(starts), corner, angle),
         has_table=has_table,
-        comes_down=tuple(has_table and at[0] < c for at, c in zip(starts, corner, strict=True)),
+        comes_down=tuple(
+            has_table and bool(at[0] < c) for at, c in zip(starts, corner, strict=True)
+        ),
         release_s=_release(clip, observation, angle),
         is_scale_known=clip.is_scale_known,
         is_scale_stated=clip.pixels_per_metre_sd is not None,

@@ -1,6 +1,6 @@
 """The default sampler: a Student-t independence kernel mixed with the random walk."""
 
-from typing import ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -55,14 +55,14 @@ class Mixture(AbstractTunedSampler):
     log_scale: jax.Array  # [], of the random walk
 
     @classmethod
-    def from_gaussian(cls, mean, covariance) -> Self:
+    def from_gaussian(cls, mean, covariance) -> "Mixture":
         """Both kernels from the same mean and covariance."""
         mean = jnp.asarray(mean)
         cholesky = jnp.linalg.cholesky(jnp.asarray(covariance, mean.dtype))
         scale = jnp.asarray(optimal_log_scale(mean.shape[0]), mean.dtype)
         return cls(mean=mean, cholesky=cholesky, log_scale=scale)
 
-    def fitted(self, mean, covariance) -> Self:
+    def fitted(self, mean, covariance) -> "Mixture":
         """New mean and covariance, same scale of the random walk."""
         mean = jnp.asarray(mean, self.mean.dtype)
         cholesky = jnp.linalg.cholesky(jnp.asarray(covariance, self.mean.dtype))
@@ -73,7 +73,7 @@ class Mixture(AbstractTunedSampler):
         """Of the density; the t has this times df / (df - 2)."""
         return self.cholesky @ self.cholesky.T
 
-    def rescaled(self, info: MixtureInfo, gain) -> Self:
+    def rescaled(self, info: MixtureInfo, gain) -> "Mixture":
         """Robbins-Monro from the random walk's steps only."""
         excess = jnp.where(info.is_independent, 0.0, info.acceptance_rate - TARGET_ACCEPTANCE)
         change = gain * self.steps_per_turn * jnp.mean(excess)

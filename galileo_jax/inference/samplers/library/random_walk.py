@@ -1,7 +1,7 @@
 """Random-walk Metropolis: BlackJAX's kernel with a learned Gaussian proposal."""
 
 import math
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import jax
 import jax.numpy as jnp
@@ -42,13 +42,13 @@ class RandomWalk(AbstractTunedSampler):
     log_scale: jax.Array  # []
 
     @classmethod
-    def from_gaussian(cls, mean, covariance) -> Self:
+    def from_gaussian(cls, mean, covariance) -> "RandomWalk":
         """Optimal scale for `covariance`; a random walk has no use for the mean."""
         cholesky = jnp.linalg.cholesky(jnp.asarray(covariance))
         scale = jnp.asarray(optimal_log_scale(mean.shape[0]), cholesky.dtype)
         return cls(cholesky=cholesky, log_scale=scale)
 
-    def fitted(self, mean, covariance) -> Self:
+    def fitted(self, mean, covariance) -> "RandomWalk":
         """New covariance, same scale."""
         cholesky = jnp.linalg.cholesky(jnp.asarray(covariance, self.cholesky.dtype))
         return type(self)(cholesky=cholesky, log_scale=self.log_scale)
@@ -58,7 +58,7 @@ class RandomWalk(AbstractTunedSampler):
         """Of the density, without the scale of the steps."""
         return self.cholesky @ self.cholesky.T
 
-    def rescaled(self, info: Info, gain) -> Self:
+    def rescaled(self, info: Info, gain) -> "RandomWalk":
         """Robbins-Monro towards an acceptance rate of 0.234."""
         change = gain * (jnp.mean(info.acceptance_rate) - TARGET_ACCEPTANCE)
         scale = self.log_scale + change.astype(self.log_scale.dtype)
