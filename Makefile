@@ -7,11 +7,15 @@ BIN := $(VENV)/bin
 CORE := $(VENV)/.core
 READY := $(VENV)/.ready
 
-# uv where it is installed: the same versions, sooner. pip writes no bytecode beforehand: of 250 MB
-# Python writes itself what it needs.
-PIP := $(BIN)/pip install --disable-pip-version-check --no-compile
-UV := uv pip install --python $(BIN)/python
-INSTALL := $(if $(shell uv --version 2>/dev/null),$(UV),$(PIP)) --quiet -c constraints.txt
+# uv where it is installed: the same versions, sooner. make UV= takes pip all the same (whose settings,
+# such as a mirror, uv does not read). Neither writes the 250 MB of bytecode: Python writes what it
+# comes to need, also where the environment (of many containers) tells it not to.
+UV ?= uv
+UV_INSTALL := $(UV) pip install --python $(BIN)/python
+PIP_INSTALL := $(BIN)/pip install --disable-pip-version-check --no-compile
+HAS_UV := $(and $(UV),$(shell $(UV) --version 2>/dev/null))
+INSTALL := $(if $(HAS_UV),$(UV_INSTALL),$(PIP_INSTALL)) --quiet -c constraints.txt
+export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: demo test test-all test-plain-processor test-cluster lint docs setup clean
 
@@ -69,9 +73,9 @@ $(CORE): pyproject.toml constraints.txt
 	@$(INSTALL) -e .
 	@touch $@
 
-# What tests and checks need beside it: node, browsers' drivers, notebooks, the studio.
+# What tests and checks need beside it: node, a driver of browsers, notebooks, the studio.
 $(READY): $(CORE)
-	@echo "Adding to $(VENV) what tests and checks need: 0.7 GB"
+	@echo "Adding to $(VENV) what tests and checks need: 0.8 GB"
 	@$(INSTALL) -e '.[dev]'
 	@touch $@
 
