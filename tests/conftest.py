@@ -68,6 +68,15 @@ def shared_data() -> Path:
 
 
 @pytest.fixture
+def nobody_can_write() -> Path:
+    """A folder in which no file can be made, not even by root, to whom permissions are no bar."""
+    folder = Path("/sys")
+    if not folder.is_dir():
+        pytest.skip("no /sys here")
+    return folder
+
+
+@pytest.fixture
 def x64():
     """64-bit JAX for one test: derivatives are checked in it."""
     import jax

@@ -1,10 +1,12 @@
 import os
 import subprocess
 import sys
-import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import galileo_jax
 from galileo_jax import __main__
@@ -76,36 +78,6 @@ def test_unknown_scene_names_the_known_ones():
         package_data.scene_path("rmap.xml")
 
 
-@pytest.mark.slow
-def test_wheel_carries_scenes_and_configs_and_works_outside_the_checkout(tmp_path):
-    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", tmp_path]
-    subprocess.run([str(part) for part in build], cwd=ROOT, check=True, capture_output=True)
-    (wheel,) = tmp_path.glob("*.whl")
-    installed = tmp_path / "installed"
-    with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(installed)
-    packaged = {
-        path.relative_to(installed / "galileo_jax" / "_data").as_posix()
-        for path in (installed / "galileo_jax" / "_data").rglob("*")
-        if path.is_file()
-    }
-    assert packaged == EVERY_FILE
-    code = (
-        "import galileo_jax, galileo_jax.files.package_data as d; "
-        "print(galileo_jax.__file__); print(d.config_path('README.md'))"
-    )
-    environment = os.environ | {"PYTHONPATH": str(installed)}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert all(line.startswith(str(installed)) for line in done.stdout.splitlines())
-
-
 def test_cache_is_in_the_users_cache_folder_and_can_be_switched_off(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv(compilation_cache.SWITCH, raising=False)
@@ -129,3 +101,39 @@ def test_compiled_programs_are_kept_unless_switched_off(setting, is_filled, tmp_
     )
     subprocess.run([sys.executable, "-c", code], env=environment, check=True)
     assert any(tmp_path.iterdir()) == is_filled
+
+
+def test_without_a_writable_cache_programs_are_compiled_anew(tmp_path):
+    """Neither the home folder nor the cache can be made: a file stands where a folder would be."""
+    (tmp_path / "file").touch()
+    environment = {key: value for key, value in os.environ.items() if "CACHE" not in key}
+    environment |= {"HOME": os.devnull, "XDG_CACHE_HOME": str(tmp_path / "file")}
+    code = (
+        "import jax; from galileo_jax.runtime import compilation_cache as c; c.enable(); "
+        "print(jax.jit(lambda x: x * 2 + 1)(1.0))"
+    )
+    call = [sys.executable, "-c", code]
+    done = subprocess.run(call, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "3.0\n"
+    assert done.stderr == ""
+
+
+def test_every_package_that_make_installs_is_pinned():
+    """Else pip and uv, today and next month, install different versions."""
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pinned = {canonicalize_name(line.partition("==")[0]) for line in lines if "==" in line}
+    needed, open_ones = set(), [Requirement("galileo-jax[dev]")]
+    while open_ones:
+        requirement = open_ones.pop()
+        for line in metadata.requires(requirement.name) or ():
+            below = Requirement(line)
+            extras = requirement.extras or {""}
+            is_needed = below.marker is None or any(
+                below.marker.evaluate({"extra": extra}) for extra in extras
+            )
+            if is_needed and (key := (canonicalize_name(below.name), *below.extras)) not in needed:
+                needed.add(key)
+                open_ones.append(below)
+    names = {name for name, *_ in needed}
+    assert {"jax", "fsspec", "pytest"} <= names, "of the core, below it, of dev"
+    assert not names - pinned - {"galileo-jax"}

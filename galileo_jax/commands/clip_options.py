@@ -60,7 +60,7 @@ def out_folder(out: str | None, clips: "Sequence[Clip]", below: str = "") -> Pat
     """Where a call's results go: `--out`, or runs/ and the clips' names, and a folder in it.
 
     Raises:
-      InputError: it is a file.
+      InputError: it is a file, or nothing can be written there.
     """
     folder = Path(out) if out else Path("runs") / "+".join(clip.path.stem for clip in clips)
     check_folder(folder)

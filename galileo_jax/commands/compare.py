@@ -14,6 +14,7 @@ from galileo_jax.commands.clip_options import (
 )
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def main(argv: Sequence[str]) -> int | None:
     clips = [] if runs else load_clips(sources, asked["pixels_per_metre"])
     if runs:
         out = Path(to) if to else Path(runs[0]) / "compare"
+        check_folder(out)
     else:
         out = out_folder(to, clips, "compare")
     from galileo_jax.api.compare import compare

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from galileo_jax.commands import command
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def main(argv: Sequence[str]) -> int | None:
     out = Path(call.out) if call.out else runs[0]
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: a file; the folder of a run expected")
+    check_folder(out)
     from galileo_jax.api.next_experiment import next_experiment
 
     with progress_display() as display:

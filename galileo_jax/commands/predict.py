@@ -6,6 +6,7 @@ from pathlib import Path
 from galileo_jax.commands import command
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.runtime.atomic_write import check_folder
 from galileo_jax.runtime.errors import InputError
 
 
@@ -16,6 +17,7 @@ def main(argv: Sequence[str]) -> int | None:
     if out.exists() and not out.is_dir():
         what = "RUN" if call.out is None else "--out"
         raise InputError(f"{what}: {out} is a file; a folder expected")
+    check_folder(out)
     from galileo_jax.api.predict import predict
 
     with progress_display() as display:

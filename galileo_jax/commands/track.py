@@ -10,7 +10,7 @@ from galileo_jax.commands import command
 from galileo_jax.commands.clip_options import corrections, warn
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
-from galileo_jax.runtime.atomic_write import writing_into
+from galileo_jax.runtime.atomic_write import check_folder, writing_into
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.track import Track
 
@@ -23,6 +23,7 @@ def main(argv: Sequence[str]) -> int | None:
     if clip.video is None:
         raise InputError(f"{clip.path}: video: missing; a csv track is already tracked")
     out: Path = call.out or Path(f"{clip.path.stem}_track")
+    check_folder(out)
     from galileo_jax.api.track import track
 
     with progress_display() as display:

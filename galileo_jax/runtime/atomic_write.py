@@ -50,9 +50,22 @@ def writing_into(out: Path) -> Iterator[None]:
 
 
 def check_folder(out: Path) -> None:
-    """Raises `InputError` where something that is no folder stands in a folder's place."""
+    """Asks, before anything is computed, whether a folder can be there and be written to.
+
+    It makes a file without a name in the nearest folder that there is: permissions alone do not
+    say it (to root everything is permitted, on a read-only disk, too).
+
+    Raises:
+      InputError: no.
+    """
     if out.exists() and not out.is_dir():
         raise InputError(f"--out: {out} is a file; a folder expected")
+    nearest = next((folder for folder in (out, *out.parents) if folder.exists()), out)
+    try:
+        with tempfile.TemporaryFile(dir=nearest):
+            pass
+    except OSError as error:
+        raise InputError(f"--out: nothing can be written to {out} ({error.strerror})") from error
 
 
 def write_text(path: Path, text: str) -> None:
