@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.api.bundle import Bundle, bundle_of
 from galileo_jax.api.clips import ClipLike, as_list, load
 from galileo_jax.api.compare import Comparison, compare
 from galileo_jax.api.diagnose import Diagnosis, diagnose
@@ -98,6 +99,21 @@ class Explanation:
             beside["what is missing, and why"] = "diagnosis/report.html"
         pages = self.report(folder / "report.html", beside)
         return replace(self, fit=fit, files=(*pages, *files))
+
+    @in_float64
+    def bundle(self, path: str | Path) -> Bundle:
+        """Writes one zip to be attached to an issue: tracks, yamls, results, versions, command.
+
+        It has no film, no picture and no name of a file, folder, user or computer. Unpacked, its
+        tracks are fitted again to the same numbers.
+
+        Args:
+          path: of the zip.
+
+        Raises:
+          InputError: the file cannot be written.
+        """
+        return bundle_of(self, path)
 
     def __repr__(self) -> str:
         """In one line."""

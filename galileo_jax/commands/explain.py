@@ -19,6 +19,7 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
+    from galileo_jax.api.explain import Explanation
     from galileo_jax.api.understand import Understood
     from galileo_jax.clip.schema import Clip
 
@@ -36,25 +37,84 @@ def looks_like_a_file(word: str) -> bool:
 def main(argv: Sequence[str]) -> int | None:
     """Explains a film or table, or trials together; asks at a terminal for what is missing."""
     call = vars(_parser().parse_args(argv))
-    files, to = call.pop("clips"), call.pop("out")
+    files, to, is_bundled = call.pop("clips"), call.pop("out"), call.pop("bundle")
     engine, seed = call.pop("engine"), call.pop("seed")
     said = {OF_YAML.get(key, key): value for key, value in call.items() if value is not None}
     if (point := said.pop("point", None)) is not None:
         said["points"] = [tuple(point)]
-    clips = _clips(files, said)
     is_folder = len(files) == 1 and Path(files[0]).is_dir()
     to = to or (f"runs/{Path(files[0]).resolve().name}" if is_folder else None)
+    try:
+        found, out = _explained(files, said, to, engine, seed)
+    except Exception as error:
+        if is_bundled:
+            _bundle_failure(files, said, to, argv, error)
+        raise
+    print(textwrap.fill(found.paragraph, min(WIDTH, shutil.get_terminal_size().columns)))
+    print(f"\n{table(found.fit, true_parameters(found.fit.measurements[0].clip))}")
+    notes_on(found.fit, out)
+    command.say(", ".join(map(str, found.files)))
+    if is_bundled:
+        from galileo_jax.api.bundle import NAME, bundle_of
+
+        made = bundle_of(found, out / NAME, command=_words(argv), others=_not_said(files, to))
+        command.say(made.line)
+    return None
+
+
+def _explained(
+    files: Sequence[str], said: dict[str, Any], to: str | None, engine: str, seed: int
+) -> "tuple[Explanation, Path]":
+    """What the files show, and the folder in which it lies."""
+    clips = _clips(files, said)
     out = out_folder(to, clips)
     warn(warning for clip in clips for warning in clip.warnings)
     from galileo_jax.api.explain import explain
 
     with progress_display() as display:
-        found = explain(clips, out=out, engine=engine, seed=seed, on_progress=display)
-    print(textwrap.fill(found.paragraph, min(WIDTH, shutil.get_terminal_size().columns)))
-    print(f"\n{table(found.fit, true_parameters(clips[0]))}")
-    notes_on(found.fit, out)
-    command.say(", ".join(map(str, found.files)))
-    return None
+        return explain(clips, out=out, engine=engine, seed=seed, on_progress=display), out
+
+
+def _bundle_failure(
+    files: Sequence[str],
+    said: dict[str, Any],
+    to: str | None,
+    argv: Sequence[str],
+    error: Exception,
+) -> None:
+    """Writes the bundle of a call that failed; where that fails, too, says why in one line."""
+    from galileo_jax.api.bundle import NAME, bundle_of_failure
+    from galileo_jax.api.explain import sources_of
+
+    try:
+        given = sources_of(list(files))
+    except InputError:
+        given = [Path(one) for one in files]
+    folder = Path(to) if to else Path("runs") / "+".join(Path(str(one)).stem for one in given)
+    try:
+        made = bundle_of_failure(
+            given,
+            error,
+            folder / NAME,
+            command=_words(argv),
+            answers=said,
+            others=_not_said(files, to),
+        )
+    except InputError as why:
+        command.say(f"warning: {why}")
+        return
+    command.say(made.line)
+
+
+def _words(argv: Sequence[str]) -> tuple[str, ...]:
+    return ("galileo", "explain", *argv)
+
+
+def _not_said(files: Sequence[str], to: str | None) -> dict[str, str]:
+    """Folders that a call names, to what a bundle has in their place."""
+    folders = {one.rstrip("/"): "clips" for one in files if Path(one).is_dir()}
+    folders |= {str(Path(one).resolve()): "clips" for one in folders}
+    return folders | ({to: "out", str(Path(to).resolve()): "out"} if to else {})
 
 
 def _clips(files: Sequence[str], said: dict[str, Any]) -> "list[Clip]":
@@ -141,6 +201,12 @@ def _parser() -> command.Parser:
     )
     add = adder(parser, "explain")
     parser.add_argument("--out", metavar="DIR", help="folder of the results (default runs/FILE)")
+    parser.add_argument(
+        "--bundle",
+        action="store_true",
+        help="write bundle.zip there, too: what somebody needs who is to help, without the film "
+        "and without names (default: off)",
+    )
     add("scenario", metavar="NAME")
     add("ramp_angle", metavar="DEG")
     add("pixels_per_metre", metavar="SCALE")
