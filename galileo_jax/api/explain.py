@@ -20,6 +20,7 @@ from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_c
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
+from galileo_jax.measurement.track_cache import is_tracked
 from galileo_jax.report.paragraph import paragraph
 from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
@@ -249,6 +250,24 @@ def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
             raise InputError(f"{path}: point (given in the call): its objects are declared already")
         return load_clip(clip, **answers)
     return understand(path)
+
+
+def kept(clips: ClipLike | Sequence[ClipLike]) -> list[str]:
+    """What a call that was stopped leaves for the next: yamls and tracks of films, in words."""
+    found: list[str] = []
+    try:
+        files = [Path(one) for one in sources_of(clips) if isinstance(one, str | Path)]
+    except InputError:
+        return []
+    for path in files:
+        try:
+            clip = load_clip(path) if is_declared(path) else None
+        except InputError:
+            continue
+        if clip is not None:
+            found.append(str(clip.path))
+            found += [f"the track of {clip.video}"] if is_tracked(clip) else []
+    return found
 
 
 def _checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:

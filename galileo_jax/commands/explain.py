@@ -6,6 +6,7 @@ import sys
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax.commands import command
@@ -13,10 +14,12 @@ from galileo_jax.commands.clip_options import notes_on, out_folder, warn
 from galileo_jax.commands.fit_table import table
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.commands.stop import stoppable
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.engine_names import ENGINES
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.runtime.progress import Cancelled
 
 if TYPE_CHECKING:
     from galileo_jax.api.explain import Explanation
@@ -45,7 +48,10 @@ def main(argv: Sequence[str]) -> int | None:
     is_folder = len(files) == 1 and Path(files[0]).is_dir()
     to = to or (f"runs/{Path(files[0]).resolve().name}" if is_folder else None)
     try:
-        found, out = _explained(files, said, to, engine, seed)
+        with stoppable(lambda: _kept(files)) as flag:
+            found, out = _explained(files, said, to, engine, seed, flag)
+    except (KeyboardInterrupt, Cancelled):
+        raise KeyboardInterrupt(_kept(files)) from None
     except Exception as error:
         if is_bundled:
             _bundle_failure(files, said, to, argv, error)
@@ -63,16 +69,27 @@ def main(argv: Sequence[str]) -> int | None:
 
 
 def _explained(
-    files: Sequence[str], said: dict[str, Any], to: str | None, engine: str, seed: int
+    files: Sequence[str], said: dict[str, Any], to: str | None, engine: str, seed: int, flag: Event
 ) -> "tuple[Explanation, Path]":
     """What the files show, and the folder in which it lies."""
-    clips = _clips(files, said)
+    clips = _clips(files, said, flag)
     out = out_folder(to, clips)
     warn(warning for clip in clips for warning in clip.warnings)
     from galileo_jax.api.explain import explain
 
     with progress_display() as display:
-        return explain(clips, out=out, engine=engine, seed=seed, on_progress=display), out
+        found = explain(clips, out=out, engine=engine, seed=seed, on_progress=display, cancel=flag)
+    return found, out
+
+
+def _kept(files: Sequence[str]) -> str:
+    """What a call that was stopped leaves, and what the next one does with it."""
+    # What was not imported has not begun; and importing it now would take seconds.
+    module = sys.modules.get("galileo_jax.api.explain")
+    found = module.kept(files) if module is not None and hasattr(module, "kept") else []
+    if not found:
+        return "stopped; nothing was written: the next run begins anew"
+    return f"stopped; kept: {', '.join(found)}: the next run goes on from there"
 
 
 def _bundle_failure(
@@ -117,7 +134,7 @@ def _not_said(files: Sequence[str], to: str | None) -> dict[str, str]:
     return folders | ({to: "out", str(Path(to).resolve()): "out"} if to else {})
 
 
-def _clips(files: Sequence[str], said: dict[str, Any]) -> "list[Clip]":
+def _clips(files: Sequence[str], said: dict[str, Any], flag: Event | None = None) -> "list[Clip]":
     """The checked clips; writes the yaml of those that have none, when all of them are right."""
     from galileo_jax.api.explain import sources_of, understood
     from galileo_jax.api.proposed_clip import clip_of, write_yaml
@@ -128,7 +145,7 @@ def _clips(files: Sequence[str], said: dict[str, Any]) -> "list[Clip]":
     to_write: list[tuple[Understood, dict[str, Any]]] = []
     answers = said
     for source in sources_of(list(files)):
-        with progress_display() as display, progress.scope(display):
+        with progress_display() as display, progress.scope(display, flag):
             known = understood(source, said)
         if isinstance(known, Understood):
             answers = asked(known, answers) if is_terminal else answers

@@ -11,6 +11,9 @@ from typing import Any
 
 from galileo_jax.runtime.errors import InputError
 
+_unfinished: set[Path] = set()
+"""Temporary files that are being written, by any thread."""
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
@@ -25,6 +28,7 @@ def replacing(path: Path) -> Iterator[Path]:
     handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
     os.close(handle)
     temporary = Path(name)
+    _unfinished.add(temporary)
     try:
         yield temporary
         umask = os.umask(0)
@@ -32,6 +36,13 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.chmod(0o666 & ~umask)
         temporary.replace(path)
     finally:
+        temporary.unlink(missing_ok=True)
+        _unfinished.discard(temporary)
+
+
+def remove_unfinished() -> None:
+    """Removes what is half-written, where the program ends without coming back to `replacing`."""
+    for temporary in tuple(_unfinished):
         temporary.unlink(missing_ok=True)
 
 
