@@ -14,6 +14,7 @@ from galileo_jax.commands.clip_options import notes_on, out_folder, warn
 from galileo_jax.commands.fit_table import table
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
+from galileo_jax.commands.show import show
 from galileo_jax.commands.stop import stoppable
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.rollout.engine_names import ENGINES
@@ -72,7 +73,7 @@ def _explained(
     files: Sequence[str], said: dict[str, Any], to: str | None, engine: str, seed: int, flag: Event
 ) -> "tuple[Explanation, Path]":
     """What the files show, and the folder in which it lies."""
-    clips = _clips(files, said, flag)
+    clips = _clips(files, said, flag, to)
     out = out_folder(to, clips)
     warn(warning for clip in clips for warning in clip.warnings)
     from galileo_jax.api.explain import explain
@@ -134,7 +135,9 @@ def _not_said(files: Sequence[str], to: str | None) -> dict[str, str]:
     return folders | ({to: "out", str(Path(to).resolve()): "out"} if to else {})
 
 
-def _clips(files: Sequence[str], said: dict[str, Any], flag: Event | None = None) -> "list[Clip]":
+def _clips(
+    files: Sequence[str], said: dict[str, Any], flag: Event | None = None, out: str | None = None
+) -> "list[Clip]":
     """The checked clips; writes the yaml of those that have none, when all of them are right."""
     from galileo_jax.api.explain import sources_of, understood
     from galileo_jax.api.proposed_clip import clip_of, write_yaml
@@ -148,7 +151,7 @@ def _clips(files: Sequence[str], said: dict[str, Any], flag: Event | None = None
         with progress_display() as display, progress.scope(display, flag):
             known = understood(source, said)
         if isinstance(known, Understood):
-            answers = asked(known, answers) if is_terminal else answers
+            answers = asked(known, answers, out) if is_terminal else answers
             clips.append(clip_of(known, answers, str(source)))
             to_write.append((known, answers))
             # What holds of one trial holds of the next, but where its things are.
@@ -160,8 +163,15 @@ def _clips(files: Sequence[str], said: dict[str, Any], flag: Event | None = None
     return clips
 
 
-def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
+def asked(known: "Understood", answers: dict[str, Any], out: str | None = None) -> dict[str, Any]:
     """Asks at the terminal for all that is open; Enter takes what stands in brackets.
+
+    Of a film a picture of what is asked about is written and, if there is a display, opened.
+
+    Args:
+      known: what the file shows.
+      answers: that the call gave.
+      out: where results go; None: where they go by default.
 
     Raises:
       InputError: the input ended (Ctrl-D) before all was answered.
@@ -179,6 +189,7 @@ def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
     while open_ones := still_open():
         if is_first:
             command.say("\n".join(told))
+            _show_marks(known, Path(out) if out else Path("runs") / known.source.stem)
             is_first = False
         one = open_ones[0]
         default = f" [{one.default}]" if one.default is not None else ""
@@ -190,6 +201,22 @@ def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
         except InputError as error:
             command.say(str(error))
     return answers
+
+
+def _show_marks(known: "Understood", folder: Path) -> None:
+    """Writes the picture that goes with the questions; asking goes on where it cannot be."""
+    if not known.is_film:
+        return
+    from galileo_jax.api.marked_picture import NAME, write_marks
+
+    try:
+        with progress_display() as display, progress.scope(display):
+            picture = write_marks(known, folder / NAME)
+    except InputError as error:
+        command.say(f"warning: {error}")
+        return
+    command.say(f"{picture}: the first picture, with what moves in it and a ruler")
+    show(picture)
 
 
 def _write(known: "Understood", answers: dict[str, Any], write: Callable[..., Path | None]) -> None:
