@@ -162,9 +162,7 @@ def bundle_of_failure(
     clips = [clip for one in sources if (clip := _clip(one, answers or {})) is not None]
     objects = [item.name for item in clips[0].objects] if clips else []
     hidden = impersonal(named, objects, others)
-    why = (
-        str(error) if isinstance(error, InputError) else "".join(traceback.format_exception(error))
-    )
+    why = str(error) if isinstance(error, InputError) else _traced(error)
     seen = [_seen(source) for source in sources]
     texts = {
         "command.txt": _command(command, hidden),
@@ -179,6 +177,12 @@ def bundle_of_failure(
     measured = [one for clip in clips if (one := _measured(clip)) is not None]
     tracks = measured if len(measured) == len(sources) else []
     return _written(Path(path), _Content(texts, {}, tracks, declared), hidden)
+
+
+def _traced(error: BaseException) -> str:
+    """The traceback without the lines of source, which may be those of a user."""
+    lines = "".join(traceback.format_exception(error)).splitlines()
+    return "\n".join(line for line in lines if not line.startswith("    "))
 
 
 def _written(path: Path, content: _Content, hidden: Impersonal) -> Bundle:

@@ -23,6 +23,8 @@ from galileo_jax.model.effects.registry import effect_names
 
 FOLDER = r"(?:[^\s\"'()\[\]<>|:;,=]*[/\\])?"
 """The folders before a file's name, as far as they have no spaces."""
+REST = r"[^\s\"'<>|:;,()\[\]]*"
+"""Of a path, below a folder that is known."""
 PATHS = re.compile(
     r"(?<![\w.:/~])(?:~?/[^\s\"'<>|:;,()\[\]/]+/|[A-Za-z]:[\\/])[^\s\"'<>|:;,()\[\]]*"
 )
@@ -30,7 +32,7 @@ PATHS = re.compile(
 QUOTED = re.compile(r"(?P<mark>[\"'])(?:~?/|[A-Za-z]:[\\/])[^\"'\n]*(?P=mark)")
 """One in quotes, which may have spaces."""
 PLAIN = {"root", "user", "clip", "film", "video", "track", "box", "sphere", "cylinder", "torus"}
-"""Words that are nobody's: changed everywhere, they would make nonsense of the text."""
+"""Words that are nobody's, as is a single letter: changed everywhere, they would make nonsense."""
 
 
 @dataclass(frozen=True)
@@ -85,13 +87,14 @@ def impersonal(
         (re.compile(rf"(?<!\w){FOLDER}{re.escape(key)}(?!\w)"), exact[key])
         for key in sorted(exact, key=len, reverse=True)
     ]
-    pairs += [(re.compile(re.escape(folder)), instead) for folder, instead in _folders()]
+    pairs += [(re.compile(re.escape(folder)), "") for folder in _own_folders()]
+    pairs += [(re.compile(rf"{re.escape(folder)}{REST}"), "PATH") for folder in _places()]
     pairs += [(QUOTED, '"PATH"'), (PATHS, "PATH")]
     kept = _own_words()
     pairs += [
         (re.compile(rf"(?<![^\W_]){re.escape(word)}(?![^\W_])"), words[word])
         for word in sorted(words, key=len, reverse=True)
-        if word and word.lower() not in kept and not re.fullmatch(r"[\d.]*|clip\d+", word)
+        if len(word) > 1 and word.lower() not in kept and not re.fullmatch(r"[\d.]*|clip\d+", word)
     ]
     return Impersonal(tuple(pairs))
 
@@ -106,14 +109,18 @@ def _own_words() -> set[str]:
     return {*PLAIN, *SCENARIOS, *effect_names(), *keys}
 
 
-def _folders() -> list[tuple[str, str]]:
-    """Where the program, its libraries and the user's files are, the deepest first."""
+def _own_folders() -> list[str]:
+    """Where the program and its libraries are, the deepest first."""
     package = Path(galileo_jax.__file__).parents[1]
-    libraries = [Path(one) for one in sys.path if one and Path(one).is_dir()]
-    own = {f"{one}/": "" for one in (package, *libraries)}
-    places = (Path.cwd(), Path.home(), Path(tempfile.gettempdir()), Path(sys.prefix))
-    own |= {f"{one}/": "PATH/" for one in places if len(one.parts) > 1 and f"{one}/" not in own}
-    return sorted(own.items(), key=lambda pair: len(pair[0]), reverse=True)
+    folders = {package, *(Path(one) for one in sys.path if one and Path(one).is_dir())}
+    return sorted((f"{one}/" for one in folders if one != Path.cwd()), key=len, reverse=True)
+
+
+def _places() -> list[str]:
+    """Where the user's files may be, the deepest first."""
+    folders = {Path.cwd(), Path.home(), Path(tempfile.gettempdir()), Path(sys.prefix)}
+    known = (f"{one}/" for one in folders if len(one.parts) > 1)
+    return sorted(known, key=len, reverse=True)
 
 
 def _users() -> set[str]:
