@@ -221,7 +221,7 @@ def _track_files(measured: Measurement, name: str, hidden: Impersonal) -> dict[s
             if path.is_file():
                 files[path.name] = path.read_bytes()
     given = _declared(measured.clip)
-    content = {"track": f"{name}.csv"}
+    content: dict[str, Any] = {"track": f"{name}.csv"}
     content |= {key: v for key, v in given.items() if key not in OF_PICTURE | OF_TABLE}
     content["objects"] = [
         {key: v for key, v in item.items() if key not in OF_OBJECTS}

@@ -112,8 +112,9 @@ def _own_words() -> set[str]:
 def _own_folders() -> list[str]:
     """Where the program and its libraries are, the deepest first."""
     package = Path(galileo_jax.__file__).parents[1]
-    folders = {package, *(Path(one) for one in sys.path if one and Path(one).is_dir())}
-    return sorted((f"{one}/" for one in folders if one != Path.cwd()), key=len, reverse=True)
+    python = {Path(sys.prefix), Path(sys.base_prefix)}
+    libraries = {Path(one) for one in sys.path if python & {*Path(one).parents}}
+    return sorted((f"{one}/" for one in (package, *libraries)), key=len, reverse=True)
 
 
 def _places() -> list[str]:
