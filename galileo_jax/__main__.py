@@ -12,6 +12,7 @@ from textwrap import indent
 import galileo_jax
 from galileo_jax import __version__
 from galileo_jax.commands import command
+from galileo_jax.commands.stop import end
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.jax_import import without_search_for_rocm
 from galileo_jax.runtime.known_names import did_you_mean
@@ -82,13 +83,13 @@ def run_verb(name: str, verb: str) -> None:
     Imported, it gives the public function of the same name, which must not be hidden by a module.
     """
     if name == "__main__":
-        sys.exit(command.run(lambda words: main([verb, *words])))
+        end(command.run(lambda words: main([verb, *words])))
     sys.modules[name] = getattr(galileo_jax, verb)
 
 
 def cli() -> None:
     """The console script's entry point."""
-    sys.exit(command.run(main))
+    end(command.run(main))
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.api.bundle import Bundle, bundle_of
 from galileo_jax.api.clips import ClipLike, as_list, load
 from galileo_jax.api.compare import Comparison, compare
 from galileo_jax.api.diagnose import Diagnosis, diagnose_fitted, with_library
@@ -22,6 +23,7 @@ from galileo_jax.diagnosis.could_not_see import could_not_see
 from galileo_jax.diagnosis.restricted_fit import extended_fit
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.model.effects.forms import FORM_NAMES
+from galileo_jax.measurement.track_cache import is_tracked
 from galileo_jax.report.paragraph import paragraph
 from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
@@ -110,6 +112,21 @@ class Explanation:
             beside["what is missing, and why"] = "diagnosis/report.html"
         pages = self.report(folder / "report.html", beside)
         return replace(self, fit=fit, files=(*pages, *files))
+
+    @in_float64
+    def bundle(self, path: str | Path) -> Bundle:
+        """Writes one zip to be attached to an issue: tracks, yamls, results, versions, command.
+
+        It has no film, no picture and no name of a file, folder, user or computer. Unpacked, its
+        tracks are fitted again to the same numbers.
+
+        Args:
+          path: of the zip.
+
+        Raises:
+          InputError: the file cannot be written.
+        """
+        return bundle_of(self, path)
 
     def __repr__(self) -> str:
         """In one line."""
@@ -245,6 +262,24 @@ def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
             raise InputError(f"{path}: point (given in the call): its objects are declared already")
         return load_clip(clip, **answers)
     return understand(path)
+
+
+def kept(clips: ClipLike | Sequence[ClipLike]) -> list[str]:
+    """What a call that was stopped leaves for the next: yamls and tracks of films, in words."""
+    found: list[str] = []
+    try:
+        files = [Path(one) for one in sources_of(clips) if isinstance(one, str | Path)]
+    except InputError:
+        return []
+    for path in files:
+        try:
+            clip = load_clip(path) if is_declared(path) else None
+        except InputError:
+            continue
+        if clip is not None:
+            found.append(str(clip.path))
+            found += [f"the track of {clip.video}"] if is_tracked(clip) else []
+    return found
 
 
 def _checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:

@@ -43,9 +43,18 @@ class Look:
         return "\n".join(_lines(self.seen))
 
     def plot(self, path: str | Path) -> Path:
-        """Writes the places in time as a figure, by the file's suffix (png, svg, pdf)."""
+        """Writes the places in time as a figure, by the path's suffix (png, svg, pdf).
+
+        Of a film the first picture, in which what moves is numbered, with its way and its angle.
+
+        Raises:
+          InputError: the picture cannot be written.
+        """
         if self.seen is None or self.table is None:
-            raise InputError(f"{self.path}: a film has no table to plot; galileo track shows it")
+            from galileo_jax.api.marked_picture import write_marks
+            from galileo_jax.api.understand import understand
+
+            return write_marks(understand(self.path), path)
         from galileo_jax.report.draw import write_picture
         from galileo_jax.report.look_chart import look_chart
 

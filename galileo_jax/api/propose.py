@@ -17,7 +17,7 @@ from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
-from galileo_jax.tracking.detect import Mover, find_movers
+from galileo_jax.tracking.detect import CameraMovesError, Mover, find_movers
 from galileo_jax.tracking.pose import rotation
 from galileo_jax.video import decode
 
@@ -74,7 +74,7 @@ def propose(
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Raises:
-      InputError: the video does not decode, or nothing moves in it.
+      InputError: the video does not decode, nothing moves in it, or the camera does.
       Cancelled: `cancel` was set.
 
     Limits: objects without texture, or that are not there in the first frame, are not found.
@@ -90,7 +90,10 @@ def propose(
         def open_frames() -> Iterator[np.ndarray]:
             return decode.frames(path)
 
-        movers = find_movers(open_frames, SPAN_PX, advance=advance)
+        try:
+            movers = find_movers(open_frames, SPAN_PX, advance=advance)
+        except CameraMovesError as error:
+            raise InputError(f"{path}: {error}; mark the objects by hand") from None
         movers = [mover for mover in movers if not mover.leaves_picture][:2] or movers[:1]
         if not movers:
             raise InputError(f"{path}: nothing moves in it; mark the objects by hand")

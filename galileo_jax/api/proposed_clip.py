@@ -10,7 +10,7 @@ import yaml
 from galileo_jax.api.questions import check_answered, questions
 from galileo_jax.api.understand import USUAL_FPS, Answers, Understood, needs_angle
 from galileo_jax.clip.load import check_clip, with_unused
-from galileo_jax.clip.look import proposed_yaml, usual_shape
+from galileo_jax.clip.look import SWINGS, proposed_yaml, usual_shape
 from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.yaml_file import yaml_text
 from galileo_jax.runtime.atomic_write import write_text
@@ -31,6 +31,7 @@ def clip_of(known: Understood, answers: Answers, source: str | None = None) -> C
       InputError: something that only a person can know is missing (one line names all of it), or
         what was said is wrong.
     """
+    _check_slides(known, answers)
     check_answered(known, answers)
     content = known.declared or yaml.safe_load(yaml_of(known, answers))
     said = {key: value for key, value in answers.items() if key != "points"}
@@ -38,6 +39,22 @@ def clip_of(known: Understood, answers: Answers, source: str | None = None) -> C
         content = _completed(known, answers) | said
     clip = with_unused(check_clip(known.yaml_path, content, overridden=frozenset(said)))
     return clip.model_copy(update={"source": source or str(known.source)})
+
+
+def _check_slides(known: Understood, answers: Answers) -> None:
+    """Refuses a motion that is said to be a slide, and goes to and fro."""
+    scenario = known.scenario(answers)
+    if scenario is None or known.has_objects or scenario.line not in ("slope", "level"):
+        return
+    likely = known.likely(answers)
+    if likely is None or likely.swings < SWINGS:
+        return
+    what = "its path" if not known.is_film else "what moves"
+    raise InputError(
+        f"{known.source}: scenario: {scenario.name}, but {what} {likely.why}, over more than half "
+        f"of its way: nothing slides so; cut one slide out, or say what it is (such as --scenario "
+        f"{likely.scenario})" + (", or which thing is meant (--point X Y)" if known.is_film else "")
+    )
 
 
 def yaml_of(known: Understood, answers: Answers) -> str:

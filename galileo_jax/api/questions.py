@@ -63,6 +63,13 @@ def check_answered(known: Understood, answers: Answers) -> None:
     missing = [one for one in questions(known, answers) if one.is_open]
     if not missing:
         return
+    if known.is_film and known.unseen and missing[0].key == "points":
+        options = " ".join(one.option for one in missing)
+        raise InputError(
+            f"{known.source}: {known.unseen}; film with a camera that rests, from before the "
+            "motion to its end, or say where in the first picture the thing is, and what else "
+            f"does not show: galileo {shlex.quote(str(known.source))} {options}"
+        )
     keys = ", ".join(f"{one.key} ({one.why})" for one in missing)
     options = " ".join(one.option for one in missing)
     name = known.yaml_path.name
@@ -104,7 +111,7 @@ def _points(known: Understood) -> Question | None:
         return None
     text = "Which thing is to be followed? x y of its middle in the first picture, pixels"
     if not known.things:
-        return Question("points", text, "no moving thing was found", "--point 312 221")
+        return Question("points", text, known.unseen, "--point 312 221")
     if len(known.things) == 1:
         return None
     listed = "; ".join(

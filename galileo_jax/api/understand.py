@@ -1,7 +1,8 @@
 """`understand`: what a film or table shows, what its yaml declares, and what is still open."""
 
+import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,28 +13,35 @@ from galileo_jax.clip.load import YAML_SUFFIXES, check_clip, has_yaml
 from galileo_jax.clip.look import Likely, likely_in_plane, usual_shape
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.scenarios.scenario import Scenario
+from galileo_jax.clip.track_csv import MAX_STEP_S
+from galileo_jax.clip.track_file import is_track
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 
 USUAL_FPS = 30.0
+MOST_PICTURES = 6000
+"""Of a film in which a motion is looked for: to look at one takes up to 10 ms, and nobody waits for
+more than a minute; 200 s of a phone's film, 25 s of slow motion."""
 
 Point = tuple[float, float]
 Answers = Mapping[str, Any]
 """What a person said, by key of the yaml; None: that nobody knows it. `points`: of the objects."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FilmPath:
     """The way that a thing takes through a film.
 
     Attributes:
       likely: the kind of motion; None where the thing cannot be followed.
       direction: in which it goes in the picture.
+      way_px: `[2, place]`, where it is one picture after the other; None: not known.
     """
 
     likely: Likely | None
     direction: str = "right"
+    way_px: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +55,7 @@ class Understood:
       look: what `look` makes of the source.
       things: what moves in a film whose yaml names no objects, to its size in the picture, px.
       foot: of a ramp that such a film shows, px; None: it shows none.
+      unseen: why no moving thing was found in such a film; "" where one was.
       is_pair: one thing sets out after the other, as on a ramp into another.
     """
 
@@ -57,6 +66,7 @@ class Understood:
     things: Mapping[Point, Point] = field(default_factory=dict)
     foot: Point | None = None
     is_pair: bool = False
+    unseen: str = ""
     _paths: dict[Point, FilmPath] = field(default_factory=dict, repr=False)
 
     @property
@@ -93,7 +103,7 @@ class Understood:
     def likely(self, answers: Answers) -> Likely | None:
         """The likeliest kind of motion, of a film of the thing that was chosen; None: unknown."""
         if (seen := self.look.seen) is not None:
-            return Likely(seen.scenario, seen.why, seen.is_clear, seen.slope_deg)
+            return Likely(seen.scenario, seen.why, seen.is_clear, seen.slope_deg, seen.swings)
         points = self.points(answers)
         if len(points) == 1:
             return self.path(points[0]).likely
@@ -133,8 +143,11 @@ def understand(file: str | Path) -> Understood:
         if named is None:
             raise InputError(f"{path}: video, track: missing; one of them expected")
         source = path.parent / str(named)
+    if not is_track(source):
+        _check_length(source)
     fps = declared.get("fps")
     found = look(source, fps=float(fps) if isinstance(fps, int | float) and fps > 0 else None)
+    _check_clock(found)
     known = Understood(source, yaml_path, declared, found)
     if not known.is_film or known.has_objects:
         return known
@@ -166,6 +179,33 @@ def needs_angle(scenario: Scenario) -> bool:
     return scenario.has_ramp and scenario.angle_deg is None
 
 
+def _check_length(film: Path) -> None:
+    """Refuses a film that is much longer than a motion, before it is looked through."""
+    from galileo_jax.video.decode import announced
+
+    count, seconds = announced(film)
+    if count <= MOST_PICTURES:
+        return
+    long = f"{seconds / 60:.0f} minutes" if seconds >= 120 else f"{seconds:.0f} s"
+    raise InputError(
+        f"{film}: {long} of film, {count} pictures; one motion is wanted, in {MOST_PICTURES} "
+        "pictures at most: cut it out, such as the 10 s from 1 min 30 s on with: "
+        f"ffmpeg -ss 90 -t 10 -i {shlex.quote(film.name)} motion.mp4"
+    )
+
+
+def _check_clock(found: Look) -> None:
+    """Refuses a table whose rows are too far apart in time to show a motion."""
+    seen = found.seen
+    if seen is None or seen.is_in_frames or not seen.step >= MAX_STEP_S:
+        return
+    raise InputError(
+        f"{found.path}: its rows are {seen.step:g} s apart: no motion shows in that; a table of "
+        f"places less than {MAX_STEP_S:g} s apart expected (if its times are milliseconds or "
+        "frame numbers, divide them by 1000 or by the frame rate)"
+    )
+
+
 def _beside(path: Path) -> Path:
     if not has_yaml(path):
         return path.with_suffix(YAML_SUFFIXES[0])
@@ -178,14 +218,15 @@ def _with_things(known: Understood) -> Understood:
 
     try:
         proposal = propose(known.source)
-    except InputError:
-        return known
+    except InputError as error:
+        why = (
+            str(error).removeprefix(f"{known.source}: ").removesuffix("; mark the objects by hand")
+        )
+        return replace(known, unseen=why)
     things = {point: proposal.sizes_px[name] for name, point in proposal.objects.items()}
     is_pair = len(things) > 1 and not proposal.doubts
     foot = proposal.foot if proposal.scenario == "ramp" else None
-    return Understood(
-        known.source, known.yaml_path, known.declared, known.look, things, foot, is_pair
-    )
+    return replace(known, things=things, foot=foot, is_pair=is_pair)
 
 
 def _followed(source: Path, yaml_path: Path, point: Point, fps: float) -> FilmPath:
@@ -203,4 +244,4 @@ def _followed(source: Path, yaml_path: Path, point: Point, fps: float) -> FilmPa
     if len(x) < 3:
         return FilmPath(None)
     direction = "right" if x[np.argmax(abs(x - x[0]))] >= x[0] else "left"
-    return FilmPath(likely_in_plane(x, y), direction)
+    return FilmPath(likely_in_plane(x, y), direction, np.stack([x, y]))

@@ -19,6 +19,9 @@ LEVEL_DEG, STEEP_DEG = 2.0, 60.0
 SWINGS = 3
 """Turns back of a motion that swings."""
 
+HALF = 0.5
+"""Of its range: what bounces at the end of its way comes back by less each time."""
+
 FALL_M_S2 = (7.0, 12.0)
 """What a fall accelerates with, air and a camera that is not level in it."""
 
@@ -45,6 +48,7 @@ class Seen:
       why: what speaks for it, one phrase.
       is_clear: no other kind of motion looks like it.
       slope_deg: of a straight path in two coordinates, against the horizontal; None of others.
+      swings: how often it turns back by more than half of its way.
       yaml: that would be written beside the file.
       warnings: doubts, one line each.
     """
@@ -65,6 +69,7 @@ class Seen:
     warnings: tuple[str, ...] = ()
     is_clear: bool = False
     slope_deg: float | None = None
+    swings: int = 0
 
 
 @dataclass(frozen=True)
@@ -76,12 +81,14 @@ class Likely:
       why: what speaks for it, one phrase.
       is_clear: no other kind of motion looks like it.
       slope_deg: of a straight path in two coordinates, against the horizontal; None of others.
+      swings: how often it turns back by more than half of its way, as nothing does that slides.
     """
 
     scenario: str
     why: str
     is_clear: bool = False
     slope_deg: float | None = None
+    swings: int = 0
 
 
 def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Seen:
@@ -119,6 +126,7 @@ def seen_in_table(path: Path, table: TrackTable, fps: float | None = None) -> Se
         warnings,
         likely.is_clear,
         likely.slope_deg,
+        likely.swings,
     )
 
 
@@ -147,7 +155,8 @@ def _likely(
 def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) -> Likely:
     """The likeliest scenario of one coordinate in time."""
     if (turns := _turns(way)) >= SWINGS:
-        return Likely("spring", f"one coordinate, which turns back {turns} times")
+        why = f"one coordinate, which turns back {turns} times"
+        return Likely("spring", why, swings=_turns(way, HALF))
     size = _acceleration(seconds, way) * metres_per_unit
     if math.isfinite(size) and FALL_M_S2[0] < abs(size) < FALL_M_S2[1]:
         why = f"one coordinate, {short(round(abs(size), 2))} m/s^2"
@@ -158,11 +167,12 @@ def _along_a_line(seconds: np.ndarray, way: np.ndarray, metres_per_unit: float) 
 
 def likely_in_plane(x: np.ndarray, y: np.ndarray) -> Likely:
     """The likeliest scenario of one object's path in a plane, in any unit and without a clock."""
-    turns = _turns(x if np.ptp(x) >= np.ptp(y) else y)
+    along = x if np.ptp(x) >= np.ptp(y) else y
+    turns = _turns(along)
     straight, degrees = _straight(x, y)
     if turns >= SWINGS:
         kind = "spring" if straight else "pendulum"
-        return Likely(kind, f"turns back {turns} times")
+        return Likely(kind, f"turns back {turns} times", swings=_turns(along, HALF))
     if not straight:
         is_thrown = _bends_once(x, y)
         return Likely("flight", "a path that bends", is_clear=is_thrown)
@@ -181,9 +191,9 @@ def _bends_once(x: np.ndarray, y: np.ndarray) -> bool:
     return bool(np.ptp(left) <= STRAIGHT * np.hypot(np.ptp(x), np.ptp(y)))
 
 
-def _turns(values: np.ndarray) -> int:
-    """How often a coordinate turns back, by more than a tenth of its range."""
-    least = 0.1 * float(np.ptp(values))
+def _turns(values: np.ndarray, share: float = 0.1) -> int:
+    """How often a coordinate turns back, by more than a share of its range."""
+    least = share * float(np.ptp(values))
     turns, extreme, direction = 0, values[0], 0
     for value in values:
         if direction == 0 and abs(value - extreme) > least:

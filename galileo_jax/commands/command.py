@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from galileo_jax.commands.stop import STOPPED
 from galileo_jax.runtime.errors import InputError
 
 if TYPE_CHECKING:
@@ -93,9 +94,9 @@ def run(main: Callable[[Sequence[str]], int | None], argv: Sequence[str] | None 
     except InputError as error:
         print(f"error: {' '.join(str(error).split())}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print("stopped; what was finished is saved", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt as stopped:
+        print(str(stopped) or "stopped; what was finished is saved", file=sys.stderr)
+        return STOPPED
     except BrokenPipeError:
         # What is still in the buffer has nowhere to go, either: no second complaint at the exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

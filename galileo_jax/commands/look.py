@@ -32,6 +32,9 @@ def _parser() -> command.Parser:
         "--fps", type=float, metavar="HZ", help="where the table counts frames (default: not known)"
     )
     parser.add_argument(
-        "--plot", type=Path, metavar="PNG", help="write the places in time (default: no figure)"
+        "--plot",
+        type=Path,
+        metavar="PNG",
+        help="write the places in time, or of a film what moves (default: no figure)",
     )
     return parser

@@ -38,6 +38,7 @@ from galileo_jax.measurement.segments.segments import (
 )
 from galileo_jax.measurement.segments.start_speed import on_ramp, start_speed
 from galileo_jax.measurement.segments.track_failure import Astray, leaves_picture
+from galileo_jax.measurement.shared_errors import beside, with_errors
 from galileo_jax.measurement.track_cache import track_once
 from galileo_jax.measurement.turning import with_turning
 from galileo_jax.measurement.wander_size import with_wander
@@ -148,7 +149,7 @@ def measure(clip: Clip) -> Measurement:
         pucks = measured.clip
         observation = with_wander(observation, pucks.objects, pucks.walls)
     frames_used = int(observation.mask.any(axis=0).sum())
-    if pixels is None:
+    if not observation.is_tracked_here:
         observation, said = with_rows_averaged(observation)
         remarks.extend(f"{clip.path}: {line}" for line in said)
     other_doubts = (
@@ -172,7 +173,7 @@ def measure(clip: Clip) -> Measurement:
 def _on_its_way(clip: Clip) -> Measurement:
     """A measurement whose points are turned, if need be, to where the clip says that they go."""
     whole, pixels = observed(clip)
-    way = other_way(clip, segment(clip, whole).used(whole), may_turn=pixels is None)
+    way = other_way(clip, segment(clip, whole).used(whole), may_turn=not whole.is_tracked_here)
     if way is not None and way.is_turned_back:
         whole = turned_back(clip, whole, way)
     return Measurement(clip, whole, whole, pixels, way=way)
@@ -233,7 +234,10 @@ def observed(clip: Clip) -> tuple[Observation, Track | None]:
     if clip.video is None:
         assert clip.track is not None  # load_clip requires one of the two
         read = read_track(clip.path, clip.track, clip, clip.fps)
-        return _as_declared(clip, read.observation), None
+        observation = (
+            with_errors(beside(clip.track), read.observation) if read.is_own else read.observation
+        )
+        return _as_declared(clip, observation), None
     pixels = track_once(clip)
     observation = with_errors_at_rest(observe(clip, pixels))
     observation = with_coding_errors(clip, observation, pixels)

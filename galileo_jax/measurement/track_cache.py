@@ -43,7 +43,7 @@ def track_once(clip: Clip) -> Track:
     folder = cache_folder()
     if folder is None or clip.video is None:
         return track_clip(clip)
-    path = folder / FOLDER / f"{_digest(clip)}.npz"
+    path = _path(folder, clip)
     if (found := _read(path)) is not None:
         return found
     track = track_clip(clip)
@@ -51,6 +51,16 @@ def track_once(clip: Clip) -> Track:
     with contextlib.suppress(OSError), replacing(path) as temporary:
         temporary.write_bytes(_packed(track))
     return track
+
+
+def is_tracked(clip: Clip) -> bool:
+    """Whether the clip's track is in the cache."""
+    folder = cache_folder()
+    return folder is not None and clip.video is not None and _path(folder, clip).is_file()
+
+
+def _path(folder: Path, clip: Clip) -> Path:
+    return folder / FOLDER / f"{_digest(clip)}.npz"
 
 
 def _packed(track: Track) -> bytes:

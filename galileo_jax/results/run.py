@@ -23,10 +23,10 @@ from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.problem import Problem
+from galileo_jax.measurement.shared_errors import save_shared_errors, with_shared_errors
 from galileo_jax.model.effects.nuisances.trial_friction import TrialFriction
 from galileo_jax.model.effects.registry import load_file, make_effects
 from galileo_jax.observation.observation import Observation
-from galileo_jax.results.shared_errors import save_shared_errors, with_shared_errors
 from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 

@@ -11,7 +11,7 @@ from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipObject
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import report
-from galileo_jax.tracking.detect import find_movers, fit_outline
+from galileo_jax.tracking.detect import CameraMovesError, find_movers, fit_outline
 from galileo_jax.tracking.fragments import Start
 from galileo_jax.tracking.motion_compensation import Coding
 from galileo_jax.tracking.square_view import square_view
@@ -86,7 +86,10 @@ def _with_points(
     known = [max(size) for size in sizes if size is not None]
     span = max(known) if known else UNKNOWN_SPAN_PX
     ramp_angle = _ramp_angle_rad(clip)
-    movers = find_movers(open_frames, span, axes_angle_rad=ramp_angle, advance=advance)
+    try:
+        movers = find_movers(open_frames, span, axes_angle_rad=ramp_angle, advance=advance)
+    except CameraMovesError as error:
+        raise InputError(f"{clip.path}: objects: point_px: missing, and {error}") from None
     taken = [item.point_px for item in clip.objects if item.point_px is not None]
     movers = [m for m in movers if all(math.dist(m.point_px, point) > span for point in taken)]
     missing = [item for item in clip.objects if item.point_px is None]

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.tracking.lucas_kanade import PYRAMID_LEVELS, follow_points
 from galileo_jax.tracking.pose import patch_at, rotation
 from galileo_jax.tracking.template import Outline, grey
@@ -24,6 +25,8 @@ SAME_WAY_PX = 3.0
 """Features of one thing are displaced alike to this, while they turn little."""
 MIN_FEATURES = 5
 LOOK_AHEAD_FRAMES = 3
+MOST = 0.8
+"""Of all features, and of the picture's sides: where so many move alike, the camera moves."""
 BORDER_SHARE = 0.03
 """Share of the frame's width within which a thing counts as at the border."""
 
@@ -49,6 +52,10 @@ class Mover:
     goes_right: bool = True
 
 
+class CameraMovesError(InputError):
+    """Nearly all features of a picture move alike."""
+
+
 def find_movers(
     open_frames: Callable[[], Iterable[np.ndarray]],
     span_px: float,
@@ -65,6 +72,9 @@ def find_movers(
         middle is taken along these axes.
       advance: called after every frame.
 
+    Raises:
+      CameraMovesError: the whole picture moves, so that nothing says what is in motion.
+
     Limits: things without texture, or that are not there in the first frame, are not found.
     """
     path, size_px = _feature_paths(open_frames, advance)
@@ -73,6 +83,8 @@ def find_movers(
     settled = moved & np.roll(moved, -1, axis=0) & np.roll(moved, -2, axis=0)
     settled[-2:] = False
     onset = np.where(settled.any(axis=0), settled.argmax(axis=0), -1)
+    if _whole_picture_moves(path, onset, size_px):
+        raise CameraMovesError("the whole picture moves alike, as it does where the camera moves")
     movers = []
     for members in _groups(path, onset, span_px):
         last = np.array([_last_seen(path[:, i]) for i in members])
@@ -89,6 +101,23 @@ def find_movers(
             )
         )
     return sorted(movers, key=lambda mover: (mover.leaves_picture, mover.onset_frame))
+
+
+def _whole_picture_moves(path: np.ndarray, onset: np.ndarray, size_px: tuple[int, int]) -> bool:
+    """Whether nearly all features, all over the picture, go the same way at the same time."""
+    moving = np.flatnonzero(onset >= 0)
+    if len(moving) < max(MIN_FEATURES, MOST * len(onset)):
+        return False
+    # The middle of them: features at the border are lost, or found, by chance.
+    low, high = np.quantile(path[0, moving], ((1 - MOST) / 4, (3 + MOST) / 4), axis=0)
+    if (high - low < (MOST - 0.1) * np.array(size_px)).any():
+        return False
+    later = min(int(np.median(onset[moving])) + LOOK_AHEAD_FRAMES, len(path) - 1)
+    way = path[later, moving] - path[0, moving]
+    way = way[np.isfinite(way).all(axis=1)]
+    if len(way) < MIN_FEATURES:
+        return False
+    return bool(np.mean(np.linalg.norm(way - np.median(way, axis=0), axis=1) < SAME_WAY_PX) > MOST)
 
 
 def _feature_paths(

@@ -110,6 +110,20 @@ def probe(path: Path, fps_declared: float | None = None) -> VideoInfo:
     return VideoInfo(scan.size_px, fps, rate, tuple((times_s - times_s[0]).tolist()), (*warnings,))
 
 
+def announced(path: Path) -> tuple[int, float]:
+    """(pictures, s) of a film as its container says, at once; 0 for what it does not say.
+
+    Raises `InputError` for a missing or undecodable file.
+    """
+    with _opened(Path(path)) as (container, stream):
+        seconds = 0.0
+        if stream.duration:
+            seconds = float(stream.duration * stream.time_base)
+        elif container.duration:
+            seconds = container.duration / av.time_base
+        return stream.frames or round(seconds * float(stream.average_rate or 0)), seconds
+
+
 def predicted_from_before(path: Path) -> np.ndarray:
     """`[picture]`, bool: whether a picture was coded as what changes since the one before it.
 

@@ -243,5 +243,5 @@ def test_a_film_in_which_nothing_moves_asks_for_a_point(tmp_path):
     known = understand(filmed(tmp_path, still))
     asked = questions(known, {})
     assert asked[0].key == "points" and asked[0].default is None
-    with pytest.raises(InputError, match="no moving thing was found"):
+    with pytest.raises(InputError, match="nothing moves in it; film with a camera that rests"):
         clip_of(known, {})

@@ -14,7 +14,8 @@ import pytest
 import yaml
 
 from galileo_jax import __main__
-from galileo_jax.commands import command, explain
+from galileo_jax.commands import command, explain, show
+from tests.api.test_understand import filmed
 
 T = np.arange(30) / 25
 ONLY_ASKS = """
@@ -160,3 +161,49 @@ def test_a_paragraph_then_the_table_of_the_fit(tmp_path, monkeypatch, capsys):
     assert table.splitlines()[0].split() == ["truth", "mean", "sd", "95", "%", "interval"]
     assert "runs/board/report.html, runs/board/result.json" in err
     assert Path("runs/board/report.html").is_file()
+
+
+@pytest.mark.video
+def test_a_picture_goes_with_the_questions_about_a_film(tmp_path, monkeypatch):
+    run = 5.0 * np.clip(np.arange(30.0) - 3, 0, 18)
+    film = filmed(tmp_path, np.stack([50 + run, 40 + 0.5 * run, 0 * run], axis=1))
+    seen, browser = tmp_path / "seen", tmp_path / "browser"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {seen}\n')
+    browser.chmod(0o755)
+    monkeypatch.setenv("DISPLAY", ":99")
+    monkeypatch.setenv("BROWSER", str(browser))
+    monkeypatch.chdir(tmp_path)
+    busy = ONLY_ASKS.replace("def main", "import time\ndef main").replace(
+        "print(", "time.sleep(3); print("
+    )
+    call = [sys.executable, "-c", busy, film.name]
+    # The program goes on for long after the questions; here the browser gets its time so.
+    code, told = at_terminal(call, ["20", "900"])
+    assert code == 0, told
+    picture = tmp_path / "runs" / "clip" / "what_moves.png"
+    assert told.count("what_moves.png: the first picture") == 1 and picture.is_file()
+    assert seen.read_text().strip() == picture.as_uri()
+    picture.unlink()
+    code, told = at_terminal(call, [])
+    assert code == 0 and not picture.exists(), "no question, no picture"
+
+
+def test_without_a_display_nothing_is_opened_and_what_fails_is_not_told(monkeypatch):
+    opened: list[str] = []
+
+    def broken(url: str) -> None:
+        opened.append(url)
+        raise OSError(url)
+
+    monkeypatch.setattr(show.webbrowser, "open", broken)
+    monkeypatch.setattr(show.sys, "platform", "linux")
+    for key in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(key, raising=False)
+    show.show(Path("a.png"))
+    assert opened == [] and not show.has_display()
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    show.show(Path("a.png"))
+    end = time.monotonic() + 5
+    while not opened and time.monotonic() < end:
+        time.sleep(0.01)
+    assert len(opened) == 1

@@ -239,7 +239,7 @@ def _end(clip: Clip, observation: Observation) -> tuple[int, int, str] | None:
     if why == STOPPED and goes_on(observation, last):
         why = STRUCK
     # Of a video: the hit falls into an exposure, whose frame shows neither.
-    return last - (SMEARED_FRAMES if clip.video is not None else 0), 0, why
+    return last - (SMEARED_FRAMES if observation.is_tracked_here else 0), 0, why
 
 
 def _of_pucks(clip: Clip, kept: _Kept) -> _Kept:
@@ -248,7 +248,10 @@ def _of_pucks(clip: Clip, kept: _Kept) -> _Kept:
     Of a film, tracks that leap are looked at by themselves: they may be of something else.
     """
     observation = kept.observation
-    if clip.video is None and (struck := stranger_frame(clip, observation)) is not None:
+    if (
+        not observation.is_tracked_here
+        and (struck := stranger_frame(clip, observation)) is not None
+    ):
         return kept.end_with((*struck, STRUCK))
     radii = [item.size_m[0] for item in clip.objects if item.size_m is not None]
     last = rest_frame(observation, min(radii)) if radii else None

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.results.shared_errors import ERRORS, save_shared_errors, with_shared_errors
+from galileo_jax.measurement.shared_errors import ERRORS, save_shared_errors, with_shared_errors
 from tests.oracle_trials import observe
 from tests.ramp_model import HIT
 
