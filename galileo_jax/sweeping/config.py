@@ -118,6 +118,18 @@ def load_config(
     return make_configs(str(path), read_mapping(path), changes, runs)
 
 
+def of_folder(folder: Path) -> dict[str, Any]:
+    """The config of a folder: each film and table in it is explained alone.
+
+    Raises:
+      InputError: there is none, or the folder is a result.
+    """
+    from galileo_jax.api.explain import sources_of
+
+    files = sources_of([folder])
+    return {"clips": [glob.escape(str(file)) for file in files], "common": {"method": "explain"}}
+
+
 def make_configs(
     name: str, content: Mapping[str, Any], changes: Sequence[str] = (), runs: Sequence[str] = ()
 ) -> tuple[SweepConfig, ...]:
