@@ -76,7 +76,7 @@ def consensus(values: np.ndarray, sds: np.ndarray) -> Consensus:
 def _distances(
     values: np.ndarray, sds: np.ndarray, is_member: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """t and mu' of every group against the members without it, and whether it lies outside."""
+    """Distances t and mu' of each group against the other members, and whether it is outside."""
     count = len(values)
     distance, others, is_outside = np.zeros(count), np.zeros(count), np.zeros(count, bool)
     for i in range(count):

@@ -1,6 +1,5 @@
 """The page of a fit, DIR/report.html."""
 
-import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path

@@ -26,7 +26,7 @@ from galileo_jax.video import decode
 PICTURE_PX, QUALITY = 200, 70  # the longer side of a thumbnail, twice as large as it is shown
 DRAWING_PX = (100, 62)
 MOST_POINTS = 60  # of a drawn path
-APART = '<span class="apart" title="stands apart">◆</span> '
+APART = '<span class="apart" title="stands apart">◆</span>&nbsp;'
 SHORT = {"mass_ratio": "m1/m2"}  # headings of columns, where they are not the parameter's name
 Document = Mapping[str, Any]
 
@@ -166,7 +166,7 @@ def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str], more: 
         f'<th scope="row">{APART if row.remark else ""}{escape(row.name)}{together}</th>',
     ]
     if row.fit is None and row.diagnosis is None:
-        said = " ".join(dict.fromkeys([*row.failures, *filter(None, [row.remark])]))
+        said = "; ".join(dict.fromkeys([*row.failures, *filter(None, [row.remark])]))
         span = f'colspan="{len(columns) + more}"'
         cells.append(f'<td class="warn why" {span}>{escape(said or "Not computed yet.")}</td>')
     else:

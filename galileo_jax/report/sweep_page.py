@@ -1,4 +1,4 @@
-"""The page of a sweep: what a class found, each clip, errors by effect and by method, verdicts, what failed."""
+"""The page of a sweep: what a class found, each clip, errors, verdicts, what failed."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -54,9 +54,11 @@ def write_sweep_page(
     if is_truth_known:
         sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
     caption = _METHOD if is_truth_known else _NO_TRUTH
-    sections += _errors("Error by method", caption, done, label, label)
+    is_comparison = is_truth_known or len({label(row) for row in done}) > 1
+    if is_comparison:
+        sections += _errors("Error by method", caption, done, label, label)
     sections += _confusion(done)
-    if done:
+    if is_comparison:
         sections.append(_methods(done, label))
     if failed:
         sections.append(_failures(failed))
@@ -93,7 +95,7 @@ def labels(rows: Iterable[Row]) -> Callable[[Row], str]:
 
 def _options(row: Row) -> dict[str, str]:
     found = dict(part.split("=", 1) for part in row["options"].split())
-    if row["method"] != "diagnose":
+    if row["method"] not in ("diagnose", "explain"):  # of these it is no option
         found["effects"] = f"with {row['effects']}" if row["effects"] != "none" else "no effect"
     return found
 

@@ -41,7 +41,8 @@ class CellResult:
     """What came of a cell.
 
     Attributes:
-      document: result.json as `galileo fit` writes it, or diagnosis.json; of `explain` that of its fit.
+      document: result.json as `galileo fit` writes it, or diagnosis.json; of
+        `explain` that of its fit.
       files: what lies beside it, by path in the cell's folder: the page; of a fit the run; of
         `explain` compare.json and, where something is missing, diagnosis.json.
     """
