@@ -229,7 +229,9 @@ def verdict_words(verdict: Mapping[str, Any]) -> str:
         return " and ".join(effects)
     if status == "law":
         return str(verdict["law"])
-    return f"ambiguous: {', '.join(effects)}" if status == "ambiguous" else str(status)
+    if status == "ambiguous":
+        return f"ambiguous: {', '.join(effects)}"
+    return "something unknown" if status == "unknown" else str(status)
 
 
 def _links(row: ClipRow) -> str:

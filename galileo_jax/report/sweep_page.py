@@ -45,6 +45,8 @@ def write_sweep_page(
     label = labels(done)
     lead = f"{len(done)} of {len(rows)} cells done"
     lead += f", {len(failed)} failed: see below." if failed else "."
+    if apart := sum(bool(row.remark) for row in clips):
+        lead += f" {apart} of {len(clips)} clips stand apart (◆)."
     sections = [header("sweep", title, lead, is_good=not failed)]
     if found:
         sections.append(class_section(found))

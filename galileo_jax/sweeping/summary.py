@@ -5,7 +5,7 @@ taken up again ends with the same table, to the last digit.
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -131,7 +131,9 @@ def _of_fit(result: dict[str, Any], truth: dict[str, Any]) -> Row:
     return row | {key: result["error"].get(key) for key in ERRORS}
 
 
-def _of_quantity(name: str, entry: dict[str, Any], best: float | None, true: float | None) -> Row:
+def _of_quantity(
+    name: str, entry: Mapping[str, Any], best: float | None, true: float | None
+) -> Row:
     value = entry["mean"] if best is None else best
     row: Row = {name: value}
     if best is None:
