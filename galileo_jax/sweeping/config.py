@@ -8,6 +8,8 @@ common: {method: mh}             # options of every cell
 grid: {seed: [0, 1], chains: [4, 8]}                   # all combinations
 list: [{sampler: mixture}, {sampler: random_walk}]     # one by one, each with all of the grid
 reports: true                    # each cell's own page; default: up to 60 cells
+
+A folder of films and tables stands for `clips: [all of them]`, `common: {method: explain}`.
 """
 
 import glob
