@@ -31,7 +31,7 @@ def main(argv: Sequence[str]) -> int | None:
     for one in found.agreements:
         print(one.sentence)
     for row in found.summary:
-        if row["remark"] and row["status"] == "done":
+        if row["remark"]:
             command.say(f"{row['clips']}: {row['remark']}")
     count = Counter(row["status"] for row in found.summary)
     print(f"{count['done']} cells done, {count['failed']} failed")

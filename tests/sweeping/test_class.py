@@ -75,8 +75,8 @@ def test_it_fits_on_a_phone(swept, browser):
 
 
 @pytest.fixture
-def groups(tmp_path):
-    """A folder with the tracks of five groups, one of which declares a wrong angle."""
+def groups(tmp_path, angle):
+    """A folder with the tracks of five groups, one of which declares another angle."""
     folder = tmp_path / "class"
     folder.mkdir()
     for seed in range(1, 6):
@@ -85,15 +85,25 @@ def groups(tmp_path):
         )
         (folder / f"group{seed}.truth.json").unlink()
     yaml = folder / "group3.yaml"
-    yaml.write_text(yaml.read_text().replace("ramp_angle_deg: 20.0", "ramp_angle_deg: 17.0"))
+    yaml.write_text(yaml.read_text().replace("ramp_angle_deg: 20.0", f"ramp_angle_deg: {angle}"))
     return folder
 
 
+# With 25 degrees the object would start inside the ramp, which is an error; 17 is found out.
+@pytest.mark.parametrize("angle", [25, pytest.param(17, marks=pytest.mark.slow)])
 def test_a_folder_is_a_class_and_who_declares_another_angle_is_told(
-    groups, tmp_path, monkeypatch, capsys
+    groups, angle, tmp_path, monkeypatch, capsys
 ):
     """Stopped after two groups by Ctrl-C, then called again."""
-    words = [str(groups), "--out", str(tmp_path / "out"), "--workers", "0"]
+    words = [
+        str(groups),
+        "--out",
+        str(tmp_path / "out"),
+        "--workers",
+        "0",
+        "--set",
+        "reports=false",
+    ]
     compute, left = run_cells.run_cell, 2
 
     def stopped(*arguments):
@@ -110,15 +120,20 @@ def test_a_folder_is_a_class_and_who_declares_another_angle_is_told(
     with in_64_bit():
         assert command.run(sweep_command.main, words) == 0
     told = capsys.readouterr()
+    count = 4 if angle == 25 else 5
     assert "5 cells, 2 of them done" in told.err
-    assert "The class found k1 = 0.2" in told.out and "5 of 5 groups agree" in told.out
+    assert "The class found k1 = 0.2" in told.out and f"{count} of {count} groups" in told.out
     table = pd.read_csv(tmp_path / "out" / "summary.csv")
-    assert table["rms_mm"].between(0.1, 0.5).all()
+    assert table["rms_mm"].dropna().between(0.1, 0.5).all()
     (apart,) = table.dropna(subset="remark").to_dict("records")
     remark = apart["remark"]
-    assert apart["clips"] == str(groups / "group3.csv") and "ramp_angle" in apart["effect"]
-    assert remark.startswith(f"effect: {apart['effect']}, where most have none; ")
-    assert remark.endswith("it declares ramp_angle_deg 17 where the others have 20")
+    assert apart["clips"] == str(groups / "group3.csv")
+    declares = f"it declares ramp_angle_deg {angle} where the others have 20"
+    if angle == 25:
+        assert "inside the ramp" in apart["failure"] and remark == declares
+    else:
+        assert "ramp_angle" in apart["effect"]
+        assert remark == f"effect: {apart['effect']}, where most have none; {declares}"
     page = (tmp_path / "out" / "report.html").read_text()
     assert remark in told.err and remark in page and page.count("◆</span>") == 1
     assert 'class="strip"' in page and 'id="plotly"' not in page, "prints without scripts"
@@ -137,6 +152,7 @@ def test_a_folder_that_is_no_class_is_one_line(tmp_path, capsys):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("angle", [17])
 def test_the_cell_is_what_the_command_finds(groups, tmp_path):
     """Wrong angle and all: result.json of `explain`, diagnosis.json beside it."""
     clip = groups / "group3.csv"
