@@ -14,6 +14,7 @@ from galileo_jax.api.fit import fit as fit_tracks
 from galileo_jax.api.fit_result import Fit, write_pages
 from galileo_jax.api.look import Look, look
 from galileo_jax.api.proposed_clip import clip_of
+from galileo_jax.api.track import TrackLike
 from galileo_jax.api.understand import Understood, is_declared, understand
 from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES, has_yaml, load_clip
 from galileo_jax.clip.schema import Clip
@@ -197,8 +198,8 @@ def explain(
     with progress.scope(on_progress, cancel):
         progress.report("looking", 0.0)
         with progress.part(0.0, UNDERSTOOD):
-            checked = [_checked(one, answers) for one in sources_of(clips)]
-        found = _explained(checked, engine, seed)
+            found_clips = [checked(one, answers) for one in sources_of(clips)]
+        found = explained(found_clips, engine, seed)
         if out is not None:
             progress.report("writing the page", 0.97)
             found = found.save(out)
@@ -228,8 +229,11 @@ def sources_of(clips: ClipLike | Sequence[ClipLike]) -> list[ClipLike]:
 
 
 def _in_folder(folder: Path) -> list[Path]:
-    if (folder / "result.json").is_file():
-        raise InputError(f"{folder}: a run, which is a result; a film, a table or a folder of them")
+    for file, kind in (("result.json", "run"), ("sweep.json", "sweep")):
+        if (folder / file).is_file():
+            raise InputError(
+                f"{folder}: a {kind}, which is a result; a film, a table or a folder of them"
+            )
     found = [
         path
         for path in sorted(folder.iterdir())
@@ -282,18 +286,37 @@ def kept(clips: ClipLike | Sequence[ClipLike]) -> list[str]:
     return found
 
 
-def _checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:
+def checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:
+    """The clip; what neither its yaml nor the answers say is taken from the file.
+
+    Args:
+      clip: of which it is asked.
+      answers: as for `understood`.
+
+    Raises:
+      InputError: the file is wrong, or something is missing that only a person can know.
+    """
     known = understood(clip, answers)
     return known if isinstance(known, Clip) else clip_of(known, answers, str(clip))
 
 
-def _explained(clips: Sequence[Clip], engine: str, seed: int) -> Explanation:
+def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanation:
+    """The explanation of clips that are checked, or tracked already.
+
+    Args:
+      tracks: trials of the same objects.
+      engine: as for `explain`.
+      seed: as for `explain`.
+    """
     with progress.part(UNDERSTOOD, FITTED):
-        first = fit_tracks(clips, engine=engine, seed=seed)
+        first = fit_tracks(tracks, engine=engine, seed=seed)
     with progress.part(FITTED, COMPARED):
         check = compare(first)
     command = command_line(
-        "explain", [clip.source for clip in clips], engine=engine, seed=seed or None
+        "explain",
+        [one.clip.source for one in first.measurements],
+        engine=engine,
+        seed=seed or None,
     )
     if check.found.no_verdict is not None:
         return Explanation(first, check, None, command)

@@ -28,6 +28,11 @@ def main(argv: Sequence[str]) -> int | None:
                 command.say(f"failed: {partial['failed']}: {partial['why']}")
 
         found = sweep(**vars(call), on_progress=display.showing(show))
+    for one in found.agreements:
+        print(one.sentence)
+    for row in found.summary:
+        if row["remark"]:
+            command.say(f"{row['clips']}: {row['remark']}")
     count = Counter(row["status"] for row in found.summary)
     print(f"{count['done']} cells done, {count['failed']} failed")
     command.say(", ".join(map(str, [*found.tables, found.report_path])))
@@ -36,7 +41,11 @@ def main(argv: Sequence[str]) -> int | None:
 
 def _parser() -> command.Parser:
     parser = command.Parser(prog="galileo sweep", description=__doc__)
-    parser.add_argument("config", metavar="CONFIG", help="a yaml file, or the name of a ready one")
+    parser.add_argument(
+        "config",
+        metavar="CONFIG",
+        help="a yaml file, the name of a ready one, or a folder of films and tables: each alone",
+    )
     add = adder(parser, "sweep")
     add("set", "multirun", metavar="KEY=VALUE")
     add("out", metavar="DIR")
@@ -46,6 +55,7 @@ def _parser() -> command.Parser:
     add("address", metavar="HOST:PORT")
     add("workers", "cpus_per_worker", "gpus_per_worker", "together")
     parser.examples(
+        "galileo sweep films/                                  a class: a film of each group",
         "galileo sweep thesis_ablation                         a ready config",
         "galileo sweep class.yaml --set common.method=mh       your own, with another value",
     )

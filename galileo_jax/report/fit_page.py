@@ -1,6 +1,5 @@
 """The page of a fit, DIR/report.html."""
 
-import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -29,11 +28,10 @@ from galileo_jax.report.provenance import provenance
 from galileo_jax.report.style import object_colour
 from galileo_jax.results.run import Run
 from galileo_jax.results.shown_digits import interval_text, number, shown, unit_text
-from galileo_jax.results.shown_parameters import shown_parameters
+from galileo_jax.results.shown_parameters import HEADLINES, shown_parameters
 from galileo_jax.runtime.atomic_write import write_text
 
 PAGE = "report.html"
-HEADLINES = re.compile(r"gravity|k\d+|mass_ratio(_\d+_\d+)?")
 
 
 def write_report(

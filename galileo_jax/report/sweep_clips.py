@@ -4,7 +4,6 @@ It needs no truth and adds nothing up: it is for whoever filmed the clips, such 
 """
 
 import base64
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -19,17 +18,16 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.report.fit_text import fits, meaning
 from galileo_jax.report.style import object_colour
 from galileo_jax.report.video_frames import jpeg
-from galileo_jax.results.shown_digits import number, shown, unit_text, value_text
-from galileo_jax.results.shown_parameters import point_estimate
+from galileo_jax.results.shown_digits import interval_text, number, shown, unit_text
+from galileo_jax.results.shown_parameters import HEADLINES, headlines, point_estimate
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.video import decode
 
 PICTURE_PX, QUALITY = 200, 70  # the longer side of a thumbnail, twice as large as it is shown
 DRAWING_PX = (100, 62)
 MOST_POINTS = 60  # of a drawn path
+APART = '<span class="apart" title="stands apart">◆</span>&nbsp;'
 SHORT = {"mass_ratio": "m1/m2"}  # headings of columns, where they are not the parameter's name
-HEADLINES = re.compile(r"k\d+|mass_ratio(_\d+_\d+)?")
-MASSES = re.compile(r"m\d+|phi")
 Document = Mapping[str, Any]
 
 
@@ -47,6 +45,9 @@ class ClipRow:
       pages: label and path of its own pages, relative to the sweep's page.
       failures: why it has no result, a sentence each.
       other_fits: how many fits it has beside the one that is shown.
+      check: compare.json of a fit that was explained.
+      remark: why it stands apart from the others; empty where it does not.
+      outside: the quantities that the others find otherwise.
     """
 
     name: str
@@ -58,6 +59,9 @@ class ClipRow:
     pages: tuple[tuple[str, Path], ...] = ()
     failures: tuple[str, ...] = ()
     other_fits: int = 0
+    check: Document | None = None
+    remark: str = ""
+    outside: tuple[str, ...] = ()
 
 
 def thumbnail(clip: Clip, observation: Observation) -> bytes | None:
@@ -105,13 +109,20 @@ def clips_section(rows: Sequence[ClipRow]) -> str:
     values = [_values(row) for row in rows]
     columns = list(dict.fromkeys(name for each in values for name in each))
     columns.sort(key=lambda name: (not HEADLINES.fullmatch(name), "mass" in name))
-    head = ["", "clip", *(SHORT.get(name, name) for name in columns), "model", "report"]
-    top = "".join(f'<th scope="col">{escape(name)}</th>' for name in head)
-    body = "".join(_row(row, own, columns) for row, own in zip(rows, values, strict=True))
+    has_remarks = any(row.remark for row in rows)
+    more = ["effect", "off", *(["remark"] if has_remarks else []), "report"]
+    head = ["", "clip", *(SHORT.get(name, name) for name in columns), *more]
+    kinds = {"": "picture", "report": "pages"}
+    top = "".join(
+        f'<th scope="col" class="{kinds.get(name, "")}">{escape(name)}</th>' for name in head
+    )
+    body = "".join(
+        _row(row, own, columns, len(more)) for row, own in zip(rows, values, strict=True)
+    )
     meanings = [
         f"{SHORT.get(name, name)}: {_meaning(name)}" for name in columns if _meaning(name) != name
     ]
-    caption = "Each value with its standard deviation."
+    caption = "Each value with its 95 % interval. Off: root mean square of the fit's distance."
     if meanings:
         caption = f"{'; '.join(meanings)}. {caption}"
     if any(row.other_fits for row in rows):
@@ -141,32 +152,33 @@ def _values(row: ClipRow) -> dict[str, Mapping[str, Any]]:
         entries = {name: entry for name, entry in last.items() if isinstance(entry, Mapping)}
     else:
         return {}
-    found = {name: entry for name, entry in entries.items() if HEADLINES.fullmatch(name)}
-    return found or {
-        name: entry
-        for name, entry in entries.items()
-        if entry["identified"] and not MASSES.fullmatch(name)
-    }
+    return headlines(entries)
 
 
-def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str]) -> str:
+def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str], more: int) -> str:
+    """A row; it has `more` cells after its values."""
     together = ""
     if row.together_with:
         others = escape(", ".join(row.together_with))
         together = f'<span class="soft">fitted together with {others}</span>'
     cells = [
         f'<td class="picture">{_picture(row)}</td>',
-        f'<th scope="row">{escape(row.name)}{together}</th>',
+        f'<th scope="row">{APART if row.remark else ""}{escape(row.name)}{together}</th>',
     ]
     if row.fit is None and row.diagnosis is None:
-        said = escape(" ".join(dict.fromkeys(row.failures)) or "Not computed yet.")
-        cells.append(f'<td class="warn why" colspan="{len(columns) + 2}">{said}</td>')
+        said = "; ".join(dict.fromkeys([*row.failures, *filter(None, [row.remark])]))
+        span = f'colspan="{len(columns) + more}"'
+        cells.append(f'<td class="warn why" {span}>{escape(said or "Not computed yet.")}</td>')
     else:
         for name in columns:
             label = escape(SHORT.get(name, name), quote=True)
             shown = _value(values[name]) if name in values else ""
-            cells.append(f'<td class="value" data-label="{label}">{shown}</td>')
+            kind = "value outside" if name in row.outside else "value"
+            cells.append(f'<td class="{kind}" data-label="{label}">{shown}</td>')
         cells.append(f'<td class="model">{_model(row)}</td>')
+        cells.append(f'<td class="value off" data-label="off">{_off(row)}</td>')
+        if more == 4:
+            cells.append(f'<td class="remark">{escape(row.remark)}</td>')
         cells.append(f'<td class="pages">{_links(row)}</td>')
     return f"<tr>{''.join(cells)}</tr>\n"
 
@@ -174,14 +186,30 @@ def _row(row: ClipRow, values: Mapping[str, Any], columns: Sequence[str]) -> str
 def _value(entry: Mapping[str, Any]) -> str:
     if not entry["identified"]:
         return '<span class="soft">not determined</span>'
-    return escape(value_text(entry) if entry["sd"] else f"{shown(entry)}{unit_text(entry)}")
+    value = escape(f"{shown(entry)}{unit_text(entry)}")
+    if not entry["sd"]:
+        return value
+    return f'{value} <span class="soft">{escape(interval_text(entry))}</span>'
+
+
+def _off(row: ClipRow) -> str:
+    """How near the fit comes; empty where that is not known."""
+    error = row.fit["error"] if row.fit is not None else {}
+    units = {"rms_mm": " mm", "rms_percent_of_way": " % of the way"}
+    sizes = [f"{error[key]:.2g}{unit}" for key, unit in units.items() if error.get(key)]
+    first, rest = sizes[:1], sizes[1:]
+    return "".join([*first, *(f' <span class="soft">{size}</span>' for size in rest)])
 
 
 def _model(row: ClipRow) -> str:
     """Whether the model describes the clip, or what is missing in it."""
     if row.diagnosis is not None:
-        said, is_good = _verdict(row.diagnosis["verdict"])
+        verdict = row.diagnosis["verdict"]
+        said, is_good = verdict_words(verdict), verdict["status"] in ("none", "named", "law")
         error = row.diagnosis["history"][-1]
+    elif row.check is not None and row.fit is not None:
+        error, is_good = row.fit["error"], bool(row.check["adequate"])
+        said = "none" if is_good else "no verdict"
     else:
         assert row.fit is not None
         error, is_good = row.fit["error"], fits(dict(row.fit))
@@ -194,18 +222,16 @@ def _model(row: ClipRow) -> str:
     return f'<b{mark}>{escape(said)}</b> <span class="soft">chi2 {chi2}</span>{failed}'
 
 
-def _verdict(verdict: Mapping[str, Any]) -> tuple[str, bool]:
-    """What a diagnosis says in a few words, and whether it knows what happens in the clip."""
+def verdict_words(verdict: Mapping[str, Any]) -> str:
+    """The effect that a diagnosis names, or what else it says, in a few words."""
     status, effects = verdict["status"], verdict["effects"]
-    if status == "none":
-        return "nothing is missing", True
     if status == "named":
-        return " and ".join(effects), True
+        return " and ".join(effects)
     if status == "law":
-        return str(verdict["law"]), True
+        return str(verdict["law"])
     if status == "ambiguous":
-        return " or ".join(effects), False
-    return "something unknown is missing", False
+        return f"ambiguous: {', '.join(effects)}"
+    return "something unknown" if status == "unknown" else str(status)
 
 
 def _links(row: ClipRow) -> str:

@@ -1,4 +1,4 @@
-"""The page of a sweep: each clip, errors by effect and by method, verdicts, what failed."""
+"""The page of a sweep: what a class found, each clip, errors, verdicts, what failed."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.report.chart import Boxes, Chart, Panel
+from galileo_jax.report.class_chart import Agreement, class_section
 from galileo_jax.report.html_page import chart_section, document, header, legend, table
 from galileo_jax.report.provenance import versions
 from galileo_jax.report.sweep_clips import ClipRow, clips_section
@@ -22,7 +23,12 @@ Row = Mapping[str, Any]
 
 
 def write_sweep_page(
-    path: Path, title: str, rows: Sequence[Row], command: str, clips: Sequence[ClipRow] = ()
+    path: Path,
+    title: str,
+    rows: Sequence[Row],
+    command: str,
+    clips: Sequence[ClipRow] = (),
+    found: Sequence[Agreement] = (),
 ) -> None:
     """Writes the page.
 
@@ -32,22 +38,29 @@ def write_sweep_page(
       rows: as `sweeping.summary.make_rows` gives them.
       command: that makes it again.
       clips: a row for each, in the order in which they are shown.
+      found: what they find together.
     """
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] == "failed"]
     label = labels(done)
     lead = f"{len(done)} of {len(rows)} cells done"
     lead += f", {len(failed)} failed: see below." if failed else "."
+    if apart := sum(bool(row.remark) for row in clips):
+        lead += f" {apart} of {len(clips)} clips stand apart (◆)."
     sections = [header("sweep", title, lead, is_good=not failed)]
+    if found:
+        sections.append(class_section(found))
     if clips:
         sections.append(clips_section(clips))
     is_truth_known = any(row["hidden"] for row in done)
     if is_truth_known:
         sections += _errors("Error by effect", _EFFECT, done, lambda row: row["hidden"], label)
     caption = _METHOD if is_truth_known else _NO_TRUTH
-    sections += _errors("Error by method", caption, done, label, label)
+    is_comparison = is_truth_known or len({label(row) for row in done}) > 1
+    if is_comparison:
+        sections += _errors("Error by method", caption, done, label, label)
     sections += _confusion(done)
-    if done:
+    if is_comparison:
         sections.append(_methods(done, label))
     if failed:
         sections.append(_failures(failed))
@@ -84,7 +97,7 @@ def labels(rows: Iterable[Row]) -> Callable[[Row], str]:
 
 def _options(row: Row) -> dict[str, str]:
     found = dict(part.split("=", 1) for part in row["options"].split())
-    if row["method"] != "diagnose":
+    if row["method"] not in ("diagnose", "explain"):  # of these it is no option
         found["effects"] = f"with {row['effects']}" if row["effects"] != "none" else "no effect"
     return found
 
@@ -112,7 +125,8 @@ def _errors(
         charts.append(_boxes("chi2 per degree of freedom", known, values, category, label))
     names = sorted({label(row) for row in rows})
     key = legend(("dot", COLOURS[i % len(COLOURS)], name) for i, name in enumerate(names))
-    return [chart_section(heading, caption, charts, legend=key)]
+    # Plotly's charts are as wide as the screen: on paper they would be cut off.
+    return [f'<div class="screen">{chart_section(heading, caption, charts, legend=key)}</div>']
 
 
 def _has_error(row: Row, quantity: str) -> bool:

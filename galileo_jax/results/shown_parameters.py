@@ -7,6 +7,7 @@ from typing import Any
 from galileo_jax.inference.per_mass import per_mass_unit
 
 MASS = re.compile(r"m\d+")
+HEADLINES = re.compile(r"gravity|k\d+|mass_ratio(_\d+_\d+)?")
 
 
 def shown_parameters(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
@@ -27,6 +28,21 @@ def shown_parameters(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     if len(masses) == 1 and not any(per_mass_unit(unit) for unit in units):
         del entries[masses[0]]
     return entries
+
+
+def headlines(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Frictions, ratios of masses and g; of a motion that has none of them what it determines.
+
+    Args:
+      entries: of parameters and what is derived from them, by name.
+
+    Returns:
+      entries by name: those of `HEADLINES` in their alphabet, ratios last.
+    """
+    found = sorted(filter(HEADLINES.fullmatch, entries), key=lambda name: ("mass" in name, name))
+    no_mass = (name for name in entries if not MASS.fullmatch(name) and name != "phi")
+    shown = found or [name for name in no_mass if entries[name]["identified"]]
+    return {name: entries[name] for name in shown}
 
 
 def point_estimate(result: Mapping[str, Any]) -> dict[str, float]:

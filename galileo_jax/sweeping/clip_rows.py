@@ -11,9 +11,10 @@ from galileo_jax.report.sweep_clips import ClipRow
 from galileo_jax.report.sweep_page import labels
 from galileo_jax.sweeping.cell import Cell
 from galileo_jax.sweeping.clip_files import ClipFiles
-from galileo_jax.sweeping.settings import Diagnose
+from galileo_jax.sweeping.settings import Diagnose, Explain
 from galileo_jax.sweeping.store import Store
 from galileo_jax.sweeping.summary import Row
+from galileo_jax.sweeping.work import CHECK, MISSING
 
 MOST_PICTURES = 200  # a page with more clips has none: each is some 7 KB
 
@@ -32,12 +33,12 @@ def make_clip_rows(cells: Sequence[Cell], store: Store, rows: Sequence[Row]) -> 
         for clip in cell.clips:
             clips[clip.key] = clip
             of_clip.setdefault(clip.key, []).append((cell, row))
-    names = _names(clips)
+    names = names_of(cells)
     label = labels([row for row in rows if row["status"] == "done"])
     made = [_row(clip, of_clip[key], store, names, label) for key, clip in clips.items()]
     if len(made) > MOST_PICTURES:
         made = [replace(row, picture=None, observation=None) for row in made]
-    return sorted(made, key=lambda row: _natural(row.name))
+    return sorted(made, key=lambda row: natural(row.name))
 
 
 def _row(
@@ -50,6 +51,10 @@ def _row(
     done = [(cell, row) for cell, row in own if row["status"] == "done"]
     fits = [cell for cell, _ in done if not isinstance(cell.settings, Diagnose)]
     diagnoses = [cell for cell, _ in done if isinstance(cell.settings, Diagnose)]
+    explained = next((cell for cell in fits[:1] if isinstance(cell.settings, Explain)), None)
+    missing = store.result(explained.name, MISSING) if explained else None
+    if diagnoses:
+        missing = store.result(diagnoses[0].name)
     shown = next(iter([*fits, *diagnoses]), None)
     together = [names[other.key] for other in shown.clips if other is not clip] if shown else []
     alike = Counter(label(row) for _, row in done)
@@ -66,15 +71,19 @@ def _row(
         measured.thumbnail if measured else None,
         measured.measurement.observation if measured else None,
         store.result(fits[0].name) if fits else None,
-        store.result(diagnoses[0].name) if diagnoses else None,
+        missing or None,
         tuple(pages),
         tuple(row["failure"] for _, row in own if row["status"] == "failed"),
         max(len(fits) - 1, 0),
+        store.result(explained.name, CHECK) if explained else None,
+        next((row["remark"] for _, row in own if row["remark"]), ""),
+        tuple(str(next((row["outside"] for _, row in own if row["outside"]), "")).split()),
     )
 
 
-def _names(clips: dict[str, ClipFiles]) -> dict[str, str]:
+def names_of(cells: Sequence[Cell]) -> dict[str, str]:
     """By key what each clip is called: its file's name, with as much of its path as it takes."""
+    clips = {clip.key: clip for cell in cells for clip in cell.clips}
     names = {key: clip.name for key, clip in clips.items()}
     for longer in (lambda clip: f"{clip.path.parent.name}/{clip.name}", lambda clip: clip.source):
         count = Counter(names.values())
@@ -82,7 +91,7 @@ def _names(clips: dict[str, ClipFiles]) -> dict[str, str]:
     return names
 
 
-def _natural(name: str) -> list[tuple[int, int | str]]:
+def natural(name: str) -> list[tuple[int, int | str]]:
     """A key that sorts numbers in names by their value."""
     parts = re.split(r"(\d+)", name.lower())
     return [(0, int(part)) if part.isdecimal() else (1, part) for part in parts]

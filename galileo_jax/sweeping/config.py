@@ -8,6 +8,8 @@ common: {method: mh}             # options of every cell
 grid: {seed: [0, 1], chains: [4, 8]}                   # all combinations
 list: [{sampler: mixture}, {sampler: random_walk}]     # one by one, each with all of the grid
 reports: true                    # each cell's own page; default: up to 60 cells
+
+A folder of films and tables stands for `clips: [all of them]`, `common: {method: explain}`.
 """
 
 import glob
@@ -116,6 +118,18 @@ def load_config(
       InputError: unreadable, or a key is unknown or its value is wrong.
     """
     return make_configs(str(path), read_mapping(path), changes, runs)
+
+
+def of_folder(folder: Path) -> dict[str, Any]:
+    """The config of a folder: each film and table in it is explained alone.
+
+    Raises:
+      InputError: there is none, or the folder is a result.
+    """
+    from galileo_jax.api.explain import sources_of
+
+    files = sources_of([folder])
+    return {"clips": [glob.escape(str(file)) for file in files], "common": {"method": "explain"}}
 
 
 def make_configs(

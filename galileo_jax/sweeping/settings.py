@@ -118,14 +118,21 @@ class Diagnose(_Settings):
     add: Name = "auto"
 
 
+class Explain(_Settings):
+    """What `galileo FILE` does: a fit, a test of the model, and a diagnosis where it fails."""
+
+    method: Literal["explain"]
+
+
 KINDS: dict[str, type[_Settings]] = {
     "grad": Grad,
     "mh": Mh,
     "cnn": Cnn,
     "thesis": Thesis,
     "diagnose": Diagnose,
+    "explain": Explain,
 }
-Settings = Grad | Mh | Cnn | Thesis | Diagnose
+Settings = Grad | Mh | Cnn | Thesis | Diagnose | Explain
 _ADAPTER: TypeAdapter[Settings] = TypeAdapter(Annotated[Settings, Field(discriminator="method")])
 
 

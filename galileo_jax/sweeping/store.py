@@ -75,9 +75,12 @@ class Store:
         """Whether a cell is done."""
         return self._cell(name, RESULT).is_file()
 
-    def result(self, name: str) -> dict[str, Any]:
-        """A cell's result.json."""
-        return json.loads(self._cell(name, RESULT).read_text(encoding="utf-8"))
+    def result(self, name: str, file: str = RESULT) -> dict[str, Any]:
+        """A cell's result.json, or what lies beside it; empty where that is not there."""
+        path = self._cell(name, file)
+        if file != RESULT and not path.is_file():
+            return {}
+        return json.loads(path.read_text(encoding="utf-8"))
 
     def failure(self, name: str) -> Failure | None:
         """Why a cell has no result; None where it has one, or was not tried."""

@@ -5,31 +5,38 @@ taken up again ends with the same table, to the last digit.
 """
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from galileo_jax.files.tables import TABLE_FORMATS, write_table
-from galileo_jax.results.shown_parameters import point_estimate
+from galileo_jax.report.sweep_clips import verdict_words
+from galileo_jax.results.shown_parameters import headlines, point_estimate
 from galileo_jax.sweeping.cell import Cell
-from galileo_jax.sweeping.settings import Diagnose
+from galileo_jax.sweeping.settings import Diagnose, Explain
 from galileo_jax.sweeping.store import Store
+from galileo_jax.sweeping.work import CHECK, MISSING
 
-QUANTITIES = ("k1", "k2", "mass_ratio")
+QUANTITIES = ("k1", "k2", "mass_ratio")  # have columns in every summary
+ERRORS = ("rmse", "noise", "chi2_per_dof", "rms_mm", "rms_percent_of_way", "frames_used", "frames")
 NONE = "none"  # no effect: in the model, hidden, or found
-OF_QUANTITY = ("", "_sd", "_q025", "_q975", "_identified", "_true", "_error", "_covered")
+OF_QUANTITY = ("", "_sd", "_q025", "_q975", "_unit", "_identified", "_true", "_error", "_covered")
 COLUMNS = (
     *("cell", "clips", "method", "options", "effects", "seed", "hidden"),
-    *("status", "failure", "converged", "verdict", "adequate", "p_value"),
+    *("status", "failure", "converged", "verdict", "effect", "adequate", "p_value"),
+    *("outside", "remark"),
     *(f"{quantity}{column}" for quantity in QUANTITIES for column in OF_QUANTITY),
-    *("rmse", "noise", "chi2_per_dof"),
+    *ERRORS,
 )
 Row = dict[str, Any]
 
 
 def make_rows(cells: Iterable[Cell], store: Store) -> list[Row]:
-    """One row for each cell, keys as in `COLUMNS`; None where there is nothing to say."""
+    """One row for each cell, keys as in `COLUMNS`; None where there is nothing to say.
+
+    What a motion determines beside `QUANTITIES` (g, a stiffness, ...) follows with such keys.
+    """
     truths: dict[Path, dict[str, Any]] = {}
     rows = []
     for cell in cells:
@@ -59,12 +66,17 @@ def write_tables(folder: Path, rows: Sequence[Row]) -> list[Path]:
     """Writes summary.csv and, where pyarrow is installed, summary.parquet; returns the files."""
     import pandas as pd
 
-    table = pd.DataFrame(list(rows), columns=list(COLUMNS))
+    table = pd.DataFrame(list(rows), columns=columns_of(rows))
     formats = [name for name in TABLE_FORMATS if name == "csv" or find_spec("pyarrow")]
     paths = [folder / f"summary.{name}" for name in formats]
     for path in paths:
         write_table(path, table)
     return paths
+
+
+def columns_of(rows: Sequence[Row]) -> list[str]:
+    """`COLUMNS`, and those of what only these rows have."""
+    return list(dict.fromkeys([*COLUMNS, *(key for row in rows for key in row)]))
 
 
 def _row(cell: Cell, store: Store, truth: dict[str, Any]) -> Row:
@@ -86,24 +98,46 @@ def _row(cell: Cell, store: Store, truth: dict[str, Any]) -> Row:
         return row
     result = store.result(cell.name)
     found = _of_diagnosis if isinstance(cell.settings, Diagnose) else _of_fit
-    return row | {"status": "done"} | found(result, truth)
+    row |= {"status": "done"} | found(result, truth)
+    if isinstance(cell.settings, Explain):
+        row |= _of_check(result, store.result(cell.name, CHECK), store.result(cell.name, MISSING))
+    return row
+
+
+def _of_check(result: dict[str, Any], check: dict[str, Any], missing: dict[str, Any]) -> Row:
+    """What an explanation says beside its fit."""
+    row: Row = {key: check[key] for key in ("adequate", "p_value")}
+    row |= {"effects": "+".join(result["effects"]) or NONE, "remark": result.get("no_verdict")}
+    status = {"verdict": {"status": NONE, "effects": []}} if check["adequate"] else {}
+    return row | _of_verdict(missing or status)
+
+
+def _of_verdict(diagnosis: dict[str, Any]) -> Row:
+    """One word for the confusion matrix, the effects named or the status; and the page's words."""
+    if not diagnosis:
+        return {}
+    verdict = diagnosis["verdict"]
+    named = "+".join(verdict["effects"])
+    word = named if verdict["status"] == "named" else verdict["status"]
+    return {"verdict": word, "effect": verdict_words(verdict)}
 
 
 def _of_fit(result: dict[str, Any], truth: dict[str, Any]) -> Row:
     entries = result["parameters"] | result["derived"]
     best = point_estimate(result)
     row: Row = {"converged": result["converged"]}
-    for name in QUANTITIES:
-        if name in entries:
-            row |= _of_quantity(name, entries[name], best.get(name), truth.get(name))
-    return row | {key: result["error"][key] for key in ("rmse", "noise", "chi2_per_dof")}
+    for name, entry in headlines(entries).items():
+        row |= _of_quantity(name, entry, best.get(name), truth.get(name))
+    return row | {key: result["error"].get(key) for key in ERRORS}
 
 
-def _of_quantity(name: str, entry: dict[str, Any], best: float | None, true: float | None) -> Row:
+def _of_quantity(
+    name: str, entry: Mapping[str, Any], best: float | None, true: float | None
+) -> Row:
     value = entry["mean"] if best is None else best
     row: Row = {name: value}
     if best is None:
-        row |= {f"{name}_{key}": entry[key] for key in ("sd", "q025", "q975", "identified")}
+        row |= {f"{name}_{key}": entry[key] for key in ("sd", "q025", "q975", "unit", "identified")}
     if true is not None:
         row |= {f"{name}_true": true, f"{name}_error": value - true}
         if best is None:
@@ -114,18 +148,13 @@ def _of_quantity(name: str, entry: dict[str, Any], best: float | None, true: flo
 def _of_diagnosis(result: dict[str, Any], truth: dict[str, Any]) -> Row:
     last = result["history"][-1]
     row: Row = {
-        "verdict": _verdict(result["verdict"]),
+        **_of_verdict(result),
         "adequate": result["adequate"],
         "p_value": result["p_value"],
         "effects": "+".join(last["effects"]) or NONE,
-        **{key: last[key] for key in ("rmse", "noise", "chi2_per_dof")},
+        **{key: last.get(key) for key in ERRORS},
     }
     for name in QUANTITIES:
         if name in last:
             row |= _of_quantity(name, last[name], None, truth.get(name))
     return row
-
-
-def _verdict(verdict: dict[str, Any]) -> str:
-    """One word for the confusion matrix: the effects named, or the status."""
-    return "+".join(verdict["effects"]) if verdict["status"] == "named" else verdict["status"]

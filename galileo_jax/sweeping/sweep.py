@@ -13,22 +13,24 @@ import yaml
 from galileo_jax import __version__
 from galileo_jax.api.options import options_of
 from galileo_jax.files.package_data import config_path
+from galileo_jax.report.class_chart import Agreement
 from galileo_jax.report.sweep_page import write_sweep_page
 from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.atomic_write import write_json, write_text
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.sweeping.agreement import agreements, with_remarks
 from galileo_jax.sweeping.cell import Cell, make_cells
 from galileo_jax.sweeping.clip_files import ClipFiles
-from galileo_jax.sweeping.clip_rows import make_clip_rows
-from galileo_jax.sweeping.config import SweepConfig, load_config, make_configs
+from galileo_jax.sweeping.clip_rows import make_clip_rows, names_of
+from galileo_jax.sweeping.config import SweepConfig, load_config, make_configs, of_folder
 from galileo_jax.sweeping.engine_local import EngineHere, EngineLocal
 from galileo_jax.sweeping.resources import Computing, num_workers
 from galileo_jax.sweeping.run_cells import COMPUTED, Report, carry_out
 from galileo_jax.sweeping.simulated import simulated_clips
 from galileo_jax.sweeping.store import Store
-from galileo_jax.sweeping.summary import COLUMNS, Row, make_rows, write_tables
+from galileo_jax.sweeping.summary import Row, columns_of, make_rows, write_tables
 from galileo_jax.sweeping.task import Engine
 from galileo_jax.sweeping.work import PAGE
 
@@ -47,15 +49,18 @@ class Sweep:
       folder: where it lies; `cells/NAME` in it is a run as `galileo fit` leaves it.
       tables: summary.csv and, where pyarrow is installed, summary.parquet.
       summary: of each cell, in the config's order; `rows` as plain mappings.
+      agreements: of each quantity that most groups determined what they find together, and who
+        lies outside: `sentence`, `groups`, `values`, `found`.
     """
 
     folder: Path
     tables: tuple[Path, ...]
     summary: tuple[Row, ...]
+    agreements: tuple[Agreement, ...] = ()
 
     @property
     def report_path(self) -> Path:
-        """The page: each clip, then errors by effect and by method."""
+        """The page: what the class found, each clip, then errors by effect and by method."""
         return self.folder / PAGE
 
     @property
@@ -63,13 +68,14 @@ class Sweep:
         """One row per cell, in the config's order; empty where there is nothing to say.
 
         `cell, clips, method, options, effects, seed, hidden, status, failure, converged, verdict,
-        adequate, p_value`; of `k1`, `k2` and `mass_ratio` the value and `_sd, _q025, _q975,
-        _identified` and, where the truth is known, `_true, _error, _covered`; `rmse, noise` (m/s),
-        `chi2_per_dof`.
+        effect, adequate, p_value, outside` (quantities), `remark` (why the clip stands apart); of
+        `k1`, `k2`, `mass_ratio` and what else the motion determines the value and `_sd, _q025,
+        _q975, _unit, _identified` and, where the truth is known, `_true, _error, _covered`; `rmse,
+        noise` (m/s), `chi2_per_dof, rms_mm, rms_percent_of_way, frames_used, frames`.
         """
         import pandas as pd
 
-        return pd.DataFrame(list(self.summary), columns=list(COLUMNS))
+        return pd.DataFrame(list(self.summary), columns=columns_of(self.summary))
 
     @property
     def failures(self) -> "pd.DataFrame":
@@ -108,16 +114,17 @@ def sweep(
 ) -> Sweep:
     """Fits or diagnoses many clips in many ways, and computes only what is not there yet.
 
-    Each cell (a clip, or trials fitted together, with one set of options) gets what `fit` or
-    `diagnose` would give. What is wrong with a clip is its cells' failure, and the sweep goes on.
-    Stopped in any way, the same call goes on where it was (docs/sweeps.md).
+    Each cell (a clip, or trials fitted together, with one set of options) gets what `fit`,
+    `diagnose` or `explain` would give. What is wrong with a clip is its cells' failure, and the
+    sweep goes on. Stopped in any way, the same call goes on where it was (docs/sweeps.md).
 
     With workers, a script needs its call below `if __name__ == "__main__":`, because each of them
     imports the script; a notebook does not.
 
     Args:
-      config: a YAML file, the name of a ready config, or its keys as a mapping.
-      out: the folder, where what is done stays done; None: sweeps/CONFIG.
+      config: a YAML file, the name of a ready config, or its keys as a mapping; or a folder of
+        films and tables, each of which is explained alone (`explain` fits them together).
+      out: the folder, where what is done stays done; None: sweeps/CONFIG, sweeps/FOLDER.
       set: "key=value" each: another value in the config, such as "common.seed=3".
       multirun: "key=a,b" each: the config once with each value, or combination of values.
       retry: whether to try again what failed.
@@ -151,12 +158,16 @@ def sweep(
     _check_not_imported_by_worker()
     computing = options_of(Computing, locals())
     computing.check()
+    plain = None
     if isinstance(config, Mapping):
         name, plain = Path(out).name if out is not None else "sweep", _plain(config)
         configs = make_configs("config", plain, set, multirun)
+    elif Path(config).is_dir():
+        name = Path(config).resolve().name
+        configs = make_configs(str(config), of_folder(Path(config)), set, multirun)
     else:
         path = _config_file(str(config))
-        name, plain = path.stem, None
+        name = path.stem
         configs = load_config(path, set, multirun)
     _check_effects(configs)
     groups = [one.clip_groups() for one in configs]
@@ -200,11 +211,15 @@ def sweep(
 
 def _written(name: str, cells: Sequence[Cell], store: Store, command: str) -> Sweep:
     """The finished sweep, with its tables and its page."""
+    called = names_of(cells)
+    names = [" + ".join(called[clip.key] for clip in cell.clips) for cell in cells]
     rows = make_rows(cells, store)
+    found = agreements(rows, names)
+    rows = with_remarks(rows, names, cells, found)
     tables = write_tables(store.folder, rows)
     clips = make_clip_rows(cells, store, rows)
-    write_sweep_page(store.folder / PAGE, name, rows, command, clips)
-    return Sweep(store.folder, tuple(tables), tuple(rows))
+    write_sweep_page(store.folder / PAGE, name, rows, command, clips, found)
+    return Sweep(store.folder, tuple(tables), tuple(rows), found)
 
 
 def _check_not_imported_by_worker() -> None:

@@ -7,17 +7,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from galileo_jax.api.track import tracks_of
-from galileo_jax.clip.load import load_clip
 from galileo_jax.measurement.measure import Measurement, measure
 from galileo_jax.report.sweep_clips import thumbnail
+from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.sweeping.clip_files import Packed
-from galileo_jax.sweeping.settings import Diagnose, Settings, Thesis
+from galileo_jax.sweeping.settings import Diagnose, Explain, Settings, Thesis
 
 if TYPE_CHECKING:
+    from galileo_jax.api.explain import Explanation
     from galileo_jax.api.fit_result import Fit
 
 PAGE = "report.html"
+CHECK, MISSING = "compare/compare.json", "diagnosis/diagnosis.json"  # of an explanation
 FILES = ("video", "track")  # of a clip, beside its yaml
 
 
@@ -39,8 +41,10 @@ class CellResult:
     """What came of a cell.
 
     Attributes:
-      document: result.json as `galileo fit` writes it, or diagnosis.json.
-      files: what lies beside it, by path in the cell's folder: the page and, of a fit, the run.
+      document: result.json as `galileo fit` writes it, or diagnosis.json; of
+        `explain` that of its fit.
+      files: what lies beside it, by path in the cell's folder: the page; of a fit the run; of
+        `explain` compare.json and, where something is missing, diagnosis.json.
     """
 
     document: Mapping[str, Any]
@@ -54,8 +58,10 @@ def measure_files(packed: Packed) -> MeasuredClip:
     Raises:
       InputError: something is wrong with it.
     """
+    from galileo_jax.api.explain import checked
+
     with packed.unpacked() as here:
-        clip = load_clip(here.path)
+        clip = checked(here.path, {})
         warnings = tuple(map(here.text_of_origin, clip.warnings))
         named = {"path": here.origin(clip.path), "source": packed.source, "warnings": warnings}
         measured = measure(clip.model_copy(update=named))
@@ -82,6 +88,7 @@ def run_cell(
       InputError: the clips do not go with each other or with the method.
     """
     from galileo_jax.api.diagnose import diagnose
+    from galileo_jax.api.explain import explained
     from galileo_jax.api.fit import fit
 
     tracks = tracks_of(measured)
@@ -93,6 +100,8 @@ def run_cell(
             if page_folder is not None:
                 found.report(folder / PAGE)
             return CellResult(dict(found.document), _content(folder))
+        if isinstance(settings, Explain):
+            return _explanation(explained(tracks, **options), folder, page_folder)
         if isinstance(settings, Thesis):
             options |= {"method": "mh", "preset": "thesis"}
         else:
@@ -104,15 +113,43 @@ def run_cell(
         return CellResult(dict(fitted.result), _content(folder))
 
 
-def _write_run(fitted: "Fit", folder: Path, final: Path) -> None:
-    """Writes the run and its pages, which name the folder that it will lie in."""
+def _explanation(found: "Explanation", folder: Path, final: Path | None) -> CellResult:
+    """What is told as of a fit, and beside it what it rests on, as `Explanation.save` writes it."""
+    write_json(folder / CHECK, found.check.document)
+    beside = {}
+    if found.diagnosis is not None:
+        write_json(folder / MISSING, found.diagnosis.document)
+        if final is not None:
+            page = found.diagnosis.report((folder / MISSING).with_name(PAGE))
+            beside["what is missing, and why"] = page.relative_to(folder).as_posix()
+    if final is not None:
+        _write_run(found.fit, folder, final, found.paragraph, beside)
+    return CellResult(dict(found.fit.result), _content(folder))
+
+
+def _write_run(
+    fitted: "Fit",
+    folder: Path,
+    final: Path,
+    lead: str = "",
+    beside: Mapping[str, str] | None = None,
+) -> None:
+    """Writes the run and its pages, which name the folder that it will lie in.
+
+    Args:
+      fitted: the fit.
+      folder: that is written to.
+      final: where it will lie.
+      lead: the result in words, for the top of the pages.
+      beside: titles of other pages to their places, for links.
+    """
     from galileo_jax.report.fit_page import write_report
     from galileo_jax.results.run import RESULT
 
     fitted.save(folder, report=False)
     (folder / RESULT).unlink()  # the store writes it last
     for run in fitted.runs(final):
-        write_report(run, folder / run.folder.relative_to(final) / PAGE)
+        write_report(run, folder / run.folder.relative_to(final) / PAGE, lead, beside)
 
 
 def _content(folder: Path) -> dict[str, bytes]:

@@ -18,13 +18,13 @@ from galileo_jax.report.sweep_clips import (
 from tests.clip.broken_clips import build_good
 from tests.video.make_video import SIZE_PX
 
-ENTRY = {"mean": 0.25, "sd": 0.02, "unit": "1", "identified": True}
+ENTRY = {"mean": 0.25, "sd": 0.02, "q025": 0.21, "q975": 0.29, "unit": "1", "identified": True}
 UNKNOWN = {**ENTRY, "identified": False}
 
 
 def fit_of(chi2: float | None = 1.0, **more):
     parameters = {"m1": UNKNOWN, "k1": ENTRY, "k2": UNKNOWN}
-    derived = {"mass_ratio": {**ENTRY, "mean": 2.0, "sd": 0.1}, "phi": ENTRY}
+    derived = {"mass_ratio": {**ENTRY, "mean": 2.0, "sd": 0.1, "q975": 2.2}, "phi": ENTRY}
     error = {"chi2_per_dof": chi2, "explained_by_noise": chi2 is not None and chi2 < 3}
     return {"parameters": parameters, "derived": derived, "error": error, **more}
 
@@ -47,9 +47,9 @@ def test_values_and_what_is_not_determined():
     text = clips_section(
         [ClipRow("a", fit=fit_of(), pages=(("report", Path("cells/a b/r.html")),))]
     )
-    assert 'data-label="k1">0.250 ± 0.020<' in text
+    assert 'data-label="k1">0.250 <span class="soft">0.210 to 0.290<' in text
     assert 'data-label="k2"><span class="soft">not determined</span>' in text
-    assert 'data-label="m1/m2">2.00 ± 0.10<' in text
+    assert 'data-label="m1/m2">2.00 <span class="soft">0.21 to 2.20<' in text
     assert ">m1<" not in text and ">phi<" not in text
     assert '<a href="cells/a%20b/r.html">report</a>' in text
 
@@ -69,7 +69,7 @@ def test_a_motion_without_friction_shows_what_it_determines():
     speed = {**ENTRY, "mean": 3.5, "unit": "m/s"}
     flight["parameters"] = {"m1": UNKNOWN, "start_speed": speed, "start_angle": UNKNOWN}
     text = clips_section([ClipRow("a", fit=flight)])
-    assert 'data-label="start_speed">3.500 ± 0.020 m/s<' in text
+    assert 'data-label="start_speed">3.500 m/s <span class="soft">' in text
     assert "start_angle" not in text and "start_speed: speed in the first frame" in text
 
 
@@ -77,7 +77,7 @@ def test_a_point_estimate_has_no_standard_deviation():
     best = {"m1": 0.3, "k1": 0.2, "m2": 0.1, "k2": 0.4}
     text = clips_section([ClipRow("a", fit=fit_of(best=best))])
     assert 'data-label="k1">0.2<' in text and 'data-label="m1/m2">3<' in text
-    assert "±" not in text
+    assert " to " not in text
 
 
 @pytest.mark.parametrize(
@@ -86,17 +86,32 @@ def test_a_point_estimate_has_no_standard_deviation():
         ({"fit": fit_of()}, "fits", True),
         ({"fit": fit_of(9.0)}, "does not fit", False),
         ({"fit": fit_of(None)}, "does not fit", False),
-        ({"diagnosis": diagnosis_of("none")}, "nothing is missing", True),
+        ({"diagnosis": diagnosis_of("none")}, "none", True),
         ({"diagnosis": diagnosis_of("named", ["air_drag"])}, "air_drag", True),
         ({"diagnosis": diagnosis_of("named", ["a", "b"])}, "a and b", True),
-        ({"diagnosis": diagnosis_of("ambiguous", ["a", "b"])}, "a or b", False),
-        ({"diagnosis": diagnosis_of("unknown")}, "something unknown is missing", False),
-        ({"fit": fit_of(), "diagnosis": diagnosis_of("none")}, "nothing is missing", True),
+        ({"diagnosis": diagnosis_of("ambiguous", ["a", "b"])}, "ambiguous: a, b", False),
+        ({"diagnosis": diagnosis_of("unknown")}, "something unknown", False),
+        ({"fit": fit_of(), "diagnosis": diagnosis_of("none")}, "none", True),
     ],
 )
 def test_whether_the_model_describes_the_clip(row, said, is_good):
     mark = "" if is_good else ' class="warn"'
     assert f"<b{mark}>{said}</b>" in clips_section([ClipRow("a", **row)])
+
+
+def test_an_explained_clip_names_its_effect_how_near_it_comes_and_why_it_stands_apart():
+    fit = fit_of()
+    fit["error"] |= {"rms_mm": 0.271, "rms_percent_of_way": 0.0512}
+    check = {"adequate": True}
+    rows = [ClipRow("a", fit=fit, check=check)]
+    rows.append(ClipRow("b", fit=fit, check={"adequate": None}, remark="<why>", outside=("k1",)))
+    text = clips_section(rows)
+    assert "<b>none</b>" in text and '<b class="warn">no verdict</b>' in text
+    assert 'data-label="off">0.27 mm <span class="soft">0.051 % of the way<' in text
+    assert text.count("◆") == 1 and text.index("◆") > text.index(">a</th>")
+    assert text.count('class="value outside" data-label="k1"') == 1
+    assert '<td class="remark">&lt;why&gt;</td>' in text
+    assert "remark" not in clips_section(rows[:1]), "no column where there is nothing to say"
 
 
 def test_a_clip_that_failed_says_why():

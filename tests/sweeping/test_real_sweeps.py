@@ -119,7 +119,7 @@ def test_ray_equals_local_to_the_last_digit(cluster, tracks, tmp_path):
     cluster.wait_for_nodes()
     words = [str(tmp_path / "plan.yaml")]
     (tmp_path / "plan.yaml").write_text(
-        f"clips: ['{tracks}/*.csv']\nlist: [{{method: cnn}}, {{method: grad}}]"
+        f"clips: ['{tracks}/*.csv']\nlist: [{{method: cnn}}, {{method: grad}}, {{method: explain}}]"
     )
     where = {"local": ["--workers", "1"], "ray": ["--engine", "ray", "--address", cluster.address]}
     for name, more in where.items():
