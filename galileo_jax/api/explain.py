@@ -23,8 +23,8 @@ from galileo_jax.clip.track_file import is_track
 from galileo_jax.diagnosis.could_not_see import could_not_see
 from galileo_jax.diagnosis.restricted_fit import extended_fit
 from galileo_jax.diagnosis.stakes import VerdictStakes
-from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.measurement.track_cache import is_tracked
+from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.report.paragraph import paragraph
 from galileo_jax.results.command_line import command_line
 from galileo_jax.runtime import progress

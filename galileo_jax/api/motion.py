@@ -41,10 +41,10 @@ class Motion:
     objects: tuple[str, ...]
     times_s: Float[np.ndarray, " frame"]
     is_visible: Bool[np.ndarray, "object frame"]
-    measured_m: Float[np.ndarray, "object 2 frame"]
-    sd_m: Float[np.ndarray, "object 2 frame"]
-    predicted_m: Float[np.ndarray, "object 2 frame"]
-    residuals: Float[np.ndarray, "object 2 frame"]
+    measured_m: Float[np.ndarray, "object axis frame"]
+    sd_m: Float[np.ndarray, "object axis frame"]
+    predicted_m: Float[np.ndarray, "object axis frame"]
+    residuals: Float[np.ndarray, "object axis frame"]
     measured_px: Float[np.ndarray, "object frame 2"] | None
     predicted_px: Float[np.ndarray, "object frame 2"] | None
     turned_rad: Float[np.ndarray, "object frame"]

@@ -162,7 +162,9 @@ class Problem:
         along = basis.reshape(len(basis), -1) @ white.reshape(len(found), -1).T
         return along @ along.T
 
-    def predict(self, theta: Float[jax.Array, " parameter"]) -> Float[jax.Array, "object 2 frame"]:
+    def predict(
+        self, theta: Float[jax.Array, " parameter"]
+    ) -> Float[jax.Array, "object axis frame"]:
         """What the camera would see, in JAX: `[parameter]` to `[object, 2, frame]`, m."""
         position, velocity = in_jax(self.engine)(theta[None])
         frames = jnp.asarray(self.observation.times_s)
@@ -171,13 +173,13 @@ class Problem:
 
     def simulate(
         self, theta: Float[np.ndarray, " parameter"]
-    ) -> Float[np.ndarray, "object 2 frame"]:
+    ) -> Float[np.ndarray, "object axis frame"]:
         """What the camera would see: `[parameter]` to `[object, 2, frame]`, m."""
         return self.simulate_batch(theta[None])[0]
 
     def simulate_batch(
         self, theta: Float[np.ndarray, "batch parameter"]
-    ) -> Float[np.ndarray, "batch object 2 frame"]:
+    ) -> Float[np.ndarray, "batch object axis frame"]:
         """`simulate` of `[batch, parameter]`: `[batch, object, 2, frame]`."""
         check_cancelled()
         times = self.observation.times_s

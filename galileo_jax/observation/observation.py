@@ -93,10 +93,10 @@ class Observation:
 
     names: tuple[str, ...]
     times_s: Float[np.ndarray, " frame"]
-    position_m: Float[np.ndarray, "object 2 frame"]
+    position_m: Float[np.ndarray, "object axis frame"]
     covariance_m2: Float[np.ndarray, "object 2 2 frame"]
     mask: Bool[np.ndarray, "object frame"]
-    modes_m: Float[np.ndarray, "mode object 2 frame"] | None = None
+    modes_m: Float[np.ndarray, "mode object axis frame"] | None = None
     is_squared: bool = False
     num_errors: int = 0
     is_turning: bool = False
@@ -110,7 +110,7 @@ class Observation:
         return self.noise_known_to > 0
 
     @property
-    def across(self) -> Float[np.ndarray, "object 2 frame"]:
+    def across(self) -> Float[np.ndarray, "object axis frame"]:
         """Unit vectors along which nothing was measured; 0 where all axes were, or none."""
         found = np.zeros_like(self.position_m)
         covariance = np.where(self.mask[:, None, None], self.covariance_m2, 0.0)
@@ -195,6 +195,6 @@ class Observation:
         return found
 
     @property
-    def velocity_m_s(self) -> Float[np.ndarray, "object 2 frame-1"]:
+    def velocity_m_s(self) -> Float[np.ndarray, "object axis frame-1"]:
         """The velocity profile `[object, 2, frame - 1]`, m/s (Galileo's comparison space)."""
         return np.diff(self.position_m, axis=-1) / np.diff(self.times_s)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from galileo_jax.model.effects.effect import (
     Effect,
@@ -85,7 +85,7 @@ def dynamics(
     scene: Surroundings,
     theta: Mapping[str, Array],
     xp: Any,
-    acts: Array | None = None,
+    acts: Bool[Any, " effect"] | None = None,
 ) -> Dynamics:
     """Puts parameters (each `[...]`) and effects together.
 

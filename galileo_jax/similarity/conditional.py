@@ -20,10 +20,10 @@ from galileo_jax.similarity.gaussian_likelihood import Whitening
 
 
 def conditional_log_density(
-    difference_m: Float[np.ndarray, "draw object 2 frame"],
+    difference_m: Float[np.ndarray, "draw object axis frame"],
     noise_scale: Float[np.ndarray, " draw"],
     data: Whitening,
-) -> Float[np.ndarray, "draw object 2 frame"]:
+) -> Float[np.ndarray, "draw object axis frame"]:
     """Log p(y_i | y_-i) of every coordinate.
 
     Args:
@@ -52,7 +52,7 @@ def conditional_log_density(
 
 def noise_draws(
     rng: np.random.Generator, noise_scale: Float[np.ndarray, " draw"], data: Whitening
-) -> Float[np.ndarray, "draw object 2 frame"]:
+) -> Float[np.ndarray, "draw object axis frame"]:
     """Draws of the likelihood's noise, one for each of `noise_scale` `[draw]`.
 
     Returns:
@@ -67,7 +67,7 @@ def noise_draws(
     return np.einsum("oijt,dojt->doit", root, both)
 
 
-def noise_sd_m(data: Whitening) -> Float[np.ndarray, "object 2 frame"]:
+def noise_sd_m(data: Whitening) -> Float[np.ndarray, "object axis frame"]:
     """The noise's standard deviation at noise scale 1, `[object, 2, frame]`, m; 0 where masked."""
     root = _root(data)
     modes = np.einsum("oijt,mojt->moit", root, data.basis) * data.gain[:, None, None, None]

@@ -24,8 +24,8 @@ NoiseModel = Literal["camera", "bodies", "tracker"]
 FEW_VALUES = 400  # of so many a singular value decomposition takes a tenth of a second
 LARGE = 6e4  # of patterns: its square times 2e-16 is a millionth
 IDLE = 1e-3  # a gain that changes a residual by less than a millionth
-Places = Float[jax.Array, "object 2 frame"]
-Batch = Float[np.ndarray, "*batch object 2 frame"]
+Places = Float[jax.Array, "object axis frame"]
+Batch = Float[np.ndarray, "*batch object axis frame"]
 Values = Float[np.ndarray, "*batch value"]
 
 
@@ -43,9 +43,9 @@ class Whitening(NamedTuple):
       num_values: how many numbers were measured.
     """
 
-    observed_m: Float[np.ndarray, "object 2 frame"]
+    observed_m: Float[np.ndarray, "object axis frame"]
     inverse_root: Float[np.ndarray, "object 2 2 frame"]
-    basis: Float[np.ndarray, "mode object 2 frame"]
+    basis: Float[np.ndarray, "mode object axis frame"]
     gain: Float[np.ndarray, " mode"]
     num_values: np.float64
 

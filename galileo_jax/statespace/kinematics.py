@@ -57,7 +57,7 @@ class Kinematics:
     """
 
     times_s: Float[np.ndarray, " frame"]
-    tangent: Float[np.ndarray, "object 2 frame"]
+    tangent: Float[np.ndarray, "object axis frame"]
     speed_m_s: Float[np.ndarray, "object frame"]
     moves: Bool[np.ndarray, "object step"]
     normal_m_s2: Float[np.ndarray, "object frame"]

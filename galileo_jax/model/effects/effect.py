@@ -390,15 +390,15 @@ class Effect:
         return {}
 
     def time(
-        self, time_s: Float[AnyArray, " frame"], theta: Theta, scene: Surroundings
-    ) -> Float[AnyArray, " frame"]:
-        """Maps the clip's time to the time since the release, s: `[frame]` to `[frame]`."""
+        self, time_s: Float[AnyArray, "frame ..."], theta: Theta, scene: Surroundings
+    ) -> Float[AnyArray, "frame ..."]:
+        """Maps the clip's time to the time since the release, s, `[frame, ...]`."""
         return time_s
 
     def measure(
-        self, position_m: Float[AnyArray, "object 2 frame"], theta: Theta, scene: Surroundings
-    ) -> Float[AnyArray, "object 2 frame"]:
-        """Maps true centres to measured ones, `[object, 2, frame]`, m (scale, camera)."""
+        self, position_m: Float[AnyArray, "object axis frame"], theta: Theta, scene: Surroundings
+    ) -> Float[AnyArray, "object axis frame"]:
+        """Maps true centres to measured ones, `[object, axis, frame]`, m (scale, camera)."""
         return position_m
 
 
