@@ -1,0 +1,116 @@
+"""The page of what was found in films and tables that others made: its pictures and its rows."""
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from galileo_jax.report.style import matplotlib_style, object_colour, palette, save_svg
+
+BLOCK = re.compile(r"(?<=<!-- rows -->\n).*?(?=<!-- end -->)", re.DOTALL)
+MOST_DOTS, MOST_CORNERS = 36, 150
+SIZE_IN = (2.5, 1.65)
+NAMES = {"k1": "friction", "mass_ratio": "ratio of the masses", "gravity": "g",
+         "air_drag_per_mass": "drag/mass", "pixels_per_metre": "scale"}  # fmt: skip
+UNITS = {"m/s^2": "m/s²", "1": "", "px/m": "px/m"}
+VERDICTS = {"wrong": "**wrong**", "wrong, not trusted": "**wrong**, and says so",
+            "refused, rightly": "right: refused"}  # fmt: skip
+
+
+def motions(track: Path, until_s: float) -> list[dict[str, Any]]:
+    """What a picture draws of an exported track: each object along the axis it goes farthest."""
+    if not track.is_file():
+        return []
+    table = pd.read_csv(track)
+    table = table[table.time_s <= table.time_s.min() + until_s]
+    found = []
+    for (_, name), one in table.groupby(["clip", "object"], sort=False):
+        axes = [axis for axis in "xyz" if f"fitted_{axis}_m" in one]
+        axis = max(axes, key=lambda axis, one=one: np.ptp(one[f"{axis}_m"].dropna()))
+        seen = one.dropna(subset=[f"{axis}_m"])
+        dots, line = _thinned(seen, MOST_DOTS), _thinned(one, MOST_CORNERS)
+        found.append({
+            "object": name, "axis": axis,
+            "dots": [_digits(dots.time_s), _digits(dots[f"{axis}_m"])],
+            "line": [_digits(line.time_s), _digits(line[f"fitted_{axis}_m"])],
+        })  # fmt: skip
+    return found
+
+
+def write(docs: Path, cases: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]) -> None:
+    """The page's count and table between its marks, and a picture for each row with a fit."""
+    folder, page = docs / "images" / "gallery", docs / "explanation" / "gallery.md"
+    folder.mkdir(parents=True, exist_ok=True)
+    lines = [counted(rows), "", "| | What, and who made it | Right | Found | Verdict | CPU s |",
+             "|---|---|---|---|---|---|"]  # fmt: skip
+    for case, row in zip(cases, rows, strict=True):
+        name = Path(case["file"]).name.split(".")[0] + case.get("suffix", "")
+        if row["motions"]:
+            (folder / f"{name}.svg").write_text(drawn(name, row["motions"], case.get("unit", "m")))
+        picture = f"![{case['what']}](../images/gallery/{name}.svg)" if row["motions"] else ""
+        lines.append(
+            f"| {picture} | {row['what'].removeprefix('real: ')}. {case['by']} | {case['known']} | "
+            f"{found(case, row)} | {VERDICTS.get(row['judged'], row['judged'])} | "
+            f"{row['cpu_s']:.0f} |"
+        )
+    text = page.read_text(encoding="utf-8")
+    page.write_text(BLOCK.sub(lambda _: "\n".join(lines) + "\n", text), encoding="utf-8")
+
+
+def counted(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How many rows are right and wrong, in a sentence."""
+    counts = Counter(row["judged"].partition(",")[0] for row in rows)
+    unsaid = sum(row["judged"] == "wrong" for row in rows)
+    right = len(rows) - counts["wrong"]
+    return (
+        f"**{right} of {len(rows)} are right, {counts['wrong'] - unsaid} are wrong and the program "
+        f"says that its model does not describe them, {unsaid} are wrong without a word.**"
+    )
+
+
+def found(case: Mapping[str, Any], row: Mapping[str, Any]) -> str:
+    """What the program said of a row: values with 95 % intervals, or its sentence."""
+    values = [f"{NAMES.get(name, name)} {_shown(one)}" for name, one in row["values"].items()]
+    hits = [line for line in row["said"] if re.search(case.get("words", r"\A\b"), line)]
+    sentence = row["sentence"] or (hits[-1] if hits and not values else "")
+    plain = re.sub(r"^\w+: (\S+: )?", "", sentence) if not row["sentence"] else sentence
+    return "; ".join([*([f"“{plain}”"] if plain else []), *values]).replace("|", "/") or "–"
+
+
+def drawn(name: str, series: Sequence[Mapping[str, Any]], unit: str) -> str:
+    """The picture: measured places as dots, the fit as a line, against time."""
+    from matplotlib.figure import Figure
+
+    with matplotlib_style(name):
+        figure = Figure(figsize=SIZE_IN)
+        axes = figure.add_axes((0.17, 0.24, 0.8, 0.62))
+        for index, one in enumerate(series):
+            colour = palette()[object_colour(index)]
+            axes.plot(*one["line"], color=colour, linewidth=1.2, alpha=0.75)
+            axes.plot(*one["dots"], "o", color=colour, markersize=2.8, markeredgewidth=0)
+        names = dict.fromkeys(one["axis"] for one in series)
+        axes.set_title(f"{' and '.join(names)}, {unit}", fontsize=8, pad=3)
+        axes.set_xlabel("time, s", fontsize=8, labelpad=1)
+        axes.locator_params(nbins=4)
+        axes.tick_params(labelsize=8, length=2.5, pad=2)
+    return re.sub(r"(\.\d\d)\d+", r"\1", save_svg(figure, name))
+
+
+def _shown(value: Mapping[str, Any]) -> str:
+    unit = UNITS.get(value["unit"], value["unit"])
+    if not value["identified"]:
+        return "not determined"
+    return f"{value['mean']:.4g} [{value['q025']:.4g}, {value['q975']:.4g}] {unit}".rstrip()
+
+
+def _thinned(table: pd.DataFrame, most: int) -> pd.DataFrame:
+    """Every so many rows."""
+    return table.iloc[:: -(-len(table) // most) or 1]
+
+
+def _digits(values: pd.Series) -> list[float]:
+    return [float(f"{one:.4g}") for one in values]
