@@ -41,7 +41,9 @@ def motions(track: Path, until_s: float) -> list[dict[str, Any]]:
     return found
 
 
-def write(docs: Path, cases: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]) -> None:
+def write(
+    docs: Path, cases: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
+) -> None:
     """The page's count and table between its marks, and a picture for each row with a fit."""
     folder, page = docs / "images" / "gallery", docs / "explanation" / "gallery.md"
     folder.mkdir(parents=True, exist_ok=True)

@@ -52,7 +52,9 @@ def main(
     kept = Journal(journal)
     for case in cases if do != "table" else ():
         row = kept.row(name_of(case), lambda case=case: tried(folder, package, case))
-        print(f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}: {_found(row)}", flush=True)
+        print(
+            f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}: {_found(row)}", flush=True
+        )
     done = [kept.rows[name_of(case)] for case in cases if name_of(case) in kept.rows]
     if do == "table":
         print("\n".join(markdown(done)))
@@ -131,9 +133,7 @@ def markdown(rows: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _written(
-    folder: Path, place: Path, case: Mapping[str, Any]
-) -> tuple[Path, dict[str, Any]]:
+def _written(folder: Path, place: Path, case: Mapping[str, Any]) -> tuple[Path, dict[str, Any]]:
     """The clip's yaml in a copy of its folder, without what a case drops, with what it sets."""
     source = folder / case["file"]
     shutil.copytree(source.parent, place, ignore=lambda at, names: _folders(Path(at), names))
