@@ -1,4 +1,5 @@
-# make demo | test | test-all | test-plain-processor | test-cluster | lint | docs | setup | clean.
+# make demo | test | test-all | test-plain-processor | test-cluster | lint | docs | figures | setup |
+# clean.
 # Each does the set-up it needs, once.
 
 PYTHON ?= python3
@@ -6,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test test-all test-plain-processor test-cluster lint docs setup clean
+.PHONY: demo test test-all test-plain-processor test-cluster lint docs figures setup clean
 
 demo: $(READY)
 	$(BIN)/galileo simulate --seed 7 --out demo/clip.mp4
@@ -48,6 +49,10 @@ docs: $(READY)
 	@$(BIN)/pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	$(BIN)/mkdocs build --strict
 	@echo "docs: build/site/index.html"
+
+# What README, tutorial and gallery print and draw, made again; prints what differs.
+figures: $(READY)
+	$(BIN)/python -m tests.docs.figures build/figures
 
 setup: $(READY)
 

@@ -22,16 +22,15 @@ VERDICTS = {"wrong": "**wrong**", "wrong, not trusted": "**wrong**, and says so"
 
 
 def motions(track: Path, until_s: float) -> list[dict[str, Any]]:
-    """What a picture draws of an exported track: each object along the axis it goes farthest."""
+    """What a picture draws of an exported track: each object along the axis that bends most."""
     if not track.is_file():
         return []
     table = pd.read_csv(track)
     table = table[table.time_s <= table.time_s.min() + until_s]
     found = []
     for (_, name), one in table.groupby(["clip", "object"], sort=False):
-        axes = [axis for axis in "xyz" if f"fitted_{axis}_m" in one]
-        axis = max(axes, key=lambda axis, one=one: np.ptp(one[f"{axis}_m"].dropna()))
-        seen = one.dropna(subset=[f"{axis}_m"])
+        seen = one.dropna(subset=["x_m"])
+        axis = max((a for a in "xyz" if f"fitted_{a}_m" in one), key=lambda a, s=seen: _bend(s, a))
         dots, line = _thinned(seen, MOST_DOTS), _thinned(one, MOST_CORNERS)
         found.append({
             "object": name, "axis": axis,
@@ -80,7 +79,7 @@ def found(case: Mapping[str, Any], row: Mapping[str, Any]) -> str:
     hits = [line for line in row["said"] if re.search(case.get("words", r"\A\b"), line)]
     sentence = row["sentence"] or (hits[-1] if hits and not values else "")
     plain = re.sub(r"^\w+: (\S+: )?", "", sentence) if not row["sentence"] else sentence
-    return "; ".join([*([f"“{plain}”"] if plain else []), *values]).replace("|", "/") or "–"
+    return "; ".join([*([f"“{plain}”"] if plain else []), *values]).replace("|", "/") or "-"
 
 
 def drawn(name: str, series: Sequence[Mapping[str, Any]], unit: str) -> str:
@@ -107,6 +106,16 @@ def _shown(value: Mapping[str, Any]) -> str:
     if not value["identified"]:
         return "not determined"
     return f"{value['mean']:.4g} [{value['q025']:.4g}, {value['q975']:.4g}] {unit}".rstrip()
+
+
+def _bend(seen: pd.DataFrame, axis: str) -> float:
+    """How far the places along an axis are from a straight line against time, m."""
+    return float(
+        np.std(
+            seen[f"{axis}_m"]
+            - np.polyval(np.polyfit(seen.time_s, seen[f"{axis}_m"], 1), seen.time_s)
+        )
+    )
 
 
 def _thinned(table: pd.DataFrame, most: int) -> pd.DataFrame:

@@ -93,7 +93,8 @@ def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any
     row = {"file": case["file"], "what": case["what"], "code": code,
            "values": {name: values[name] for name in wanted if name in values},
            "right": _right(case), "wall_s": round(wall_s, 1), "cpu_s": round(cpu_s, 1),
-           "keys": _num_keys(declared), "sentence": document.get("sentence", ""), "motions": motions,
+           "keys": _num_keys(declared), "sentence": document.get("sentence", ""),
+           "motions": motions,
            "said": said.replace(scratch, "").strip().splitlines()[-25:]}  # fmt: skip
     return row | {"judged": judged(case, row, values, said)}
 

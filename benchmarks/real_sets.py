@@ -2,8 +2,8 @@
 
     python -m benchmarks real_sets FOLDER [--set NAME ...] [--first 0] [--flights 60] [--out OUT]
 
-FOLDER: spin_flights/, cube_tosses/. A set that is absent is skipped, and a line says so. What is made
-goes into OUT (default: thrown away). Single films and tables: `python -m benchmarks people`.
+FOLDER: spin_flights/, cube_tosses/. A set that is absent is skipped, and a line says so. What is
+made goes into OUT (default: thrown away). Single films and tables: `python -m benchmarks people`.
 """
 
 import csv

@@ -1,9 +1,9 @@
 """DIR/errors.npz of a run: what observation.csv cannot say of a track's errors.
 
 The csv has a covariance for each frame. Errors that many frames share (`Observation.modes_m`) and
-what is known of where the track is from stand beside it, and how far pucks were seen to turn, so that
-a comparison of a saved run has the likelihood of the fit. Where there is nothing to say there is no
-file.
+what is known of where the track is from stand beside it, and how far pucks were seen to turn, so
+that a comparison of a saved run has the likelihood of the fit. Where there is nothing to say there
+is no file.
 """
 
 from dataclasses import replace
