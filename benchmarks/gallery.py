@@ -11,12 +11,14 @@ import pandas as pd
 
 from galileo_jax.report.style import matplotlib_style, object_colour, palette, save_svg
 
+Row = Mapping[str, Any]  # of people.yaml, of the journal, or a part of one
 BLOCK = re.compile(r"(?<=<!-- rows -->\n).*?(?=<!-- end -->)", re.DOTALL)
 MOST_DOTS, MOST_CORNERS = 36, 150
 SIZE_IN = (2.5, 1.65)
+DISTRUST = "See where it fails"
 NAMES = {"k1": "friction", "mass_ratio": "ratio of the masses", "gravity": "g",
-         "air_drag_per_mass": "drag/mass", "pixels_per_metre": "scale"}  # fmt: skip
-UNITS = {"m/s^2": "m/s²", "1": "", "px/m": "px/m"}
+         "launch_speed": "launch speed", "pixels_per_metre": "scale",
+         "deceleration1": "deceleration 1", "deceleration2": "deceleration 2"}  # fmt: skip
 VERDICTS = {"wrong": "**wrong**", "wrong, not trusted": "**wrong**, and says so",
             "refused, rightly": "right: refused"}  # fmt: skip
 
@@ -31,7 +33,8 @@ def motions(track: Path, until_s: float) -> list[dict[str, Any]]:
     for (_, name), one in table.groupby(["clip", "object"], sort=False):
         seen = one.dropna(subset=["x_m"])
         axis = max((a for a in "xyz" if f"fitted_{a}_m" in one), key=lambda a, s=seen: _bend(s, a))
-        dots, line = _thinned(seen, MOST_DOTS), _thinned(one, MOST_CORNERS)
+        during = one[one.time_s.between(seen.time_s.min(), seen.time_s.max())]
+        dots, line = _thinned(seen, MOST_DOTS), _thinned(during, MOST_CORNERS)
         found.append({
             "object": name, "axis": axis,
             "dots": [_digits(dots.time_s), _digits(dots[f"{axis}_m"])],
@@ -40,9 +43,7 @@ def motions(track: Path, until_s: float) -> list[dict[str, Any]]:
     return found
 
 
-def write(
-    docs: Path, cases: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]
-) -> None:
+def write(docs: Path, cases: Sequence[Row], rows: Sequence[Row]) -> None:
     """The page's count and table between its marks, and a picture for each row with a fit."""
     folder, page = docs / "images" / "gallery", docs / "explanation" / "gallery.md"
     folder.mkdir(parents=True, exist_ok=True)
@@ -50,19 +51,17 @@ def write(
              "|---|---|---|---|---|---|"]  # fmt: skip
     for case, row in zip(cases, rows, strict=True):
         name = Path(case["file"]).name.split(".")[0] + case.get("suffix", "")
-        if row["motions"]:
+        picture = f"![{case['tells']}](../images/gallery/{name}.svg)" if row["motions"] else ""
+        if picture:
             (folder / f"{name}.svg").write_text(drawn(name, row["motions"], case.get("unit", "m")))
-        picture = f"![{case['what']}](../images/gallery/{name}.svg)" if row["motions"] else ""
-        lines.append(
-            f"| {picture} | {row['what'].removeprefix('real: ')}. {case['by']} | {case['known']} | "
-            f"{found(case, row)} | {VERDICTS.get(row['judged'], row['judged'])} | "
-            f"{row['cpu_s']:.0f} |"
-        )
+        verdict, seconds = VERDICTS.get(row["judged"], row["judged"]), f"{row['cpu_s']:.0f}"
+        cells = [f"{case['tells']}. {case['by']}", case["known"], found(case, row), verdict]
+        lines.append(" | ".join([f"| {picture}", *cells, f"{seconds} |"]))
     text = page.read_text(encoding="utf-8")
     page.write_text(BLOCK.sub(lambda _: "\n".join(lines) + "\n", text), encoding="utf-8")
 
 
-def counted(rows: Sequence[Mapping[str, Any]]) -> str:
+def counted(rows: Sequence[Row]) -> str:
     """How many rows are right and wrong, in a sentence."""
     counts = Counter(row["judged"].partition(",")[0] for row in rows)
     unsaid = sum(row["judged"] == "wrong" for row in rows)
@@ -73,16 +72,16 @@ def counted(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def found(case: Mapping[str, Any], row: Mapping[str, Any]) -> str:
+def found(case: Row, row: Row) -> str:
     """What the program said of a row: values with 95 % intervals, or its sentence."""
     values = [f"{NAMES.get(name, name)} {_shown(one)}" for name, one in row["values"].items()]
-    hits = [line for line in row["said"] if re.search(case.get("words", r"\A\b"), line)]
-    sentence = row["sentence"] or (hits[-1] if hits and not values else "")
-    plain = re.sub(r"^\w+: (\S+: )?", "", sentence) if not row["sentence"] else sentence
-    return "; ".join([*([f"“{plain}”"] if plain else []), *values]).replace("|", "/") or "-"
+    hits = [line for line in row["said"] if re.search(case.get("words", DISTRUST), line)]
+    said = row["sentence"] or (re.sub(r"^warning: (\S+: )?", "", hits[-1]) if hits else "")
+    said = said.partition(": galileo")[0].replace("|", "/")
+    return "; ".join([*values, *([f"“{said}”"] if said and not values else [])])
 
 
-def drawn(name: str, series: Sequence[Mapping[str, Any]], unit: str) -> str:
+def drawn(name: str, series: Sequence[Row], unit: str) -> str:
     """The picture: measured places as dots, the fit as a line, against time."""
     from matplotlib.figure import Figure
 
@@ -101,8 +100,8 @@ def drawn(name: str, series: Sequence[Mapping[str, Any]], unit: str) -> str:
     return re.sub(r"(\.\d\d)\d+", r"\1", save_svg(figure, name))
 
 
-def _shown(value: Mapping[str, Any]) -> str:
-    unit = UNITS.get(value["unit"], value["unit"])
+def _shown(value: Row) -> str:
+    unit = {"m/s^2": "m/s²", "1": ""}.get(value["unit"], value["unit"])
     if not value["identified"]:
         return "not determined"
     return f"{value['mean']:.4g} [{value['q025']:.4g}, {value['q975']:.4g}] {unit}".rstrip()
@@ -110,12 +109,8 @@ def _shown(value: Mapping[str, Any]) -> str:
 
 def _bend(seen: pd.DataFrame, axis: str) -> float:
     """How far the places along an axis are from a straight line against time, m."""
-    return float(
-        np.std(
-            seen[f"{axis}_m"]
-            - np.polyval(np.polyfit(seen.time_s, seen[f"{axis}_m"], 1), seen.time_s)
-        )
-    )
+    time_s, place_m = seen.time_s, seen[f"{axis}_m"]
+    return float(np.std(place_m - np.polyval(np.polyfit(time_s, place_m, 1), time_s)))
 
 
 def _thinned(table: pd.DataFrame, most: int) -> pd.DataFrame:

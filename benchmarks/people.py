@@ -137,7 +137,9 @@ def markdown(rows: list[dict[str, Any]]) -> list[str]:
 def _written(folder: Path, place: Path, case: Mapping[str, Any]) -> tuple[Path, dict[str, Any]]:
     """The clip's yaml in a copy of its folder, without what a case drops, with what it sets."""
     source = folder / case["file"]
-    shutil.copytree(source.parent, place, ignore=lambda at, names: _folders(Path(at), names))
+    place.mkdir()
+    for file in (one for one in source.parent.iterdir() if one.is_file()):
+        shutil.copy(file, place)
     path = (place / source.name).with_suffix(".yaml")
     declared = case.get("clip") or yaml.safe_load(path.read_text())
     for key in case.get("drop", ()):
@@ -150,10 +152,6 @@ def _written(folder: Path, place: Path, case: Mapping[str, Any]) -> tuple[Path, 
         (place / declared["track"]).write_text("\n".join(lines))
     path.write_text(yaml.safe_dump(declared | case.get("set", {})))
     return path, declared | case.get("set", {})
-
-
-def _folders(place: Path, names: list[str]) -> list[str]:
-    return [one for one in names if (place / one).is_dir()]
 
 
 def _read(path: Path) -> dict[str, Any]:
