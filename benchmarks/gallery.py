@@ -27,7 +27,7 @@ def motions(track: Path, until_s: float) -> list[dict[str, Any]]:
     """What a picture draws of an exported track: each object along the axis that bends most."""
     if not track.is_file():
         return []
-    table = pd.read_csv(track)
+    table: Any = pd.read_csv(track)
     table = table[table.time_s <= table.time_s.min() + until_s]
     found = []
     for (_, name), one in table.groupby(["clip", "object"], sort=False):
@@ -107,16 +107,16 @@ def _shown(value: Row) -> str:
     return f"{value['mean']:.4g} [{value['q025']:.4g}, {value['q975']:.4g}] {unit}".rstrip()
 
 
-def _bend(seen: pd.DataFrame, axis: str) -> float:
+def _bend(seen: Any, axis: str) -> float:
     """How far the places along an axis are from a straight line against time, m."""
     time_s, place_m = seen.time_s, seen[f"{axis}_m"]
     return float(np.std(place_m - np.polyval(np.polyfit(time_s, place_m, 1), time_s)))
 
 
-def _thinned(table: pd.DataFrame, most: int) -> pd.DataFrame:
+def _thinned(table: Any, most: int) -> Any:
     """Every so many rows."""
     return table.iloc[:: -(-len(table) // most) or 1]
 
 
-def _digits(values: pd.Series) -> list[float]:
+def _digits(values: Any) -> list[float]:
     return [float(f"{one:.4g}") for one in values]

@@ -24,8 +24,8 @@ def save_shared_errors(folder: Path, observation: Observation) -> None:
     """Writes them, or removes those of an older run."""
     is_plain = not any(getattr(observation, name) for name in (*FLAGS, KNOWN_TO))
     modes = NOTHING if observation.modes_m is None else observation.modes_m
-    turned = {} if observation.turned_rad is None else {TURNED: observation.turned_rad}
-    if is_plain and not modes.size and not turned:
+    turned = NOTHING if observation.turned_rad is None else observation.turned_rad
+    if is_plain and not modes.size and not turned.size:
         (folder / ERRORS).unlink(missing_ok=True)
         return
     with replacing(folder / ERRORS) as path:
@@ -35,7 +35,7 @@ def save_shared_errors(folder: Path, observation: Observation) -> None:
             is_squared=observation.is_squared,
             num_errors=observation.num_errors,
             noise_known_to=observation.noise_known_to,
-            **turned,
+            turned_rad=turned,
         )
 
 
@@ -47,12 +47,12 @@ def with_shared_errors(folder: Path, observation: Observation) -> Observation:
         modes = file["modes_m"]
         squared, num_errors = (int(file[name]) for name in FLAGS)
         known_to = float(file.get(KNOWN_TO, 0.0))  # runs of earlier versions have none
-        turned = file.get(TURNED)
+        turned = file.get(TURNED, NOTHING)
     return replace(
         observation,
         modes_m=modes if modes.size else None,
         is_squared=bool(squared),
         num_errors=num_errors,
         noise_known_to=known_to,
-        turned_rad=turned,
+        turned_rad=turned if turned.size else None,
     )
