@@ -1,5 +1,6 @@
 """The page of what was found in films and tables that others made: its pictures and its rows."""
 
+import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -91,7 +92,8 @@ def drawn(name: str, series: Sequence[Row], unit: str) -> str:
         for index, one in enumerate(series):
             colour = palette()[object_colour(index)]
             axes.plot(*one["line"], color=colour, linewidth=1.2, alpha=0.75)
-            axes.plot(*one["dots"], "o", color=colour, markersize=2.8, markeredgewidth=0)
+            dots = [values[:: len(series)] for values in one["dots"]]
+            axes.plot(*dots, "o", color=colour, markersize=2.8, markeredgewidth=0)
         names = dict.fromkeys(one["axis"] for one in series)
         axes.set_title(f"{' and '.join(names)}, {unit}", fontsize=8, pad=3)
         axes.set_xlabel("time, s", fontsize=8, labelpad=1)
@@ -101,10 +103,12 @@ def drawn(name: str, series: Sequence[Row], unit: str) -> str:
 
 
 def _shown(value: Row) -> str:
-    unit = {"m/s^2": "m/s²", "1": ""}.get(value["unit"], value["unit"])
+    unit = {"m/s^2": "m/s²", "radii/s^2": "radii/s²", "1": ""}.get(value["unit"], value["unit"])
     if not value["identified"]:
         return "not determined"
-    return f"{value['mean']:.4g} [{value['q025']:.4g}, {value['q975']:.4g}] {unit}".rstrip()
+    digits = max(0, math.ceil(-math.log10(value["sd"] / 3)))
+    mean, low, high = (f"{value[name]:.{digits}f}" for name in ("mean", "q025", "q975"))
+    return f"{mean} [{low}, {high}] {unit}".rstrip()
 
 
 def _bend(seen: Any, axis: str) -> float:
