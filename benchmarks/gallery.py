@@ -2,7 +2,6 @@
 
 import math
 import re
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -64,12 +63,11 @@ def write(docs: Path, cases: Sequence[Row], rows: Sequence[Row]) -> None:
 
 def counted(rows: Sequence[Row]) -> str:
     """How many rows are right and wrong, in a sentence."""
-    counts = Counter(row["judged"].partition(",")[0] for row in rows)
-    unsaid = sum(row["judged"] == "wrong" for row in rows)
-    right = len(rows) - counts["wrong"]
+    right = sum(row["judged"] in ("right", "refused, rightly") for row in rows)
+    said = sum(row["judged"].endswith("not trusted") for row in rows)
     return (
-        f"**{right} of {len(rows)} are right, {counts['wrong'] - unsaid} are wrong and the program "
-        f"says that its model does not describe them, {unsaid} are wrong without a word.**"
+        f"**{right} of {len(rows)} are right, {said} are wrong and the program says that its model "
+        f"does not describe them, {len(rows) - right - said} are wrong without a word.**"
     )
 
 

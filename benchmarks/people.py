@@ -33,7 +33,7 @@ FOLDER = Path(__file__).parents[1] / ".." / "shared" / "data" / "people"
 PACKAGE = Path(__file__).parents[1]
 JOURNAL = PACKAGE / "build" / "people.jsonl"
 CASES = Path(__file__).with_suffix(".yaml")
-TOO_LONG_S = 300.0
+TOO_LONG_S = 300.0  # of a processor
 DISTRUST = "See where it fails|No known effect explains the data"
 IMPLIED = ("track", "video", "objects")  # keys that say nothing but which file
 
@@ -103,7 +103,7 @@ def judged(
     case: Mapping[str, Any], row: Mapping[str, Any], values: Mapping[str, Any], said: str
 ) -> str:
     """In a word or two, how a case went."""
-    if row["wall_s"] > TOO_LONG_S:
+    if row["cpu_s"] > TOO_LONG_S:
         return "too long"
     if row["code"] == 2 and "refused" in case and re.search(case["refused"], said):
         return "refused, rightly"
