@@ -1,4 +1,5 @@
-# make demo | test | test-all | test-plain-processor | test-cluster | lint | docs | setup | clean.
+# make demo | test | test-all | test-plain-processor | test-cluster | lint | docs | figures | setup |
+# clean.
 # Each does the set-up it needs, once.
 
 PYTHON ?= python3
@@ -17,7 +18,7 @@ HAS_UV := $(and $(UV),$(shell $(UV) --version 2>/dev/null))
 INSTALL := $(if $(HAS_UV),$(UV_INSTALL),$(PIP_INSTALL)) --quiet -c constraints.txt
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test test-all test-plain-processor test-cluster lint docs setup clean
+.PHONY: demo test test-all test-plain-processor test-cluster lint docs figures setup clean
 
 demo: $(CORE)
 	$(BIN)/galileo simulate --seed 7 --out demo/clip.mp4
@@ -59,6 +60,10 @@ docs: $(READY)
 	@$(INSTALL) -e '.[docs]'
 	$(BIN)/mkdocs build --strict
 	@echo "docs: build/site/index.html"
+
+# What README, tutorial and gallery print and draw, made again; prints what differs.
+figures: $(READY)
+	$(BIN)/python -m tests.docs.figures build/figures
 
 setup: $(READY)
 

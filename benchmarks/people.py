@@ -2,15 +2,18 @@
 
     python -m benchmarks people run [--only WORD] [--journal FILE]    # goes on where it was
     python -m benchmarks people table [--journal FILE]                # the markdown of the docs
+    python -m benchmarks people gallery [--journal FILE] [--docs DIR] # docs/explanation/gallery.md
 
 What is right for each file stands in people.yaml. Every case is a command of its own, as a user
 would type it; `--package` is the checkout that is tried. The journal is of one version: delete it
-to measure another.
+to measure another. `gallery` runs what its page shows and the journal lacks.
 """
 
 import json
+import math
 import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -23,33 +26,40 @@ from typing import Any, Literal
 
 import yaml
 
+from benchmarks import gallery
 from benchmarks.journal import Journal
 
 FOLDER = Path(__file__).parents[1] / ".." / "shared" / "data" / "people"
-JOURNAL = Path("/tmp/people.jsonl")
 PACKAGE = Path(__file__).parents[1]
+JOURNAL = PACKAGE / "build" / "people.jsonl"
 CASES = Path(__file__).with_suffix(".yaml")
-TOO_LONG_S = 300.0
-DISTRUST = "See where it fails"
+TOO_LONG_S = 300.0  # of a processor
+DISTRUST = "See where it fails|No known effect explains the data"
 IMPLIED = ("track", "video", "objects")  # keys that say nothing but which file
 
 
 def main(
-    do: Literal["run", "table"],
+    do: Literal["run", "table", "gallery"],
     *,
     folder: Path = FOLDER,
     journal: Path = JOURNAL,
     only: str = "",
     package: Path = PACKAGE,
+    docs: Path = PACKAGE / "docs",
 ) -> dict[str, int]:
     cases = [one for one in yaml.safe_load(CASES.read_text()) if only in one["file"]]
+    cases = [one for one in cases if do != "gallery" or "by" in one]
     kept = Journal(journal)
-    for case in cases if do == "run" else ():
+    for case in cases if do != "table" else ():
         row = kept.row(name_of(case), lambda case=case: tried(folder, package, case))
-        print(f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}", flush=True)
+        print(
+            f"{row['judged']:<24} {row['wall_s']:5.0f} s  {row['case']}: {_found(row)}", flush=True
+        )
     done = [kept.rows[name_of(case)] for case in cases if name_of(case) in kept.rows]
     if do == "table":
         print("\n".join(markdown(done)))
+    if do == "gallery":
+        gallery.write(docs, cases, done)
     return dict(Counter(row["judged"] for row in done))
 
 
@@ -60,27 +70,32 @@ def name_of(case: Mapping[str, Any]) -> str:
 
 def tried(folder: Path, package: Path, case: Mapping[str, Any]) -> dict[str, Any]:
     """A row: what the command said of a case, in how long, and how that is judged."""
+    ask = case.get("ask", "fit")
     with tempfile.TemporaryDirectory() as scratch:
-        place = Path(scratch) / "in"
-        shutil.copytree((folder / case["file"]).parent, place)
-        path = place / Path(case["file"]).name
-        declared = _declared(path, case)
-        path.write_text(yaml.safe_dump(declared))
-        ask = case.get("ask", "fit")
-        call = [sys.executable, "-m", f"galileo_jax.{ask}", str(path), "--out", f"{scratch}/out"]
+        path, declared = _written(folder, Path(scratch) / "in", case)
+        out = Path(scratch) / "out"
+        files = [str(path), *(str(path.parent / one) for one in case.get("and", ()))]
+        call = [sys.executable, "-m", f"galileo_jax.{ask}", *files, "--out", str(out)]
         call += ["--free", case["free"]] if "free" in case else []
-        began = time.monotonic()
+        began, cpu_began = time.monotonic(), _cpu_s()
         code, said = _run(call, package)
-        wall_s = time.monotonic() - began
-        result = Path(scratch) / "out" / "result.json"
-        document = json.loads(result.read_text()) if result.is_file() else {}
+        wall_s, cpu_s = time.monotonic() - began, _cpu_s() - cpu_began
+        model = out / "model" if ask == "diagnose" else out
+        document = _read(model / "result.json") | _read(out / "diagnosis.json")
+        export = [sys.executable, "-m", "galileo_jax.export", str(model), "--to", "csv"]
+        if "by" in case and not code:
+            _run([*export, "--fitted", "--out", scratch], package)
+        motions = gallery.motions(Path(scratch) / "track.csv", case.get("until_s", math.inf))
     values: dict[str, Any] = {}
     for part in ("nuisances", "derived", "parameters"):
         values |= document.get(part, {})
+    wanted = [*case.get("right", {}), *case.get("shown", ())]
     row = {"file": case["file"], "what": case["what"], "code": code,
-           "values": {name: values[name] for name in case.get("right", {}) if name in values},
-           "right": _right(case), "wall_s": round(wall_s, 1),
-           "keys": _num_keys(declared), "said": said.strip().splitlines()[-25:]}  # fmt: skip
+           "values": {name: values[name] for name in wanted if name in values},
+           "right": _right(case), "wall_s": round(wall_s, 1), "cpu_s": round(cpu_s, 1),
+           "keys": _num_keys(declared), "sentence": document.get("sentence", ""),
+           "motions": motions,
+           "said": said.replace(scratch, "").strip().splitlines()[-25:]}  # fmt: skip
     return row | {"judged": judged(case, row, values, said)}
 
 
@@ -88,7 +103,7 @@ def judged(
     case: Mapping[str, Any], row: Mapping[str, Any], values: Mapping[str, Any], said: str
 ) -> str:
     """In a word or two, how a case went."""
-    if row["wall_s"] > TOO_LONG_S:
+    if row["cpu_s"] > TOO_LONG_S:
         return "too long"
     if row["code"] == 2 and "refused" in case and re.search(case["refused"], said):
         return "refused, rightly"
@@ -100,7 +115,7 @@ def judged(
     is_said = re.search(case.get("words", ""), said) is not None
     is_quiet = "never" not in case or re.search(case["never"], said) is None
     is_only_refusal = not {"right", "words", "never"} & set(case)
-    is_trusted = DISTRUST not in said
+    is_trusted = re.search(DISTRUST, said) is None
     if is_right and is_said and is_quiet and not is_only_refusal:
         return "right" if is_trusted or not case.get("trusted") else "right, not trusted"
     return "wrong" if is_trusted else "wrong, not trusted"
@@ -111,23 +126,36 @@ def markdown(rows: list[dict[str, Any]]) -> list[str]:
     lines = ["| File | What it is | Right | Found, 95 % interval | Judged | s | Keys |",
              "|---|---|---|---|---|---|---|"]  # fmt: skip
     for row in rows:
-        found = "; ".join(f"{name} {_shown(value)}" for name, value in row["values"].items())
         name = row["file"].removesuffix(".yaml").removesuffix(".wanted")
         lines.append(
             f"| `{name}` | {row['what'].removeprefix('real: ')} | {row['right']} | "
-            f"{found or _line(row)} | {row['judged']} | {row['wall_s']:.0f} | {row['keys']} |"
+            f"{_found(row)} | {row['judged']} | {row['wall_s']:.0f} | {row['keys']} |"
         )
     return lines
 
 
-def _declared(path: Path, case: Mapping[str, Any]) -> dict[str, Any]:
-    """The clip's yaml without what a case drops, and with what it sets."""
-    declared = yaml.safe_load(path.read_text())
+def _written(folder: Path, place: Path, case: Mapping[str, Any]) -> tuple[Path, dict[str, Any]]:
+    """The clip's yaml in a copy of its folder, without what a case drops, with what it sets."""
+    source = folder / case["file"]
+    place.mkdir()
+    for file in (one for one in source.parent.iterdir() if one.is_file()):
+        shutil.copy(file, place)
+    path = (place / source.name).with_suffix(".yaml")
+    declared = case.get("clip") or yaml.safe_load(path.read_text())
     for key in case.get("drop", ()):
         declared.pop(key, None)
         for item in declared["objects"]:
             item.pop(key, None)
-    return declared | case.get("set", {})
+    if "rows" in case:
+        kept = [one for one in source.read_text().splitlines() if one.startswith(case["rows"])]
+        lines = [case["titles"], *(one.partition(",")[2] for one in kept)]
+        (place / declared["track"]).write_text("\n".join(lines))
+    path.write_text(yaml.safe_dump(declared | case.get("set", {})))
+    return path, declared | case.get("set", {})
+
+
+def _read(path: Path) -> dict[str, Any]:
+    return json.loads(path.read_text()) if path.is_file() else {}
 
 
 def _run(call: list[str], package: Path) -> tuple[int, str]:
@@ -140,6 +168,12 @@ def _run(call: list[str], package: Path) -> tuple[int, str]:
     except subprocess.TimeoutExpired:
         return 124, "stopped by the benchmark"
     return done.returncode, f"{done.stdout}\n{done.stderr}"
+
+
+def _cpu_s() -> float:
+    """The processor time of all commands that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def _is_near(found: Mapping[str, Any] | None, goal: Any) -> bool:
@@ -166,6 +200,11 @@ def _right(case: Mapping[str, Any]) -> str:
 def _num_keys(declared: Mapping[str, Any]) -> int:
     items = sum(len(set(item) - {"name", "shape"}) for item in declared["objects"])
     return len(set(declared) - set(IMPLIED)) + items
+
+
+def _found(row: Mapping[str, Any]) -> str:
+    """The values with their intervals; where none was asked for, what was said."""
+    return "; ".join(f"{name} {_shown(one)}" for name, one in row["values"].items()) or _line(row)
 
 
 def _shown(value: Mapping[str, Any]) -> str:

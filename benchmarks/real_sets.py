@@ -1,10 +1,9 @@
-"""What is found in each set of real measurements: the rows of docs/explanation/real_data.md.
+"""What is found in sets of many real measurements: rows of docs/explanation/real_data.md.
 
     python -m benchmarks real_sets FOLDER [--set NAME ...] [--first 0] [--flights 60] [--out OUT]
 
-FOLDER: ball_toss.yaml, slide_r1.yaml, slide_r2.yaml, projectile_45.mp4,
-spin_flights/, puck_head_on.mp4, cube_tosses/. A set that is absent is skipped, and a line says so.
-What is made goes into OUT (default: thrown away).
+FOLDER: spin_flights/, cube_tosses/. A set that is absent is skipped, and a line says so. What is
+made goes into OUT (default: thrown away). Single films and tables: `python -m benchmarks people`.
 """
 
 import csv
@@ -24,27 +23,11 @@ FAST_RAD_S = 100.0  # spins that bend a flight
 MOST_RAD_S = 1000.0  # spins above were hardly measured: such flights do not curve
 POOR_CHI2 = 3.0  # per degree of freedom
 MOST_AMONG = 3  # effects that explain a flight equally well
-PROJECTILE = """video: {file}
-scenario: flight
-fps: 240.0
-pixels_per_metre: null
-launch_angle_deg: 45.0
-objects:
-  - {{name: object1, shape: sphere, size_m: null, point_px: [48.5, 67.5], first_frame: 180}}
-"""
 FLIGHT = """track: {file}
 track_up: z
 scenario: flight
 objects:
   - {{name: object1, shape: sphere, size_m: [0.02], mass_kg: 0.0027}}
-"""
-PUCKS = """video: {file}
-scenario: from_above
-fps: 240.0
-pixels_per_metre: null
-objects:
-  - {{name: object1, shape: cylinder, size_m: null, point_px: [79.8, 72.0], first_frame: 168}}
-  - {{name: object2, shape: cylinder, size_m: null, point_px: [150.3, 86.1], first_frame: 168}}
 """
 CUBE = """track: {file}
 track_up: z
@@ -81,31 +64,6 @@ def main(
                     found[name] = f"refused; {error}"
             print(f"{name}: {found[name]}", flush=True)
     return found
-
-
-def ball_toss(folder: Path, out: Path, _: slice) -> str:
-    """What is wrong with the scale of the tossed ball?"""
-    document = gx.diagnose(folder / "ball_toss.yaml").document
-    verdict, chi2 = document["verdict"], [one["chi2_per_dof"] for one in document["history"]]
-    return (
-        f"{verdict['status']} {', '.join(verdict['effects'])}; chi2 per degree of freedom "
-        f"{chi2[0]:.2f} -> {chi2[-1]:.2f}"
-    )
-
-
-def slides(folder: Path, out: Path, _: slice) -> str:
-    """Friction and scale of the board, from both runs."""
-    found = gx.fit([folder / "slide_r1.yaml", folder / "slide_r2.yaml"])
-    told = [_estimate(found, name) for name in ("k1", "pixels_per_metre")]
-    cuts = [str(cut) for one in found.measurements for cut in one.cuts]
-    return "; ".join([*told, _error(found), *cuts])
-
-
-def projectile(folder: Path, out: Path, _: slice) -> str:
-    """The launch speed, from the clip alone."""
-    found = gx.fit(_declared(folder / "projectile_45.mp4", out, PROJECTILE))
-    told = [_estimate(found, name) for name in ("launch_speed", "pixels_per_metre")]
-    return f"{'; '.join(told)}; {_error(found)}"
 
 
 def spin_flights(folder: Path, out: Path, flights: slice) -> str:
@@ -198,21 +156,10 @@ def cube_falls(folder: Path, out: Path, _: slice) -> str:
     )
 
 
-def puck_head_on(folder: Path, out: Path, _: slice) -> str:
-    """Restitution, friction in radii and mass ratio."""
-    found = gx.fit(_declared(folder / "puck_head_on.mp4", out, PUCKS))
-    names = ("restitution", "mass_ratio", "deceleration1", "deceleration2")
-    return f"{'; '.join(_estimate(found, name) for name in names)}; {_error(found)}"
-
-
 Row = Callable[[Path, Path, slice], str]
 SETS: dict[str, tuple[tuple[str, ...], Row]] = {
-    "ball_toss": (("ball_toss.yaml", "ball_toss.mp4"), ball_toss),
-    "slides": (("slide_r1.yaml", "slide_r2.yaml"), slides),
-    "projectile": (("projectile_45.mp4",), projectile),
     "spin_flights": (("spin_flights/index.csv",), spin_flights),
     "spin_named": (("spin_flights/index.csv",), spin_named),
-    "puck_head_on": (("puck_head_on.mp4",), puck_head_on),
     "cube_falls": (("cube_tosses",), cube_falls),
     "cube_tosses": (("cube_tosses",), cube_tosses),
 }
@@ -249,16 +196,6 @@ def _rms_mm(found: gx.Fit) -> float:
     left = left[:, problem.observation.mask[0]]
     left = left - left.mean(axis=1, keepdims=True)
     return 1e3 * float(np.sqrt(np.mean(np.sum(left**2, axis=0))))
-
-
-def _estimate(found: gx.Fit, name: str) -> str:
-    told = {**found.result["parameters"], **found.result["derived"]}[name]
-    return f"{name} {told['mean']:.4g} [{told['q025']:.4g}, {told['q975']:.4g}] {told['unit']}"
-
-
-def _error(found: gx.Fit) -> str:
-    error: dict[str, Any] = found.result["error"]
-    return f"chi2 per degree of freedom {error['chi2_per_dof']:.2f}"
 
 
 def _with_p(candidate: dict[str, Any]) -> str:

@@ -1,8 +1,9 @@
 """What the csv of a track cannot say of its errors: DIR/errors.npz of a run, NAME.errors.npz.
 
 The csv has a covariance for each frame. Errors that many frames share (`Observation.modes_m`) and
-what is known of where the track is from stand beside it, so that a comparison of a saved run has
-the likelihood of the fit. Where there is nothing to say there is no file. A bundle has the file
+what is known of where the track is from stand beside it, and how far pucks were seen to turn, so
+that a comparison of a saved run has the likelihood of the fit. Where there is nothing to say there
+is no file. A bundle has the file
 beside its track, by the track's name, so that the track of a film is fitted again as the film was.
 """
 
@@ -17,7 +18,7 @@ from galileo_jax.runtime.errors import InputError
 
 ERRORS = "errors.npz"
 FLAGS = ("is_squared", "num_errors")
-KNOWN_TO = "noise_known_to"
+KNOWN_TO, TURNED = "noise_known_to", "turned_rad"
 NOTHING = np.zeros((0, 0, 0, 0))
 
 
@@ -40,7 +41,8 @@ def write_errors(path: Path, observation: Observation) -> None:
     """Writes them into a file, or removes it where there is nothing to say."""
     is_plain = not any(getattr(observation, name) for name in (*FLAGS, KNOWN_TO))
     modes = NOTHING if observation.modes_m is None else observation.modes_m
-    if is_plain and not modes.size:
+    turned = NOTHING if observation.turned_rad is None else observation.turned_rad
+    if is_plain and not modes.size and not turned.size:
         path.unlink(missing_ok=True)
         return
     with replacing(path) as temporary:
@@ -50,6 +52,7 @@ def write_errors(path: Path, observation: Observation) -> None:
             is_squared=observation.is_squared,
             num_errors=observation.num_errors,
             noise_known_to=observation.noise_known_to,
+            turned_rad=turned,
         )
 
 
@@ -66,6 +69,7 @@ def with_errors(path: Path, observation: Observation) -> Observation:
             modes = file["modes_m"]
             squared, num_errors = (int(file[name]) for name in FLAGS)
             known_to = float(file.get(KNOWN_TO, 0.0))  # runs of earlier versions have none
+            turned = file.get(TURNED, NOTHING)
     except Exception as error:  # a damaged archive raises anything
         raise InputError(f"{path}: damaged, or not the errors of a track") from error
     if modes.size and modes.shape[1:] != observation.position_m.shape:
@@ -76,4 +80,5 @@ def with_errors(path: Path, observation: Observation) -> Observation:
         is_squared=bool(squared),
         num_errors=num_errors,
         noise_known_to=known_to,
+        turned_rad=turned if turned.size else None,
     )

@@ -72,15 +72,15 @@ def differences(expected: str, printed: str) -> list[str]:
 
 
 def _is_alike(one: str, other: str) -> bool:
-    words, numbers = _taken_apart(one)
-    other_words, other_numbers = _taken_apart(other)
+    words, numbers = taken_apart(one)
+    other_words, other_numbers = taken_apart(other)
     return words == other_words and all(
         abs(float(a) - float(b)) <= 1.001 * _tolerance(a)  # decimals are not exact
         for a, b in zip(numbers, other_numbers, strict=True)
     )
 
 
-def _taken_apart(line: str) -> tuple[list[str], list[str]]:
+def taken_apart(line: str) -> tuple[list[str], list[str]]:
     """Words, with a mark where a number is, and the numbers."""
     return NUMBER.sub("#", line).split(), NUMBER.findall(line)
 

@@ -5,12 +5,11 @@ import re
 import pytest
 
 from tests.docs.console import differences, run
+from tests.docs.figures import DEMO, FIT, FITTED
 from tests.docs.pages import ROOT
 
 README = (ROOT / "README.md").read_text()
 MOST_LINES = 130
-DEMO = "galileo simulate --seed 7 --out demo/clip.mp4"
-FIT = "galileo fit demo/clip.mp4 --method grad --out demo/grad"
 
 
 def test_the_readme_fits_on_two_screens():
@@ -34,7 +33,7 @@ def test_the_demo_is_what_the_makefile_runs():
 @pytest.mark.video
 def test_the_demo_prints_what_the_readme_shows(tmp_path):
     run(DEMO, tmp_path)
-    shown = re.search(r"((?:    .*\n)+)\n`k1` and `k2` are", README)
+    shown = FITTED.search(README)
     assert shown
     lines = [line.removeprefix("    ") for line in shown[1].splitlines()]
     assert not differences("\n".join(lines), run(FIT, tmp_path))

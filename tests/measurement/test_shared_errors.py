@@ -19,6 +19,13 @@ def test_modes_and_where_the_track_is_from_come_back(tmp_path):
     assert (found.num_errors, found.is_squared, found.noise_known_to) == (2, True, 0.15)
 
 
+def test_how_far_pucks_turned_comes_back(tmp_path):
+    plain = observe(HIT, 0)
+    turned = np.where(plain.mask, 0.1, np.nan)
+    save_shared_errors(tmp_path, replace(plain, turned_rad=turned))
+    np.testing.assert_array_equal(with_shared_errors(tmp_path, plain).turned_rad, turned)
+
+
 def test_a_run_of_an_earlier_version_is_read(tmp_path):
     plain = observe(HIT, 0)
     save_shared_errors(tmp_path, replace(plain, is_squared=True))
