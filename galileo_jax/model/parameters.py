@@ -21,11 +21,14 @@ Role = Literal["main", "nuisance", "effect", "latent", "given"]
 STRETCHED_TO = 6.0  # z, by a long tail
 
 
+Numbers = jax.Array | np.ndarray | np.floating
+
+
 @runtime_checkable
 class Prior(Protocol):
     """A distribution of one number, as a map from the standard normal."""
 
-    def forward(self, z: jax.Array) -> jax.Array:
+    def forward(self, z: Numbers) -> Numbers:
         """Maps `z ~ N(0, 1)` to the parameter; monotonic and differentiable."""
         ...
 
@@ -45,7 +48,7 @@ class Normal:
     mean: float
     sd: float
 
-    def forward(self, z: jax.Array) -> jax.Array:
+    def forward(self, z: Numbers) -> Numbers:
         """`mean + sd z`."""
         return self.mean + self.sd * z
 
@@ -65,7 +68,7 @@ class LogNormal:
     median: float
     sd: float
 
-    def forward(self, z: jax.Array) -> jax.Array:
+    def forward(self, z: Numbers) -> Numbers:
         """`median exp(sd z)`."""
         return self.median * jnp.exp(self.sd * z)
 
@@ -92,7 +95,7 @@ class LongTailed:
     median: float
     sd: float
 
-    def forward(self, z: jax.Array) -> jax.Array:
+    def forward(self, z: Numbers) -> Numbers:
         """`median exp(sd sinh(z))`."""
         return self.median * jnp.exp(self.sd * _stretched(z))
 
@@ -116,7 +119,7 @@ class Uniform:
     low: float
     high: float
 
-    def forward(self, z: jax.Array) -> jax.Array:
+    def forward(self, z: Numbers) -> Numbers:
         """`low + (high - low) Phi(z)`."""
         return self.low + (self.high - self.low) * ndtr(z)
 
@@ -136,7 +139,7 @@ class HalfNormal:
 
     sd: float
 
-    def forward(self, z: jax.Array) -> jax.Array:
+    def forward(self, z: Numbers) -> Numbers:
         """`sd Phi^-1((1 + Phi(z)) / 2)`."""
         return self.sd * ndtri(0.5 + 0.5 * jnp.clip(ndtr(z), 0.0, 1 - 1e-12))
 
@@ -205,7 +208,7 @@ class PriorTable(NamedTuple):
         kind, a, b = zip(*(parameter.prior.encode() for parameter in parameters), strict=True)
         return cls(np.array(kind), np.array(a, float), np.array(b, float))
 
-    def forward(self, z: jax.Array) -> jax.Array:
+    def forward(self, z: Numbers) -> Numbers:
         """As the function `forward`: `z` `[..., parameter]` to the parameters' units."""
         share = ndtr(z)
         half = ndtri(0.5 + 0.5 * jnp.clip(share, 0.0, 1 - 1e-12))
@@ -261,7 +264,7 @@ def _stretched(z: Any) -> Any:
     return xp.sinh(near) + (z - near)
 
 
-def forward(parameters: Sequence[Parameter], z: jax.Array) -> jax.Array:
+def forward(parameters: Sequence[Parameter], z: jax.Array | np.ndarray) -> jax.Array:
     """Maps `z` `[..., parameter]` to `theta` of the same shape, in the parameters' units."""
     return jnp.stack([p.prior.forward(z[..., i]) for i, p in enumerate(parameters)], axis=-1)
 

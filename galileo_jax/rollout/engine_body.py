@@ -41,7 +41,7 @@ def roll_out(
     """
 
     def frame(pose: Pose, dt_s: jax.Array):
-        def substep(_: int, at: Pose) -> Pose:
+        def substep(_: jax.Array, at: Pose) -> Pose:
             return _step(at, dt_s / substeps, solid)
 
         after = jax.lax.fori_loop(0, substeps, substep, pose)

@@ -150,7 +150,7 @@ class EngineCFree:
             batch.step(nstep=self.substeps)
         for i in np.flatnonzero(begin < num_records - 1):
             own, mujocos = ([values[i] for values in some] for some in (poses, after))
-            _join(Poses(*own), Poses(*mujocos), begin[i], late_s[i] / model.record_dt_s, model)
+            _join(Poses(*own), Poses(*mujocos), int(begin[i]), late_s[i] / model.record_dt_s, model)
         return ~batch.warning.reshape(size, -1).any(axis=1)
 
     def _first(

@@ -136,7 +136,7 @@ class EngineMJX:
             }
         )
 
-    def _rub(self, friction: jax.Array) -> jax.Array:
+    def _rub(self, friction: jax.Array | np.ndarray) -> jax.Array:
         """The contact pairs' friction with the objects' coefficients `[object]` in it."""
         pairs = self._base.pair_friction
         for i in range(self.model.scene.model.npair):

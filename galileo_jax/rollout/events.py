@@ -19,7 +19,7 @@ from galileo_jax.rollout.motion import Dynamics, dynamics
 
 State = TypeVar("State")  # a PyTree
 Motion = tuple[
-    Float[jax.Array, "*batch object 2 record"], Float[jax.Array, "*batch object 2 record"]
+    Float[jax.Array, "*batch object axis record"], Float[jax.Array, "*batch object axis record"]
 ]
 """Centres (m) and velocities (m/s)."""
 Advance = Callable[[Any, jax.Array, jax.Array, Any], tuple[Any, jax.Array]]

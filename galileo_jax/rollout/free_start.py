@@ -4,7 +4,10 @@ In the array standard, so that the same lines run in NumPy (C engine) and in JAX
 """
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import jax
+from jaxtyping import Int
 
 from galileo_jax.model.effects.effect import Surroundings
 from galileo_jax.model.model import Model
@@ -53,7 +56,7 @@ def check_free(model: Model) -> None:
         )
 
 
-def past_the_foot_m(scene: Surroundings) -> float:
+def past_the_foot_m(scene: Surroundings) -> float | jax.Array:
     """Where object 1's centre (x) is when all of it is on the table, beyond the foot's zone."""
     # Inside a compiled program the numbers are JAX's.
     beyond = scene.corner_m[0] + FOOT_ZONE_M
@@ -91,7 +94,7 @@ def in_space(position_m: Array, velocity_m_s: Array, beside_m: Array) -> Poses:
 
 def record_before_hit(
     position_m: Array, velocity_m_s: Array, scene: Surroundings, dt_s: float
-) -> Array:
+) -> Int[Any, "..."]:
     """The last record before any faces meet, `[...]`; the number of records if none do."""
     xp = position_m.__array_namespace__()
     half = xp.asarray(scene.half_length_m)[:, None]

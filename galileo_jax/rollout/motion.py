@@ -171,7 +171,7 @@ def _added(force: Force | None) -> Friction | None:
     return None if force is None else lambda state, total: total + force(state)
 
 
-def _if_acts(acts: Array | None, i: int, law: Friction | None) -> Friction | None:
+def _if_acts(acts: Bool[Any, " effect"] | None, i: int, law: Friction | None) -> Friction | None:
     """`law`, left out where effect `i` does not act."""
     if acts is None or law is None:
         return law

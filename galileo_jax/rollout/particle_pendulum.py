@@ -130,7 +130,7 @@ def pendulum_system(task: Task) -> System:
         return _to_turn(swing, time_s, left_s, is_last, pendulum, scene)
 
     def seen(swings: Swing, times_s: jax.Array) -> Motion:
-        def one(swing: Swing, time_s: jax.Array) -> Motion:
+        def one(swing: Swing, time_s: jax.Array) -> tuple[jax.Array, jax.Array]:
             way = jnp.sign(swing.turning_rad_s) if pendulum.has_friction else 0.0
             turns = rates(swing, time_s, way, pendulum, scene)[0].turning_rad_s
             return place(swing, turns, pendulum, first, scene)

@@ -19,7 +19,7 @@ from galileo_jax.rollout.trajectory import Trajectory
 
 JUMP_M_S2 = 30.0  # no steady force accelerates so much
 
-Places = Float[np.ndarray, "batch object 2 record"]
+Places = Float[np.ndarray, "batch object axis record"]
 Motion = tuple[Places, Places]
 """Centres (m) and velocities (m/s), from the release on, every `Model.record_dt_s`."""
 
@@ -47,7 +47,7 @@ def in_jax(engine: Engine) -> Callable[[jax.Array], tuple[jax.Array, jax.Array]]
     model = engine.model
     shape = (len(model.scene.names), 2, model.num_records + 1)
 
-    def host(theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def host(theta: np.ndarray | jax.Array) -> tuple[np.ndarray, np.ndarray]:
         theta = np.asarray(theta)
         # XLA calls back on a thread of its own, which does not have the caller's setting.
         with jax.enable_x64(theta.dtype == np.float64):

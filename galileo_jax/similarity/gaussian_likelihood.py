@@ -25,6 +25,7 @@ FEW_VALUES = 400  # of so many a singular value decomposition takes a tenth of a
 LARGE = 6e4  # of patterns: its square times 2e-16 is a millionth
 IDLE = 1e-3  # a gain that changes a residual by less than a millionth
 Places = Float[jax.Array, "object axis frame"]
+Scale = Float[jax.Array, ""] | float
 Batch = Float[np.ndarray, "*batch object axis frame"]
 Values = Float[np.ndarray, "*batch value"]
 
@@ -73,7 +74,7 @@ class GaussianLikelihood:
         return whitening_of(observation, inverse_root, patterns)
 
     @staticmethod
-    def whiten(difference_m: Places, noise_scale: Float[jax.Array, ""], data: Whitening) -> Places:
+    def whiten(difference_m: Places, noise_scale: Scale, data: Whitening) -> Places:
         """C^-1/2 r for `difference_m` `[object, 2, frame]`; unit normal if the model is right."""
         y = jnp.einsum("oijt,ojt->oit", data.inverse_root, difference_m)
         amplitude = jnp.einsum("moit,oit->m", data.basis, y)
@@ -104,7 +105,7 @@ class GaussianLikelihood:
 
     @staticmethod
     def log_density(
-        predicted_m: Places, noise_scale: Float[jax.Array, ""], data: Whitening
+        predicted_m: Places, noise_scale: Scale, data: Whitening
     ) -> Float[jax.Array, ""]:
         """Log N(observed; predicted, C), up to the constant of the tracker's own covariance."""
         difference = jnp.asarray(data.observed_m) - predicted_m

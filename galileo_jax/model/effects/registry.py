@@ -10,7 +10,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, no_type_check
 
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.runtime.errors import InputError
@@ -26,6 +26,7 @@ effect_registry: Registry[type[Effect]] = Registry(
 EffectClass = TypeVar("EffectClass", bound=type[Effect])
 
 
+@no_type_check  # whatever a user decorates is told in one line
 def register(effect: EffectClass) -> EffectClass:
     """Class decorator: makes an effect known under its `name`.
 

@@ -14,7 +14,7 @@ def unscaled(path_m: Array, error: Array) -> Array:
     return path_m / (1.0 + error[..., None])
 
 
-def scaled(position_m: Array, error: Array, scene: Surroundings) -> Array:
+def scaled(position_m: Array, error: Array | float, scene: Surroundings) -> Array:
     """True centres `[object, 2, frame]` as they are measured."""
     if scene.has_table:
         return position_m + error * position_m

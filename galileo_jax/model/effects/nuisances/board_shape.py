@@ -98,12 +98,11 @@ class BoardShape(Effect):
         # Beyond what is seen the board goes on straight.
         inside = xp.clip(u, -1.0, 1.0)
         turned, bend = xp.zeros_like(inside), xp.zeros_like(inside)
-        given = {parameter.name for parameter in self.parameters(scene)}
         # P_n and its derivative by their recurrences, from P_-1 = 0 and P_0 = 1 on.
         before, here = xp.zeros_like(inside), xp.ones_like(inside)
         rise_before, rise = xp.zeros_like(inside), xp.zeros_like(inside)
         for n in range(MOST + 1):
-            if (name := f"{self.name}_{n}") in given:
+            if (name := f"{self.name}_{n}") in scene.expected:
                 value = theta[name][..., None]
                 turned, bend = turned + value * here, bend + value * rise
             following = ((2 * n + 1) * inside * here - n * before) / (n + 1)
