@@ -1,6 +1,6 @@
 """`explain`: everything about a film or table in one call, as a lab report says it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -168,7 +168,7 @@ def explain(
     with progress.scope(on_progress, cancel):
         progress.report("looking", 0.0)
         with progress.part(0.0, UNDERSTOOD):
-            checked = [_checked(one, answers) for one in sources_of(clips)]
+            checked, _ = answered_clips(sources_of(clips), answers, lambda _, said: said)
         found = _explained(checked, engine, seed)
         if out is not None:
             progress.report("writing the page", 0.97)
@@ -235,9 +235,38 @@ def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
     return understand(path)
 
 
-def _checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:
-    known = understood(clip, answers)
-    return known if isinstance(known, Clip) else clip_of(known, answers, str(clip))
+def answered_clips(
+    clips: Sequence[ClipLike],
+    said: Mapping[str, Any],
+    ask: Callable[[Understood, dict[str, Any]], dict[str, Any]],
+    look_at: Callable[[ClipLike, Mapping[str, Any]], Clip | Understood] = understood,
+) -> tuple[list[Clip], list[tuple[Understood, dict[str, Any]]]]:
+    """The checked clips, and those whose yaml leaves something open with what was answered.
+
+    What is answered of one trial holds of the next, but where its things are.
+
+    Args:
+      clips: the trials.
+      said: of all of them, by keys of the yaml.
+      ask: given what is understood of a clip, and the answers so far, returns all answers.
+      look_at: `understood`, or it with a memory or a display of its progress.
+
+    Raises:
+      InputError: of any of them; nothing was written.
+    """
+    checked: list[Clip] = []
+    asked: list[tuple[Understood, dict[str, Any]]] = []
+    answers = dict(said)
+    for clip in clips:
+        known = look_at(clip, said)
+        if isinstance(known, Clip):
+            checked.append(known)
+            continue
+        answers = ask(known, answers)
+        checked.append(clip_of(known, answers, str(clip)))
+        asked.append((known, answers))
+        answers = {key: v for key, v in answers.items() if key != "points" or key in said}
+    return checked, asked
 
 
 def _explained(clips: Sequence[Clip], engine: str, seed: int) -> Explanation:
@@ -250,6 +279,7 @@ def _explained(clips: Sequence[Clip], engine: str, seed: int) -> Explanation:
     )
     if check.is_adequate or check.found.no_verdict is not None:
         return Explanation(first, check, None, command)
+    progress.report("asking what is missing", COMPARED, Explanation(first, check, None, command))
     with progress.part(COMPARED, 0.95):
         found = diagnose(tracks_of(first.measurements), engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)

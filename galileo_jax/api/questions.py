@@ -3,6 +3,7 @@
 import math
 import re
 import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,6 +57,35 @@ def questions(known: Understood, answers: Answers) -> tuple[Question, ...]:
     ]
     told = {*answers, *known.declared}
     return tuple(one for one in asked if one is not None and one.key not in told)
+
+
+@dataclass(frozen=True)
+class Answered:
+    """All questions, with what was typed to them.
+
+    Attributes:
+      questions: in the order in which they are asked.
+      answers: by keys of the yaml; the defaults where nothing was typed.
+      problems: by the question's key, one line that says what would be right.
+    """
+
+    questions: tuple[Question, ...]
+    answers: Answers
+    problems: Mapping[str, str]
+
+
+def answered(known: Understood, typed: Mapping[str, str]) -> Answered:
+    """What a person answers who types this, by the questions' keys, and Enter to all others."""
+    asked: dict[str, Question] = {}
+    answers: dict[str, Any] = {}
+    problems: dict[str, str] = {}
+    while left := [one for one in questions(known, answers) if one.key not in asked]:
+        one = asked[left[0].key] = left[0]
+        try:
+            answers |= parsed(one, typed.get(one.key, ""), known, answers)
+        except InputError as error:
+            problems[one.key] = str(error)
+    return Answered(tuple(asked.values()), answers, problems)
 
 
 def check_answered(known: Understood, answers: Answers) -> None:

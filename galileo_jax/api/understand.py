@@ -1,7 +1,7 @@
 """`understand`: what a film or table shows, what its yaml declares, and what is still open."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,10 +30,12 @@ class FilmPath:
     Attributes:
       likely: the kind of motion; None where the thing cannot be followed.
       direction: in which it goes in the picture.
+      moved_px: how far from one end of its way to the other.
     """
 
     likely: Likely | None
     direction: str = "right"
+    moved_px: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,7 @@ class Understood:
       things: what moves in a film whose yaml names no objects, to its size in the picture, px.
       foot: of a ramp that such a film shows, px; None: it shows none.
       is_pair: one thing sets out after the other, as on a ramp into another.
+      unseen: why nothing that moves was found, one line; "" where something was.
     """
 
     source: Path
@@ -57,6 +60,7 @@ class Understood:
     things: Mapping[Point, Point] = field(default_factory=dict)
     foot: Point | None = None
     is_pair: bool = False
+    unseen: str = ""
     _paths: dict[Point, FilmPath] = field(default_factory=dict, repr=False)
 
     @property
@@ -166,14 +170,12 @@ def _with_things(known: Understood) -> Understood:
 
     try:
         proposal = propose(known.source)
-    except InputError:
-        return known
+    except InputError as error:
+        return replace(known, unseen=str(error).removeprefix(f"{known.source}: "))
     things = {point: proposal.sizes_px[name] for name, point in proposal.objects.items()}
     is_pair = len(things) > 1 and not proposal.doubts
     foot = proposal.foot if proposal.scenario == "ramp" else None
-    return Understood(
-        known.source, known.yaml_path, known.declared, known.look, things, foot, is_pair
-    )
+    return replace(known, things=things, foot=foot, is_pair=is_pair)
 
 
 def _followed(source: Path, yaml_path: Path, point: Point, fps: float) -> FilmPath:
@@ -191,4 +193,5 @@ def _followed(source: Path, yaml_path: Path, point: Point, fps: float) -> FilmPa
     if len(x) < 3:
         return FilmPath(None)
     direction = "right" if x[np.argmax(abs(x - x[0]))] >= x[0] else "left"
-    return FilmPath(likely_in_plane(x, y), direction)
+    moved = float(np.hypot(np.ptp(x), np.ptp(y)))
+    return FilmPath(likely_in_plane(x, y), direction, moved)

@@ -4,7 +4,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -59,25 +59,16 @@ def main(argv: Sequence[str]) -> int | None:
 
 def _clips(files: Sequence[str], said: dict[str, Any]) -> "list[Clip]":
     """The checked clips; writes the yaml of those that have none, when all of them are right."""
-    from galileo_jax.api.explain import sources_of, understood
-    from galileo_jax.api.proposed_clip import clip_of, write_yaml
-    from galileo_jax.api.understand import Understood
+    from galileo_jax.api.explain import answered_clips, sources_of, understood
+    from galileo_jax.api.proposed_clip import write_yaml
+
+    def look_at(clip: Any, said: Mapping[str, Any]) -> "Clip | Understood":
+        with progress_display() as display, progress.scope(display):
+            return understood(clip, said)
 
     is_terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    clips: list[Clip] = []
-    to_write: list[tuple[Understood, dict[str, Any]]] = []
-    answers = said
-    for source in sources_of(list(files)):
-        with progress_display() as display, progress.scope(display):
-            known = understood(source, said)
-        if isinstance(known, Understood):
-            answers = asked(known, answers) if is_terminal else answers
-            clips.append(clip_of(known, answers, str(source)))
-            to_write.append((known, answers))
-            # What holds of one trial holds of the next, but where its things are.
-            answers = {key: value for key, value in answers.items() if key != "points"}
-        else:
-            clips.append(known)
+    ask = asked if is_terminal else lambda _, answers: answers
+    clips, to_write = answered_clips(sources_of(list(files)), said, ask, look_at)
     for known, answers in to_write:
         _write(known, answers, write_yaml)
     return clips
@@ -90,9 +81,8 @@ def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
       InputError: the input ended (Ctrl-D) before all was answered.
     """
     from galileo_jax.api.questions import Question, parsed, questions
+    from galileo_jax.api.seen_sentence import sentence_of
 
-    seen = known.look.summary().split("\n\n")[0].splitlines()
-    told = [seen[0], *(line for line in seen if line.startswith(("moves:", "time step:")))]
     is_first = True
 
     def still_open() -> Sequence[Question]:
@@ -101,7 +91,7 @@ def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
 
     while open_ones := still_open():
         if is_first:
-            command.say("\n".join(told))
+            command.say(sentence_of(known, answers))
             is_first = False
         one = open_ones[0]
         default = f" [{one.default}]" if one.default is not None else ""

@@ -100,6 +100,18 @@ def in_words(line: str) -> str:
     return text
 
 
+def explanation_view(found: gx.Explanation) -> dict[str, Any]:
+    """The result in words, and what the parts show of it."""
+    return {
+        "explained": {
+            "paragraph": found.paragraph,
+            "fit": fit_view(found.fit),
+            "compare": comparison_view(found.check),
+            "diagnosis": None if found.diagnosis is None else diagnosis_view(found.diagnosis),
+        }
+    }
+
+
 def comparison_view(check: gx.Comparison) -> dict[str, Any]:
     """Where a model fails, in words."""
     from galileo_jax.report import diagnosis_text
