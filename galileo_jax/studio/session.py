@@ -1,28 +1,42 @@
 """What all tabs look at: the clips, their marks, the results, and the job that runs."""
 
 import asyncio
+import math
 import os
+import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.clip.track_file import is_track
 from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results
-from galileo_jax.studio.clip_state import Sheet, changed, opened, redone, undone
+from galileo_jax.studio.clip_state import Sheet, Table, changed, opened, redone, undone
 from galileo_jax.studio.frames import Frames
 from galileo_jax.studio.jobs import Message, Worker
 from galileo_jax.studio.marks import Marks
 from galileo_jax.studio.marks_yaml import proposed
-from galileo_jax.studio.paths import videos
+from galileo_jax.studio.paths import tables, videos
 from galileo_jax.studio.shown import Results, with_partial
-from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
+from galileo_jax.studio.stages import (
+    FILES,
+    State,
+    Trials,
+    changed_at,
+    made,
+    states,
+    track_files,
+    track_mark,
+)
 from galileo_jax.studio.store import Store
 
 MOST_AT_ONCE = 12  # videos of a folder that are decoded before the page opens
+PAGE = "report.html"
+LEAST_SPENT_S, LEAST_SHARE = 3.0, 0.05  # before it is said how long a job will take
 MOST_FRAMES = 4  # clips whose frames are held
 
 
@@ -34,6 +48,15 @@ class Job:
     stage: str = "starting"
     share: float = 0.0
     is_cancelled: bool = False
+    begun: float = field(default_factory=time.monotonic)
+
+    def time_left(self, now: float) -> str:
+        """How long it will still take if it goes on as until now; "" while that is unknown."""
+        spent = now - self.begun
+        if self.is_cancelled or spent < LEAST_SPENT_S or not LEAST_SHARE < self.share < 1:
+            return ""
+        seconds = spent * (1 - self.share) / self.share
+        return f"about {10 * math.ceil(seconds / 10)} s left"
 
 
 class Session:
@@ -41,12 +64,12 @@ class Session:
 
     Args:
       root: the folder that was opened.
-      clip: which of its clips is shown first; None: the first.
+      clip: which of its clips is shown first, a table with its suffix; None: the first.
     """
 
     def __init__(self, root: Path, clip: str | None = None):
         self.root, self.store = root.resolve(), Store(root)
-        self.sheets: dict[str, Sheet] = {}
+        self.sheets: dict[str, Sheet | Table] = {}
         self.broken: dict[str, str] = {}
         self.active = ""
         self.chosen: tuple[str, ...] = ()
@@ -54,6 +77,9 @@ class Session:
         self.error = ""
         self.note = ""
         self.results = Results({})
+        self.seen: Mapping[str, Any] | None = None  # what is understood of the active clip
+        self.typed: dict[str, str] = {}  # answers to what is asked of it
+        self._looking: int | None = None  # the question to the worker that is waited for
         self.versions: Counter[str] = Counter()
         self._frames: dict[str, Frames] = {}
         self._next: list[Callable[[], None]] = []
@@ -65,13 +91,17 @@ class Session:
         self._effects_left: tuple[str, ...] = ()  # in the result that lies there
         self._unopened: dict[str, Path] = {}
         self.scan()
-        self.show(clip if clip in self.names else next(iter(self.names), ""))
+        if clip is not None and is_track(path := self.root / clip):
+            self.add(path)
+        else:
+            is_known = clip in self.names or clip in self.broken
+            self.show(clip if clip and is_known else next(iter(self.names), ""))
 
     # clips
 
     def scan(self) -> None:
         """Looks at the folder again; a video is decoded once to know it, the first ones now."""
-        for name, path in videos(self.root).items():
+        for name, path in {**tables(self.root), **videos(self.root)}.items():
             if name in self.sheets:
                 continue
             self._unopened[name] = path
@@ -84,17 +114,29 @@ class Session:
         """Of all clips that can be shown."""
         return tuple(sorted({*self.sheets, *self._unopened}))
 
+    def add(self, path: Path) -> None:
+        """Takes in a film, a table or a yaml that was opened or dropped, and turns to it."""
+        self.scan()
+        if is_track(path):
+            self.sheets[path.stem] = Table(self.root, path)
+        if path.stem in self.names:
+            self.show(path.stem)
+
     def show(self, name: str) -> None:
-        """Turns to one clip, alone."""
-        if self._open(name):
-            self.active, self.chosen = name, (name,)
+        """Turns to one clip, alone; to none where it is broken."""
+        is_open = self._open(name)
+        if is_open or name in self.broken:
+            self.active, self.chosen = (name, (name,)) if is_open else ("", ())
             self._reopen()
 
     def _open(self, name: str) -> bool:
         path = self._unopened.pop(name, None)
         if path is not None:
             try:
-                self.sheets[name] = opened(self.root, path, self.store)
+                is_table = is_track(path)
+                self.sheets[name] = (
+                    Table(self.root, path) if is_table else opened(self.root, path, self.store)
+                )
                 self.broken.pop(name, None)
             except InputError as error:
                 self.broken[name] = str(error).replace(f"{path}: ", "")
@@ -117,8 +159,9 @@ class Session:
 
     @property
     def sheet(self) -> Sheet | None:
-        """The active clip's."""
-        return self.sheets.get(self.active)
+        """The active clip's; None where that is a table."""
+        found = self.sheets.get(self.active)
+        return found if isinstance(found, Sheet) else None
 
     @property
     def trials(self) -> Trials:
@@ -140,17 +183,18 @@ class Session:
 
     @property
     def states(self) -> dict[str, State]:
-        """Of the seven stages."""
+        """Of the stages."""
         return states(self.trials, self.store, self.effects)
 
     def picture(self, name: str, index: int) -> bytes | None:
         """A frame of a clip, JPEG."""
-        if name not in self.sheets:
+        sheet = self.sheets.get(name)
+        if not isinstance(sheet, Sheet):
             return None
         if name not in self._frames:
             while len(self._frames) >= MOST_FRAMES:
                 self._frames.pop(next(iter(self._frames)))
-            self._frames[name] = Frames(self.sheets[name].video)
+            self._frames[name] = Frames(sheet.video)
         return self._frames[name].picture(index)
 
     # marks
@@ -177,7 +221,90 @@ class Session:
             self.error = " ".join(str(error).split())
         self._changed("marks", "job")
 
+    # what is understood, and explained
+
+    def understand(self) -> None:
+        """Looks at the active clip, where that has not been done, to say what it shows."""
+        if self.active and self.seen is None and self._looking is None and self.job is None:
+            self._look()
+
+    def say(self, key: str, text: str) -> None:
+        """Takes an answer to a question, as it is typed."""
+        self.typed[key] = text
+        self._look()
+
+    def _look(self) -> None:
+        self._loop = self._loop or asyncio.get_running_loop()
+        name = self.sheets[self.active].source.name
+        self._looking = self.worker.ask("understand", clip=name, typed=dict(self.typed))
+
+    def explain(self) -> None:
+        """Says what the chosen clips show: `galileo FILE` with the answers that were typed."""
+        self._start("explain", clips=self.trials.files, typed=dict(self.typed), run=self._run)
+
+    def answer_anew(self) -> None:
+        """Asks again what was asked: what `explain` wrote to the yaml is taken back."""
+        typed = self.typed
+        for sheet in self.answered:
+            sheet.yaml.unlink()
+            self._read_again(sheet.name)
+        self._reopen()
+        self.typed = typed
+
+    @property
+    def answered(self) -> tuple[Sheet | Table, ...]:
+        """The chosen clips whose yaml is what `explain` wrote there."""
+        return tuple(
+            sheet
+            for sheet in self.trials.sheets
+            if (text := self.store.get("clips", sheet.name).get("answered"))
+            and sheet.yaml.is_file()
+            and sheet.yaml.read_text(encoding="utf-8") == text
+        )
+
+    def report(self, name: str) -> str | None:
+        """The page of a chosen clip's run, to be kept as one file; None: there is none."""
+        file = PAGE if len(self.chosen) == 1 else f"report_{name}.html"
+        path = self.trials.run / file
+        is_inside = path.is_file() and path.resolve().is_relative_to(self.root)
+        if name not in self.chosen or not is_inside:
+            return None
+        return results.alone(path.read_text(encoding="utf-8"))
+
+    def _read_again(self, name: str) -> None:
+        """A clip's yaml as somebody else has left it."""
+        if isinstance(sheet := self.sheets.get(name), Sheet):
+            self.sheets[name] = opened(self.root, sheet.video, self.store)
+
+    def _explained(self, trials: Trials, found: Mapping[str, Any]) -> None:
+        """Remembers what was explained, for the page and for its parts."""
+        for sheet in trials.sheets:
+            had = self.store.get("clips", sheet.name)
+            if self._context["yamls"][sheet.name] is None and sheet.yaml.is_file():
+                text = sheet.yaml.read_text(encoding="utf-8")
+                self.store.put("clips", sheet.name, had | {"answered": text})
+            self._read_again(sheet.name)
+        trials = Trials(self.root, tuple(self.sheets[one.name] for one in trials.sheets))
+        marks, plain = trials.made_of(), trials.made_of(())
+        fitted = made(trials.file("fit"), marks)
+        entry = {
+            "rounds": [], "fit": fitted, "explained": {**fitted, "text": found["paragraph"]},
+            "compare": made(trials.file("compare"), plain), "compare_view": found["compare"],
+        }  # fmt: skip
+        if found["diagnosis"] is not None:
+            entry["diagnose"] = made(trials.file("diagnose"), marks)
+            entry["diagnose_view"] = found["diagnosis"]
+        self.store.put("runs", trials.name, entry)
+        self.seen = None
+        if trials.name == self.trials.name:
+            self._show_stored()
+
     # jobs
+
+    def propose_once(self) -> None:
+        """Does what `propose` does, where nothing is drawn yet and nothing is computed."""
+        if self.sheet is not None and not self.sheet.is_drawn and self.job is None:
+            self.propose()
 
     def propose(self) -> None:
         """Looks for the objects and the ramp of a clip that has no marks."""
@@ -271,6 +398,7 @@ class Session:
         self._context = {
             "trials": trials, "tracks": marks, "clip": self.active,
             "of": {"marks": trials.made_of(), "model": trials.made_of(effects)},
+            "yamls": {one.name: one.yaml if one.yaml.is_file() else None for one in trials.sheets},
         }  # fmt: skip
         self.job, self.error, self.note = Job(task), "", ""
         self._changed("job")
@@ -280,7 +408,9 @@ class Session:
             self._loop.call_soon_threadsafe(self._receive, message)
 
     def _receive(self, message: Message) -> None:
-        if message.task in ("simulate", "open_run"):
+        if message.task == "understand":
+            self._understood(message)
+        elif message.task in ("simulate", "open_run"):
             self._answered(message)
         elif message.kind == "progress":
             stage, share = message.content
@@ -291,6 +421,13 @@ class Session:
             self._partial(message.content)
         else:
             self._ended(message)
+
+    def _understood(self, message: Message) -> None:
+        if message.kind in ("progress", "partial") or message.job != self._looking:
+            return
+        self._looking = None
+        self.seen = {"problem": message.content} if message.kind == "error" else message.content
+        self._changed("clips")
 
     def _partial(self, content: Mapping[str, Any]) -> None:
         if self._context["trials"].name != self.trials.name:
@@ -321,11 +458,16 @@ class Session:
             return
         if task == "track":
             for sheet in trials.sheets:
+                if isinstance(sheet, Table):
+                    continue
                 entry = self.store.get("clips", sheet.name)
                 path = track_files(sheet) / "track_px.csv"
                 mark = made(path, self._context["tracks"][sheet.name])
                 self.store.put("clips", sheet.name, entry | {"tracked": mark})
             self._changed("results")
+            return
+        if task == "explain":
+            self._explained(trials, content["explained"])
             return
         if task == "export":
             self.note = "Written: " + ", ".join(content["files"])
@@ -353,7 +495,7 @@ class Session:
 
     def _propose(self, found: Mapping[str, Any]) -> None:
         sheet = self.sheets.get(self._context["clip"])
-        if sheet is None or sheet.is_drawn:
+        if not isinstance(sheet, Sheet) or sheet.is_drawn:
             return
         marks = proposed(found, sheet.info.size_px)
         self.sheets[sheet.name] = changed(sheet, marks, self.store)
@@ -384,7 +526,8 @@ class Session:
 
     def _reopen(self) -> None:
         """Shows what lies in the folder for the clips that are chosen now."""
-        self.results = Results(self._tracks())
+        self.results, self.seen, self._looking = Results(self._tracks()), None, None
+        self.typed = {}
         self._show_stored()
         self._changed("clips", "marks", "results", "job")
 
@@ -407,7 +550,10 @@ class Session:
         is_own = found and last == (run / FILES["diagnose"]).stat().st_mtime_ns  # not a command's
         curves = entry.get("diagnose_view", {}).get("curves", {}) if is_own else {}
         diagnosis = {"sentence": "", **found, "curves": curves}
+        explained = entry.get("explained", {})
+        is_told = explained.get("at") == changed_at(run / FILES["fit"])
         self._set_results(
+            paragraph=str(explained.get("text", "")) if is_told else "",
             compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
             prediction=self._prediction(entry),
             diagnosis=diagnosis if found else None,

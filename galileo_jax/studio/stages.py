@@ -83,7 +83,7 @@ def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, 
     marks = trials.made_of() if complete else ""
     entry = store.get("runs", trials.name)
     fit = _state(trials, "fit", entry, marks)
-    if entry.get("explained", {}).get("at") == _changed_at(trials.file("fit")):
+    if entry.get("explained", {}).get("at") == changed_at(trials.file("fit")):
         found["explain"] = fit
     tracked = [_track_state(sheet, store) for sheet in trials.sheets]
     if not complete:
@@ -109,7 +109,7 @@ def track_mark(sheet: Sheet | Table) -> str:
     return fingerprint(yaml_content(sheet.yaml))
 
 
-def _changed_at(path: Path) -> int:
+def changed_at(path: Path) -> int:
     """When a file was written; 0 where it is not there."""
     return path.stat().st_mtime_ns if path.is_file() else 0
 
