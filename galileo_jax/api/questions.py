@@ -153,7 +153,7 @@ def _scenario(known: Understood, answers: Answers) -> Question | None:
     likely = known.likely(answers)
     if likely is not None and likely.is_clear:
         return None
-    text = f"What kind of motion is it? One of {', '.join(SCENARIOS)}"
+    text = "What kind of motion is it?"
     if likely is None:
         why = "the motion could not be followed"
         return Question("scenario", text, why, "--scenario ramp", None, tuple(SCENARIOS))
@@ -179,7 +179,7 @@ def _units(known: Understood, answers: Answers) -> Question | None:
     if known.declared.get("pixels_per_metre") is not None:
         return None
     choices = (*METRES_PER_UNIT, "px")
-    text = f"In which unit are its lengths? One of {', '.join(choices)}"
+    text = "In which unit are its lengths?"
     size = max(seen.moved)
     if (unit := _unit_by_gravity(known, answers)) is not None:
         why = f"it falls as free fall does in {unit}"

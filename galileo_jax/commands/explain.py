@@ -95,7 +95,8 @@ def asked(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
             is_first = False
         one = open_ones[0]
         default = f" [{one.default}]" if one.default is not None else ""
-        command.say(f"{one.text}\n  ({one.why})")
+        choices = f" One of {', '.join(one.choices)}" if one.choices else ""
+        command.say(f"{one.text}{choices}\n  ({one.why})")
         try:
             answers = answers | parsed(one, input(f"  {one.key}{default}: "), known, answers)
         except EOFError:

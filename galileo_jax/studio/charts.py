@@ -42,6 +42,7 @@ def fit_figure(motion: Mapping[str, Any], is_dark: bool) -> dict[str, Any]:
     times, marks = motion["times"], []
     for i, name in enumerate(motion["objects"]):
         measured, sd = (np.array(motion[key][i], float) for key in ("x", "sd_x"))
+        sd[~(sd <= np.nanmax(measured) - np.nanmin(measured))] = np.nan  # not measured
         marks.append(Points(times, measured, object_colour(i), f"{name}, measured", sd=sd))
         marks.append(Line(times, motion["model_x"][i], "ink", f"{name}, model", width_px=2))
     return _figure(Panel("x, m", tuple(marks), xlabel="time, s"), is_dark)

@@ -98,8 +98,8 @@ def _choice(one: Mapping[str, Any], typed: str | None) -> Any:
     """A field with the likely answer first."""
     likely = one["default"]
     others = [choice for choice in one["choices"] if choice != likely]
-    shown = {likely: f"{likely}: looks like this one"} if likely else {}
-    shown |= {choice: choice for choice in others}
+    said = f"{likely}: looks like this one" if one["key"] == "scenario" else likely
+    shown = ({likely: said} if likely else {}) | {choice: choice for choice in others}
     return ui.select(shown, value=typed or likely).props("options-dense")
 
 
