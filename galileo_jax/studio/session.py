@@ -219,6 +219,7 @@ class Session:
             self.error = ""
         except (InputError, OSError) as error:
             self.error = " ".join(str(error).split())
+        self.seen = None
         self._changed("marks", "job")
 
     # what is understood, and explained
@@ -244,9 +245,14 @@ class Session:
 
     def answer_anew(self) -> None:
         """Asks again what was asked: what `explain` wrote to the yaml is taken back."""
-        typed = self.typed
         for sheet in self.answered:
             sheet.yaml.unlink()
+        self._back()
+
+    def _back(self) -> None:
+        """To what lies in the folder; what was typed stays."""
+        typed = self.typed
+        for sheet in self.trials.sheets:
             self._read_again(sheet.name)
         self._reopen()
         self.typed = typed
@@ -439,6 +445,8 @@ class Session:
         follow, self._next, self.job = self._next, [], None
         if message.task == "track" and message.kind != "done":
             self._set_results(tracks=self._tracks())  # as they were
+        if message.task == "explain" and message.kind != "done":
+            self._back()
         if message.kind == "done":
             self._record(message.task, message.content)
             for action in follow:

@@ -58,6 +58,7 @@ def _asked(tab: "Tab", seen: Mapping[str, Any]) -> None:
             word.set_text(now.get("problems", {}).get(key, "") if is_typed else "")
 
     tab.refresh = refresh
+    refresh()
 
 
 def drawn(tab: "Tab") -> Any:
@@ -70,7 +71,7 @@ def drawn(tab: "Tab") -> Any:
     return (
         "explain", session.active, session.chosen, session.seen is None, seen.get("problem"), asked,
         session.results.paragraph, session.error, session.note, session.job is None,
-        tab.placing, tuple(session.broken), session.typed.get(POINTS),
+        tab.placing, tuple(session.broken),
     )  # fmt: skip
 
 
