@@ -123,10 +123,9 @@ class Session:
             self.show(path.stem)
 
     def show(self, name: str) -> None:
-        """Turns to one clip, alone; to none where it is broken."""
-        is_open = self._open(name)
-        if is_open or name in self.broken:
-            self.active, self.chosen = (name, (name,)) if is_open else ("", ())
+        """Turns to one clip, alone."""
+        if self._open(name):
+            self.active, self.chosen = name, (name,)
             self._reopen()
 
     def _open(self, name: str) -> bool:
