@@ -1,12 +1,10 @@
 """What all tabs look at: the clips, their marks, the results, and the job that runs."""
 
 import asyncio
-import math
 import os
-import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,49 +12,20 @@ from galileo_jax.clip.track_file import is_track
 from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.studio import results
+from galileo_jax.studio import explained, results
 from galileo_jax.studio.clip_state import Sheet, Table, changed, opened, redone, undone
 from galileo_jax.studio.frames import Frames
+from galileo_jax.studio.job import Job
 from galileo_jax.studio.jobs import Message, Worker
 from galileo_jax.studio.marks import Marks
 from galileo_jax.studio.marks_yaml import proposed
 from galileo_jax.studio.paths import tables, videos
 from galileo_jax.studio.shown import Results, with_partial
-from galileo_jax.studio.stages import (
-    FILES,
-    State,
-    Trials,
-    changed_at,
-    made,
-    states,
-    track_files,
-    track_mark,
-)
+from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import Store
 
 MOST_AT_ONCE = 12  # videos of a folder that are decoded before the page opens
-PAGE = "report.html"
-LEAST_SPENT_S, LEAST_SHARE = 3.0, 0.05  # before it is said how long a job will take
 MOST_FRAMES = 4  # clips whose frames are held
-
-
-@dataclass(frozen=True)
-class Job:
-    """The job that runs."""
-
-    task: str
-    stage: str = "starting"
-    share: float = 0.0
-    is_cancelled: bool = False
-    begun: float = field(default_factory=time.monotonic)
-
-    def time_left(self, now: float) -> str:
-        """How long it will still take if it goes on as until now; "" while that is unknown."""
-        spent = now - self.begun
-        if self.is_cancelled or spent < LEAST_SPENT_S or not LEAST_SHARE < self.share < 1:
-            return ""
-        seconds = spent * (1 - self.share) / self.share
-        return f"about {10 * math.ceil(seconds / 10)} s left"
 
 
 class Session:
@@ -259,22 +228,11 @@ class Session:
     @property
     def answered(self) -> tuple[Sheet | Table, ...]:
         """The chosen clips whose yaml is what `explain` wrote there."""
-        return tuple(
-            sheet
-            for sheet in self.trials.sheets
-            if (text := self.store.get("clips", sheet.name).get("answered"))
-            and sheet.yaml.is_file()
-            and sheet.yaml.read_text(encoding="utf-8") == text
-        )
+        return explained.answered(self.trials, self.store)
 
     def report(self, name: str) -> str | None:
         """The page of a chosen clip's run, to be kept as one file; None: there is none."""
-        file = PAGE if len(self.chosen) == 1 else f"report_{name}.html"
-        path = self.trials.run / file
-        is_inside = path.is_file() and path.resolve().is_relative_to(self.root)
-        if name not in self.chosen or not is_inside:
-            return None
-        return results.alone(path.read_text(encoding="utf-8"))
+        return explained.report(self.trials, name) if name in self.chosen else None
 
     def _read_again(self, name: str) -> None:
         """A clip's yaml as somebody else has left it."""
@@ -283,25 +241,13 @@ class Session:
 
     def _explained(self, trials: Trials, found: Mapping[str, Any]) -> None:
         """Remembers what was explained, for the page and for its parts."""
+        explained.remember_answers(trials, self.store, self._context["undeclared"])
         for sheet in trials.sheets:
-            had = self.store.get("clips", sheet.name)
-            if self._context["yamls"][sheet.name] is None and sheet.yaml.is_file():
-                text = sheet.yaml.read_text(encoding="utf-8")
-                self.store.put("clips", sheet.name, had | {"answered": text})
             self._read_again(sheet.name)
-        trials = Trials(self.root, tuple(self.sheets[one.name] for one in trials.sheets))
-        marks, plain = trials.made_of(), trials.made_of(())
-        fitted = made(trials.file("fit"), marks)
-        entry = {
-            "rounds": [], "fit": fitted, "explained": {**fitted, "text": found["paragraph"]},
-            "compare": made(trials.file("compare"), plain), "compare_view": found["compare"],
-        }  # fmt: skip
-        if found["diagnosis"] is not None:
-            entry["diagnose"] = made(trials.file("diagnose"), marks)
-            entry["diagnose_view"] = found["diagnosis"]
-        self.store.put("runs", trials.name, entry)
+        now = Trials(self.root, tuple(self.sheets[one.name] for one in trials.sheets))
+        self.store.put("runs", now.name, explained.entry(now, found))
         self.seen = None
-        if trials.name == self.trials.name:
+        if now.name == self.trials.name:
             self._show_stored()
 
     # jobs
@@ -403,7 +349,7 @@ class Session:
         self._context = {
             "trials": trials, "tracks": marks, "clip": self.active,
             "of": {"marks": trials.made_of(), "model": trials.made_of(effects)},
-            "yamls": {one.name: one.yaml if one.yaml.is_file() else None for one in trials.sheets},
+            "undeclared": {one.name for one in trials.sheets if not one.yaml.is_file()},
         }  # fmt: skip
         self.job, self.error, self.note = Job(task), "", ""
         self._changed("job")
@@ -557,10 +503,8 @@ class Session:
         is_own = found and last == (run / FILES["diagnose"]).stat().st_mtime_ns  # not a command's
         curves = entry.get("diagnose_view", {}).get("curves", {}) if is_own else {}
         diagnosis = {"sentence": "", **found, "curves": curves}
-        explained = entry.get("explained", {})
-        is_told = explained.get("at") == changed_at(run / FILES["fit"])
         self._set_results(
-            paragraph=str(explained.get("text", "")) if is_told else "",
+            paragraph=explained.paragraph(self.trials, entry),
             compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
             prediction=self._prediction(entry),
             diagnosis=diagnosis if found else None,

@@ -17,7 +17,8 @@ from galileo_jax.api.seen_sentence import sentence_of
 from galileo_jax.api.understand import Understood
 from galileo_jax.results.run import read_result
 from galileo_jax.studio import results
-from galileo_jax.studio.session import Job, Session
+from galileo_jax.studio.job import Job
+from galileo_jax.studio.session import Session
 from tests.missing import needed_module
 from tests.studio.clips import clip_in
 from tests.studio.hand import LONG_MS, Hand
@@ -173,6 +174,7 @@ PEOPLES = [
     ("real/01_slide/slide.mp4", SLIDE, (0.25, 0.36)),
     ("real/01_slide/slide_tracker_gbk.txt", {"ramp_angle_deg": "23"}, (0.27, 0.31)),
     ("plain_disc/clip.mp4", {}, None),
+    ("tables/m16_fast_ball.mp4", {"scenario": "fall"}, None),
 ]
 
 
@@ -188,7 +190,11 @@ def test_from_peoples_files_to_a_report(browser, folder, shared_data, capsys, na
         sentence, asked = page.inner_text("[data-sentence]"), hand.said()
         for key, text in typed.items():
             hand.wait_for(f"[data-answer={key}]")
-            hand.type(f"[data-answer={key}]", text)
+            if key == "scenario":
+                hand.click(f"[data-question={key}] .q-field__control")
+                hand.click(f".q-menu .q-item:has-text('{text}')")
+            else:
+                hand.type(f"[data-answer={key}]", text)
         hand.picture(f"explain_{file.suffix[1:]}", 0.0)
         hand.click("[data-do=explain]")
         hand.wait_for("[data-do=save-report]")
