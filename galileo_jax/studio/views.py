@@ -37,6 +37,7 @@ def motion_view(motion: gx.Motion) -> dict[str, Any]:
         "x": numbers(motion.measured_m[:, 0], 5),
         "y": numbers(motion.measured_m[:, 1], 5),
         "sd_x": numbers(motion.sd_m[:, 0], 6),
+        "sd_y": numbers(motion.sd_m[:, 1], 6),
         "white": numbers(motion.residuals, 3),
         "seen_px": numbers(motion.measured_px, 2),
         "outlines": [numbers(corners, 2) for corners in motion.outlines_px],

@@ -185,7 +185,7 @@ def test_from_peoples_files_to_a_report(browser, folder, shared_data, capsys, na
     file = folder / Path(name).name
     shutil.copyfile(shared_data / "people" / name, file)
     with started(file) as studio, opened(browser, studio) as page:
-        hand = Hand(page)
+        hand = Hand(page, has_pictures=file.name == "slide.mp4")
         hand.wait_for("[data-do=explain]")
         sentence, asked = page.inner_text("[data-sentence]"), hand.said()
         for key, text in typed.items():
@@ -195,14 +195,14 @@ def test_from_peoples_files_to_a_report(browser, folder, shared_data, capsys, na
                 hand.click(f".q-menu .q-item:has-text('{text}')")
             else:
                 hand.type(f"[data-answer={key}]", text)
-        hand.picture(f"explain_{file.suffix[1:]}", 0.0)
+        hand.picture("explain", 0.0)
         hand.click("[data-do=explain]")
         hand.wait_for("[data-do=save-report]")
         paragraph = page.inner_text("[data-paragraph]")
         with page.expect_download() as download:
             hand.click("[data-do=save-report]")
         report = Path(download.value.path()).read_text(encoding="utf-8")
-        hand.picture(f"explained_{file.suffix[1:]}", 1.5)
+        hand.picture("explained", 1.5)
         spent = cpu_s(studio.process.pid)
         done = hand.said()
     with capsys.disabled():
