@@ -153,6 +153,16 @@ def opened(root: Path, video: Path, store: Store) -> Sheet:
     return Sheet(root, video, info, Step(empty, text, problem), is_drawn=text is not None)
 
 
+def opened_table(root: Path, source: Path) -> Table:
+    """A table.
+
+    Raises:
+      InputError: its yaml names a file outside the folder.
+    """
+    check_declared(root, source.parent, yaml_content(source.with_suffix(".yaml")))
+    return Table(root, source)
+
+
 def changed(sheet: Sheet, marks: Marks, store: Store) -> Sheet:
     """The sheet with other marks, written to the yaml where they are valid."""
     if marks == sheet.marks and sheet.is_drawn:

@@ -13,7 +13,15 @@ from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import explained, results
-from galileo_jax.studio.clip_state import Sheet, Table, changed, opened, redone, undone
+from galileo_jax.studio.clip_state import (
+    Sheet,
+    Table,
+    changed,
+    opened,
+    opened_table,
+    redone,
+    undone,
+)
 from galileo_jax.studio.frames import Frames
 from galileo_jax.studio.job import Job
 from galileo_jax.studio.jobs import Message, Worker
@@ -87,8 +95,10 @@ class Session:
         """Takes in a film, a table or a yaml that was opened or dropped, and turns to it."""
         self.scan()
         if is_track(path):
-            self.sheets[path.stem] = Table(self.root, path)
+            self.sheets.pop(path.stem, None)
+            self._unopened[path.stem] = path
         if path.stem in self.names:
+            self._read_again(path.stem)
             self.show(path.stem)
 
     def show(self, name: str) -> None:
@@ -101,10 +111,10 @@ class Session:
         path = self._unopened.pop(name, None)
         if path is not None:
             try:
-                is_table = is_track(path)
-                self.sheets[name] = (
-                    Table(self.root, path) if is_table else opened(self.root, path, self.store)
-                )
+                if is_track(path):
+                    self.sheets[name] = opened_table(self.root, path)
+                else:
+                    self.sheets[name] = opened(self.root, path, self.store)
                 self.broken.pop(name, None)
             except InputError as error:
                 self.broken[name] = str(error).replace(f"{path}: ", "")

@@ -22,6 +22,8 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.runtime import progress
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import views
+from galileo_jax.studio.paths import check_declared
+from galileo_jax.studio.store import yaml_content
 
 Partial = Callable[[Mapping[str, Any]], None]
 
@@ -73,6 +75,8 @@ def _understood(clip: ClipLike, said: Mapping[str, Any]) -> Clip | Understood:
     """`understood`, once for every state of the clip's files."""
     path = Path(str(clip))
     files = (path, *(path.with_suffix(suffix) for suffix in YAML_SUFFIXES))
+    for one in files[1:]:
+        check_declared(Path(), path.parent, yaml_content(one))
     state = [one.stat().st_mtime_ns if one.is_file() else 0 for one in files]
     if (kept := _seen.get(str(clip))) is None or kept[0] != state:
         kept = _seen[str(clip)] = (state, understood(clip, said))

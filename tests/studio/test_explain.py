@@ -16,7 +16,8 @@ from galileo_jax.api.questions import answered
 from galileo_jax.api.seen_sentence import sentence_of
 from galileo_jax.api.understand import Understood
 from galileo_jax.results.run import read_result
-from galileo_jax.studio import results
+from galileo_jax.runtime.errors import InputError
+from galileo_jax.studio import results, work
 from galileo_jax.studio.job import Job
 from galileo_jax.studio.session import Session
 from tests.missing import needed_module
@@ -242,6 +243,19 @@ def test_the_fit_is_told_before_the_diagnosis_ends_and_can_be_cancelled(browser,
             assert is_within(page)
         page.click("[data-stage=predict]")
         assert "galileo explain drag.csv" in page.inner_text("[data-commands]")
+
+
+def test_a_table_whose_yaml_leads_out_of_the_folder_is_not_opened(tmp_path, monkeypatch):
+    (tmp_path / "in").mkdir()
+    path = tmp_path / "in" / "slope.csv"
+    for one in (path, tmp_path / "slope.csv"):
+        one.write_text(SLOPE)
+    path.with_suffix(".yaml").write_text("track: ../slope.csv\nscenario: incline\n")
+    session = Session(path.parent, path.name)
+    assert session.sheets == {} and "leads out of" in session.broken["slope"]
+    monkeypatch.chdir(path.parent)
+    with pytest.raises(InputError, match="leads out of"):
+        work.understand(clip=path.name, typed={}, partial=print)
 
 
 def test_answers_are_given_anew(tmp_path):
