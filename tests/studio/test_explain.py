@@ -6,22 +6,17 @@ import shutil
 from html import unescape
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
 import galileo_jax as gx
-from galileo_jax.api.explain import understood
-from galileo_jax.api.questions import answered
-from galileo_jax.api.seen_sentence import sentence_of
-from galileo_jax.api.understand import Understood
 from galileo_jax.results.run import read_result
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import results, work
 from galileo_jax.studio.job import Job
 from galileo_jax.studio.session import Session
 from tests.missing import needed_module
-from tests.studio.clips import clip_in
+from tests.studio.clips import clip_in, still_film
 from tests.studio.hand import LONG_MS, Hand
 from tests.studio.server import started
 from tests.studio.test_page import children_of, opened
@@ -38,47 +33,9 @@ def folder(tmp_path) -> Path:
     return tmp_path
 
 
-def still_film(path: Path) -> Path:
-    """A film in which nothing moves."""
-    picture = np.random.default_rng(1).integers(0, 255, (120, 160, 3), np.uint8)
-    code = cv2.VideoWriter.fourcc(*"mp4v")
-    film = cv2.VideoWriter(str(path), code, 30.0, (160, 120))
-    for _ in range(20):
-        film.write(cv2.GaussianBlur(picture, (9, 9), 0))
-    film.release()
-    return path
-
-
 def is_within(page) -> bool:
     """Whether nothing on the page has to be scrolled to sideways."""
     return page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-
-
-def test_the_sentence_of_a_table_and_what_is_asked_of_it(tmp_path):
-    path = tmp_path / "slope.csv"
-    path.write_text(SLOPE)
-    known = understood(path, {})
-    assert isinstance(known, Understood)
-    found = answered(known, {"ramp_angle_deg": "steep"})
-    sentence = sentence_of(known, found.answers)
-    assert sentence.startswith("One thing moves, 0.538 (in a unit that it does not say) in one")
-    assert sentence.endswith("it looks like an incline. 30 rows, 25 a second.")
-    asked = [one.key for one in found.questions]
-    assert asked == ["scenario", "track_units", "ramp_angle_deg"]
-    assert found.answers == {"scenario": "incline", "track_units": "m"}, "Enter takes the default"
-    assert found.problems == {"ramp_angle_deg": "ramp_angle_deg: 'steep' is not a number"}
-    asked = answered(known, {"scenario": "fall"}).questions
-    assert [one.key for one in asked] == ["scenario", "track_units"], "a fall has no ramp"
-
-
-def test_the_sentence_of_a_film_and_of_a_clip(tmp_path):
-    bare = understood(clip_in(tmp_path, is_bare=True), {})
-    assert re.match(r"(2|One) things? moves?", sentence_of(bare, {}))
-    assert "pictures a second." in sentence_of(bare, {})
-    still = understood(still_film(tmp_path / "still.mp4"), {})
-    assert sentence_of(still, {}).startswith("No moving thing was found: ")
-    declared = understood(clip_in(tmp_path), {})
-    assert sentence_of(declared, {}).startswith("slide.yaml says all that is needed: a ramp at ")
 
 
 def test_the_time_that_is_left_is_said_once_it_can_be_known():
