@@ -220,7 +220,9 @@ class _Page:
         now = session.versions
         new = {part for part in now if self._seen.get(part) != now[part]}
         self._seen.update(now)
-        if new & PARTS.get(tab.stage, {"clips", "marks", "results"}):
+        if "opened" in new:
+            tab.go("explain")
+        elif new & PARTS.get(tab.stage, {"clips", "marks", "results"}):
             self.show()
         elif new & {"clips", "marks", "results"}:
             self._lamps()

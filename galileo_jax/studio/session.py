@@ -100,6 +100,7 @@ class Session:
         if path.stem in self.names:
             self._read_again(path.stem)
             self.show(path.stem)
+        self._changed("opened")
 
     def show(self, name: str) -> None:
         """Turns to one clip, alone."""
