@@ -37,7 +37,7 @@ def entry(trials: Trials, found: Mapping[str, Any]) -> dict[str, Any]:
     fitted = made(trials.file("fit"), trials.made_of())
     kept: dict[str, Any] = {
         "fit": fitted,
-        "explained": {**fitted, "text": found["paragraph"]},
+        "explained": {**fitted, "paragraph": found["paragraph"], "notes": found["notes"]},
         "compare": made(trials.file("compare"), trials.made_of(())),
         "compare_view": found["compare"],
     }
@@ -47,10 +47,12 @@ def entry(trials: Trials, found: Mapping[str, Any]) -> dict[str, Any]:
     return kept
 
 
-def paragraph(trials: Trials, entry: Mapping[str, Any]) -> str:
-    """The result in words; "" where the run is not the one that was explained."""
-    told = entry.get("explained", {})
-    return str(told["text"]) if told and told["at"] == changed_at(trials.file("fit")) else ""
+def told(trials: Trials, entry: Mapping[str, Any]) -> dict[str, Any]:
+    """The result in words with its notes; empty where the run is not the one that was explained."""
+    found = entry.get("explained")
+    if not found or found.get("at") != changed_at(trials.file("fit")):
+        return {"paragraph": "", "notes": ()}
+    return {"paragraph": str(found["paragraph"]), "notes": tuple(map(str, found["notes"]))}
 
 
 def report(trials: Trials, name: str) -> str | None:

@@ -515,7 +515,7 @@ class Session:
         curves = entry.get("diagnose_view", {}).get("curves", {}) if is_own else {}
         diagnosis = {"sentence": "", **found, "curves": curves}
         self._set_results(
-            paragraph=explained.paragraph(self.trials, entry),
+            **explained.told(self.trials, entry),
             compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
             prediction=self._prediction(entry),
             diagnosis=diagnosis if found else None,

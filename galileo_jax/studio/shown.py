@@ -11,6 +11,7 @@ class Results:
 
     tracks: Mapping[str, Any]
     paragraph: str = ""  # what `explain` says
+    notes: tuple[str, ...] = ()  # that go with it
     fit: Mapping[str, Any] | None = None
     live: Mapping[str, Any] | None = None  # the model at the sliders
     compare: Mapping[str, Any] | None = None
@@ -39,7 +40,8 @@ def with_partial(shown: Results, content: Mapping[str, Any]) -> Results:
         case "fit":
             return replace(shown, fit=new, live=None)
         case "explained":
-            return replace(shown, paragraph=new["paragraph"], fit=new["fit"], live=None)
+            told = {"paragraph": new["paragraph"], "notes": tuple(new["notes"])}
+            return replace(shown, **told, fit=new["fit"], live=None)
         case "compare":
             return replace(shown, compare=new)
         case "candidate":

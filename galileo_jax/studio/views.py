@@ -102,10 +102,14 @@ def in_words(line: str) -> str:
 
 
 def explanation_view(found: gx.Explanation) -> dict[str, Any]:
-    """The result in words, and what the parts show of it."""
+    """The result in words, what is to be known of it, and what the parts show of it."""
+    measured = found.fit.measurements
+    remarks = [line for one in measured for line in (*one.remarks, *one.doubts)]
+    notes = dict.fromkeys([*remarks, *found.fit.warnings, *found.fit.taken_as_exact])
     return {
         "explained": {
             "paragraph": found.paragraph,
+            "notes": [in_words(line) for line in notes],
             "fit": fit_view(found.fit),
             "compare": comparison_view(found.check),
             "diagnosis": None if found.diagnosis is None else diagnosis_view(found.diagnosis),

@@ -8,7 +8,7 @@ from nicegui import ui
 
 from galileo_jax.clip.load import YAML_SUFFIXES
 from galileo_jax.clip.track_file import TRACK_SUFFIXES
-from galileo_jax.studio.panels.parts import main_button, on_entered, plain_button, title
+from galileo_jax.studio.panels.parts import main_button, on_entered, plain_button, remark, title
 
 POINTS = "points"  # the question that a click into the video answers
 FILES = ",".join(("video/*", *TRACK_SUFFIXES, *YAML_SUFFIXES))  # that may be dropped
@@ -125,6 +125,8 @@ def _explained(tab: "Tab") -> None:
             f"data-do=save-report>Save the report{which}</a>",
             sanitize=False,
         )
+    for line in session.results.notes:
+        remark("odd", line)
 
 
 def _drop() -> None:
