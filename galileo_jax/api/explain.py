@@ -1,6 +1,6 @@
 """`explain`: everything about a film or table in one call, as a lab report says it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -198,7 +198,7 @@ def explain(
     with progress.scope(on_progress, cancel):
         progress.report("looking", 0.0)
         with progress.part(0.0, UNDERSTOOD):
-            found_clips = [checked(one, answers) for one in sources_of(clips)]
+            found_clips, _ = answered_clips(sources_of(clips), answers, lambda _, said: said)
         found = explained(found_clips, engine, seed)
         if out is not None:
             progress.report("writing the page", 0.97)
@@ -296,8 +296,42 @@ def checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:
     Raises:
       InputError: the file is wrong, or something is missing that only a person can know.
     """
-    known = understood(clip, answers)
-    return known if isinstance(known, Clip) else clip_of(known, answers, str(clip))
+    (found,), _ = answered_clips([clip], answers, lambda _, said: said)
+    return found
+
+
+def answered_clips(
+    clips: Sequence[ClipLike],
+    said: Mapping[str, Any],
+    ask: Callable[[Understood, dict[str, Any]], dict[str, Any]],
+    look_at: Callable[[ClipLike, Mapping[str, Any]], Clip | Understood] = understood,
+) -> tuple[list[Clip], list[tuple[Understood, dict[str, Any]]]]:
+    """The checked clips, and those whose yaml leaves something open with what was answered.
+
+    What is answered of one trial holds of the next, but where its things are.
+
+    Args:
+      clips: the trials.
+      said: of all of them, by keys of the yaml.
+      ask: given what is understood of a clip, and the answers so far, returns all answers.
+      look_at: `understood`, or it with a memory or a display of its progress.
+
+    Raises:
+      InputError: of any of them; nothing was written.
+    """
+    found: list[Clip] = []
+    asked: list[tuple[Understood, dict[str, Any]]] = []
+    answers = dict(said)
+    for clip in clips:
+        known = look_at(clip, said)
+        if isinstance(known, Clip):
+            found.append(known)
+            continue
+        answers = ask(known, answers)
+        found.append(clip_of(known, answers, str(clip)))
+        asked.append((known, answers))
+        answers = {key: v for key, v in answers.items() if key != "points" or key in said}
+    return found, asked
 
 
 def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanation:
@@ -324,6 +358,7 @@ def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanatio
         with progress.part(COMPARED, 0.95):
             progress.report("what could not have been seen", 0.0)
             return Explanation(first, check, None, command, _could_not_see(check, engine, seed))
+    progress.report("asking what is missing", COMPARED, Explanation(first, check, None, command))
     with progress.part(COMPARED, 0.95):
         found = diagnose_fitted(first, engine=engine, seed=seed)
         progress.report("fitting with what is missing", 0.98)

@@ -3,6 +3,7 @@
 import math
 import re
 import shlex
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,6 +57,35 @@ def questions(known: Understood, answers: Answers) -> tuple[Question, ...]:
     ]
     told = {*answers, *known.declared}
     return tuple(one for one in asked if one is not None and one.key not in told)
+
+
+@dataclass(frozen=True)
+class Answered:
+    """All questions, with what was typed to them.
+
+    Attributes:
+      questions: in the order in which they are asked.
+      answers: by keys of the yaml; the defaults where nothing was typed.
+      problems: by the question's key, one line that says what would be right.
+    """
+
+    questions: tuple[Question, ...]
+    answers: Answers
+    problems: Mapping[str, str]
+
+
+def answered(known: Understood, typed: Mapping[str, str]) -> Answered:
+    """What a person answers who types this, by the questions' keys, and Enter to all others."""
+    asked: dict[str, Question] = {}
+    answers: dict[str, Any] = {}
+    problems: dict[str, str] = {}
+    while left := [one for one in questions(known, answers) if one.key not in asked]:
+        one = asked[left[0].key] = left[0]
+        try:
+            answers |= parsed(one, typed.get(one.key, ""), known, answers)
+        except InputError as error:
+            problems[one.key] = str(error)
+    return Answered(tuple(asked.values()), answers, problems)
 
 
 def check_answered(known: Understood, answers: Answers) -> None:
@@ -132,7 +162,7 @@ def _scenario(known: Understood, answers: Answers) -> Question | None:
     likely = known.likely(answers)
     if likely is not None and likely.is_clear:
         return None
-    text = f"What kind of motion is it? One of {', '.join(SCENARIOS)}"
+    text = "What kind of motion is it?"
     if likely is None:
         why = "the motion could not be followed"
         return Question("scenario", text, why, "--scenario ramp", None, tuple(SCENARIOS))
@@ -158,7 +188,7 @@ def _units(known: Understood, answers: Answers) -> Question | None:
     if known.declared.get("pixels_per_metre") is not None:
         return None
     choices = (*METRES_PER_UNIT, "px")
-    text = f"In which unit are its lengths? One of {', '.join(choices)}"
+    text = "In which unit are its lengths?"
     size = max(seen.moved)
     if (unit := _unit_by_gravity(known, answers)) is not None:
         why = f"it falls as free fall does in {unit}"

@@ -43,6 +43,11 @@ class FilmPath:
     direction: str = "right"
     way_px: np.ndarray | None = None
 
+    @property
+    def moved_px(self) -> float:
+        """How far from one end of its way to the other."""
+        return 0.0 if self.way_px is None else float(np.hypot(*np.ptp(self.way_px, axis=1)))
+
 
 @dataclass(frozen=True, eq=False)
 class Understood:
@@ -219,10 +224,8 @@ def _with_things(known: Understood) -> Understood:
     try:
         proposal = propose(known.source)
     except InputError as error:
-        why = (
-            str(error).removeprefix(f"{known.source}: ").removesuffix("; mark the objects by hand")
-        )
-        return replace(known, unseen=why)
+        why = str(error).removeprefix(f"{known.source}: ")
+        return replace(known, unseen=why.removesuffix("; mark the objects by hand"))
     things = {point: proposal.sizes_px[name] for name, point in proposal.objects.items()}
     is_pair = len(things) > 1 and not proposal.doubts
     foot = proposal.foot if proposal.scenario == "ramp" else None

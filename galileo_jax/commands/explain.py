@@ -4,7 +4,7 @@ import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Any
@@ -139,28 +139,23 @@ def _clips(
     files: Sequence[str], said: dict[str, Any], flag: Event | None = None, out: str | None = None
 ) -> "list[Clip]":
     """The checked clips; writes the yaml of those that have none, when all of them are right."""
-    from galileo_jax.api.explain import sources_of, understood
-    from galileo_jax.api.proposed_clip import clip_of, write_yaml
-    from galileo_jax.api.understand import Understood
+    from galileo_jax.api.explain import answered_clips, sources_of, understood
+    from galileo_jax.api.proposed_clip import write_yaml
+
+    def look_at(clip: Any, said: Mapping[str, Any]) -> "Clip | Understood":
+        with progress_display() as display, progress.scope(display, flag):
+            return understood(clip, said)
 
     is_terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    clips: list[Clip] = []
-    to_write: list[tuple[Understood, dict[str, Any]]] = []
-    answers = said
-    for source in sources_of(list(files)):
-        with progress_display() as display, progress.scope(display, flag):
-            known = understood(source, said)
-        if isinstance(known, Understood):
-            answers = asked(known, answers, out) if is_terminal else answers
-            clips.append(clip_of(known, answers, str(source)))
-            to_write.append((known, answers))
-            # What holds of one trial holds of the next, but where its things are.
-            answers = {key: value for key, value in answers.items() if key != "points"}
-        else:
-            clips.append(known)
+    ask = (lambda known, answers: asked(known, answers, out)) if is_terminal else _as_said
+    clips, to_write = answered_clips(sources_of(list(files)), said, ask, look_at)
     for known, answers in to_write:
         _write(known, answers, write_yaml)
     return clips
+
+
+def _as_said(known: "Understood", answers: dict[str, Any]) -> dict[str, Any]:
+    return answers
 
 
 def asked(known: "Understood", answers: dict[str, Any], out: str | None = None) -> dict[str, Any]:
@@ -177,9 +172,8 @@ def asked(known: "Understood", answers: dict[str, Any], out: str | None = None) 
       InputError: the input ended (Ctrl-D) before all was answered.
     """
     from galileo_jax.api.questions import Question, parsed, questions
+    from galileo_jax.api.seen_sentence import sentence_of
 
-    seen = known.look.summary().split("\n\n")[0].splitlines()
-    told = [seen[0], *(line for line in seen if line.startswith(("moves:", "time step:")))]
     is_first = True
 
     def still_open() -> Sequence[Question]:
@@ -188,12 +182,13 @@ def asked(known: "Understood", answers: dict[str, Any], out: str | None = None) 
 
     while open_ones := still_open():
         if is_first:
-            command.say("\n".join(told))
+            command.say(sentence_of(known, answers))
             _show_marks(known, Path(out) if out else Path("runs") / known.source.stem)
             is_first = False
         one = open_ones[0]
         default = f" [{one.default}]" if one.default is not None else ""
-        command.say(f"{one.text}\n  ({one.why})")
+        choices = f" One of {', '.join(one.choices)}" if one.choices else ""
+        command.say(f"{one.text}{choices}\n  ({one.why})")
         try:
             answers = answers | parsed(one, input(f"  {one.key}{default}: "), known, answers)
         except EOFError:

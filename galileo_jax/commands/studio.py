@@ -1,4 +1,4 @@
-"""`galileo studio`: film, mark, compare, add what is missing, in one page on this machine."""
+"""`galileo studio`: a film or table explained, and its parts, in one page on this machine."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,8 +26,8 @@ def _parser() -> command.Parser:
         nargs="?",
         default=Path("."),
         type=Path,
-        metavar="CLIP|FOLDER",
-        help="a video, or a folder with videos (default: this folder)",
+        metavar="FILE|FOLDER",
+        help="a film, a table, or a folder with films (default: this folder)",
     )
     parser.add_argument(
         "--port",
@@ -42,7 +42,7 @@ def _parser() -> command.Parser:
         help="print the address, open no browser (default: off)",
     )
     parser.examples(
-        "galileo studio clip.mp4                               one clip",
+        "galileo studio clip.mp4                               one film, or a table",
         "galileo studio trials/ --no-browser                   a folder of trials",
     )
     return parser

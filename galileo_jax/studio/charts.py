@@ -38,13 +38,25 @@ def track_figure(track: Mapping[str, Any], is_dark: bool, end_s: float) -> dict[
 
 
 def fit_figure(motion: Mapping[str, Any], is_dark: bool) -> dict[str, Any]:
-    """Measured places with their errors, and the model's curve."""
-    times, marks = motion["times"], []
+    """Measured places with their errors, and the model's curve, where it moves most."""
+    times, marks, axis = motion["times"], [], _axis(motion)
     for i, name in enumerate(motion["objects"]):
-        measured, sd = (np.array(motion[key][i], float) for key in ("x", "sd_x"))
+        measured, sd = (np.array(motion[key][i], float) for key in (axis, f"sd_{axis}"))
+        sd[~(sd <= np.nanmax(measured) - np.nanmin(measured))] = np.nan  # not measured
         marks.append(Points(times, measured, object_colour(i), f"{name}, measured", sd=sd))
-        marks.append(Line(times, motion["model_x"][i], "ink", f"{name}, model", width_px=2))
-    return _figure(Panel("x, m", tuple(marks), xlabel="time, s"), is_dark)
+        curve = motion[f"model_{axis}"][i]
+        marks.append(Line(times, curve, "ink", f"{name}, model", width_px=2))
+    return _figure(Panel(f"{axis}, m", tuple(marks), xlabel="time, s"), is_dark)
+
+
+def _axis(motion: Mapping[str, Any]) -> str:
+    """Along which most is moved: y of what falls, x of all else."""
+    x, y = (np.array(motion[f"model_{axis}"], float) for axis in "xy")
+    return "y" if _longest(y) > 2 * _longest(x) else "x"
+
+
+def _longest(places: np.ndarray) -> float:
+    return float(np.max(np.nanmax(places, axis=-1) - np.nanmin(places, axis=-1)))
 
 
 def residual_figure(

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from galileo_jax.api.label import label
+from galileo_jax.api.understand import is_declared
 from galileo_jax.clip.label import updated_file
 from galileo_jax.clip.load import check_clip
 from galileo_jax.clip.yaml_file import read_mapping
@@ -41,6 +42,37 @@ STORED = TypeAdapter(Step)
 
 
 @dataclass(frozen=True)
+class Table:
+    """A clip that is a table: it has no pictures to mark.
+
+    Attributes:
+      root: the folder that was opened.
+      source: the table.
+    """
+
+    root: Path
+    source: Path
+
+    @property
+    def name(self) -> str:
+        """The clip's, without suffix."""
+        return self.source.stem
+
+    @property
+    def yaml(self) -> Path:
+        """Where what is declared is written."""
+        return self.source.with_suffix(".yaml")
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether its yaml leaves nothing open."""
+        try:
+            return is_declared(self.source)
+        except InputError:
+            return False
+
+
+@dataclass(frozen=True)
 class Sheet:
     """A clip with its marks.
 
@@ -70,6 +102,11 @@ class Sheet:
     def yaml(self) -> Path:
         """Where what is declared is written."""
         return self.video.with_suffix(".yaml")
+
+    @property
+    def source(self) -> Path:
+        """What was filmed."""
+        return self.video
 
     @property
     def marks(self) -> Marks:
@@ -114,6 +151,16 @@ def opened(root: Path, video: Path, store: Store) -> Sheet:
         problem = _problem_of(path)
     empty = blank(info.container_fps or 30.0, info.size_px)
     return Sheet(root, video, info, Step(empty, text, problem), is_drawn=text is not None)
+
+
+def opened_table(root: Path, source: Path) -> Table:
+    """A table.
+
+    Raises:
+      InputError: its yaml names a file outside the folder.
+    """
+    check_declared(root, source.parent, yaml_content(source.with_suffix(".yaml")))
+    return Table(root, source)
 
 
 def changed(sheet: Sheet, marks: Marks, store: Store) -> Sheet:

@@ -212,12 +212,13 @@ def _run(
     send: Callable[[Message], None],
     cancel: Any,
 ) -> None:
+    import galileo_jax as gx
     from galileo_jax.runtime.errors import InputError
     from galileo_jax.runtime.progress import Cancelled, scope
 
     def on_progress(stage: str, share: float, partial: Any) -> None:
         send(Message(number, task, "progress", (stage, share)))
-        if isinstance(partial, dict):
+        if isinstance(partial, dict | gx.Explanation):
             send(Message(number, task, "partial", work.shown(partial)))
 
     def partial(content: Mapping[str, Any]) -> None:

@@ -1,6 +1,7 @@
 """The page of one tab: the stages above, the video and its curves left, the stage's panel right."""
 
 import asyncio
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,13 +12,14 @@ from nicegui import ui
 
 from galileo_jax.studio import charts
 from galileo_jax.studio.marks import Marks, corrected, moved, with_object
-from galileo_jax.studio.panels import compare, diagnose, fit, marks, predict, track, video
+from galileo_jax.studio.panels import compare, diagnose, explain, fit, marks, predict, track, video
 from galileo_jax.studio.session import Session
 from galileo_jax.studio.stages import STAGES
 from galileo_jax.studio.viewer import Viewer
 
 HERE = Path(__file__).parent
 PANELS = {
+    "explain": explain.build,
     "video": video.build,
     "marks": marks.build,
     "track": track.build,
@@ -28,7 +30,11 @@ PANELS = {
 }
 POLL_S = 0.1
 CURVES_AFTER_S = 0.03
-PARTS = {"video": {"clips", "marks"}, "marks": {"clips", "marks"}}  # that their panels show
+PARTS = {
+    "video": {"clips", "marks"},
+    "marks": {"clips", "marks"},
+    "explain": {"clips", "results"},
+}  # that their panels show
 RUNNING = {"propose": "marks", "open_run": "fit", "export": "predict"}  # else its own stage
 
 
@@ -53,7 +59,7 @@ class Tab:
     """
 
     session: Session
-    stage: str = "video"
+    stage: str = "explain"
     candidate: str = ""
     placing: str = ""
     frame: int = 0
@@ -74,6 +80,8 @@ class Tab:
         self.stage, self.candidate, self.placing = stage, "", ""
         if stage in ("fit", "compare", "diagnose", "predict"):
             self.session.open_run()
+        if stage == "marks":
+            self.session.propose_once()
         self.redraw()
 
     def mark(self, marks: Marks) -> None:
@@ -104,8 +112,6 @@ def build_page(session: Session) -> None:
     page.show()
     if tab.stage in ("fit", "compare", "diagnose", "predict"):
         session.open_run()
-    if session.sheet is not None and not session.sheet.is_drawn and session.job is None:
-        ui.timer(0.2, lambda: _propose_once(session), once=True)
     ui.timer(POLL_S, page.look)
 
 
@@ -150,7 +156,10 @@ class _Page:
         if sheet is None or not tab.placing:
             return
         (x, y, frame), name, tab.placing = event.args, tab.placing, ""
-        if name == marks.NEW:
+        if name == explain.POINTS:
+            self._session.say(name, f"{x:.0f} {y:.0f}")
+            self.show()
+        elif name == marks.NEW:
             tab.mark(with_object(sheet.marks, (x, y)))
         else:
             tab.mark(corrected(sheet.marks, name, int(frame), (x, y)))
@@ -165,6 +174,7 @@ class _Page:
         self._seen.update(self._session.versions)
         self._lamps()
         self._viewer.show(self._session, tab.stage, bool(tab.placing))
+        self._viewer.set_visibility(self._session.sheet is not None)
         if tab.drawn == (now := _shown(tab)):
             tab.refresh()
         else:
@@ -205,10 +215,14 @@ class _Page:
     def look(self) -> None:
         """Shows what has changed since it was looked last."""
         session, tab = self._session, self._tab
+        if tab.stage == "explain":
+            session.understand()
         now = session.versions
         new = {part for part in now if self._seen.get(part) != now[part]}
         self._seen.update(now)
-        if new & PARTS.get(tab.stage, {"clips", "marks", "results"}):
+        if "opened" in new:
+            tab.go("explain")
+        elif new & PARTS.get(tab.stage, {"clips", "marks", "results"}):
             self.show()
         elif new & {"clips", "marks", "results"}:
             self._lamps()
@@ -225,7 +239,7 @@ class _Page:
 
 def _shown(tab: Tab) -> Any:
     """What a panel is built of: while it is the same, the panel stays as it is."""
-    if (now := marks.drawn(tab)) is not None:
+    if (now := marks.drawn(tab) or explain.drawn(tab)) is not None:
         return now
     session = tab.session
     found = session.results
@@ -237,18 +251,12 @@ def _shown(tab: Tab) -> Any:
     )  # fmt: skip
 
 
-def _propose_once(session: Session) -> None:
-    if session.sheet is not None and not session.sheet.is_drawn and session.job is None:
-        session.propose()
-
-
 def _first_stage(session: Session) -> str:
     """The stage that a clip has come to."""
-    if session.sheet is None:
-        return "video"
-    if not session.sheet.is_complete:
-        return "marks"
     states = session.states
+    is_new = session.sheet is None or not {"done", "stale"} & {states["track"], states["fit"]}
+    if is_new or states["explain"] != "open":
+        return "explain"
     if states["diagnose"] in ("done", "stale"):
         return "diagnose"
     return next((s for s in ("track", "fit", "compare") if states[s] != "done"), "diagnose")
@@ -309,12 +317,12 @@ def _figure(tab: Tab) -> Any:
     motion = Viewer.motion(tab.session)
     if tab.stage == "track" or motion is None:
         track = found.tracks.get(tab.session.active)
-        is_wanted = tab.stage not in ("video", "marks")
+        is_wanted = tab.stage not in ("explain", "video", "marks")
         if track is None or not is_wanted or tab.session.sheet is None:
             return None
         count = tab.session.sheet.info.frame_count
         return charts.track_figure(track, dark, count / tab.session.sheet.marks.fps)
-    if tab.stage == "fit":
+    if tab.stage in ("explain", "fit"):
         return charts.fit_figure(motion, dark)
     is_of_this_model = found.compare is not None and tab.session.states["compare"] == "done"
     stretches = found.compare["stretches"] if found.compare and is_of_this_model else ()
@@ -344,7 +352,9 @@ def _job_bar(session: Session) -> None:
     assert job is not None
     with ui.element("div").classes("job").props('role="status"'):
         text = "stopping" if job.is_cancelled else job.stage
-        ui.label(f"{STAGES.get(job.task, 'Looking')}: {text}").classes("small")
+        left = job.time_left(time.monotonic())
+        said = ", ".join(filter(None, (text, left)))
+        ui.label(f"{STAGES.get(job.task, 'Looking')}: {said}").classes("small")
         with ui.element("div").classes("meter"):
             ui.element("i").style(f"width: {100 * job.share:.0f}%")
         if not job.is_cancelled:

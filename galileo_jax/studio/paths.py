@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Any
 
 from galileo_jax.clip.load import FILM_SUFFIXES
+from galileo_jax.clip.track_file import is_track
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.studio.store import yaml_content
 
 NAME = re.compile(r"[\w][\w .()+-]{0,79}", re.UNICODE)
 
@@ -43,6 +45,18 @@ def videos(root: Path) -> dict[str, Path]:
         if not is_video or path.stem in found or not NAME.fullmatch(path.stem):
             continue
         if path.is_file() and path.resolve().is_relative_to(root.resolve()):
+            found[path.stem] = path
+    return found
+
+
+def tables(root: Path) -> dict[str, Path]:
+    """The tables of a folder that a yaml beside them declares, by name without suffix."""
+    found: dict[str, Path] = {}
+    for path in sorted(root.iterdir()):
+        is_plain = is_track(path) and NAME.fullmatch(path.stem) and not path.name.startswith(".")
+        if not is_plain or not path.resolve().is_relative_to(root.resolve()):
+            continue
+        if yaml_content(path.with_suffix(".yaml")).get("track") == path.name:
             found[path.stem] = path
     return found
 

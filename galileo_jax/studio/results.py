@@ -1,6 +1,7 @@
 """What lies in a run's folder, as the page shows it; nothing in it is run or trusted."""
 
 import csv
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,8 @@ from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.paths import below, check_declared
+
+BESIDE = re.compile(r'<p><a href="[\w/.-]+\.html">[^<]*</a></p>\n')
 
 
 def program_of(run: Path) -> str | None:
@@ -80,6 +83,11 @@ def with_round(rounds: Sequence[Mapping[str, Any]], new: Mapping[str, Any]) -> l
     """The rounds with one more; those whose model is not a part of the new one's are over."""
     own = set(new["effects"])
     return [dict(one) for one in (*(r for r in rounds if set(r["effects"]) < own), new)]
+
+
+def alone(page: str) -> str:
+    """A run's page as one file to be kept: without the links to pages beside it."""
+    return BESIDE.sub("", page)
 
 
 def _number(text: str) -> float | None:

@@ -9,8 +9,10 @@ import webbrowser
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES
+from galileo_jax.clip.track_file import is_track
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.guard import Guard
 from galileo_jax.studio.session import Session
@@ -114,15 +116,22 @@ def make_app(
         caching = {"cache-control": "no-store"}
         return Response(path.read_bytes(), media_type="image/png", headers=caching)
 
+    @app.get("/report/{name}")
+    def report(name: str) -> Response:
+        """A clip's page, to be kept."""
+        page = session.report(name)
+        if page is None:
+            return PlainTextResponse("no such report", 404)
+        kept = {"content-disposition": f"attachment; filename*=utf-8''{quote(name)}.html"}
+        return Response(page, media_type="text/html", headers=kept)
+
     @app.put(UPLOAD + "{name}")
     async def upload(name: str, request: Request) -> Response:
         try:
             path = await receive(session.root, name, _chunks(request), largest_upload)
         except InputError as error:
             return PlainTextResponse(f"{error}\n", 422)
-        session.scan()
-        if path.stem in session.sheets:
-            session.show(path.stem)
+        session.add(path)
         return PlainTextResponse(f"{path.name} is there\n")
 
     ui.page("/")(lambda: build_page(session))
@@ -140,14 +149,16 @@ async def _chunks(request: Any) -> AsyncIterator[bytes]:
 
 
 def _source(path: Path) -> tuple[Path, str | None]:
-    """The folder to open, and the clip in it."""
+    """The folder to open, and the name of the clip in it, of a table with its suffix."""
     if path.is_dir():
         return path.resolve(), None
     if not path.exists():
         raise InputError(f"{path}: no such file or folder")
     if path.suffix.lower() in (*YAML_SUFFIXES, *FILM_SUFFIXES):
         return path.parent.resolve(), path.stem
-    raise InputError(f"{path}: a video, its yaml or a folder with videos expected")
+    if is_track(path):
+        return path.parent.resolve(), path.name
+    raise InputError(f"{path}: a film, a table, its yaml or a folder with films expected")
 
 
 def _listening(port: int | None) -> socket.socket:

@@ -4,20 +4,30 @@ import asyncio
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from galileo_jax.clip.track_file import is_track
 from galileo_jax.report.diagnosis_text import PROPOSED
 from galileo_jax.results.stale_outputs import document
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.studio import results
-from galileo_jax.studio.clip_state import Sheet, changed, opened, redone, undone
+from galileo_jax.studio import explained, results
+from galileo_jax.studio.clip_state import (
+    Sheet,
+    Table,
+    changed,
+    opened,
+    opened_table,
+    redone,
+    undone,
+)
 from galileo_jax.studio.frames import Frames
+from galileo_jax.studio.job import Job
 from galileo_jax.studio.jobs import Message, Worker
 from galileo_jax.studio.marks import Marks
 from galileo_jax.studio.marks_yaml import proposed
-from galileo_jax.studio.paths import videos
+from galileo_jax.studio.paths import tables, videos
 from galileo_jax.studio.shown import Results, with_partial
 from galileo_jax.studio.stages import FILES, State, Trials, made, states, track_files, track_mark
 from galileo_jax.studio.store import Store
@@ -26,27 +36,17 @@ MOST_AT_ONCE = 12  # videos of a folder that are decoded before the page opens
 MOST_FRAMES = 4  # clips whose frames are held
 
 
-@dataclass(frozen=True)
-class Job:
-    """The job that runs."""
-
-    task: str
-    stage: str = "starting"
-    share: float = 0.0
-    is_cancelled: bool = False
-
-
 class Session:
     """State of the studio; all of it is changed in the server's loop.
 
     Args:
       root: the folder that was opened.
-      clip: which of its clips is shown first; None: the first.
+      clip: which of its clips is shown first, a table with its suffix; None: the first.
     """
 
     def __init__(self, root: Path, clip: str | None = None):
         self.root, self.store = root.resolve(), Store(root)
-        self.sheets: dict[str, Sheet] = {}
+        self.sheets: dict[str, Sheet | Table] = {}
         self.broken: dict[str, str] = {}
         self.active = ""
         self.chosen: tuple[str, ...] = ()
@@ -54,6 +54,9 @@ class Session:
         self.error = ""
         self.note = ""
         self.results = Results({})
+        self.seen: Mapping[str, Any] | None = None  # what is understood of the active clip
+        self.typed: dict[str, str] = {}  # answers to what is asked of it
+        self._looking: int | None = None  # the question to the worker that is waited for
         self.versions: Counter[str] = Counter()
         self._frames: dict[str, Frames] = {}
         self._next: list[Callable[[], None]] = []
@@ -65,13 +68,17 @@ class Session:
         self._effects_left: tuple[str, ...] = ()  # in the result that lies there
         self._unopened: dict[str, Path] = {}
         self.scan()
-        self.show(clip if clip in self.names else next(iter(self.names), ""))
+        if clip is not None and is_track(path := self.root / clip):
+            self.add(path)
+        else:
+            is_known = clip in self.names or clip in self.broken
+            self.show(clip if clip and is_known else next(iter(self.names), ""))
 
     # clips
 
     def scan(self) -> None:
         """Looks at the folder again; a video is decoded once to know it, the first ones now."""
-        for name, path in videos(self.root).items():
+        for name, path in {**tables(self.root), **videos(self.root)}.items():
             if name in self.sheets:
                 continue
             self._unopened[name] = path
@@ -84,6 +91,17 @@ class Session:
         """Of all clips that can be shown."""
         return tuple(sorted({*self.sheets, *self._unopened}))
 
+    def add(self, path: Path) -> None:
+        """Takes in a film, a table or a yaml that was opened or dropped, and turns to it."""
+        self.scan()
+        if is_track(path):
+            self.sheets.pop(path.stem, None)
+            self._unopened[path.stem] = path
+        if path.stem in self.names:
+            self._read_again(path.stem)
+            self.show(path.stem)
+        self._changed("opened")
+
     def show(self, name: str) -> None:
         """Turns to one clip, alone."""
         if self._open(name):
@@ -94,7 +112,10 @@ class Session:
         path = self._unopened.pop(name, None)
         if path is not None:
             try:
-                self.sheets[name] = opened(self.root, path, self.store)
+                if is_track(path):
+                    self.sheets[name] = opened_table(self.root, path)
+                else:
+                    self.sheets[name] = opened(self.root, path, self.store)
                 self.broken.pop(name, None)
             except InputError as error:
                 self.broken[name] = str(error).replace(f"{path}: ", "")
@@ -117,8 +138,9 @@ class Session:
 
     @property
     def sheet(self) -> Sheet | None:
-        """The active clip's."""
-        return self.sheets.get(self.active)
+        """The active clip's; None where that is a table."""
+        found = self.sheets.get(self.active)
+        return found if isinstance(found, Sheet) else None
 
     @property
     def trials(self) -> Trials:
@@ -140,17 +162,18 @@ class Session:
 
     @property
     def states(self) -> dict[str, State]:
-        """Of the seven stages."""
+        """Of the stages."""
         return states(self.trials, self.store, self.effects)
 
     def picture(self, name: str, index: int) -> bytes | None:
         """A frame of a clip, JPEG."""
-        if name not in self.sheets:
+        sheet = self.sheets.get(name)
+        if not isinstance(sheet, Sheet):
             return None
         if name not in self._frames:
             while len(self._frames) >= MOST_FRAMES:
                 self._frames.pop(next(iter(self._frames)))
-            self._frames[name] = Frames(self.sheets[name].video)
+            self._frames[name] = Frames(sheet.video)
         return self._frames[name].picture(index)
 
     # marks
@@ -175,9 +198,75 @@ class Session:
             self.error = ""
         except (InputError, OSError) as error:
             self.error = " ".join(str(error).split())
+        self.seen = None
         self._changed("marks", "job")
 
+    # what is understood, and explained
+
+    def understand(self) -> None:
+        """Looks at the active clip, where that has not been done, to say what it shows."""
+        if self.active and self.seen is None and self._looking is None and self.job is None:
+            self._look()
+
+    def say(self, key: str, text: str) -> None:
+        """Takes an answer to a question, as it is typed."""
+        self.typed[key] = text
+        self._look()
+
+    def _look(self) -> None:
+        self._loop = self._loop or asyncio.get_running_loop()
+        name = self.sheets[self.active].source.name
+        self._looking = self.worker.ask("understand", clip=name, typed=dict(self.typed))
+
+    def explain(self) -> None:
+        """Says what the chosen clips show: `galileo FILE` with the answers that were typed."""
+        self._start("explain", clips=self.trials.files, typed=dict(self.typed), run=self._run)
+
+    def answer_anew(self) -> None:
+        """Asks again what was asked: what `explain` wrote to the yaml is taken back."""
+        for sheet in self.answered:
+            sheet.yaml.unlink()
+        self._back()
+
+    def _back(self) -> None:
+        """To what lies in the folder; what was typed stays."""
+        typed = self.typed
+        for sheet in self.trials.sheets:
+            self._read_again(sheet.name)
+        self._reopen()
+        self.typed = typed
+
+    @property
+    def answered(self) -> tuple[Sheet | Table, ...]:
+        """The chosen clips whose yaml is what `explain` wrote there."""
+        return explained.answered(self.trials, self.store)
+
+    def report(self, name: str) -> str | None:
+        """The page of a chosen clip's run, to be kept as one file; None: there is none."""
+        return explained.report(self.trials, name) if name in self.chosen else None
+
+    def _read_again(self, name: str) -> None:
+        """A clip's yaml as somebody else has left it."""
+        if isinstance(sheet := self.sheets.get(name), Sheet):
+            self.sheets[name] = opened(self.root, sheet.video, self.store)
+
+    def _explained(self, trials: Trials, found: Mapping[str, Any]) -> None:
+        """Remembers what was explained, for the page and for its parts."""
+        explained.remember_answers(trials, self.store, self._context["undeclared"])
+        for sheet in trials.sheets:
+            self._read_again(sheet.name)
+        now = Trials(self.root, tuple(self.sheets[one.name] for one in trials.sheets))
+        self.store.put("runs", now.name, explained.entry(now, found))
+        self.seen = None
+        if now.name == self.trials.name:
+            self._show_stored()
+
     # jobs
+
+    def propose_once(self) -> None:
+        """Does what `propose` does, where nothing is drawn yet and nothing is computed."""
+        if self.sheet is not None and not self.sheet.is_drawn and self.job is None:
+            self.propose()
 
     def propose(self) -> None:
         """Looks for the objects and the ramp of a clip that has no marks."""
@@ -271,6 +360,7 @@ class Session:
         self._context = {
             "trials": trials, "tracks": marks, "clip": self.active,
             "of": {"marks": trials.made_of(), "model": trials.made_of(effects)},
+            "undeclared": {one.name for one in trials.sheets if not one.yaml.is_file()},
         }  # fmt: skip
         self.job, self.error, self.note = Job(task), "", ""
         self._changed("job")
@@ -280,7 +370,9 @@ class Session:
             self._loop.call_soon_threadsafe(self._receive, message)
 
     def _receive(self, message: Message) -> None:
-        if message.task in ("simulate", "open_run"):
+        if message.task == "understand":
+            self._understood(message)
+        elif message.task in ("simulate", "open_run"):
             self._answered(message)
         elif message.kind == "progress":
             stage, share = message.content
@@ -292,6 +384,13 @@ class Session:
         else:
             self._ended(message)
 
+    def _understood(self, message: Message) -> None:
+        if message.kind in ("progress", "partial") or message.job != self._looking:
+            return
+        self._looking = None
+        self.seen = {"problem": message.content} if message.kind == "error" else message.content
+        self._changed("clips")
+
     def _partial(self, content: Mapping[str, Any]) -> None:
         if self._context["trials"].name != self.trials.name:
             return
@@ -302,6 +401,8 @@ class Session:
         follow, self._next, self.job = self._next, [], None
         if message.task == "track" and message.kind != "done":
             self._set_results(tracks=self._tracks())  # as they were
+        if message.task == "explain" and message.kind != "done":
+            self._back()
         if message.kind == "done":
             self._record(message.task, message.content)
             for action in follow:
@@ -321,11 +422,16 @@ class Session:
             return
         if task == "track":
             for sheet in trials.sheets:
+                if isinstance(sheet, Table):
+                    continue
                 entry = self.store.get("clips", sheet.name)
                 path = track_files(sheet) / "track_px.csv"
                 mark = made(path, self._context["tracks"][sheet.name])
                 self.store.put("clips", sheet.name, entry | {"tracked": mark})
             self._changed("results")
+            return
+        if task == "explain":
+            self._explained(trials, content["explained"])
             return
         if task == "export":
             self.note = "Written: " + ", ".join(content["files"])
@@ -353,7 +459,7 @@ class Session:
 
     def _propose(self, found: Mapping[str, Any]) -> None:
         sheet = self.sheets.get(self._context["clip"])
-        if sheet is None or sheet.is_drawn:
+        if not isinstance(sheet, Sheet) or sheet.is_drawn:
             return
         marks = proposed(found, sheet.info.size_px)
         self.sheets[sheet.name] = changed(sheet, marks, self.store)
@@ -384,7 +490,8 @@ class Session:
 
     def _reopen(self) -> None:
         """Shows what lies in the folder for the clips that are chosen now."""
-        self.results = Results(self._tracks())
+        self.results, self.seen, self._looking = Results(self._tracks()), None, None
+        self.typed = {}
         self._show_stored()
         self._changed("clips", "marks", "results", "job")
 
@@ -408,6 +515,7 @@ class Session:
         curves = entry.get("diagnose_view", {}).get("curves", {}) if is_own else {}
         diagnosis = {"sentence": "", **found, "curves": curves}
         self._set_results(
+            **explained.told(self.trials, entry),
             compare=entry.get("compare_view") if (run / FILES["compare"]).is_file() else None,
             prediction=self._prediction(entry),
             diagnosis=diagnosis if found else None,

@@ -10,6 +10,8 @@ class Results:
     """Views of what was computed for the chosen clips; None: not there."""
 
     tracks: Mapping[str, Any]
+    paragraph: str = ""  # what `explain` says
+    notes: tuple[str, ...] = ()  # that go with it
     fit: Mapping[str, Any] | None = None
     live: Mapping[str, Any] | None = None  # the model at the sliders
     compare: Mapping[str, Any] | None = None
@@ -37,6 +39,9 @@ def with_partial(shown: Results, content: Mapping[str, Any]) -> Results:
             return _with_track(shown, new)
         case "fit":
             return replace(shown, fit=new, live=None)
+        case "explained":
+            told = {"paragraph": new["paragraph"], "notes": tuple(new["notes"])}
+            return replace(shown, **told, fit=new["fit"], live=None)
         case "compare":
             return replace(shown, compare=new)
         case "candidate":

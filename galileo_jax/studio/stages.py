@@ -1,4 +1,4 @@
-"""The seven stages: which are done, which are out of date, which wait for another."""
+"""The stages: which are done, which are out of date, which wait for another."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,12 +6,13 @@ from typing import Any, Literal
 
 from galileo_jax.results.run import RESULT
 from galileo_jax.results.stale_outputs import DOCUMENTS, PREDICTION
-from galileo_jax.studio.clip_state import Sheet
+from galileo_jax.studio.clip_state import Sheet, Table
 from galileo_jax.studio.store import Store, fingerprint, yaml_content
 
 State = Literal["locked", "open", "done", "stale"]
 
 STAGES = {
+    "explain": "Explain",
     "video": "Video",
     "marks": "Marks",
     "track": "Track",
@@ -33,7 +34,7 @@ class Trials:
     """
 
     root: Path
-    sheets: tuple[Sheet, ...]
+    sheets: tuple[Sheet | Table, ...]
 
     @property
     def name(self) -> str:
@@ -55,14 +56,14 @@ class Trials:
     @property
     def files(self) -> list[str]:
         """The clips as a command is given them, in the folder."""
-        return [sheet.video.name for sheet in self.sheets]
+        return [sheet.source.name for sheet in self.sheets]
 
     def made_of(self, *more: Any) -> str:
         """What tells results of these marks from those of others."""
         return fingerprint([yaml_content(sheet.yaml) for sheet in self.sheets], *more)
 
 
-def track_files(sheet: Sheet) -> Path:
+def track_files(sheet: Sheet | Table) -> Path:
     """The folder that `galileo track` writes by default."""
     return sheet.root / f"{sheet.name}_track"
 
@@ -76,12 +77,14 @@ def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, 
         date where it is younger than the yaml.
       effects: of the fitted model.
     """
-    found: dict[str, State] = {"video": "done" if trials.sheets else "open"}
+    found: dict[str, State] = {"explain": "open", "video": "done" if trials.sheets else "open"}
     complete = bool(trials.sheets) and all(sheet.is_complete for sheet in trials.sheets)
     found["marks"] = "locked" if not trials.sheets else "done" if complete else "open"
     marks = trials.made_of() if complete else ""
     entry = store.get("runs", trials.name)
     fit = _state(trials, "fit", entry, marks)
+    if entry.get("explained", {}).get("at") == changed_at(trials.file("fit")):
+        found["explain"] = fit
     tracked = [_track_state(sheet, store) for sheet in trials.sheets]
     if not complete:
         found["track"] = "locked"
@@ -101,12 +104,19 @@ def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, 
     return found
 
 
-def track_mark(sheet: Sheet) -> str:
+def track_mark(sheet: Sheet | Table) -> str:
     """What a track was made of."""
     return fingerprint(yaml_content(sheet.yaml))
 
 
-def _track_state(sheet: Sheet, store: Store) -> State:
+def changed_at(path: Path) -> int:
+    """When a file was written; 0 where it is not there."""
+    return path.stat().st_mtime_ns if path.is_file() else 0
+
+
+def _track_state(sheet: Sheet | Table, store: Store) -> State:
+    if isinstance(sheet, Table):
+        return "done"
     path = track_files(sheet) / "track_px.csv"
     if not path.is_file():
         return "open"
@@ -124,7 +134,7 @@ def _state(trials: Trials, stage: str, entry: dict[str, Any], now: str) -> State
 
 
 def _fresh(
-    path: Path, made: Any, now: str, sheets: tuple[Sheet, ...], more: tuple[Path, ...] = ()
+    path: Path, made: Any, now: str, sheets: tuple[Sheet | Table, ...], more: tuple[Path, ...] = ()
 ) -> State:
     if isinstance(made, dict) and made.get("at") == path.stat().st_mtime_ns:
         return "done" if made.get("of") == now else "stale"

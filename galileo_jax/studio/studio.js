@@ -23,12 +23,13 @@
     line(graph);
   }), 300);
   const send = async (file) => {
-    const say = (text) => window.dispatchEvent(new CustomEvent("galileo-said", { detail: text }));
+    const say = (text, isWrong) => window.dispatchEvent(
+      new CustomEvent("galileo-said", { detail: { text, isWrong } }));
     say(`${file.name} …`);
     try {
       const answer = await fetch(`/upload/${encodeURIComponent(file.name)}`, { method: "PUT", body: file });
-      say(await answer.text());
-    } catch (error) { say(`${file.name}: not taken; too large?`); }
+      say(await answer.text(), !answer.ok);
+    } catch (error) { say(`${file.name}: not taken; too large?`, true); }
   };
   window.galileoUpload = async (files) => { for (const file of files) await send(file); };
   addEventListener("dragover", (event) => event.preventDefault());
@@ -38,6 +39,8 @@
   });
   addEventListener("galileo-said", (event) => {
     const place = document.querySelector(".said");
-    if (place) place.textContent = event.detail;
+    if (!place) return;
+    place.textContent = event.detail.text;
+    place.classList.toggle("trouble", Boolean(event.detail.isWrong));
   });
 })();

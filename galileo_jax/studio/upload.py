@@ -4,15 +4,20 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 
+from galileo_jax.api.look import look
 from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES
 from galileo_jax.clip.schema import ClipFile
+from galileo_jax.clip.track_file import TRACK_SUFFIXES
 from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio.paths import below, check_declared, safe_name
 from galileo_jax.video.decode import probe
 
 LARGEST_BYTES = 1_000_000_000
-LARGEST_TEXT_BYTES = 1_000_000
+LARGEST_OTHERS = {
+    **dict.fromkeys(TRACK_SUFFIXES, 20_000_000),
+    **dict.fromkeys(YAML_SUFFIXES, 1_000_000),
+}
 
 
 async def receive(
@@ -28,16 +33,16 @@ async def receive(
 
     Raises:
       InputError: the name climbs out of the folder or is taken, the file is too large, or its
-        content is neither a video nor a clip's yaml; nothing is left behind.
+        content is no video, no table and no clip's yaml; nothing is left behind.
     """
     safe_name(name)
     suffix = Path(name).suffix.lower()
-    if suffix not in (*FILM_SUFFIXES, *YAML_SUFFIXES):
-        raise InputError(f"{name}: a video or a yaml expected")
+    if suffix not in (*FILM_SUFFIXES, *YAML_SUFFIXES, *TRACK_SUFFIXES):
+        raise InputError(f"{name}: a video, a table or a yaml expected")
     target = below(root, name)
     if target.exists():
         raise InputError(f"{name}: there is such a file already; rename one of them")
-    limit = min(limit, LARGEST_TEXT_BYTES) if suffix in YAML_SUFFIXES else limit
+    limit = min(limit, LARGEST_OTHERS.get(suffix, limit))
     with NamedTemporaryFile(dir=root, prefix=".upload_", suffix=suffix, delete=False) as file:
         part = Path(file.name)
         try:
@@ -64,6 +69,8 @@ def _check(root: Path, part: Path, name: str) -> None:
             if unknown := [key for key in content if key not in ClipFile.model_fields]:
                 raise InputError(f"{unknown[0]}: unknown key; a clip's yaml expected")
             check_declared(root, root, content)
+        elif part.suffix in TRACK_SUFFIXES:
+            look(part)
         else:
             probe(part)
     except InputError as error:

@@ -30,6 +30,10 @@ export default {
             <polygon v-if="body(i)" class="body" :points="corners(outline)" :transform="body(i)"/>
           </g>
         </g>
+        <g v-for="([x, y, w, h], n) in frame ? [] : things" :key="'s' + n" class="thing">
+          <rect class="mark" :x="x - w / 2" :y="y - h / 2" :width="w" :height="h"/>
+          <text class="label" :font-size="15 * k" :x="x - w / 2" :y="y - h / 2 - 4 * k">{{ n + 1 }}</text>
+        </g>
         <g v-if="editable">
           <line v-if="at.upper && at.foot" class="ramp" v-bind="ends('upper', 'foot')"/>
           <line v-if="at.upper && at.foot && table" class="ramp table" :x1="at.foot[0]"
@@ -79,7 +83,7 @@ export default {
     name: String, count: Number, fps: Number, width: Number, height: Number,
     marks: Object, words: Object, boxes: Object, stick: String, editable: Boolean, table: Boolean,
     placing: Boolean, track: Object, model: Object, stretches: Array, sides: Array,
-    told: Array, follow: Number, first: Number, last: Number,
+    told: Array, things: Array, follow: Number, first: Number, last: Number,
   },
   data: () => ({ frame: 0, shown: 0, k: 1, at: {}, held: null, moved: false, loupe: null,
                  timer: null, cache: new Map() }),

@@ -25,6 +25,8 @@ class Viewer(Element, component="viewer.js"):
         marks, found = sheet.marks, session.results
         motion, track = self.motion(session), found.tracks.get(sheet.name)
         is_measured = stage not in ("video", "marks")
+        is_asked = stage == "explain" and found.fit is None and session.seen is not None
+        things = session.seen.get("things", []) if is_asked and session.seen else []
         stretches: Sequence[Any] = ()
         is_shown = stage in ("compare", "diagnose") and session.states["compare"] == "done"
         if is_shown and found.compare is not None:
@@ -41,6 +43,7 @@ class Viewer(Element, component="viewer.js"):
                 "boxes": _boxes(sheet),
                 "stick": _length(marks.stick_m),
                 "sides": [_length(side) for side in marks.rectangle_m],
+                "things": things,
                 "editable": stage == "marks",
                 "table": marks.has_table,
                 "placing": placing,

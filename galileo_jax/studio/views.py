@@ -37,6 +37,7 @@ def motion_view(motion: gx.Motion) -> dict[str, Any]:
         "x": numbers(motion.measured_m[:, 0], 5),
         "y": numbers(motion.measured_m[:, 1], 5),
         "sd_x": numbers(motion.sd_m[:, 0], 6),
+        "sd_y": numbers(motion.sd_m[:, 1], 6),
         "white": numbers(motion.residuals, 3),
         "seen_px": numbers(motion.measured_px, 2),
         "outlines": [numbers(corners, 2) for corners in motion.outlines_px],
@@ -98,6 +99,22 @@ def in_words(line: str) -> str:
         name, sides, source = size.groups()
         return f"{name}: no size given; {sides.replace(', ', ' x ')} m is used, {source}."
     return text
+
+
+def explanation_view(found: gx.Explanation) -> dict[str, Any]:
+    """The result in words, what is to be known of it, and what the parts show of it."""
+    measured = found.fit.measurements
+    remarks = [line for one in measured for line in (*one.remarks, *one.doubts)]
+    notes = dict.fromkeys([*remarks, *found.fit.warnings, *found.fit.taken_as_exact])
+    return {
+        "explained": {
+            "paragraph": found.paragraph,
+            "notes": [in_words(line) for line in notes],
+            "fit": fit_view(found.fit),
+            "compare": comparison_view(found.check),
+            "diagnosis": None if found.diagnosis is None else diagnosis_view(found.diagnosis),
+        }
+    }
 
 
 def comparison_view(check: gx.Comparison) -> dict[str, Any]:

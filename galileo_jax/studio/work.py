@@ -4,19 +4,32 @@ They run in the worker's process, whose working folder is the one that was opene
 are asked for again are kept in its memory.
 """
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import galileo_jax as gx
+from galileo_jax.api.clips import ClipLike
+from galileo_jax.api.explain import answered_clips, understood
+from galileo_jax.api.proposed_clip import write_yaml
+from galileo_jax.api.questions import answered
+from galileo_jax.api.seen_sentence import sentence_of
+from galileo_jax.api.understand import Understood
+from galileo_jax.clip.load import YAML_SUFFIXES
+from galileo_jax.clip.schema import Clip
 from galileo_jax.runtime import progress
+from galileo_jax.runtime.errors import InputError
 from galileo_jax.studio import views
+from galileo_jax.studio.paths import check_declared
+from galileo_jax.studio.store import yaml_content
 
 Partial = Callable[[Mapping[str, Any]], None]
 
 _fits: dict[str, gx.Fit] = {}  # by run and what it was made of
 _MOST_FITS = 12
+_seen: dict[str, tuple[Any, Clip | Understood]] = {}  # by clip, with the state of its files
 
 
 def propose(*, video: str, partial: Partial) -> dict[str, Any]:
@@ -24,8 +37,56 @@ def propose(*, video: str, partial: Partial) -> dict[str, Any]:
     return {"proposal": asdict(gx.propose(video))}
 
 
-def shown(content: Mapping[str, Any]) -> dict[str, Any]:
+def understand(*, clip: str, typed: Mapping[str, str], partial: Partial) -> dict[str, Any]:
+    """What a clip shows in one sentence, and what is asked of a person."""
+    known = _understood(clip, {})
+    if isinstance(known, Clip):
+        return {"sentence": sentence_of(known, {}), "questions": [], "problems": {}, "things": []}
+    found = answered(known, typed)
+    return {
+        "sentence": sentence_of(known, found.answers),
+        "questions": [asdict(one) for one in found.questions],
+        "problems": dict(found.problems),
+        "things": [[*place, *size] for place, size in known.things.items()],
+    }
+
+
+def explain(
+    *, clips: Sequence[str], typed: Mapping[str, str], run: str, partial: Partial
+) -> dict[str, Any]:
+    """What `galileo FILE` does, with answers as somebody types them there."""
+
+    def ask(known: Understood, answers: dict[str, Any]) -> dict[str, Any]:
+        found = answered(known, typed)
+        if found.problems:
+            raise InputError(next(iter(found.problems.values())))
+        return {**answers, **found.answers}
+
+    checked, asked = answered_clips(clips, {}, ask, _understood)
+    for known, answers in asked:
+        with contextlib.suppress(InputError):  # a folder that is not to be written in
+            write_yaml(known, answers)
+    found = gx.explain(checked, out=run)
+    _keep(run, run, found.fit)
+    return views.explanation_view(found)
+
+
+def _understood(clip: ClipLike, said: Mapping[str, Any]) -> Clip | Understood:
+    """`understood`, once for every state of the clip's files."""
+    path = Path(str(clip))
+    files = (path, *(path.with_suffix(suffix) for suffix in YAML_SUFFIXES))
+    for one in files[1:]:
+        check_declared(Path(), path.parent, yaml_content(one))
+    state = [one.stat().st_mtime_ns if one.is_file() else 0 for one in files]
+    if (kept := _seen.get(str(clip))) is None or kept[0] != state:
+        kept = _seen[str(clip)] = (state, understood(clip, said))
+    return kept[1]
+
+
+def shown(content: Mapping[str, Any] | gx.Explanation) -> dict[str, Any]:
     """A partial result of the API as the page shows it."""
+    if isinstance(content, gx.Explanation):
+        return views.explanation_view(content)
     given = dict(content)
     motions = given.pop("motions", None)
     if motions is not None:
@@ -142,6 +203,8 @@ def _keep(key: str, run: str, fit: gx.Fit) -> None:
 
 TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
     "propose": propose,
+    "understand": understand,
+    "explain": explain,
     "track": track,
     "fit": fit,
     "compare": compare,

@@ -5,6 +5,9 @@ from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
 
+import cv2
+import numpy as np
+
 import galileo_jax as gx
 
 
@@ -24,3 +27,14 @@ def clip_in(folder: Path, name: str = "slide", *, is_bare: bool = False) -> Path
         yaml = folder / f"{name}.yaml"
         yaml.write_text(yaml.read_text().replace("slide.mp4", f"{name}.mp4"))
     return folder / f"{name}.mp4"
+
+
+def still_film(path: Path) -> Path:
+    """A film in which nothing moves."""
+    picture = np.random.default_rng(1).integers(0, 255, (120, 160, 3), np.uint8)
+    code = cv2.VideoWriter.fourcc(*"mp4v")
+    film = cv2.VideoWriter(str(path), code, 30.0, (160, 120))
+    for _ in range(20):
+        film.write(cv2.GaussianBlur(picture, (9, 9), 0))
+    film.release()
+    return path

@@ -3,9 +3,7 @@
 `STUDIO_PICTURES=docs/images` writes the pictures of the tutorial.
 """
 
-import os
 import shutil
-import time
 from pathlib import Path
 
 import pytest
@@ -15,46 +13,11 @@ from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.results.run import read_result
 from galileo_jax.studio.session import Session
 from tests.missing import needed_module
+from tests.studio.hand import LONG_MS, Hand
 from tests.studio.server import started
-from tests.studio.test_page import drag, opened, wait_until
+from tests.studio.test_page import opened, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.video]
-LONG_MS = 1_500_000  # a diagnosis on a busy machine
-
-
-class Hand:
-    """Counts what a person does."""
-
-    def __init__(self, page, has_pictures: bool = True):
-        self.page, self.clicks, self.began = page, 0, time.monotonic()
-        self.has_pictures = has_pictures
-
-    def click(self, selector: str) -> None:
-        self.page.locator(selector).first.click()
-        self.clicks += 1
-
-    def drag(self, handle: str, dx: float, dy: float) -> None:
-        drag(self.page, handle, dx, dy)
-        self.clicks += 1
-
-    def wait(self, stage: str, state: str = "done") -> None:
-        selector = f"[data-stage={stage}][data-state={state}]"
-        self.page.wait_for_selector(selector, timeout=LONG_MS)
-
-    def wait_for(self, selector: str) -> None:
-        self.page.wait_for_selector(selector, timeout=LONG_MS)
-
-    def picture(self, name: str, at_s: float = 0.6) -> None:
-        folder = os.environ.get("STUDIO_PICTURES")
-        if folder and self.has_pictures:
-            self.page.mouse.move(640, 5)
-            self.page.evaluate(f"dispatchEvent(new CustomEvent('galileo-go', {{detail: {at_s}}}))")
-            self.page.wait_for_timeout(900)
-            path = Path(folder) / f"studio_{name}.jpg"
-            self.page.screenshot(path=path, type="jpeg", quality=78)
-
-    def said(self) -> str:
-        return f"{self.clicks} clicks, {time.monotonic() - self.began:.0f} s"
 
 
 def stick(folder: Path) -> float:
@@ -82,7 +45,8 @@ def test_from_a_bare_video_to_a_named_effect(browser, folder, capsys, effect, se
     video.with_suffix(".yaml").unlink()
     with started(folder) as studio, opened(browser, studio) as page:
         hand = Hand(page, has_pictures=effect == "air_drag")
-        # What moves is found without a click; the stick is laid on a length, and it is typed.
+        # What moves is found; the stick is laid on a length, and it is typed.
+        hand.click("[data-stage=marks]")
         hand.wait_for("[data-handle=object1]")
         hand.drag("stick2", 60, 0)
         wait_until(lambda: stick(folder) > 0.3 * 640 + 30)
@@ -142,6 +106,7 @@ def test_a_diagnosis_is_cancelled_and_nothing_is_lost(browser, folder):
     gx.simulate(folder / "clip.mp4", seed=5, seconds=1.5, size=(320, 180))
     with started(folder) as studio, opened(browser, studio) as page:
         hand = Hand(page)
+        hand.click("[data-stage=track]")
         hand.click("[data-do=track]")
         hand.wait("track")
         hand.click("[data-do=fit]")

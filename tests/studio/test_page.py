@@ -14,6 +14,7 @@ import galileo_jax as gx
 from galileo_jax.clip.yaml_file import read_mapping
 from tests.missing import needed_module
 from tests.studio.clips import clip_in
+from tests.studio.hand import drag
 from tests.studio.server import Server, started
 
 pytestmark = pytest.mark.video
@@ -21,8 +22,10 @@ PATIENCE_MS = 60_000  # nothing here takes long; a busy machine may
 
 
 @contextmanager
-def opened(browser, studio: Server, size: tuple[int, int] = (1280, 720)) -> Iterator[Any]:
-    """A tab with the page; it must not complain."""
+def opened(
+    browser, studio: Server, size: tuple[int, int] = (1280, 720), expected: str = "nothing"
+) -> Iterator[Any]:
+    """A tab with the page; it must not complain, but of what is expected."""
     context = browser.new_context(viewport={"width": size[0], "height": size[1]})
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
@@ -33,18 +36,7 @@ def opened(browser, studio: Server, size: tuple[int, int] = (1280, 720)) -> Iter
     page.wait_for_selector("[data-stage=marks]")
     yield page
     context.close()
-    assert not complaints
-
-
-def drag(page, handle: str, dx: float, dy: float) -> None:
-    """Grabs a mark and lets it go elsewhere, as a finger does."""
-    box = page.locator(f"[data-handle={handle}] .target").bounding_box()
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.move(x, y)
-    page.mouse.down()
-    page.mouse.move(x + dx / 2, y + dy / 2, steps=3)
-    page.mouse.move(x + dx, y + dy, steps=3)
-    page.mouse.up()
+    assert all(expected in one for one in complaints), complaints
 
 
 def wait_until(is_so: Callable[[], bool]) -> None:

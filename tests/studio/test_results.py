@@ -18,6 +18,9 @@ MOTION = {
     "x": [[0.0, 0.01, None]],
     "sd_x": [[0.001, 0.001, 0.001]],
     "model_x": [[0.0, 0.011, 0.02]],
+    "y": [[0.0, 0.0, None]],
+    "sd_y": [[0.001, 0.001, 0.001]],
+    "model_y": [[0.0, 0.0, 0.0]],
     "white": [[[0.1, -0.3, None], [0.0, 0.2, None]]],
 }
 
@@ -99,6 +102,12 @@ def test_a_damaged_track_is_none(tmp_path, text):
     path = tmp_path / "track_px.csv"
     path.write_text(text)
     assert pixel_track(path) in (None, {**(pixel_track(path) or {}), "objects": []})
+
+
+def test_what_falls_is_drawn_along_y():
+    assert charts.fit_figure(MOTION, False)["layout"]["yaxis"]["title"]["text"] == "x, m"
+    fallen = {**MOTION, "model_y": [[0.0, -0.2, -0.8]]}
+    assert charts.fit_figure(fallen, False)["layout"]["yaxis"]["title"]["text"] == "y, m"
 
 
 def test_figures_are_plain_data_that_a_page_can_take():

@@ -93,6 +93,9 @@ def test_a_file_is_dropped_on_the_page(browser, folder):
             }""",
             content,
         )
-        page.dispatch_event("[data-drop]", "drop", {"dataTransfer": held})
+        page.dispatch_event("body", "drop", {"dataTransfer": held})
+        page.wait_for_selector("[data-stage=explain][aria-current=step]")
+        page.wait_for_selector("[data-do=explain]")
+        page.click("[data-stage=video]")
         page.wait_for_selector("[data-clip=dropped].main")
     assert (folder / "dropped.mp4").read_bytes() == (folder / "slide.mp4").read_bytes()

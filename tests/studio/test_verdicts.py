@@ -14,8 +14,8 @@ import pytest
 
 from galileo_jax.results.run import read_result
 from tests.missing import needed_module
+from tests.studio.hand import LONG_MS, Hand
 from tests.studio.server import started
-from tests.studio.test_loop import LONG_MS, Hand
 from tests.studio.test_page import opened, wait_until
 
 pytestmark = [pytest.mark.slow, pytest.mark.video]

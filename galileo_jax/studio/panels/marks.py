@@ -33,9 +33,10 @@ def build(tab: "Tab") -> None:
     """The panel."""
     session = tab.session
     sheet = session.sheet
-    if sheet is None:
-        return
     title("Marks")
+    if sheet is None:
+        ui.label("A table has no pictures: what is declared stands in its yaml.").classes("soft")
+        return
     marks = sheet.marks
     fields: dict[str, Any] = {}
     shown: dict[str, Any] = {}

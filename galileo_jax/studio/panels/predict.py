@@ -53,10 +53,13 @@ def _commands(tab: "Tab") -> str:
     session = tab.session
     clips, run = session.trials.files, f"runs/{session.trials.name}"
     lines = [f"cd {shlex.quote(str(session.root))}"]
-    if session.results.diagnosis is not None:
-        lines.append(command_line("diagnose", clips, add="none"))
-    lines.append(command_line("fit", clips, effects=",".join(session.effects)))
-    lines.append(command_line("compare", [run]))
+    if session.results.paragraph:
+        lines.append(command_line("explain", clips))
+    else:
+        if session.results.diagnosis is not None:
+            lines.append(command_line("diagnose", clips, add="none"))
+        lines.append(command_line("fit", clips, effects=",".join(session.effects)))
+        lines.append(command_line("compare", [run]))
     runs = [run] if len(session.chosen) == 1 else [f"{run}/{name}" for name in session.chosen]
     lines += [command_line("predict", [one], seconds=f"{SECONDS:g}") for one in runs]
     return "\n".join(lines)
@@ -69,12 +72,12 @@ def _lines(tab: "Tab") -> str:
     run = f"runs/{session.trials.name}"
     effects = f", effects={list(session.effects)!r}" if session.effects else ""
     lines = ["import galileo_jax as gx", ""]
-    if session.results.diagnosis is not None:
-        lines.append(f"found = gx.diagnose({clips}, add='none')")
-    lines += [
-        f"fit = gx.fit({clips}{effects}).save({run!r})",
-        "check = gx.compare(fit)",
-    ]
+    if session.results.paragraph:
+        lines.append(f"fit = gx.explain({clips}, out={run!r}).fit")
+    else:
+        if session.results.diagnosis is not None:
+            lines.append(f"found = gx.diagnose({clips}, add='none')")
+        lines += [f"fit = gx.fit({clips}{effects}).save({run!r})", "check = gx.compare(fit)"]
     if len(files) == 1:
         lines.append(f"ahead = gx.predict(fit, seconds={SECONDS:g})")
     else:

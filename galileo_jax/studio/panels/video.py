@@ -15,16 +15,6 @@ def build(tab: "Tab") -> None:
     """The panel."""
     session = tab.session
     title("Video")
-    with ui.element("div").classes("drop").props("data-drop"):
-        ui.label("Drop a video here").style("margin-bottom: 8px")
-        with ui.element("label").classes("choose"):
-            ui.label("or choose a file")
-            ui.html(
-                '<input type="file" accept="video/*,.yaml,.yml" multiple aria-label="open a file" '
-                'onchange="galileoUpload(this.files)" style="min-height: 44px">',
-                sanitize=False,
-            )
-        ui.label("").classes("said small")
     for name, problem in session.broken.items():
         ui.label(f"{name}: {problem}").classes("trouble")
     if not session.names:
