@@ -28,7 +28,7 @@ Numbers = jax.Array | np.ndarray | np.floating
 class Prior(Protocol):
     """A distribution of one number, as a map from the standard normal."""
 
-    def forward(self, z: Numbers) -> Numbers:
+    def forward(self, z: Numbers) -> Any:
         """Maps `z ~ N(0, 1)` to the parameter; monotonic and differentiable."""
         ...
 
@@ -48,7 +48,7 @@ class Normal:
     mean: float
     sd: float
 
-    def forward(self, z: Numbers) -> Numbers:
+    def forward(self, z: Numbers) -> Any:
         """`mean + sd z`."""
         return self.mean + self.sd * z
 
@@ -68,7 +68,7 @@ class LogNormal:
     median: float
     sd: float
 
-    def forward(self, z: Numbers) -> Numbers:
+    def forward(self, z: Numbers) -> Any:
         """`median exp(sd z)`."""
         return self.median * jnp.exp(self.sd * z)
 
@@ -95,7 +95,7 @@ class LongTailed:
     median: float
     sd: float
 
-    def forward(self, z: Numbers) -> Numbers:
+    def forward(self, z: Numbers) -> Any:
         """`median exp(sd sinh(z))`."""
         return self.median * jnp.exp(self.sd * _stretched(z))
 
@@ -119,7 +119,7 @@ class Uniform:
     low: float
     high: float
 
-    def forward(self, z: Numbers) -> Numbers:
+    def forward(self, z: Numbers) -> Any:
         """`low + (high - low) Phi(z)`."""
         return self.low + (self.high - self.low) * ndtr(z)
 
@@ -139,7 +139,7 @@ class HalfNormal:
 
     sd: float
 
-    def forward(self, z: Numbers) -> Numbers:
+    def forward(self, z: Numbers) -> Any:
         """`sd Phi^-1((1 + Phi(z)) / 2)`."""
         return self.sd * ndtri(0.5 + 0.5 * jnp.clip(ndtr(z), 0.0, 1 - 1e-12))
 
@@ -208,7 +208,7 @@ class PriorTable(NamedTuple):
         kind, a, b = zip(*(parameter.prior.encode() for parameter in parameters), strict=True)
         return cls(np.array(kind), np.array(a, float), np.array(b, float))
 
-    def forward(self, z: Numbers) -> Numbers:
+    def forward(self, z: Numbers) -> Any:
         """As the function `forward`: `z` `[..., parameter]` to the parameters' units."""
         share = ndtr(z)
         half = ndtri(0.5 + 0.5 * jnp.clip(share, 0.0, 1 - 1e-12))

@@ -239,7 +239,7 @@ def test_what_cannot_be_rehearsed_is_tried_all_the_same(verdicts, monkeypatch):
 
 def test_a_folder_that_cannot_be_written(verdicts, tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match=r"--out: .*file/run: Not a directory"):
+    with pytest.raises(InputError, match=r"--out: .*file/run \(Not a directory\)"):
         gx.discover(Lab(), out=tmp_path / "file" / "run")
 
 

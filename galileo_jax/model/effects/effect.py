@@ -166,7 +166,7 @@ class Surroundings:
 
     names: tuple[str, ...]
     angle_rad: float
-    gravity: float | Array
+    gravity: Any  # a number; within compiled code, or of a batch, an array
     half_length_m: tuple[float, ...]
     half_height_m: tuple[float, ...]
     corner_m: tuple[float, ...]
@@ -242,7 +242,7 @@ class Surroundings:
         xp = mass[0].__array_namespace__()
         return xp.stack(mass, axis=-1) * xp.asarray(self.gravity)[..., None]
 
-    def only(self, value: Array | np.floating, *objects: int) -> Array:
+    def only(self, value: Any, *objects: int) -> Array:
         """`value` `[...]` for the given objects (counted from 0), 0 for others: `[..., object]`."""
         chosen = [1.0 if i in objects else 0.0 for i in range(len(self.names))]
         return value[..., None] * value.__array_namespace__().asarray(chosen)
