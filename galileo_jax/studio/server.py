@@ -173,6 +173,7 @@ def _listening(port: int | None) -> socket.socket:
         listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             listening.bind((HOST, number))
+            listening.listen()  # until then another studio may be bound to it, too
         except (OSError, OverflowError):
             listening.close()
             continue

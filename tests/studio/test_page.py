@@ -119,7 +119,7 @@ def test_the_keyboard_steps_through_frames_and_moves_marks(browser, folder):
         page.keyboard.press("ArrowRight")
         page.keyboard.press("ArrowLeft")
         assert page.inner_text(".scrub output").endswith("· 1")
-        assert page.locator(".frame").get_attribute("src") == "/frame/slide/1"
+        page.wait_for_selector('.frame[src="/frame/slide/1"]')  # once it has come
         page.focus("[data-handle=object2]")
         page.focus("[data-handle=object1]")
         page.keyboard.press("ArrowDown")
