@@ -1,4 +1,4 @@
-# make demo | test | test-all | test-plain-processor | test-cluster | lint | docs | figures | setup |
+# make demo | test | test-all | test-plain-processor | test-shapes | test-cluster | lint | docs | figures | setup |
 # clean.
 # Each does the set-up it needs, once.
 
@@ -18,7 +18,7 @@ HAS_UV := $(and $(UV),$(shell $(UV) --version 2>/dev/null))
 INSTALL := $(if $(HAS_UV),$(UV_INSTALL),$(PIP_INSTALL)) --quiet -c constraints.txt
 export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: demo test test-all test-plain-processor test-cluster lint docs figures setup clean
+.PHONY: demo test test-all test-plain-processor test-shapes test-cluster lint docs figures setup clean
 
 demo: $(CORE)
 	$(BIN)/galileo simulate --seed 7 --out demo/clip.mp4
@@ -45,6 +45,16 @@ test-plain-processor: $(READY)
 	$(PYTEST) tests/api/test_processors.py
 	$(PLAIN) $(PYTEST) -m "not slow" tests/commands/test_fit.py tests/commands/test_compare.py \
 	  tests/commands/test_predict.py tests/inference/test_coverage.py
+
+# What annotations say of shapes and types, at every call; of the rooms that are all numbers.
+NUMERICS := model rollout similarity statespace
+comma := ,
+empty :=
+space := $(empty) $(empty)
+CHECKED := $(subst $(space),$(comma),$(addprefix galileo_jax.,$(NUMERICS)))
+
+test-shapes: $(READY)
+	$(PYTEST) -m "not slow" --jaxtyping-packages=$(CHECKED),beartype.beartype $(addprefix tests/,$(NUMERICS))
 
 test-cluster: $(READY)
 	@$(INSTALL) -e '.[dev,distributed]'
