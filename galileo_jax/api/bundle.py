@@ -118,7 +118,7 @@ def bundle_of(
     measured = found.fit.measurements
     names = [item.name for item in measured[0].clip.objects]
     hidden = impersonal([_files_of(one.clip) for one in measured], names, others)
-    documents = {"result.json": found.fit.result, "compare.json": found.check.document}
+    documents = {"result.json": found.fit.result, "compare.json": found.check_document}
     if found.diagnosis is not None:
         documents["diagnosis.json"] = found.diagnosis.document
     looks = "\n\n".join(one.summary() for one in found.looks)

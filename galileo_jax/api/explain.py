@@ -74,10 +74,11 @@ class Explanation:
         """The result in the words of a lab report."""
         shapes = [item.shape for item in self.fit.measurements[0].clip.objects]
         found = None if self.diagnosis is None else self.diagnosis.document
-        return paragraph(self.fit.result, self._check_document, found, shapes)
+        return paragraph(self.fit.result, self.check_document, found, shapes)
 
     @property
-    def _check_document(self) -> dict[str, Any]:
+    def check_document(self) -> dict[str, Any]:
+        """compare.json: the check's, and where nothing is missing what could not have been seen."""
         seen = {"could_not_see": self.could_not_see} if self.could_not_see else {}
         return {**self.check.document, **seen}
 
@@ -105,7 +106,7 @@ class Explanation:
         fit = self.fit.save(folder, report=False)
         beside: dict[str, str] = {}
         files = [folder / "result.json"]
-        write_json(folder / "compare" / "compare.json", self._check_document)
+        write_json(folder / "compare" / "compare.json", self.check_document)
         files.append(folder / "compare" / "compare.json")
         if self.diagnosis is not None:
             self.diagnosis.save(folder / "diagnosis")

@@ -42,12 +42,12 @@ STORED = TypeAdapter(Step)
 
 
 @dataclass(frozen=True)
-class Table:
-    """A clip that is a table: it has no pictures to mark.
+class Opened:
+    """A clip that was opened.
 
     Attributes:
       root: the folder that was opened.
-      source: the table.
+      source: the film or table.
     """
 
     root: Path
@@ -63,6 +63,11 @@ class Table:
         """Where what is declared is written."""
         return self.source.with_suffix(".yaml")
 
+
+@dataclass(frozen=True)
+class Table(Opened):
+    """A table: it has no pictures to mark."""
+
     @property
     def is_complete(self) -> bool:
         """Whether its yaml leaves nothing open."""
@@ -73,40 +78,21 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Sheet:
-    """A clip with its marks.
+class Sheet(Opened):
+    """A film with its marks.
 
     Attributes:
-      root: the folder that was opened.
-      video: the clip's.
-      info: of the video.
+      info: of the film.
       present: the marks now.
       past, future: what undo and redo lead to, the nearest last.
       is_drawn: whether a person or a proposal has drawn anything yet.
     """
 
-    root: Path
-    video: Path
     info: VideoInfo
     present: Step
     past: tuple[Step, ...] = ()
     future: tuple[Step, ...] = ()
     is_drawn: bool = True
-
-    @property
-    def name(self) -> str:
-        """The clip's, without suffix."""
-        return self.video.stem
-
-    @property
-    def yaml(self) -> Path:
-        """Where what is declared is written."""
-        return self.video.with_suffix(".yaml")
-
-    @property
-    def source(self) -> Path:
-        """What was filmed."""
-        return self.video
 
     @property
     def marks(self) -> Marks:
@@ -210,7 +196,7 @@ def _write(sheet: Sheet, marks: Marks) -> str | None:
         if before is not None:
             _remove_objects(sheet, before, marks)
         if wanted := labels(before, marks):
-            label(sheet.video, **wanted)
+            label(sheet.source, **wanted)
     except InputError as error:
         return said(error, sheet)
     return None
@@ -229,7 +215,7 @@ def _remove_objects(sheet: Sheet, before: Marks, after: Marks) -> None:
 def said(error: Exception, sheet: Sheet) -> str:
     """An error without the clip's own path, which the page shows anyway."""
     text = " ".join(str(error).split())
-    for path in (sheet.yaml, sheet.video, sheet.yaml.name, sheet.video.name):
+    for path in (sheet.yaml, sheet.source, sheet.yaml.name, sheet.source.name):
         text = text.removeprefix(f"{path}: ")
     return text[:1].upper() + text[1:]
 

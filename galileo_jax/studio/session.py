@@ -173,7 +173,7 @@ class Session:
         if name not in self._frames:
             while len(self._frames) >= MOST_FRAMES:
                 self._frames.pop(next(iter(self._frames)))
-            self._frames[name] = Frames(sheet.video)
+            self._frames[name] = Frames(sheet.source)
         return self._frames[name].picture(index)
 
     # marks
@@ -248,7 +248,7 @@ class Session:
     def _read_again(self, name: str) -> None:
         """A clip's yaml as somebody else has left it."""
         if isinstance(sheet := self.sheets.get(name), Sheet):
-            self.sheets[name] = opened(self.root, sheet.video, self.store)
+            self.sheets[name] = opened(self.root, sheet.source, self.store)
 
     def _explained(self, trials: Trials, found: Mapping[str, Any]) -> None:
         """Remembers what was explained, for the page and for its parts."""
@@ -271,7 +271,7 @@ class Session:
     def propose(self) -> None:
         """Looks for the objects and the ramp of a clip that has no marks."""
         if self.sheet is not None:
-            self._start("propose", video=self.sheet.video.name)
+            self._start("propose", video=self.sheet.source.name)
 
     def track(self) -> None:
         """Tracks the chosen clips."""

@@ -115,7 +115,7 @@ def run_cell(
 
 def _explanation(found: "Explanation", folder: Path, final: Path | None) -> CellResult:
     """What is told as of a fit, and beside it what it rests on, as `Explanation.save` writes it."""
-    write_json(folder / CHECK, found.check.document)
+    write_json(folder / CHECK, found.check_document)
     beside = {}
     if found.diagnosis is not None:
         write_json(folder / MISSING, found.diagnosis.document)

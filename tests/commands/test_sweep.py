@@ -12,6 +12,7 @@ from galileo_jax.sweeping.work import CellResult
 from tests.clip.broken_clips import build_good_track
 from tests.missing import needed_module
 from tests.report.browser import opened
+from tests.sweeping.stopped import stopping
 
 TRUTH = {"m1": 0.4, "k1": 0.2, "m2": 0.2, "k2": 0.3, "effect": "air_drag"}
 
@@ -105,18 +106,9 @@ def test_goes_on_where_it_was_stopped(tmp_path, clips, calls, monkeypatch, capsy
     text = "grid: {seed: [0, 1, 2, 13]}"
     assert run(tmp_path, clips[:2], text, out="whole") == 0
     assert len(calls) == 8
-    compute, left = run_cells.run_cell, 3
-
-    def stopped(*arguments):
-        nonlocal left
-        if left == 0:
-            raise KeyboardInterrupt
-        left -= 1
-        return compute(*arguments)
-
     calls.clear()
     with monkeypatch.context() as patched:
-        patched.setattr(run_cells, "run_cell", stopped)
+        patched.setattr(run_cells, "run_cell", stopping(run_cells.run_cell, 3))
         assert run(tmp_path, clips[:2], text) == 130
     assert run(tmp_path, clips[:2], text) == 0
     assert len(calls) == len(set(calls)) == 8, "none is lost, and none computed twice"

@@ -20,6 +20,7 @@ from galileo_jax.sweeping.settings import make_settings
 from galileo_jax.sweeping.sweep import sweep
 from tests.precision import in_64_bit
 from tests.report.browser import opened
+from tests.sweeping.stopped import stopping
 
 NUM_CLIPS = 20
 WRONG = "clip7"  # one of them has a mistake in its yaml
@@ -104,17 +105,8 @@ def test_a_folder_is_a_class_and_who_declares_another_angle_is_told(
         "--set",
         "reports=false",
     ]
-    compute, left = run_cells.run_cell, 2
-
-    def stopped(*arguments):
-        nonlocal left
-        if left == 0:
-            raise KeyboardInterrupt
-        left -= 1
-        return compute(*arguments)
-
     with in_64_bit(), monkeypatch.context() as patched:
-        patched.setattr(run_cells, "run_cell", stopped)
+        patched.setattr(run_cells, "run_cell", stopping(run_cells.run_cell, 2))
         assert command.run(sweep_command.main, words) == 130
     capsys.readouterr()
     with in_64_bit():

@@ -26,7 +26,7 @@ def build(tab: "Tab") -> None:
         return
     info = sheet.info
     ui.label(
-        f"{sheet.video.name}: {info.frame_count} frames, {info.size_px[0]} x {info.size_px[1]}"
+        f"{sheet.source.name}: {info.frame_count} frames, {info.size_px[0]} x {info.size_px[1]}"
     ).classes("soft")
     with ui.element("div").classes("rowline"):
         rate = ui.number("true frames per second", value=sheet.marks.fps, min=1)
