@@ -116,7 +116,8 @@ def sweep(
 
     Each cell (a clip, or trials fitted together, with one set of options) gets what `fit`,
     `diagnose` or `explain` would give. What is wrong with a clip is its cells' failure, and the
-    sweep goes on. Stopped in any way, the same call goes on where it was (docs/sweeps.md).
+    sweep goes on. Stopped in any way, the same call goes on where it was
+    (docs/how-to/many_clips.md).
 
     With workers, a script needs its call below `if __name__ == "__main__":`, because each of them
     imports the script; a notebook does not.
