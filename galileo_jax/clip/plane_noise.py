@@ -5,10 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
+from galileo_jax.observation.observation import UNMEASURED_SD_M
 from galileo_jax.runtime.errors import InputError
 
 MIN_NOISE_WINDOWS = 8
 """Fewer third differences give a standard deviation that is off by a third or more."""
+
+ACROSS = 0.01
+"""Who marks a picture is no hundred times better across the motion than along it: then one
+coordinate was measured, and both were made of it."""
 
 MIN_SD_M = 1e-5
 """No camera sees less than ten micrometres; also what is taken for positions without noise."""
@@ -66,7 +71,12 @@ def too_few_rows(path: Path, name: str) -> InputError:
 def roughness_covariance_m2(
     path: Path, name: str, times_s: np.ndarray, position_m: np.ndarray
 ) -> np.ndarray:
-    """`[2, 2, row]`, m^2: errors of the same size in every row, by `position_noise_m`.
+    """Covariance `[2, 2, row]`, m^2, of errors of the same size in every row.
+
+        C = sd_x^2, sd_y^2 on the diagonal, of `position_noise_m`
+
+    Of points on one straight line, nearer to it than `ACROSS` times their error along it, the
+    distance from it tells nothing: there it is `UNMEASURED_SD_M`.
 
     Raises:
       InputError: too few consecutive rows to tell.
@@ -74,4 +84,18 @@ def roughness_covariance_m2(
     sd = [position_noise_m(times_s, coordinate) for coordinate in position_m]
     if any(map(math.isnan, sd)):
         raise too_few_rows(path, name)
-    return np.repeat(np.diag(np.square(sd))[:, :, None], len(times_s), axis=2)
+    covariance = np.diag(np.square(sd))
+    if len(position_m) == 2 and (line := _line_through(position_m)) is not None:
+        along, across = line
+        sd_m = position_noise_m(times_s, along @ position_m)
+        if np.nanstd(across @ position_m) < ACROSS * sd_m:
+            covariance = sd_m**2 * np.outer(along, along)
+            covariance += UNMEASURED_SD_M**2 * np.outer(across, across)
+    return np.repeat(covariance[:, :, None], len(times_s), axis=2)
+
+
+def _line_through(position_m: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Unit vectors `[2]` along and across the line nearest to points `[2, row]`; None: at rest."""
+    seen = position_m[:, np.isfinite(position_m).all(axis=0)]
+    far, vectors = np.linalg.eigh(np.cov(seen))
+    return (vectors[:, 1], vectors[:, 0]) if far[1] > MIN_SD_M**2 else None

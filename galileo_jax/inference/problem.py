@@ -142,6 +142,8 @@ class Problem:
         other = replace(self, sizes=sizes)
         for name in ("fixed_patterns", "patterns", "seen_motion", "_inverse_root"):
             other.__dict__[name] = getattr(self, name)
+        if "_usual" in self.__dict__:
+            other.__dict__["_usual"] = self._usual
         return other
 
     @cached_property
@@ -238,26 +240,33 @@ class Problem:
         return GaussianLikelihood.whiten_batch(difference, noise_scale, self.data)
 
     def followed(self, predicted_m: np.ndarray) -> np.ndarray:
-        """Where bodies most probably were: a prediction and their most probable deviation from it.
+        """Where bodies were, if they deviate from a prediction as bodies usually do.
 
             d = U_b U_b^T C^-1 r,    U_b: patterns of what bodies do, not of errors of the marks
+
+        All imperfections are of their priors' medians in it: d is the same linear function of the
+        residuals r for every model of a track, so that what it leaves falls as models get better.
 
         Args:
           predicted_m: `[object, axis, frame]`.
 
         Returns:
-          the same shape; the prediction where imperfections have no sizes.
+          the same shape; the prediction where imperfections have no place.
         """
-        names = [name for name in self.patterns if not TERMS[name].is_of_marks]
-        if self.sizes is None or not names:
+        own = [self.patterns[name] for name in self.patterns if not TERMS[name].is_of_marks]
+        if not own:
             return predicted_m
-        own = [self._sized(name) for name in names]
-        patterns, data = np.concatenate(own), self.data
-        left = self.tracking_errors(predicted_m)  # in stated errors, C^-1 of them at scale 1
+        patterns, usual = np.concatenate(own), self._usual
+        left = usual.tracking_errors(predicted_m)  # in stated errors, C^-1 of them at scale 1
         white = np.tensordot(patterns.reshape(len(patterns), -1) @ left, patterns, 1)
-        root = np.where(self.observation.mask[:, None, None], data.inverse_root, 0.0)
+        root = np.where(self.observation.mask[:, None, None], self._inverse_root, 0.0)
         root = np.linalg.pinv(np.moveaxis(root, -1, 1))  # [object, frame, axis, axis]
         return predicted_m + np.einsum("otij,ojt->oit", root, white)
+
+    @cached_property
+    def _usual(self) -> "Problem":
+        """The same with imperfections of usual sizes."""
+        return self.with_sizes(dict.fromkeys(self.patterns, 0.0))
 
     def tracking_errors(self, predicted_m: np.ndarray, noise_scale: float = 1.0) -> np.ndarray:
         """The tracking errors that a prediction leaves, in units of their sd.

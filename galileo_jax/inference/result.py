@@ -103,13 +103,15 @@ def distance_error(
         seen = problem.observation
         axes = 2 if seen.is_turning else predicted.shape[1]
         fitted = predicted + seen.offset_m(predicted)[..., None]
-        for mask, place, own in zip(seen.mask, seen.position_m, fitted, strict=True):
+        every = zip(seen.mask, seen.position_m, fitted, seen.across, strict=True)
+        for mask, place, own, across in every:
             if mask.any():
-                place, own = place[:axes, mask], own[:axes, mask]
-                squares.append(np.sum((place - own) ** 2, axis=0))
+                away, own = (place - own)[:axes, mask], own[:axes, mask]
+                away -= across[:axes, mask] * np.sum(across[:axes, mask] * away, axis=0)
+                squares.append(np.sum(away**2, axis=0))
                 way_m = max(way_m, float(np.linalg.norm(np.ptp(own, axis=1))))
-    every = np.concatenate(squares)
-    rms_m = float(np.sqrt(np.mean(every))) if every.size else math.nan
+    of_all = np.concatenate(squares)
+    rms_m = float(np.sqrt(np.mean(of_all))) if of_all.size else math.nan
     is_known = all(p.model.scene.surroundings.is_scale_known for p in problems)
     return {
         "rms_mm": 1e3 * rms_m if is_known else math.nan,

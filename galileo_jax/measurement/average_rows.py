@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 
 MOST_ROWS = 500
 FEWEST, MOST_TERMS = 4, 6  # rows, and terms of p: no more than half of its rows and one
@@ -33,6 +33,9 @@ def with_rows_averaged(observation: Observation) -> tuple[Observation, list[str]
     mask = observation.mask[:, kept]
     position = np.where(observation.mask[:, None], observation.position_m, 0.0) @ weights.T
     covariance = observation.covariance_m2 @ (weights**2).T
+    across = observation.across[..., kept]  # no mean makes known what was not measured
+    missing = UNMEASURED_SD_M**2 - np.einsum("oat,oabt,obt->ot", across, covariance, across)
+    covariance += np.einsum("ot,oat,obt->oabt", missing, across, across)
     modes, turned = observation.modes_m, observation.turned_rad
     averaged = replace(
         observation,
@@ -101,8 +104,10 @@ def _of_group(observation: Observation, group: slice, around: slice) -> np.ndarr
         return weights
     place = observation.position_m[is_seen][..., around]
     left = place - place @ fit.T @ powers.T
-    variance = np.einsum("oaat->oat", observation.covariance_m2[is_seen][..., around])
-    chi2, degrees = np.sum(left**2 / variance), left.shape[0] * left.shape[1]
-    degrees = degrees * (len(times) - terms)
+    covariance = np.moveaxis(observation.covariance_m2[is_seen][..., around], -1, 1)
+    white = np.linalg.solve(covariance, np.moveaxis(left, -1, 1)[..., None])[..., 0]
+    chi2 = np.einsum("oat,ota->", left, white)
+    num_lines = (observation.across[is_seen][..., around] != 0).any(axis=(1, 2)).sum()
+    degrees = (left.shape[0] * left.shape[1] - num_lines) * (len(times) - terms)
     is_smooth = chi2 < degrees + CLEAR * math.sqrt(2 * degrees)
     return weights if is_smooth else None

@@ -99,6 +99,22 @@ def test_missing_error_columns_are_estimated(tmp_path: Path) -> None:
     assert np.ptp(observation.covariance_m2[0, 0, 0]) == 0
 
 
+def test_of_points_on_one_straight_line_the_distance_from_it_tells_nothing(tmp_path: Path) -> None:
+    """Somebody measured a way and wrote it as x and y: the error is the way's, along the way."""
+    rng = np.random.default_rng(2)
+    times = np.arange(80) / 30
+    way = times**2 + rng.normal(0, 1e-3, 80)
+    along = np.array([np.cos(0.4), -np.sin(0.4)])
+    path = tmp_path / "track.csv"
+    rows = "".join(f"{t},{along[0] * w},{along[1] * w}\n" for t, w in zip(times, way, strict=True))
+    path.write_text("time_s,ball_x_m,ball_y_m\n" + rows)
+    observation = read_observation_csv(path)
+    covariance = observation.covariance_m2[0, :, :, 5]
+    assert np.sqrt(along @ covariance @ along) == pytest.approx(1e-3, rel=0.4)
+    np.testing.assert_allclose(np.abs(observation.across[0, :, 5] @ along), 0.0, atol=1e-6)
+    assert (observation.across[0] != 0).all()
+
+
 ROWS = "".join(f"{i / 30:.4f},{0.01 * i:.3f},0.5,0.001\n" for i in range(12))
 GOOD = "time_s,object1_x_m,object1_y_m,object1_sd_m\n" + ROWS
 

@@ -79,6 +79,20 @@ def test_the_mode_the_draws_and_the_evidence_are_those_of_a_grid(clip):
     assert sizes.log_evidence == pytest.approx(whole - at_mode, abs=0.1)
 
 
+@pytest.mark.parametrize("smaller", [1e-2, 1e-9])
+def test_errors_far_smaller_than_stated_leave_sizes_to_move(clip, smaller):
+    """Their noise scale lies many prior sds away; beyond rounding nothing is probable."""
+    white = np.sqrt(np.exp(-VALUES)) * np.linspace(-1, 1, VALUES)  # hardly any noise of its own
+    own = LinearClip(clip.e + white, clip.slopes * 1e3, clip.fixed, clip.of_terms)
+    start = fit_like(2)
+    start.z[-1] = np.log(smaller) / NOISE_SD
+    modes = most_probable([own], [TERM], None, start)
+    assert modes[0].x[0] == pytest.approx(
+        most_probable([own], [TERM], None, fit_like(2))[0].x[0], abs=0.1
+    )
+    assert np.isfinite(integrated([own], [TERM], modes).log_evidence)
+
+
 def test_the_likelihood_of_sizes_integrates_the_noise(clip):
     """Differences between sizes as sums over the noise have them."""
     grid = np.linspace(-5, 5, 401)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from galileo_jax.measurement.average_rows import MOST_ROWS, with_rows_averaged
-from galileo_jax.observation.observation import Observation
+from galileo_jax.observation.observation import UNMEASURED_SD_M, Observation
 
 SD_M = 5e-4
 
@@ -64,6 +64,26 @@ def test_rows_at_a_blow_and_a_gap_stay_as_they_are():
     error = (averaged.position_m[0, 0, kept] - 5 * np.abs(averaged.times_s[kept] - 2.0)) / sd
     assert np.mean(error**2) == pytest.approx(1.0, abs=0.2)
     assert not ((averaged.times_s > 299.5 / 400) & (averaged.times_s < 302.5 / 400) & kept).any()
+
+
+def test_what_is_known_along_a_line_stays_known_along_it_alone():
+    """And a blow is seen along it: what was not measured makes no row smoother than it is."""
+    times = np.arange(1600) / 400
+    along, across = np.array([0.6, -0.8]), np.array([0.8, 0.6])
+    way = 5 * np.abs(times - 2.0) + SD_M * np.random.default_rng(0).standard_normal(1600)
+    error = SD_M**2 * np.outer(along, along) + UNMEASURED_SD_M**2 * np.outer(across, across)
+    whole = replace(
+        seen(way, times),
+        position_m=np.einsum("a,t->at", along, way)[None],
+        covariance_m2=np.broadcast_to(error[None, :, :, None], (1, 2, 2, 1600)),
+    )
+    averaged, _ = with_rows_averaged(whole)
+    assert len(averaged.times_s) < 1.2 * MOST_ROWS
+    found = np.abs(np.einsum("a,oat->ot", across, averaged.across))
+    np.testing.assert_allclose(found, 1.0)
+    sd = np.sqrt(np.einsum("a,oabt,b->ot", along, averaged.covariance_m2, along)[0])
+    assert np.median(sd) < 0.8 * SD_M
+    assert (np.abs(averaged.times_s - 2.0) < 2.5 / 400).sum() == 5
 
 
 def test_shared_errors_are_averaged_alike():

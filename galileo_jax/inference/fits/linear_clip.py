@@ -212,7 +212,8 @@ def _climbed(
     for _ in range(MOST_STEPS):
         step = np.linalg.solve(information + damping * np.eye(len(both)), gradient)
         step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), still))
-        there = np.clip(both + step, -LARGEST, LARGEST)
+        there = both + step
+        there[: len(terms)] = np.clip(there[: len(terms)], -LARGEST, LARGEST)
         new = _look(clips, terms, there)
         if new[0] < value - STILL_NATS:
             damping *= 10
@@ -235,9 +236,10 @@ def _look(
         own = [k for k, term in enumerate(terms) if term.name in clip.of_terms] + [count + index]
         units = [*(clip.of_terms[terms[k].name] for k in own[:-1]), np.eye(len(clip.e))]
         parts = [np.exp(2 * widths[k] * both[k]) * u for k, u in zip(own, units, strict=True)]
-        root = scipy.linalg.cholesky(clip.fixed + sum(parts), lower=True)
-        (dpotri,) = scipy.linalg.get_lapack_funcs(("potri",), (root,))
-        inverted = dpotri(root, lower=True)[0]
+        root, failed = scipy.linalg.lapack.dpotrf(clip.fixed + sum(parts), lower=True)
+        if failed:  # so far out that rounding leaves no covariance
+            return -np.inf, gradient, information
+        inverted = scipy.linalg.lapack.dpotri(root, lower=True)[0]
         inverted = np.tril(inverted) + np.tril(inverted, -1).T
         pulled = inverted @ clip.e
         value -= 0.5 * float(clip.e @ pulled) + float(np.log(np.diag(root)).sum())
@@ -301,11 +303,13 @@ class _Normal:
 
 
 def _value(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray) -> float:
-    """`_look`'s value alone."""
+    """`_look`'s value alone; -inf so far out that rounding leaves no covariance."""
     value, count = -0.5 * float(both @ both), len(terms)
     for index, clip in enumerate(clips):
         cover = clip.covariance(terms, both[:count], both[count + index])
-        root = scipy.linalg.cholesky(cover, lower=True)
+        root, failed = scipy.linalg.lapack.dpotrf(cover, lower=True)
+        if failed:
+            return -np.inf
         white = scipy.linalg.solve_triangular(root, clip.e, lower=True)
         value -= 0.5 * float(white @ white) + float(np.log(np.diag(root)).sum())
     return value
