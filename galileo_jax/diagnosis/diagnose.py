@@ -29,6 +29,7 @@ from galileo_jax.diagnosis.constants_with_names import with_known_constants
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Reason, Round, Verdict
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_evidence import expected_leads
+from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay
 from galileo_jax.diagnosis.imperfect_world import ImperfectWorld, imperfect_world
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
 from galileo_jax.diagnosis.law_verdict import (
@@ -131,9 +132,11 @@ def diagnose(
         on_round(rounds[0])
     verdict = with_known_constants(trials, verdict, candidates, seed)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
+    friction: tuple[FrictionAlongWay, ...] = ()
     if rough is not None and verdict.effects in UNEVEN:
         rounds.append(Round(rough.base, rough.comparison, called=verdict.effects))
         on_round(rounds[-1])
+        friction = rough.friction
     chosen = to_add(verdict, candidates) if add == "auto" else None
     if chosen is not None:
         known = compared if rough is None else {}
@@ -146,7 +149,7 @@ def diagnose(
         around = formula.hypothesis if formula is not None and explains(formula) else table.base
         missing = infer_missing_force(trials, around, seed, found.views)
     left_out, each = _clip_by_clip(trials, table.base, rounds, listener)
-    return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each)
+    return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each, friction)
 
 
 @dataclass(frozen=True)
@@ -400,7 +403,7 @@ def _in_imperfect_world(
     trials: JointProblem, rough: ImperfectWorld, on_stage: Callable[[str], None]
 ) -> Verdict:
     """The verdict on a table of hypotheses with imperfections."""
-    plain = without_a_name(rough.comparison, rough.table)
+    plain = without_a_name(rough.comparison, rough.table, is_friction=rough.pushing is None)
     if plain is not None:
         return plain
     law = law_verdict(rough.table, rough.decisive)
@@ -441,7 +444,7 @@ def _instead(
     if other.status in ("none", "named", "ambiguous") and other.effects != verdict.effects:
         return rough, other
     if verdict.status == "unknown":
-        said = reasons.imperfections_fail(rough.comparison)
+        said = reasons.imperfections_fail(rough.comparison, rough.pushing)
         return None, replace(verdict, reasons=(*verdict.reasons, said))
     return None, verdict
 

@@ -12,6 +12,7 @@ from scipy.special import softmax
 
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.diagnosis.each_clip import EachClip
+from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay
 from galileo_jax.model.effects.forms import FORM_FAMILIES, FORM_NAMES
 from galileo_jax.search.hypothesis import Hypothesis
 
@@ -185,6 +186,7 @@ class Diagnosis:
         all and by itself; else empty.
       left_one_out: per clip of a series, the rmse (m/s) predicted from the others, before and
         after; empty for one clip.
+      friction: of each clip along the way, where it is uneven; else empty.
     """
 
     rounds: tuple[Round, ...]
@@ -193,6 +195,7 @@ class Diagnosis:
     missing: MissingForce | None = None
     left_one_out: tuple[tuple[str, float, float], ...] = ()
     each_clip: tuple[EachClip, ...] = ()
+    friction: tuple[FrictionAlongWay, ...] = ()
 
     @property
     def base(self) -> Comparison:

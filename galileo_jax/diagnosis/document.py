@@ -12,6 +12,7 @@ from galileo_jax.comparison.document import comparison_document
 from galileo_jax.diagnosis.could_not_see import could_not_see
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
 from galileo_jax.diagnosis.each_clip import kind_of
+from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay
 from galileo_jax.diagnosis.law_verdict import best_formula
 from galileo_jax.diagnosis.verdict import explains
 from galileo_jax.inference.fit_posterior import fit_posterior
@@ -73,6 +74,9 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
         document["imperfections"] = imperfections(whose, last.fit.sizes, posterior)
     if diagnosis.missing is not None:
         document["missing_force"] = _missing_force(diagnosis, diagnosis.missing, named)
+    if diagnosis.friction:
+        clips = [problem.name for problem in trials.problems]
+        document["friction_along_way"] = _friction(clips, diagnosis.friction)
     if diagnosis.left_one_out:
         document["left_one_out"] = [
             {"clip": clip, "rmse_before": before, "rmse_after": after}
@@ -207,6 +211,17 @@ def _missing_force(
             for i, name in enumerate(names)
         },
     }
+
+
+def _friction(clips: Sequence[str], found: Sequence[FrictionAlongWay]) -> list[dict[str, Any]]:
+    """Of each clip and body that slides, the coefficient against the way."""
+    rows = []
+    for clip, one in zip(clips, found, strict=True):
+        for body, name in enumerate(one.names):
+            path_m, mean, sd = one.profile(body).tolist()
+            entry = {"clip": clip, "object": name, "path_m": path_m, "mean": mean, "sd": sd}
+            rows += [entry] if path_m else []
+    return rows
 
 
 def _formula(best: Candidate, is_explained: bool) -> dict[str, Any]:

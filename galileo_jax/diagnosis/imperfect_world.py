@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 
 from galileo_jax.comparison.compare import Comparison, compare
 from galileo_jax.diagnosis.diagnosis import Candidate
+from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay, Stretch, friction_along_way
 from galileo_jax.diagnosis.verdict import CONVINCING, explains, ranked, rivals, to_compare
 from galileo_jax.inference.fits.gradient import Code
 from galileo_jax.inference.fits.imperfect import with_imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.statespace.terms.friction_roughness import NAME
 
 # Beside none: so many of the most probable of each kind in the exact world.
 NUM_SINGLE, NUM_FORMS, NUM_PAIRS, NUM_LAWS = 6, 2, 2, 2
@@ -30,12 +32,20 @@ class ImperfectWorld:
       comparison: of it with the data.
       table: ranked; evidence is over that of `base`.
       decisive: nats by which one must be ahead of another.
+      friction: of each clip, where friction varies by more than is usual; else empty.
     """
 
     base: Hypothesis
     comparison: Comparison
     table: tuple[Candidate, ...]
     decisive: float
+    friction: tuple[FrictionAlongWay, ...] = ()
+
+    @property
+    def pushing(self) -> Stretch | None:
+        """Where friction would have to push beyond doubt, the clearest; None: nowhere."""
+        every = [one for clip in self.friction for one in clip.stretches if one.pushes]
+        return min(every, key=lambda one: one.mean / one.sd, default=None)
 
     def with_candidates(
         self, trials: JointProblem, candidates: Sequence[Candidate], seed: int
@@ -98,7 +108,12 @@ def imperfect_world(
     if world.fit.sizes is None or world.fit.code is Code.FAILED:
         return None
     sized = Hypothesis(base.effects, world.fit, world.trials)
-    return ImperfectWorld(sized, compare(world.trials, world.fit, seed), (), decisive)
+    friction: tuple[FrictionAlongWay, ...] = ()
+    if NAME in world.fit.sizes.unusual:
+        every = range(len(trials.problems))
+        friction = tuple(friction_along_way(world.trials, world.fit, clip) for clip in every)
+    comparison = compare(world.trials, world.fit, seed)
+    return ImperfectWorld(sized, comparison, (), decisive, friction)
 
 
 def _best(candidates: Sequence[Candidate]) -> list[Candidate]:

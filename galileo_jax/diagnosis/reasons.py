@@ -5,6 +5,7 @@ from math import exp, floor, log
 
 from galileo_jax.comparison.compare import ADEQUATE_P, Comparison
 from galileo_jax.diagnosis.diagnosis import Candidate, Reason
+from galileo_jax.diagnosis.friction_along_way import Stretch
 from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.model.effects.forms.form import Form
 from galileo_jax.observation.observation import AWAY_M, AWAY_SD
@@ -496,10 +497,18 @@ def imperfections_explain(comparison: Comparison) -> Reason:
     )
 
 
-def imperfections_fail(comparison: Comparison) -> Reason:
-    """Nor do imperfections explain what no effect explains; argument as above."""
+def imperfections_fail(comparison: Comparison, pushing: Stretch | None) -> Reason:
+    """Nor do imperfections explain what no effect explains.
+
+    Args:
+      comparison: as above.
+      pushing: where uneven friction would have to push.
+    """
     why = (
-        f"would have to be larger than usual: {', '.join(comparison.unusual)}"
+        f"explain it only with a friction coefficient of {pushing.mean:.2g} ± {pushing.sd:.1g} of "
+        f"{pushing.name} from {pushing.from_m:.3g} to {pushing.to_m:.3g} m, and no surface pushes"
+        if pushing is not None
+        else f"would have to be larger than usual: {', '.join(comparison.unusual)}"
         if comparison.unusual
         else f"leave more than noise ({p_equals(comparison.p_value)})"
     )

@@ -100,17 +100,20 @@ def is_nothing_missing(is_base_accepted: bool, candidates: Sequence[Candidate]) 
     return is_base_accepted and best_named(candidates).log_odds < CONVINCING
 
 
-def without_a_name(comparison: Comparison, candidates: Sequence[Candidate]) -> Verdict | None:
+def without_a_name(
+    comparison: Comparison, candidates: Sequence[Candidate], is_friction: bool = True
+) -> Verdict | None:
     """The verdict where no effect is needed in an imperfect world; None where one is.
 
     None is missing where imperfections of usual sizes leave nothing but noise and no effect is
     convincing beside them. The friction is uneven where it varies by more and no effect, with
     imperfections of usual sizes, explains the data about as well; ambiguous where one does. A
-    formula has to be better than imperfections are.
+    formula has to be better than imperfections are. What would have to push is no friction.
 
     Args:
       comparison: of the model without effects, with imperfections.
       candidates: ranked, with imperfections, compared with the data.
+      is_friction: whether uneven friction is nowhere negative.
     """
     if comparison.p_value < ADEQUATE_P:
         return None
@@ -120,7 +123,7 @@ def without_a_name(comparison: Comparison, candidates: Sequence[Candidate]) -> V
     if not comparison.unusual:
         return None if lead >= CONVINCING else Verdict("none", (), reasons=why)
     name = AS_EFFECTS.get(comparison.unusual)
-    if name is None or lead >= DECISIVE:
+    if name is None or lead >= DECISIVE or not is_friction:
         return None
     rivals = [c for c in explaining if not c.is_form and c.law is None and c.log_odds > -DECISIVE]
     if not rivals:

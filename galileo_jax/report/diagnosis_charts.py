@@ -1,6 +1,7 @@
 """Charts of a diagnosis: how the error falls, the candidates, and the missing force."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -92,3 +93,22 @@ def missing_force_chart(missing: MissingForce, names: Mapping[int, str]) -> Char
     listed = ", ".join(names.values())
     label = f"acceleration that the model of {listed} lacks, against time, speed and position"
     return Chart(f"missing_{'_'.join(names.values())}", label, panels)
+
+
+def friction_chart(rows: Sequence[Mapping[str, Any]], clip: str) -> Chart:
+    """The coefficient of friction along the way with its 95 % band, of the bodies of one clip.
+
+    Args:
+      rows: `friction_along_way` of diagnosis.json.
+      clip: whose.
+    """
+    marks: list[Mark] = []
+    for index, row in enumerate(one for one in rows if one["clip"] == clip):
+        colour = object_colour(index)
+        path, mean, sd = (np.array(row[key], float) for key in ("path_m", "mean", "sd"))
+        marks.append(Band(path, mean - 1.96 * sd, mean + 1.96 * sd, colour, "95 %", 0.25))
+        marks.append(Line(path, mean, colour, row["object"]))
+    panel = Panel(
+        "friction coefficient", tuple(marks), title=clip, xlabel="along the path, m", level=0.0
+    )
+    return Chart(f"friction_{clip}", f"friction coefficient along the way in {clip}", (panel,))

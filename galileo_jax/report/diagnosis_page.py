@@ -15,7 +15,12 @@ from galileo_jax.report import diagnosis_text
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.comparison_charts import before_after_chart
 from galileo_jax.report.comparison_page import cells, failures, motion
-from galileo_jax.report.diagnosis_charts import known_objects, missing_force_chart, rounds_chart
+from galileo_jax.report.diagnosis_charts import (
+    friction_chart,
+    known_objects,
+    missing_force_chart,
+    rounds_chart,
+)
 from galileo_jax.report.html_page import chart_section, document, header, items, legend, table
 from galileo_jax.report.provenance import provenance
 from galileo_jax.results.shown_digits import shown
@@ -74,6 +79,7 @@ def write_diagnosis_page(
         ),
         *(_added(name, charts) for name, charts in _before_after(diagnosis, shown)),
         _missing(report, trials.problems[0].observation.names),
+        _friction(report.record.get("friction_along_way", [])),
         cells(diagnosis.base, several=len(trials.problems) > 1),
         _each_clip(report.record.get("each_clip")),
         _left_one_out(report.record.get("left_one_out", [])),
@@ -222,6 +228,18 @@ def _missing(report: DiagnosisReport, names: Sequence[str]) -> str:
         "The acceleration along the path that the model lacks, in m/s², with its 95 % band, "
         f"inferred without assuming a formula. {found} In a formula q is the position in m past "
         "the foot, v the speed in m/s and t the time in s since the release.",
+        charts,
+    )
+
+
+def _friction(rows: Sequence[Mapping[str, Any]]) -> str:
+    if not rows:
+        return ""
+    charts = [friction_chart(rows, clip) for clip in dict.fromkeys(row["clip"] for row in rows)]
+    return chart_section(
+        "Friction along the way",
+        "The coefficient of friction on stretches of four frames, with its 95 % band, as the "
+        "motion asks for it: past the foot of the ramp, or past the start on a slope alone.",
         charts,
     )
 

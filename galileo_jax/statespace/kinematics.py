@@ -49,6 +49,7 @@ class Kinematics:
 
     Attributes:
       times_s: `[frame]`.
+      path_m: `[object, frame]`, past the foot; between measured places on straight lines.
       tangent: `[object, 2, frame]`, unit vectors of the path, in the direction of travel.
       speed_m_s: `[object, frame]`, along the path; 0 at rest.
       moves: `[object, frame-1]`, whether each moves from frame to frame.
@@ -57,6 +58,7 @@ class Kinematics:
     """
 
     times_s: Float[np.ndarray, " frame"]
+    path_m: Float[np.ndarray, "object frame"]
     tangent: Float[np.ndarray, "object axis frame"]
     speed_m_s: Float[np.ndarray, "object frame"]
     moves: Bool[np.ndarray, "object step"]
@@ -96,7 +98,7 @@ def kinematics(observation: Observation, scene: Surroundings) -> Kinematics | No
         speed[i][speed[i] < least] = 0.0
         moves[i] = (speed[i, 1:] > 0) | (speed[i, :-1] > 0)
     tangent = np.stack([np.cos(angle), -np.sin(angle)], axis=1)
-    found = Kinematics(times, tangent, speed, moves, scene.gravity * np.cos(angle))
+    found = Kinematics(times, place, tangent, speed, moves, scene.gravity * np.cos(angle))
     return replace(found, hits=_hits(observation, place))
 
 

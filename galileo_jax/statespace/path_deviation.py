@@ -7,6 +7,8 @@ to both, as the time and speed at which it comes change: s+ = (v+ / v-) s-, and 
 (the saltation matrix of a hit on what rests).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
@@ -22,8 +24,9 @@ def deviations(
     friction: float = 0.0,
     pushed: Float[np.ndarray, "step object object"] | None = None,
     jumps: Float[np.ndarray, "step object"] | None = None,
-) -> Float[np.ndarray, "frame object frame object"]:
-    """The covariance of deviations along the path, m^2.
+    shown: Sequence[int] = (PLACE,),
+) -> Float[np.ndarray, "frame shown frame shown"]:
+    """The covariance of deviations along the path, m^2, and of what else is shown of the state.
 
     Args:
       motion: as measured.
@@ -31,6 +34,7 @@ def deviations(
       friction: standard deviation of its coefficient.
       pushed: covariance of white accelerations in each step, m^2/s^3.
       jumps: standard deviation of each speed's jump in a step, m/s.
+      shown: of each object; the places of all objects first, then the next of all.
     """
     count, frames = motion.speed_m_s.shape
     size, steps = NUM * count, frames - 1
@@ -53,8 +57,9 @@ def deviations(
         diffusion[:, fast[:, None], fast] += pushed * np.moveaxis(both, -1, 0)
     way = transitions(drift, diffusion, motion.step_s)
     way = _with_events(way, motion, jumps)
-    seen = np.zeros((frames, count, size))
-    seen[:, np.arange(count), NUM * np.arange(count) + PLACE] = 1.0
+    which = np.add.outer(shown, NUM * np.arange(count)).reshape(-1)
+    seen = np.zeros((frames, len(which), size))
+    seen[:, np.arange(len(which)), which] = 1.0
     return covariance(way, start, seen)
 
 

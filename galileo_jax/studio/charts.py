@@ -8,7 +8,7 @@ import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import MissingForce
 from galileo_jax.report.chart import Band, Chart, Line, Panel, Points, time_limits
-from galileo_jax.report.diagnosis_charts import known_objects, missing_force_chart
+from galileo_jax.report.diagnosis_charts import friction_chart, known_objects, missing_force_chart
 from galileo_jax.report.plotly_figure import dark, figure
 from galileo_jax.report.style import object_colour
 from galileo_jax.studio.views import numbers
@@ -98,6 +98,11 @@ def missing_figure(record: Mapping[str, Any], is_dark: bool) -> dict[str, Any]:
     beside = (replace(one, ylabel="", has_y_ticks=False) for one in others if one)
     panels = (replace(first, title=""), *beside) if first else ()
     return _figure_of(Chart("", "", panels, columns=len(panels)), is_dark)
+
+
+def friction_figure(rows: Sequence[Mapping[str, Any]], is_dark: bool) -> dict[str, Any]:
+    """The coefficient of friction along the way of the first clip's bodies."""
+    return _figure_of(friction_chart(rows, str(rows[0]["clip"])), is_dark)
 
 
 def prediction_figure(found: Mapping[str, Any], is_dark: bool) -> dict[str, Any]:

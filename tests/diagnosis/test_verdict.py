@@ -666,6 +666,11 @@ def test_imperfections_explain_where_no_effect_beside_them_convinces(
         )
 
 
+def test_friction_that_would_push_is_no_uneven_friction():
+    found = Comparison(0.5, (), (), {}, (), (), (1.0,), False, ("friction_roughness",))
+    assert without_a_name(found, [candidate("air_drag", -9.0)], is_friction=False) is None
+
+
 def test_a_candidate_with_unusual_imperfections_explains_nothing():
     """Whatever its p-value is."""
     assert explains(candidate("air_drag", 9.0))

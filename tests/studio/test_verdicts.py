@@ -22,8 +22,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.video]
 
 BOARD = "--scenario incline --size 320x180 --m1 0.15"
 CUBIC = "--effects-from my_effect.py --effect cubic_drag:cubic_drag"
-TAPPED = "--effects-from my_effect.py --effect taps:taps=-3"
-CLIPS = {  # a drag with the cube of the speed is a law; no formula says three taps
+TAPPED = "--effects-from my_effect.py --effect taps:taps=9"
+CLIPS = {  # a drag with the cube of the speed is a law; no formula says three taps down the slope
     "unknown": f"{BOARD} {TAPPED} --seed 9 --angle 30 --k1 0.2 --fps 60",
     "law": f"{BOARD} {CUBIC}=0.1 --seed 4 --angle 35 --k1 0.15",
     "ambiguous": f"{BOARD} --effect air_drag --strength 0.1 --seed 7 --angle 25 --k1 0.2"

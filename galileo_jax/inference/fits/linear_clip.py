@@ -111,17 +111,17 @@ def linear_clips(trials: JointProblem, fit: GradientFit) -> list[LinearClip]:
         first += size
         white = problem.whiten(problem.simulate(trials.of_clip(theta, index)), scale)
         every = np.column_stack([white - rows @ fit.z[:count], rows])
-        every = _averaged(_in_stated_errors(every, scale, problem).T, problem)
-        modes = _averaged(problem.fixed_patterns, problem)
+        every = averaged(_in_stated_errors(every, scale, problem).T, problem)
+        modes = averaged(problem.fixed_patterns, problem)
         of_terms = {}
         for term, patterns in problem.patterns.items():
-            own = _averaged(patterns, problem)
+            own = averaged(patterns, problem)
             of_terms[term] = own.T @ own
         found.append(LinearClip(every[0], every[1:].T, modes.T @ modes, of_terms))
     return found
 
 
-def _averaged(values: np.ndarray, problem: Problem) -> Float[np.ndarray, "row value"]:
+def averaged(values: np.ndarray, problem: Problem) -> Float[np.ndarray, "row value"]:
     """Rows of measured values; neighbours of many are averaged, independent errors staying so.
 
     Args:

@@ -3,7 +3,7 @@
 from galileo_jax.statespace.path_deviation import deviations
 from galileo_jax.statespace.term import Patterns, Seen, Term, along_path, none, register
 
-LENGTH_M = 0.01
+NAME, LENGTH_M = "friction_roughness", 0.01
 
 
 def _patterns(seen: Seen) -> Patterns:
@@ -15,7 +15,7 @@ def _patterns(seen: Seen) -> Patterns:
 
 register(
     Term(
-        name="friction_roughness",
+        name=NAME,
         meaning="the friction coefficient varies by {size} along the way",
         unit="1",
         median=lambda _: 0.005,

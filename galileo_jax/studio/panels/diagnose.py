@@ -131,7 +131,10 @@ def _strength(row: Mapping[str, Any]) -> str:
 
 
 def _missing(tab: "Tab", found: Mapping[str, Any]) -> None:
-    """The acceleration that the model lacks, where there is one."""
+    """The acceleration that the model lacks, or the uneven friction, where there is one."""
+    if rows := found.get("friction_along_way"):
+        ui.label("The friction coefficient along the way").classes("small soft")
+        ui.plotly(charts.friction_figure(rows, tab.dark)).style("height: 230px; width: 100%")
     record = found.get("missing_force")
     if not record:
         return
