@@ -134,7 +134,7 @@ def diagnose(
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
     friction: tuple[FrictionAlongWay, ...] = ()
     if rough is not None and verdict.effects in UNEVEN:
-        rounds.append(Round(rough.base, rough.comparison, called=verdict.effects))
+        rounds.append(rough.round_called(verdict.effects))
         on_round(rounds[-1])
         friction = rough.friction
     chosen = to_add(verdict, candidates) if add == "auto" else None

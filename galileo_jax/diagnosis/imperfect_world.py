@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from galileo_jax.comparison.compare import Comparison, compare
-from galileo_jax.diagnosis.diagnosis import Candidate
+from galileo_jax.diagnosis.diagnosis import Candidate, Round
 from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay, Stretch, friction_along_way
 from galileo_jax.diagnosis.verdict import CONVINCING, explains, ranked, rivals, to_compare
 from galileo_jax.inference.fits.gradient import Code
@@ -46,6 +46,14 @@ class ImperfectWorld:
         """Where friction would have to push beyond doubt, the clearest; None: nowhere."""
         every = [one for clip in self.friction for one in clip.stretches if one.pushes]
         return min(every, key=lambda one: one.mean / one.sd, default=None)
+
+    def round_called(self, effects: tuple[str, ...]) -> Round:
+        """The base as a round, its imperfections part of the model by the name of effects."""
+        fit, trials = self.base.fit, self.base.trials
+        assert trials is not None
+        theta = trials.theta(fit.z, fit.free)
+        error = error_of(trials, theta, fit.num_fitted, fit.pull, is_usual=False)
+        return Round(self.base, replace(self.comparison, error=error), called=effects)
 
     def with_candidates(
         self, trials: JointProblem, candidates: Sequence[Candidate], seed: int

@@ -239,7 +239,7 @@ class Problem:
         difference = self.data.observed_m - predicted_m
         return GaussianLikelihood.whiten_batch(difference, noise_scale, self.data)
 
-    def followed(self, predicted_m: np.ndarray) -> np.ndarray:
+    def followed(self, predicted_m: np.ndarray, is_usual: bool = True) -> np.ndarray:
         """Where bodies were, if they deviate from a prediction as bodies usually do.
 
             d = U_b U_b^T C^-1 r,    U_b: patterns of what bodies do, not of errors of the marks
@@ -249,15 +249,17 @@ class Problem:
 
         Args:
           predicted_m: `[object, axis, frame]`.
+          is_usual: else imperfections are of the sizes that were found, as part of the model.
 
         Returns:
           the same shape; the prediction where imperfections have no place.
         """
-        own = [self.patterns[name] for name in self.patterns if not TERMS[name].is_of_marks]
+        whose = self._usual if is_usual else self
+        own = [whose._sized(name) for name in self.patterns if not TERMS[name].is_of_marks]
         if not own:
             return predicted_m
-        patterns, usual = np.concatenate(own), self._usual
-        left = usual.tracking_errors(predicted_m)  # in stated errors, C^-1 of them at scale 1
+        patterns = np.concatenate(own)
+        left = whose.tracking_errors(predicted_m)  # in stated errors, C^-1 of them at scale 1
         white = np.tensordot(patterns.reshape(len(patterns), -1) @ left, patterns, 1)
         root = np.where(self.observation.mask[:, None, None], self._inverse_root, 0.0)
         root = np.linalg.pinv(np.moveaxis(root, -1, 1))  # [object, frame, axis, axis]

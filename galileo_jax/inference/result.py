@@ -120,7 +120,11 @@ def distance_error(
 
 
 def error_of(
-    trials: JointProblem, theta: np.ndarray, num_fitted: float, pull: float = 0.0
+    trials: JointProblem,
+    theta: np.ndarray,
+    num_fitted: float,
+    pull: float = 0.0,
+    is_usual: bool = True,
 ) -> dict[str, float]:
     """Errors of places and velocities, and chi2 per degree of freedom, at `theta` `[parameter]`.
 
@@ -132,13 +136,14 @@ def error_of(
       theta: in the parameters' units, noise scales last.
       num_fitted: how many numbers' worth the parameters were fitted with, nuisances left out.
       pull: of the nuisances, which are data, too: the sum of their squared `prior_deviations`.
+      is_usual: see `Problem.followed`.
     """
     predictions, chi2, count = [], pull, 0.0
     for clip, problem in enumerate(trials.problems):
         predicted = problem.simulate(trials.of_clip(theta, clip))
         chi2 += float(np.sum(problem.tracking_errors(predicted) ** 2))
         count += float(GaussianLikelihood.degrees(1.0, problem.data))
-        predictions.append(problem.followed(predicted))
+        predictions.append(problem.followed(predicted, is_usual))
     error = velocity_error(trials.problems, predictions)
     error |= distance_error(trials.problems, predictions)
     degrees = max(count - num_fitted, 1.0)
