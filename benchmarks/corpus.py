@@ -53,7 +53,9 @@ def main(
         name = f"{'video' if videos else 'track'}{index}"
         path, recipe = _clip(clips / f"{name}.{'mp4' if videos else 'csv'}", index)
         row = journal.row(f"{task} {name}", lambda path=path: _timed(path, task))
-        tables.row(row["case"], (recipe["scenario"], *recipe.get("effects", ()), row["cpu_s"]))
+        rises = "error rises" if row.get("rises") else ""
+        said = (recipe["scenario"], *recipe.get("effects", ()), row["cpu_s"], rises)
+        tables.row(row["case"], said)
     return None
 
 
@@ -119,7 +121,9 @@ def _outcome(path: Path, task: str) -> dict[str, Any]:
     found = gx.diagnose(path)
     candidates = found.document["candidates"]
     best = max(candidate["score"] for candidate in candidates)
+    errors = [row["rmse"] for row in found.document["history"]]
     return {
+        "rises": bool(errors[-1] > errors[0]),  # whether what was added makes the error larger
         "log_evidence": {
             "+".join(candidate["effects"]) if "effects" in candidate else candidate["effect"]: (
                 candidate["score"] - best

@@ -61,7 +61,7 @@ class FrictionAlongWay:
       names: of the bodies.
       body: `[stretch]`, whose.
       steps: `[stretch]`, between how many frames.
-      from_m, to_m: `[stretch]`, past the foot (on a slope alone, past the start).
+      from_m, to_m: `[stretch]`, past the foot; on a slope alone, from where the track counts.
       mean, sd: `[stretch]`.
     """
 

@@ -239,7 +239,8 @@ def _friction(rows: Sequence[Mapping[str, Any]]) -> str:
     return chart_section(
         "Friction along the way",
         "The coefficient of friction on stretches of four frames, with its 95 % band, as the "
-        "motion asks for it: past the foot of the ramp, or past the start on a slope alone.",
+        "motion asks for it. The path is counted from the foot of the ramp; on a slope alone, "
+        "from where the track counts.",
         charts,
     )
 
