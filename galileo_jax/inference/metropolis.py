@@ -56,7 +56,8 @@ def metropolis_posterior(
     where they are, in coordinates and with proposals that suit it; it alone is returned.
 
     Args:
-      trials: the target is `trials.log_density`, noise scales included.
+      trials: the target is `trials.log_density`, noise scales included; where the fit has sizes of
+        imperfections, integrated over these.
       fit: its covariance is the first proposal; chains start dispersed along its valley.
       seed: same seed, same draws.
       sampler: a name in the samplers' registry.
@@ -94,7 +95,7 @@ def metropolis_posterior(
             found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]
         return found or {"log_noise": draws[..., -1]}
 
-    kernel, density = sampler_class(sampler), density_of(trials)
+    kernel, density = sampler_class(sampler), density_of(trials, fit)
     dim, key = valley.root.shape[1], jax.random.key(seed)
     first, second = _parts(settings)
     total = settings.warmup_steps + settings.max_steps

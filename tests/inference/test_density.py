@@ -7,7 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from galileo_jax.inference.density import density_of, likelihood_of
+from galileo_jax.inference.density import density_of
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.imperfect import fit_worlds
+from galileo_jax.inference.fits.sized_density import LEAST_SIZES, SizedDensity
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.samplers.program import Program
 from galileo_jax.rollout.engines import make_engine
@@ -32,8 +35,6 @@ def test_it_is_the_density_of_the_trials(experiments):
         z = draw(trials, seed)
         expected = float(jax.jit(trials.log_density)(jnp.asarray(z)))
         assert float(program(jnp.asarray(z))) == pytest.approx(expected, rel=BETWEEN_PROGRAMS)
-        likelihood = float(likelihood_of(trials)(jnp.asarray(z)))
-        assert likelihood - 0.5 * z @ z == pytest.approx(expected, rel=BETWEEN_PROGRAMS)
 
 
 def test_clips_of_one_kind_share_the_code():
@@ -51,10 +52,28 @@ def test_an_engine_that_is_called_back_keeps_its_own():
     (problem,) = make_trials([HIT]).problems
     trials = JointProblem((replace(problem, engine=make_engine("c", problem.model)),))
     z = jnp.asarray(draw(trials))
-    density, likelihood = density_of(trials), likelihood_of(trials)
+    density = density_of(trials)
     assert not isinstance(density, Program)
     assert float(density(z)) == float(trials.log_density(z))
-    assert float(likelihood(z)) - 0.5 * float(z @ z) == pytest.approx(float(density(z)))
+
+
+@pytest.mark.parametrize("experiments", [[HIT], [HIT, STEEPER]], ids=["one clip", "two"])
+def test_sizes_of_imperfections_are_integrated(experiments):
+    """The mean over draws of sizes, as points round a fit are weighed with (`SizedDensity`)."""
+    world = fit_worlds(make_trials(experiments), 0, may_be_exact=False).best
+    trials, fit = world.trials, world.fit
+    assert fit.sizes is not None
+    few = replace(fit.sizes, draws=fit.sizes.draws[:LEAST_SIZES])
+    fit = replace(fit, sizes=few)
+    program = density_of(trials, fit)
+    assert isinstance(program, Program)
+    by_points = SizedDensity(trials, fit, GradientFitter(trials).residuals.clips)
+    rng, sd = np.random.default_rng(1), np.sqrt(np.diag(fit.covariance))
+    z = fit.z + 1.5 * sd * rng.standard_normal((6, len(fit.z)))
+    apart = np.array([float(program(jnp.asarray(one))) for one in z]) - by_points(z)
+    np.testing.assert_allclose(apart, 0.0, atol=1e-4)
+    at_mode = np.array([float(density_of(trials)(jnp.asarray(one))) for one in z])
+    assert np.ptp(at_mode - by_points(z)) > 0.01, "and not that of the most probable sizes"
 
 
 def test_where_no_rollout_succeeds_it_is_minus_infinity():

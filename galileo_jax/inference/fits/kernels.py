@@ -70,15 +70,27 @@ class ClipArrays(NamedTuple):
     column: np.ndarray
 
 
+def left_of(kind: Kind, theta, position, velocity, data: Any, scene):
+    """Residuals of one motion in units of the stated errors, `[value]`."""
+    difference = _difference_m(kind, theta, position, velocity, data, scene)
+    left = jnp.einsum("oijt,ojt->oit", data.whitening.inverse_root, difference).reshape(-1)
+    return jnp.where(jnp.abs(left) < FAILED, left, FAILED)
+
+
 def white_of(kind: Kind, theta, position, velocity, noise, data: Any, scene):
     """Whitened residuals of one motion, `[value]`."""
+    difference = _difference_m(kind, theta, position, velocity, data, scene)
+    white = GaussianLikelihood.whiten(difference, noise, data.whitening).reshape(-1)
+    return jnp.where(jnp.abs(white) < FAILED, white, FAILED)
+
+
+def _difference_m(kind: Kind, theta, position, velocity, data: Any, scene):
+    """Observed minus predicted, `[object, axis, frame]`."""
     times = jnp.arange(position.shape[-1]) * kind.record_dt_s
     # The drawn pitch is no measurement, so that none is made up here.
     motion = Trajectory(times, position, velocity)
     predicted = seen(kind.effects, kind.names, theta, motion, data.times_s, scene)
-    difference = data.whitening.observed_m - predicted
-    white = GaussianLikelihood.whiten(difference, noise, data.whitening).reshape(-1)
-    return jnp.where(jnp.abs(white) < FAILED, white, FAILED)
+    return data.whitening.observed_m - predicted
 
 
 @trace_cached(num_static=1)

@@ -23,6 +23,17 @@ from galileo_jax.similarity.gaussian_likelihood import Whitening
 LEAST_SIZES, MOST_SQUARES = 32, 500_000
 
 
+def sizes_of(
+    trials: JointProblem, fit: GradientFit, num: int
+) -> tuple[Float[np.ndarray, "draw term"], Float[np.ndarray, " draw"]]:
+    """Draws of the terms' sizes, x, and log p(y | x) of each, the largest 0."""
+    assert fit.sizes is not None
+    draws = fit.sizes.draws[:num, : len(fit.sizes.x)]
+    linear = linear_clips(trials, fit)
+    each = np.array([log_likelihood(linear, trials.terms, x) for x in draws])
+    return draws, each - each.max()
+
+
 class SizedDensity:
     """The log density of parameters and noise scales, up to a constant."""
 
@@ -30,9 +41,7 @@ class SizedDensity:
         assert fit.sizes is not None
         self._clips, self._fit = clips, fit
         num = max(LEAST_SIZES, MOST_SQUARES // fit.num_values**2)
-        draws = fit.sizes.draws[:num, : len(fit.sizes.x)]
-        linear = linear_clips(trials, fit)
-        self._of_sizes = [log_likelihood(linear, trials.terms, x) for x in draws]
+        draws, self._of_sizes = sizes_of(trials, fit, num)
         self._data = [
             [
                 clip.problem.with_sizes(dict(zip(fit.sizes.names, x, strict=True))).data
@@ -51,7 +60,7 @@ class SizedDensity:
             predicted = clip.problem.simulate_batch(clip.theta(z[:, :count], free))
             left = _in_stated_errors(predicted, each[0])
             found += [_log_likelihood(left, noise[:, c], data) for data in each]
-        found -= np.array(self._of_sizes)[:, None] - max(self._of_sizes)
+        found -= self._of_sizes[:, None]
         mean = np.asarray(logsumexp(found, axis=0)) - np.log(len(found))
         return np.nan_to_num(mean, nan=-np.inf) - 0.5 * np.sum(z**2, axis=1)
 
