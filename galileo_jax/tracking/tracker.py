@@ -64,40 +64,9 @@ def track_video(
         what it has found.
     """
     clock = in_steps(times_s)
-    exposure, kept = Exposure(), _Kept(len(starts))
-    pieces: list[list[Piece]] = [[] for _ in starts]
-    before: Picture | None = None
-    count, size_px = 0, (0, 0)
-    for index, frame in enumerate(open_frames()):
-        picture = Picture(grey(frame))
-        used = [k for k, start in enumerate(starts) if start.uses(index)]
-        for k in used:
-            beside = [own[-1].follower for i, own in enumerate(pieces) if own and i != k]
-            step = clock[index] - clock[index - 1] if index else 1.0
-            follow_on(pieces[k], starts[k], index, before, picture, exposure, beside, step)
-        keep_apart([pieces[k][-1] for k in used], index, before, picture)
-        for k in used:
-            kept.add(k, index, picture, pieces[k][-1].follower)
-        before = picture
-        count, size_px = index + 1, picture.size_px
-        advance(Seen(index, tuple(_place(own, index) for own in pieces)))
-
-    flat = [(k, piece) for k, own in enumerate(pieces) for piece in own]
-    coarse = [piece.poses(count) for _, piece in flat]
-    templates = [_final_template(piece.follower) for _, piece in flat]
-    shares = _learnt(kept, open_frames, [k for k, _ in flat], coarse, templates, exposure, clock)
-    fits: list[list[Refined | None]] = [[] for _ in flat]
-    for index, pictures in enumerate(kept.pictures(open_frames, count)):
-        each = zip(flat, coarse, templates, shares, fits, strict=True)
-        for (k, piece), poses, template, share, found in each:
-            picture = pictures[k]
-            if picture is None or not np.isfinite(poses[index, 0]):
-                found.append(None)
-                continue
-            velocities = piece.velocities(poses, index, clock)
-            found.append(refine_pose(picture, template, poses[index], velocities, share))
-        advance(None)
-
+    first = _from_frame_to_frame(open_frames, starts, clock, advance)
+    count, flat = first.count, [(k, piece) for k, own in enumerate(first.pieces) for piece in own]
+    shares, fits = _in_every_frame(first, flat, open_frames, clock, advance)
     coding = coding or Coding(np.zeros(count, bool))
     done = finished(
         fits, [piece for _, piece in flat], shares, coding, clock[:count], len(starts) == 1
@@ -116,8 +85,80 @@ def track_video(
         shifts_px=np.stack([item.shifts_px for item in objects]),
         angle_rad=np.stack([item.angle_rad for item in objects]),
         is_visible=np.stack([np.isfinite(item.angle_rad) for item in objects]),
-        frame_size_px=size_px,
+        frame_size_px=first.size_px,
     )
+
+
+@dataclass(frozen=True)
+class _FirstPass:
+    """What following from frame to frame gives.
+
+    Attributes:
+      pieces: of each start.
+      kept: the pictures that are kept for the second pass.
+      exposure: as far as smears show it.
+      count: of frames.
+      size_px: of the picture.
+    """
+
+    pieces: list[list[Piece]]
+    kept: "_Kept"
+    exposure: Exposure
+    count: int
+    size_px: tuple[int, int]
+
+
+def _from_frame_to_frame(
+    open_frames: Callable[[], Iterable[np.ndarray]],
+    starts: Sequence[Start],
+    clock: np.ndarray,
+    advance: Callable[[Seen | None], None],
+) -> _FirstPass:
+    """The first pass of `track_video`; `clock` in usual steps."""
+    exposure, kept = Exposure(), _Kept(len(starts))
+    pieces: list[list[Piece]] = [[] for _ in starts]
+    before: Picture | None = None
+    count, size_px = 0, (0, 0)
+    for index, frame in enumerate(open_frames()):
+        picture = Picture(grey(frame))
+        used = [k for k, start in enumerate(starts) if start.uses(index)]
+        for k in used:
+            beside = [own[-1].follower for i, own in enumerate(pieces) if own and i != k]
+            step = clock[index] - clock[index - 1] if index else 1.0
+            follow_on(pieces[k], starts[k], index, before, picture, exposure, beside, step)
+        keep_apart([pieces[k][-1] for k in used], index, before, picture)
+        for k in used:
+            kept.add(k, index, picture, pieces[k][-1].follower)
+        before = picture
+        count, size_px = index + 1, picture.size_px
+        advance(Seen(index, tuple(_place(own, index) for own in pieces)))
+    return _FirstPass(pieces, kept, exposure, count, size_px)
+
+
+def _in_every_frame(
+    first: _FirstPass,
+    flat: Sequence[tuple[int, Piece]],
+    open_frames: Callable[[], Iterable[np.ndarray]],
+    clock: np.ndarray,
+    advance: Callable[[Seen | None], None],
+) -> tuple[list[float], list[list[Refined | None]]]:
+    """The second pass: of each piece its shares of a frame's time, and its pose in each frame."""
+    coarse = [piece.poses(first.count) for _, piece in flat]
+    templates = [_final_template(piece.follower) for _, piece in flat]
+    of = [k for k, _ in flat]
+    shares = _learnt(first.kept, open_frames, of, coarse, templates, first.exposure, clock)
+    fits: list[list[Refined | None]] = [[] for _ in flat]
+    for index, pictures in enumerate(first.kept.pictures(open_frames, first.count)):
+        each = zip(flat, coarse, templates, shares, fits, strict=True)
+        for (k, piece), poses, template, share, found in each:
+            picture = pictures[k]
+            if picture is None or not np.isfinite(poses[index, 0]):
+                found.append(None)
+                continue
+            velocities = piece.velocities(poses, index, clock)
+            found.append(refine_pose(picture, template, poses[index], velocities, share))
+        advance(None)
+    return shares, fits
 
 
 def _with_silhouettes(
