@@ -68,21 +68,8 @@ def replicates(
     # The Jacobian was whitened at the fit's own noise scale.
     rows = np.repeat(fitted_scale / noise_scale, sizes)
     jacobian = fit.jacobian[:, free] * rows[:, None]
-    masks = [
-        np.repeat(
-            problem.observation.mask[:, None], problem.observation.position_m.shape[1], axis=1
-        ).reshape(-1)
-        for problem in trials.problems
-    ]
-    noise = np.concatenate(
-        [
-            _errors(problem, scale, size, label, count, generator) * mask
-            for problem, scale, size, label, mask in zip(
-                trials.problems, noise_scale, mode_size, labels, masks, strict=True
-            )
-        ],
-        axis=1,
-    )
+    each = zip(trials.problems, noise_scale, mode_size, labels, strict=True)
+    noise = np.concatenate([_errors(*one, count, generator) for one in each], axis=1)
     centre = generator.standard_normal((count, len(free)))
     gain = inverse(jacobian.T @ jacobian + np.eye(len(free)))
     base = np.concatenate(_at(trials, fit, fit.z[None], noise_scale), axis=1)
@@ -112,7 +99,10 @@ def _errors(
     count: int,
     generator: np.random.Generator,
 ) -> np.ndarray:
-    """Whitened errors of a clip, `[replicate, value]`: the tracker's, and modes of a size."""
+    """Whitened errors of a clip, `[replicate, value]`: the tracker's, and modes of a size.
+
+    0 where nothing was seen.
+    """
     data, errors = problem.data, problem.errors_in_full
     gain2, basis = data.gain**2, data.basis.reshape(len(data.gain), -1)
     found = generator.standard_normal((count, problem.observation.position_m.size))
@@ -127,7 +117,9 @@ def _errors(
         along = along @ symmetric_root(mode_covariance(0.0, mode_size, data, errors))
     own = found @ basis.T
     left = noise_scale / np.sqrt(noise_scale**2 + gain2)
-    return found + ((own + along / noise_scale) * left - own) @ basis
+    found = found + ((own + along / noise_scale) * left - own) @ basis
+    seen = problem.observation
+    return found * np.repeat(seen.mask[:, None], seen.position_m.shape[1], axis=1).reshape(-1)
 
 
 def _uneven(
