@@ -115,9 +115,7 @@ def _of_clip(part: Rolled, data: Part, z: jax.Array, noise: jax.Array) -> jax.Ar
     return jnp.where(has_failed, -jnp.inf, -0.5 * (jnp.sum(white**2) + log_determinant))
 
 
-def _with_sizes(
-    left: jax.Array, noise: jax.Array, sized: Sized, num_values: jax.Array
-) -> jax.Array:
+def _with_sizes(left: jax.Array, noise: jax.Array, sized: Sized, num_values: Any) -> jax.Array:
     """Log N(left; 0, C_k) of residuals in stated errors `[value]`, `[size]`."""
     along2 = jnp.einsum("kmn,n->km", sized.turned, sized.basis @ left) ** 2
     variance = noise**2

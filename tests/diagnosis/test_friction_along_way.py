@@ -48,6 +48,7 @@ def found(folder, more: float):
     track = gx.track(folder / "board.csv")
     trials = make_joint_problem([track.clip], [track.observation])
     world = fit_worlds(trials, 0, may_be_exact=False).best
+    assert world.fit.sizes is not None
     assert "friction_roughness" in world.fit.sizes.unusual
     return friction_along_way(world.trials, world.fit)
 
@@ -61,7 +62,8 @@ def test_stretches_hold_the_friction_that_is_there(tmp_path, more):
         truth = []
         for ends in zip(profile.from_m[own], profile.to_m[own], strict=True):
             # Over the time that it takes, in which speeds change evenly.
-            at = np.linspace(*np.interp(ends, way, times), 200)
+            begin, end = np.interp(ends, way, times)
+            at = np.linspace(begin, end, 200)
             truth.append(friction(np.interp(at, times, way), more).mean())
         z = (profile.mean[own] - truth) / profile.sd[own]
         assert np.mean(z**2) < 2.0, (steps, z)

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg
 from jaxtyping import Float
+from scipy.linalg.lapack import dpotrf, dpotri  # pyright: ignore[reportAttributeAccessIssue]
 from scipy.special import logsumexp
 
 from galileo_jax.inference.fits.adaptive_mixture import AdaptiveMixture
@@ -236,10 +237,10 @@ def _look(
         own = [k for k, term in enumerate(terms) if term.name in clip.of_terms] + [count + index]
         units = [*(clip.of_terms[terms[k].name] for k in own[:-1]), np.eye(len(clip.e))]
         parts = [np.exp(2 * widths[k] * both[k]) * u for k, u in zip(own, units, strict=True)]
-        root, failed = scipy.linalg.lapack.dpotrf(clip.fixed + sum(parts), lower=True)
+        root, failed = dpotrf(clip.fixed + sum(parts), lower=True)
         if failed:  # so far out that rounding leaves no covariance
             return -np.inf, gradient, information
-        inverted = scipy.linalg.lapack.dpotri(root, lower=True)[0]
+        inverted = dpotri(root, lower=True)[0]
         inverted = np.tril(inverted) + np.tril(inverted, -1).T
         pulled = inverted @ clip.e
         value -= 0.5 * float(clip.e @ pulled) + float(np.log(np.diag(root)).sum())
@@ -307,7 +308,7 @@ def _value(clips: Sequence[LinearClip], terms: Sequence[Term], both: np.ndarray)
     value, count = -0.5 * float(both @ both), len(terms)
     for index, clip in enumerate(clips):
         cover = clip.covariance(terms, both[:count], both[count + index])
-        root, failed = scipy.linalg.lapack.dpotrf(cover, lower=True)
+        root, failed = dpotrf(cover, lower=True)
         if failed:
             return -np.inf
         white = scipy.linalg.solve_triangular(root, clip.e, lower=True)
