@@ -107,14 +107,10 @@ def make_app(
     @app.get("/still/{name}")
     def still(name: str) -> Response:
         """The first and the last frame of a clip's prediction."""
-        path = (
-            session.trials.run / ("" if len(session.chosen) == 1 else name) / "first_and_last.png"
-        )
-        is_inside = path.is_file() and path.resolve().is_relative_to(session.root)
-        if name not in session.chosen or not is_inside:
+        picture = session.still(name)
+        if picture is None:
             return PlainTextResponse("no such picture", 404)
-        caching = {"cache-control": "no-store"}
-        return Response(path.read_bytes(), media_type="image/png", headers=caching)
+        return Response(picture, media_type="image/png", headers={"cache-control": "no-store"})
 
     @app.get("/report/{name}")
     def report(name: str) -> Response:

@@ -71,11 +71,8 @@ def track_files(sheet: Sheet | Table) -> Path:
 def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, State]:
     """The state of every stage, from the files that are there.
 
-    Args:
-      trials: the clips.
-      store: which marks results were made of; a result without an entry, of a command, is up to
-        date where it is younger than the yaml.
-      effects: of the fitted model.
+    A result without an entry in the store, of a command, is up to date where it is younger than
+    the yaml.
     """
     found: dict[str, State] = {"explain": "open", "video": "done" if trials.sheets else "open"}
     complete = bool(trials.sheets) and all(sheet.is_complete for sheet in trials.sheets)
