@@ -125,21 +125,14 @@ class Fit:
         """
         import pandas as pd
 
-        theta = self.problem.theta(self._z())
         parts = []
-        for c, problem in enumerate(self.problem.problems):
-            seen = problem.observation
-            predicted = problem.simulate(self.problem.of_clip(theta, c))
-            white = problem.tracking_errors(predicted).reshape(predicted.shape)
-            fitted = predicted + seen.offset_m(predicted)[..., None]
-            for k, name in enumerate(seen.names):
-                is_seen = seen.mask[k]
-                left = np.where(is_seen, seen.position_m[k] - fitted[k], np.nan)
-                columns: dict[str, Any] = {"clip": problem.name, "object": name}
-                columns["time_s"] = seen.times_s
-                columns |= {f"{axis}_m": left[i] for i, axis in enumerate("xy")}
-                for i, axis in enumerate("xy"):
-                    columns[f"{axis}_white"] = np.where(is_seen, white[k, i], np.nan)
+        for motion in self.motions():
+            left = motion.measured_m - motion.predicted_m
+            for k, name in enumerate(motion.objects):
+                columns: dict[str, Any] = {"clip": motion.clip, "object": name}
+                columns["time_s"] = motion.times_s
+                columns |= {f"{axis}_m": left[k, i] for i, axis in enumerate("xy")}
+                columns |= {f"{axis}_white": motion.residuals[k, i] for i, axis in enumerate("xy")}
                 parts.append(pd.DataFrame(columns))
         return pd.concat(parts, ignore_index=True)
 

@@ -117,8 +117,7 @@ def roughness(hypothesis: Hypothesis) -> float:
 def ambiguity(rivals: Sequence[str]) -> str:
     """What a clip cannot tell, in one sentence; what all have in common is told first.
 
-    Args:
-      rivals: hypotheses, the effects of each joined by +.
+    `rivals`: hypotheses, the effects of each joined by +.
     """
     hypotheses = [rival.split("+") for rival in rivals]
     common = [name for name in hypotheses[0] if all(name in own for own in hypotheses)]
@@ -161,9 +160,6 @@ def formula_text(record: Mapping[str, Any]) -> str:
     """What the best formula says of the missing force, in one sentence.
 
     Empty where no force is missing, and for a file from before formulas were fitted in the model.
-
-    Args:
-      record: diagnosis.json.
     """
     missing = record.get("missing_force") or {}
     if "best_formula" not in missing:

@@ -32,9 +32,7 @@ MANY = 300  # points; an SVG has so many as a picture
 def to_plotly(chart: Chart, has_legend: bool = True) -> "go.Figure":
     """The chart as an interactive figure, as wide as what shows it.
 
-    Args:
-      chart: what is drawn.
-      has_legend: whether the figure itself says what the marks mean.
+    `has_legend`: whether the figure itself says what the marks mean.
     """
     import plotly.graph_objects as go
 

@@ -25,11 +25,8 @@ def paragraph(
 ) -> str:
     """What was measured, how well the model follows it, what is missing, what could not be seen.
 
-    Args:
-      result: result.json of the fit that is told.
-      check: compare.json of the model without what was found missing.
-      diagnosis: diagnosis.json; None where nothing is missing.
-      shapes: of the objects, as they are declared.
+    Of result.json, of compare.json of the model without what was found missing, and, where
+    something is, of diagnosis.json; `shapes`: of the objects, as declared.
     """
     entries = {
         name: entry for name, entry in shown_parameters(result).items() if name != SAME_AS_RATIO

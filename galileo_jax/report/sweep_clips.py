@@ -67,9 +67,7 @@ class ClipRow:
 def thumbnail(clip: Clip, observation: Observation) -> bytes | None:
     """A small JPEG from the middle of a clip's motion; None where it has no video.
 
-    Args:
-      clip: with a video that is still there.
-      observation: its track, frame by frame as in the video.
+    `observation`: its track, frame by frame as in the video.
     """
     if clip.video is None:
         return None

@@ -32,13 +32,8 @@ def write_sweep_page(
 ) -> None:
     """Writes the page.
 
-    Args:
-      path: of the HTML file.
-      title: of the sweep.
-      rows: as `sweeping.summary.make_rows` gives them.
-      command: that makes it again.
-      clips: a row for each, in the order in which they are shown.
-      found: what they find together.
+    `rows`: as `sweeping.summary.make_rows` gives them; `clips` in the order in which they are
+    shown.
     """
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] == "failed"]
