@@ -68,12 +68,7 @@ WHAT = {
 
 @dataclass(frozen=True)
 class Bundle:
-    """A bundle that was written.
-
-    Attributes:
-      path: of the zip.
-      names: what is in it.
-    """
+    """A bundle that was written."""
 
     path: Path
     names: tuple[str, ...]
@@ -106,11 +101,8 @@ def bundle_of(
 ) -> Bundle:
     """Writes the bundle of what was explained.
 
-    Args:
-      found: what was explained.
-      path: of the zip.
-      command: the words of the call; none: those that do the same.
-      others: words that are not to be in it, to what is said instead.
+    `command`: the words of the call; none: those that do the same. `others`: words that are not
+    to be in it, to what is said instead.
 
     Raises:
       InputError: the file cannot be written.
@@ -146,13 +138,8 @@ def bundle_of_failure(
 ) -> Bundle:
     """Writes the bundle of a call that failed: what was understood, and why it stopped.
 
-    Args:
-      files: of the call.
-      error: that it raised: one line where a person can mend it, else all of it.
-      path: of the zip.
-      command: the words of the call.
-      answers: what it said, by keys of the yaml.
-      others: words that are not to be in it, to what is said instead.
+    An `error` that a person can mend is one line, any other all of it. `answers`: what the call
+    said, by keys of the yaml; `command` and `others` as for `bundle_of`.
 
     Raises:
       InputError: the file cannot be written.

@@ -360,10 +360,7 @@ def diagnose(
 def diagnose_fitted(fit: Fit, *, engine: str = "auto", seed: int = 0) -> Diagnosis:
     """As `diagnose` of a fit's tracks; the model without effects is not searched for again.
 
-    Args:
-      fit: of that model, with the options that `fit` has where nothing is said, and this seed.
-      engine: what simulates the motion.
-      seed: of all random numbers.
+    `fit`: of that model, with the options that `fit` has where nothing is said, and this seed.
     """
     sources = [one.clip.source for one in fit.measurements]
     command = command_line("diagnose", sources, engine=engine, seed=seed or None)

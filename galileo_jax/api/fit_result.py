@@ -268,11 +268,7 @@ def write_pages(
 ) -> tuple[Path, ...]:
     """Writes the page of each run; of several NAME.html becomes NAME_CLIP.html.
 
-    Args:
-      runs: of the fit's clips.
-      path: the page.
-      lead: the result in words, for its top.
-      beside: titles of other pages to their places, for links.
+    `lead` and `beside`: as for `write_report`.
     """
     from galileo_jax.report.fit_page import write_report
 
@@ -298,17 +294,8 @@ def make_fit(
 ) -> Fit:
     """A `Fit` with its result.json.
 
-    Args:
-      measurements: the clips.
-      problem: the model of them.
-      posterior: draws in the parameters' units.
-      z_best: `[parameter]`, the best fit.
-      gradient: where it came from, if it is a gradient fit.
-      exact: the gradient fit in an exact world, if there is one.
-      method: of the fit.
-      seed: of everything random.
-      timings: by stage, s.
-      notes: what else the method has to say, for result.json.
+    `gradient`: where it came from, if it is a gradient fit; `exact`: that in an exact world, if
+    there is one; `notes`: what else the method has to say.
     """
     if doubts := [doubt for one in measurements for doubt in one.doubts]:
         notes = {**notes, "warnings": [*doubts, *notes.get("warnings", [])]}

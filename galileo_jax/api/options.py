@@ -18,10 +18,8 @@ Options = TypeVar("Options")
 def options_of(kind: type[Options], arguments: Mapping[str, Any], **checked: Any) -> Options:
     """The options of a call, `kind` being a dataclass with fields of the arguments' names.
 
-    Args:
-      kind: of the options.
-      arguments: of the call by name, its `locals()`; None: as the field's default.
-      **checked: what is not taken as it was given.
+    `arguments`: of the call by name, its `locals()`; None: as the field's default. `checked`:
+    what is not taken as it was given.
     """
     names = [one.name for one in fields(kind)]  # pyright: ignore[reportArgumentType]
     given = {name: arguments[name] for name in names if arguments[name] is not None}

@@ -26,12 +26,7 @@ FILES = {"fit": RESULT, **DOCUMENTS, "predict": PREDICTION}
 
 @dataclass(frozen=True)
 class Trials:
-    """The clips that are fitted together, and where their results lie.
-
-    Attributes:
-      root: the folder that was opened.
-      sheets: of the clips, in their order.
-    """
+    """The clips that are fitted together, and where their results lie."""
 
     root: Path
     sheets: tuple[Sheet | Table, ...]
