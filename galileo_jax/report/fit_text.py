@@ -150,11 +150,16 @@ def _struck(name: str) -> int | None:
     return struck if struck > 1 else None
 
 
-def distance(error: Mapping[str, Any]) -> str:
-    """How near the fit comes to what was seen, and in how many frames; empty where unknown."""
+def nearness(error: Mapping[str, Any]) -> list[str]:
+    """How near the fit comes to what was seen: in mm, and as a share of the way, where known."""
     units = {"rms_mm": "mm", "rms_percent_of_way": "% of the way"}
     known = {unit: error.get(key) for key, unit in units.items()}  # None in a file, NaN before
-    sizes = [f"{size:.2g} {unit}" for unit, size in known.items() if size and size == size]
+    return [f"{size:.2g} {unit}" for unit, size in known.items() if size and size == size]
+
+
+def distance(error: Mapping[str, Any]) -> str:
+    """How near the fit comes to what was seen, and in how many frames; empty where unknown."""
+    sizes = nearness(error)
     frames = f"{error['frames_used']} of {error['frames']} frames" if error.get("frames") else ""
     said = f"{' or '.join(sizes)} off (root mean square)" if sizes else ""
     return ", in ".join(filter(None, [said, frames]))

@@ -141,7 +141,7 @@ class Store:
         picture = np.frombuffer(measured.thumbnail or b"", np.uint8)
         with replacing(self._clip(key)) as path:
             text = np.array(json.dumps(notes, default=asdict))
-            np.savez_compressed(path, notes=text, thumbnail=picture, **arrays)
+            np.savez_compressed(path, notes=text, thumbnail=picture, **arrays)  # pyright: ignore
 
     def _cell(self, name: str, file: str) -> Path:
         return self.cell_folder(name) / file
