@@ -56,7 +56,7 @@ def fit(
     effects_from: Sequence[str | Path] = (),
     free: EffectsLike = (),
     discrepancy: Discrepancy = "auto",
-    motion: str = "planar",
+    motion: Literal["planar", "free"] = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
     seed: int = 0,
@@ -67,8 +67,8 @@ def fit(
     init: Literal["grad", "cnn"] = "grad",
     preset: Literal["galileo", "thesis"] = "galileo",
     similarity: str = "thesis_gaussian",
-    acceptance: str = "coin",
-    selection: str = "best",
+    acceptance: Literal["coin", "metropolis"] = "coin",
+    selection: Literal["best", "least_variance"] = "best",
     checkpoint: str | Path | None = None,
     on_progress: OnProgress | None = None,
     cancel: CancelFlag | None = None,
@@ -144,7 +144,7 @@ def _check(options: FitOptions) -> None:
     Raises:
       InputError: an option that this method does not have, or a value that it does not know.
     """
-    from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
+    from galileo_jax.rollout.engine_names import ENGINES
 
     check_choices(options)
     if options.discrepancy == "rough" and not _has_imperfections(options):
@@ -153,7 +153,6 @@ def _check(options: FitOptions) -> None:
             f"--preset galileo, not of --method {options.method} and --motion {options.motion}"
         )
     check_known("--engine", "engine", options.engine, ENGINES)
-    check_known("--motion", "motion", options.motion, MOTIONS)
     _refuse_ignored(options)
     if options.method == "mh":
         from galileo_jax.inference.samplers import sampler_names

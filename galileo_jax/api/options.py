@@ -43,7 +43,7 @@ class FitOptions:
     effects_from: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
     discrepancy: Discrepancy = "auto"
-    motion: str = "planar"
+    motion: Literal["planar", "free"] = "planar"
     engine: str = "auto"
     noise: Literal["camera", "bodies", "tracker"] | None = None
     seed: int = 0
@@ -53,8 +53,8 @@ class FitOptions:
     init: Literal["grad", "cnn"] = "grad"
     preset: Literal["galileo", "thesis"] = "galileo"
     similarity: str = "thesis_gaussian"
-    acceptance: str = "coin"
-    selection: str = "best"
+    acceptance: Literal["coin", "metropolis"] = "coin"
+    selection: Literal["best", "least_variance"] = "best"
 
 
 @dataclass(frozen=True)
