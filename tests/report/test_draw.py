@@ -92,11 +92,12 @@ def test_bars_and_boxes_have_categories():
     svg = to_svg(chart(Panel("", (bars,), xlabel="p")))
     assert position_of(svg, "a") < position_of(svg, "b")
     boxes = tuple(
-        Boxes(["air", "none"] * 3, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "object1", name, offset, 0.4)
-        for name, offset in (("grad", -0.2), ("mh", 0.2))
+        Boxes(["air", "none"] * 3, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "object1", name, is_beside=True)
+        for name in ("grad", "mh")
     )
     assert plotly_of(chart(Panel("error", boxes))).layout.boxmode == "group"
-    assert ">none</text>" in to_svg(chart(Panel("error", boxes)))
+    with pytest.raises(TypeError, match="on pages alone"):
+        to_svg(chart(Panel("error", boxes)))
 
 
 def position_of(svg: str, text: str) -> float:
