@@ -29,14 +29,11 @@ MOST_NAMES = 6  # in a legend over the marks
 MANY = 300  # points; an SVG has so many as a picture
 
 
-def to_plotly(chart: Chart, has_legend: bool = True) -> "go.Figure":
-    """The chart as an interactive figure, as wide as what shows it.
-
-    `has_legend`: whether the figure itself says what the marks mean.
-    """
+def to_plotly(chart: Chart) -> "go.Figure":
+    """The chart as an interactive figure with its legend, as wide as what shows it."""
     import plotly.graph_objects as go
 
-    return go.Figure(figure(chart, has_legend))
+    return go.Figure(figure(chart))
 
 
 def to_svg(chart: Chart) -> str:

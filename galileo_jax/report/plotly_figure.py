@@ -21,7 +21,7 @@ LEGEND_PX, LEGEND_WIDTH_PX = 40, 800  # of one line
 def figure(chart: Chart, has_legend: bool = True) -> dict[str, Any]:
     """`data` and `layout`, with NumPy arrays in them, as wide as what shows it.
 
-    `has_legend`: as for `draw.to_plotly`.
+    `has_legend`: whether the figure itself says what the marks mean.
     """
     size, data = layout_of(chart), []
     layout: dict[str, Any] = {"shapes": [], "annotations": []}
