@@ -188,17 +188,16 @@ def sweep(
             "version": __version__,
         }
         write_json(store.folder / "sweep.json", document)
-        if retry:
-            for cell in cells:
-                store.forget_failure(cell.name)
+        for cell in cells if retry else ():
+            store.forget_failure(cell.name)
         done = sum(store.has_result(cell.name) and cell.name not in again for cell in cells)
         report("starting", 0.0, {"cells": len(cells), "done": done, "folder": store.folder})
         with _engine(computing) as worker:
             carry_out(cells, store, worker, report, with_page=with_page, computed_again=again)
-        report("writing the page", COMPUTED, None)
+        report("writing the page", COMPUTED)
         made = _written(name, cells, store, command)
         report("done", 1.0, made)
-    return made
+        return made
 
 
 def _written(name: str, cells: Sequence[Cell], store: Store, command: str) -> Sweep:
