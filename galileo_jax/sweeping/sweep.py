@@ -194,7 +194,7 @@ def sweep(
         report("starting", 0.0, {"cells": len(cells), "done": done, "folder": store.folder})
         with _engine(computing) as worker:
             carry_out(cells, store, worker, report, with_page=with_page, computed_again=again)
-        report("writing the page", COMPUTED)
+        report("writing the page", COMPUTED, None)
         made = _written(name, cells, store, command)
         report("done", 1.0, made)
         return made
