@@ -15,7 +15,9 @@ none depends on the JAX precision of its caller. Errors that a user can mend are
 Everything is imported when it is first used.
 """
 
+import ast
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
@@ -57,39 +59,20 @@ if TYPE_CHECKING:
     from galileo_jax.runtime.progress import Cancelled
     from galileo_jax.sweeping.sweep import Sweep, sweep
 
-_PLACES = {
-    "galileo_jax.api.catalogue": ("effects", "scenarios"),
-    "galileo_jax.api.clips": ("load",),
-    "galileo_jax.api.compare": ("Comparison", "compare"),
-    "galileo_jax.api.diagnose": ("Diagnosis", "diagnose"),
-    "galileo_jax.api.discover": ("Discovery", "discover"),
-    "galileo_jax.api.fit": ("fit",),
-    "galileo_jax.api.fit_result": ("Fit",),
-    "galileo_jax.api.fit_tosses": ("TossFit", "fit_tosses"),
-    "galileo_jax.api.next_experiment": ("NextExperiment", "next_experiment"),
-    "galileo_jax.api.predict": ("Prediction", "predict"),
-    "galileo_jax.api.propose": ("Proposal", "propose"),
-    "galileo_jax.api.motion": ("Motion",),
-    "galileo_jax.api.explain": ("Explanation", "explain"),
-    "galileo_jax.api.export": ("export",),
-    "galileo_jax.api.label": ("label",),
-    "galileo_jax.api.look": ("Look", "look"),
-    "galileo_jax.api.run": ("load_run",),
-    "galileo_jax.api.simulate": ("Simulated", "simulate"),
-    "galileo_jax.api.track": ("Track", "track"),
-    "galileo_jax.api.train": ("train",),
-    "galileo_jax.clip.schema": ("Clip",),
-    "galileo_jax.model.effects.effect": (
-        *("Array", "Effect", "Force", "Friction", "State", "Surroundings", "Theta"),
-    ),
-    "galileo_jax.model.effects.registry": ("register_effect",),
-    "galileo_jax.model.parameters": ("HalfNormal", "LogNormal", "Normal", "Parameter", "Uniform"),
-    "galileo_jax.runtime.errors": ("InputError",),
-    "galileo_jax.runtime.progress": ("Cancelled",),
-    "galileo_jax.sweeping.sweep": ("Sweep", "sweep"),
-}
-PLACE = {name: place for place, names in _PLACES.items() for name in names}
-_RENAMED = {"register_effect": "register"}  # where a name says too little outside its module
+
+def _places() -> dict[str, tuple[str, str]]:
+    """Module of each public name, and its name there: the imports above, read and not made."""
+    tree = ast.parse(Path(__file__).read_text(encoding="utf-8"))
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    imports = (node for node in block.body if isinstance(node, ast.ImportFrom))
+    return {
+        one.asname or one.name: (str(node.module), one.name)
+        for node in imports
+        for one in node.names
+    }
+
+
+PLACES = _places()
 
 __all__ = [
     "Array",
@@ -148,10 +131,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Imports a public name when it is first asked for."""
-    if name not in PLACE:
+    if name not in PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(PLACE[name]), _RENAMED.get(name, name))
-    globals()[name] = value
+    module, own_name = PLACES[name]
+    value = globals()[name] = getattr(import_module(module), own_name)
     return value
 
 

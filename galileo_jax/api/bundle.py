@@ -20,7 +20,7 @@ import yaml
 
 from galileo_jax.api.clips import ClipLike
 from galileo_jax.api.look import look
-from galileo_jax.clip.load import YAML_SUFFIXES, load_clip
+from galileo_jax.clip.load import YAML_SUFFIXES, load_clip, yaml_of
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip, ClipFile
 from galileo_jax.clip.track_csv import write_observation_csv
@@ -68,12 +68,7 @@ WHAT = {
 
 @dataclass(frozen=True)
 class Bundle:
-    """A bundle that was written.
-
-    Attributes:
-      path: of the zip.
-      names: what is in it.
-    """
+    """A bundle that was written."""
 
     path: Path
     names: tuple[str, ...]
@@ -106,11 +101,8 @@ def bundle_of(
 ) -> Bundle:
     """Writes the bundle of what was explained.
 
-    Args:
-      found: what was explained.
-      path: of the zip.
-      command: the words of the call; none: those that do the same.
-      others: words that are not to be in it, to what is said instead.
+    `command`: the words of the call; none: those that do the same. `others`: words that are not
+    to be in it, to what is said instead.
 
     Raises:
       InputError: the file cannot be written.
@@ -146,13 +138,8 @@ def bundle_of_failure(
 ) -> Bundle:
     """Writes the bundle of a call that failed: what was understood, and why it stopped.
 
-    Args:
-      files: of the call.
-      error: that it raised: one line where a person can mend it, else all of it.
-      path: of the zip.
-      command: the words of the call.
-      answers: what it said, by keys of the yaml.
-      others: words that are not to be in it, to what is said instead.
+    An `error` that a person can mend is one line, any other all of it. `answers`: what the call
+    said, by keys of the yaml; `command` and `others` as for `bundle_of`.
 
     Raises:
       InputError: the file cannot be written.
@@ -247,10 +234,9 @@ def _is_fixed(clip: Clip) -> bool:
 
 def _declared_beside(source: Path) -> dict[str, Any]:
     """What the yaml of a file says; empty where there is none, or it is none."""
-    names = [source] if source.suffix.lower() in YAML_SUFFIXES else []
-    names += [source.with_suffix(suffix) for suffix in YAML_SUFFIXES]
+    path = yaml_of(source)
     try:
-        return dict(next((read_mapping(one) for one in names if one.is_file()), {}))
+        return dict(read_mapping(path)) if path.is_file() else {}
     except InputError:
         return {}
 
@@ -278,7 +264,7 @@ def _named_files(source: Path) -> list[Path]:
 def _seen(source: Path) -> str:
     """What is seen in a file; why nothing is."""
     try:
-        declared = _declared_beside(source) if source.suffix.lower() in YAML_SUFFIXES else {}
+        declared = _declared_beside(source) if source == yaml_of(source) else {}
         named = declared.get("video") or declared.get("track")
         return look(source.parent / str(named) if named else source).summary()
     except Exception as error:  # whatever it is, that is what is to be told

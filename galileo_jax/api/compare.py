@@ -86,20 +86,19 @@ class Comparison:
     @in_float64
     def report(self, path: str | Path) -> Path:
         """Writes the page (one HTML file, no network needed)."""
-        from galileo_jax.report import comparison_page
+        from galileo_jax.report.comparison_page import write_comparison_page
 
-        problem, gradient = self.fit.problem, self.gradient
-        page = comparison_page.ComparisonReport(
+        write_comparison_page(
+            Path(path),
+            ", ".join(self.fit.names),
             self.found,
-            problem,
-            problem.theta(gradient.z, gradient.free),
-            tuple(one.clip for one in self.fit.measurements),
-            problem.all_effects,
-            self.paths,
-            self.command,
-            self._seed,
+            self.fit.problem,
+            self.gradient,
+            [one.clip for one in self.fit.measurements],
+            self.fit.problem.all_effects,
+            command=self.command,
+            seed=self._seed,
         )
-        comparison_page.write_comparison_page(Path(path), ", ".join(self.fit.names), page)
         return Path(path)
 
     def save(self, folder: str | Path) -> Path:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,8 +36,7 @@ from galileo_jax.measurement.measure import Measurement, inferred
 from galileo_jax.model.effects.forms import FORM_NAMES, FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.observation.observation import Observation
-from galileo_jax.report.diagnosis_text import PROPOSED
-from galileo_jax.report.diagnosis_text import verdict as sentence_of
+from galileo_jax.report import diagnosis_text
 from galileo_jax.results.command_line import command_line
 from galileo_jax.results.stale_outputs import TRACKS, digest
 from galileo_jax.results.truth import hidden_effect
@@ -47,6 +46,7 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.search.hypothesis import Hypothesis
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,8 +98,6 @@ class Diagnosis:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
-        from galileo_jax.report import diagnosis_text
-
         return diagnosis_text.verdict(self.found)
 
     @property
@@ -168,9 +166,8 @@ class Diagnosis:
         """
         hypotheses = {one.name: one.hypothesis for one in self.found.candidates}
         check_known("candidate", "candidate", effect, tuple(hypotheses))
-        fit, trials = hypotheses[effect].fit, hypotheses[effect].of(self.problem)
-        theta = trials.theta(fit.z, fit.free)
-        return motions_at(trials, [one.clip for one in self.measurements], theta)
+        clips = [one.clip for one in self.measurements]
+        return _motions_of(hypotheses[effect], self.problem, clips)
 
     @cached_property
     @in_float64
@@ -216,11 +213,8 @@ class Diagnosis:
 
     def next_command(self, folder: str | Path = ".") -> str:
         """The command that comes next; `folder`: where the diagnosis is saved."""
-        from galileo_jax.report import diagnosis_text
-
-        return diagnosis_text.next_command(
-            self.found, list(self.document["clips"]), list(self.effects_from), Path(folder)
-        )
+        clips = list(self.document["clips"])
+        return diagnosis_text.next_command(self.found, clips, self.effects_from, Path(folder))
 
     @in_float64
     def plot(self) -> "go.Figure":
@@ -232,20 +226,21 @@ class Diagnosis:
     @in_float64
     def report(self, path: str | Path) -> Path:
         """Writes the page (one HTML file, no network needed)."""
-        from galileo_jax.report.diagnosis_page import DiagnosisReport, write_diagnosis_page
+        from galileo_jax.report.diagnosis_page import write_diagnosis_page
 
-        clips = tuple(one.clip for one in self.measurements)
-        page = DiagnosisReport(
+        clips = [one.clip for one in self.measurements]
+        write_diagnosis_page(
+            Path(path),
+            ", ".join(one.name for one in self.measurements),
+            self.problem,
             self.found,
             self.document,
-            self.next_command(Path(path).parent),
-            hidden_effect(clips[0]),
             clips,
-            self.command,
-            int(self.document["seed"]),
+            truth=hidden_effect(clips[0]),
+            command=self.command,
+            next_command=self.next_command(Path(path).parent),
+            seed=int(self.document["seed"]),
         )
-        title = ", ".join(one.name for one in self.measurements)
-        write_diagnosis_page(Path(path), title, self.problem, page)
         return Path(path)
 
     @in_float64
@@ -261,7 +256,7 @@ class Diagnosis:
           svg: also writes the residuals before and after each effect as SVG, below plots/.
         """
         folder, best = Path(folder), self.best
-        proposed = folder / PROPOSED
+        proposed = folder / diagnosis_text.PROPOSED
         proposed.unlink(missing_ok=True)
         formula = proposed_formula(self.verdict, self.found.candidates)
         if formula is not None and formula.law is not None:
@@ -365,10 +360,7 @@ def diagnose(
 def diagnose_fitted(fit: Fit, *, engine: str = "auto", seed: int = 0) -> Diagnosis:
     """As `diagnose` of a fit's tracks; the model without effects is not searched for again.
 
-    Args:
-      fit: of that model, with the options that `fit` has where nothing is said, and this seed.
-      engine: what simulates the motion.
-      seed: of all random numbers.
+    `fit`: of that model, with the options that `fit` has where nothing is said, and this seed.
     """
     sources = [one.clip.source for one in fit.measurements]
     command = command_line("diagnose", sources, engine=engine, seed=seed or None)
@@ -425,36 +417,7 @@ def _diagnosed(
     if options.add not in ("auto", "none", *problem.all_effects):
         raise InputError(f"--add: {options.add} has no place in {clips[0].path}")
 
-    share, stage = 0.0, ""
-
-    def on_stage(begun: str) -> None:
-        nonlocal share, stage
-        stage = begun
-        share = max([share, *(done for begin, done in STAGES.items() if stage.startswith(begin))])
-        progress.report(stage, share)
-
-    def on_round(one: Round) -> None:
-        if one.hypothesis.fit.code is Code.FAILED:
-            raise InputError(f"{clips[0].path}: {one.hypothesis.fit.code}")
-        progress.report("compared", share, {"round": history_row(problem, one, seed)})
-
-    def on_candidate(one: Candidate) -> None:
-        row = {
-            "effect": one.name,
-            "score": one.log_odds,
-            "probability": one.probability,
-            **{key: one.error[key] for key in ("rmse", "chi2_per_dof")},
-        }
-        theta = trials_of(one).theta(one.hypothesis.fit.z, one.hypothesis.fit.free)
-        progress.report(
-            stage,
-            share,
-            {"candidate": row, "motions": lambda: motions_at(trials_of(one), clips, theta)},
-        )
-
-    def trials_of(one: Candidate) -> JointProblem:
-        return one.hypothesis.of(problem)
-
+    told = _Told(problem, clips, seed)
     base = None
     if before is not None and before.exact is not None:
         base = extended_fit(before.exact, before.problem, problem)
@@ -463,20 +426,54 @@ def _diagnosed(
         seed=seed,
         add=options.add,
         base=base,
-        on_stage=on_stage,
-        on_round=on_round,
-        on_candidate=on_candidate,
+        on_stage=told.stage,
+        on_round=told.round,
+        on_candidate=told.candidate,
     )
-    with progress.part(max(share, ADVISED), 1.0):
+    with progress.part(max(told.share, ADVISED), 1.0):
         found = with_next(found, clips[0], problem, seed)
-    timings = {
-        "track": round(track_s, 3),
-        "diagnose": round(time.perf_counter() - began, 3),
-    }
+    timings = {"track": round(track_s, 3), "diagnose": round(time.perf_counter() - began, 3)}
     document = _document(measured, problem, found, options, timings)
     made = Diagnosis(tuple(measured), problem, found, document, command, files)
     progress.report("diagnosed", 1.0, made)
     return made
+
+
+class _Told:
+    """What the caller is told while the loop runs; `share` of the work is done."""
+
+    def __init__(self, problem: JointProblem, clips: Sequence[Clip], seed: int):
+        self._problem, self._clips, self._seed = problem, clips, seed
+        self._stage, self.share = "", 0.0
+
+    def stage(self, begun: str) -> None:
+        known = (done for begin, done in STAGES.items() if begun.startswith(begin))
+        self._stage, self.share = begun, max([self.share, *known])
+        progress.report(begun, self.share)
+
+    def round(self, one: Round) -> None:
+        if one.hypothesis.fit.code is Code.FAILED:
+            raise InputError(f"{self._clips[0].path}: {one.hypothesis.fit.code}")
+        row = history_row(self._problem, one, self._seed)
+        progress.report("compared", self.share, {"round": row})
+
+    def candidate(self, one: Candidate) -> None:
+        row = {
+            "effect": one.name,
+            "score": one.log_odds,
+            "probability": one.probability,
+            **{key: one.error[key] for key in ("rmse", "chi2_per_dof")},
+        }
+        motions = partial(_motions_of, one.hypothesis, self._problem, self._clips)
+        progress.report(self._stage, self.share, {"candidate": row, "motions": motions})
+
+
+def _motions_of(
+    hypothesis: Hypothesis, problem: JointProblem, clips: Sequence[Clip]
+) -> tuple[Motion, ...]:
+    """Every clip's motion as a hypothesis has it."""
+    trials, fit = hypothesis.of(problem), hypothesis.fit
+    return motions_at(trials, clips, trials.theta(fit.z, fit.free))
 
 
 def _document(
@@ -491,7 +488,7 @@ def _document(
     return {
         "clips": [clip.source for clip in clips],
         TRACKS: [digest(one.observation) for one in measured],
-        "sentence": sentence_of(found),
+        "sentence": diagnosis_text.verdict(found),
         **diagnosis_document(problem, found, options.seed),
         **inferred(measured),
         **({"effects_from": resolved(files)} if files else {}),

@@ -248,9 +248,7 @@ def _in_folder(folder: Path) -> list[Path]:
 def understood(clip: ClipLike, answers: Mapping[str, Any]) -> Clip | Understood:
     """The checked clip, where its yaml leaves nothing open; else what is understood of the file.
 
-    Args:
-      clip: of which it is asked.
-      answers: what a person said, by keys of the yaml: it goes before what a yaml declares.
+    `answers`: what a person said, by keys of the yaml: it goes before what a yaml declares.
 
     Raises:
       InputError: the file or its yaml is wrong.
@@ -289,10 +287,6 @@ def kept(clips: ClipLike | Sequence[ClipLike]) -> list[str]:
 
 def checked(clip: ClipLike, answers: Mapping[str, Any]) -> Clip:
     """The clip; what neither its yaml nor the answers say is taken from the file.
-
-    Args:
-      clip: of which it is asked.
-      answers: as for `understood`.
 
     Raises:
       InputError: the file is wrong, or something is missing that only a person can know.
@@ -336,13 +330,7 @@ def answered_clips(
 
 
 def explained(tracks: Sequence[TrackLike], engine: str, seed: int) -> Explanation:
-    """The explanation of clips that are checked, or tracked already.
-
-    Args:
-      tracks: trials of the same objects.
-      engine: as for `explain`.
-      seed: as for `explain`.
-    """
+    """The explanation of clips that are checked, or tracked already."""
     with progress.part(UNDERSTOOD, FITTED):
         first = fit_tracks(tracks, engine=engine, seed=seed)
     with progress.part(FITTED, COMPARED):

@@ -24,12 +24,7 @@ SVG = "svg"
 
 @dataclass(frozen=True)
 class Exported:
-    """What `export` wrote.
-
-    Attributes:
-      paths: the files.
-      warnings: of the clip, where a clip was exported, one line each.
-    """
+    """What `export` wrote."""
 
     paths: tuple[Path, ...]
     warnings: tuple[str, ...] = ()

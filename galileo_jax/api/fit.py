@@ -1,7 +1,8 @@
 """`fit`: from tracks to masses, friction coefficients and effects, with honest intervals."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -55,7 +56,7 @@ def fit(
     effects_from: Sequence[str | Path] = (),
     free: EffectsLike = (),
     discrepancy: Discrepancy = "auto",
-    motion: str = "planar",
+    motion: Literal["planar", "free"] = "planar",
     engine: str = "auto",
     noise: NoiseModel | None = None,
     seed: int = 0,
@@ -66,8 +67,8 @@ def fit(
     init: Literal["grad", "cnn"] = "grad",
     preset: Literal["galileo", "thesis"] = "galileo",
     similarity: str = "thesis_gaussian",
-    acceptance: str = "coin",
-    selection: str = "best",
+    acceptance: Literal["coin", "metropolis"] = "coin",
+    selection: Literal["best", "least_variance"] = "best",
     checkpoint: str | Path | None = None,
     on_progress: OnProgress | None = None,
     cancel: CancelFlag | None = None,
@@ -143,7 +144,7 @@ def _check(options: FitOptions) -> None:
     Raises:
       InputError: an option that this method does not have, or a value that it does not know.
     """
-    from galileo_jax.rollout.engine_names import ENGINES, MOTIONS
+    from galileo_jax.rollout.engine_names import ENGINES
 
     check_choices(options)
     if options.discrepancy == "rough" and not _has_imperfections(options):
@@ -152,7 +153,6 @@ def _check(options: FitOptions) -> None:
             f"--preset galileo, not of --method {options.method} and --motion {options.motion}"
         )
     check_known("--engine", "engine", options.engine, ENGINES)
-    check_known("--motion", "motion", options.motion, MOTIONS)
     _refuse_ignored(options)
     if options.method == "mh":
         from galileo_jax.inference.samplers import sampler_names
@@ -226,80 +226,69 @@ def _compile_beside(clips: Sequence[Clip], options: FitOptions) -> Any:
     return precompile(clips, None if options.method == "cnn" else compile_for).join
 
 
+@dataclass(frozen=True)
+class _Found:
+    """What a method found; `notes` are for result.json."""
+
+    problem: JointProblem
+    posterior: Posterior
+    z_best: np.ndarray
+    notes: Mapping[str, Any]
+    gradient: GradientFit | None = None
+    exact: GradientFit | None = None
+
+
 def _fitted(
-    measured: Sequence[Measurement],
-    options: FitOptions,
-    track_s: float,
-    checkpoint: Path | None,
+    measured: Sequence[Measurement], options: FitOptions, track_s: float, checkpoint: Path | None
 ) -> Fit:
     if options.preset == "thesis" and len(measured) > 1:
         raise InputError("--preset thesis: one clip expected")
     clips = [one.clip for one in measured]
     problem = _problem(clips, [one.observation for one in measured], options)
     timings = {"track": track_s, "compile": 0.0, "fit": 0.0}
-    notes: dict[str, Any] = {"engine": problem.problems[0].engine.name}
-    gradient: GradientFit | None = None
-    exact: GradientFit | None = None
+    engine = problem.problems[0].engine.name
 
-    def finish(posterior: Posterior, z_best: np.ndarray, notes: dict[str, Any]) -> Fit:
+    def made(found: _Found, notes: Mapping[str, Any]) -> Fit:
         return make_fit(
             tuple(measured),
-            problem,
-            posterior,
-            z_best,
-            gradient,
-            exact=exact,
+            found.problem,
+            found.posterior,
+            found.z_best,
+            found.gradient,
+            exact=found.exact,
             method=options.method,
             seed=options.seed,
             timings=timings,
-            notes=notes,
+            notes={"engine": engine, **found.notes, **notes},
         )
 
     began = time.perf_counter()
     if options.method == "cnn":
-        posterior, z_best, extra = _by_network(problem, options)
+        found = _by_network(problem, options)
     elif options.preset == "thesis":
-        posterior, z_best, extra = _by_thesis(problem, options)
+        found = _by_thesis(problem, options)
     else:
         fitter = GradientFitter(problem)
         progress.report("compiling", 0.0)
         fitter.compile()
         timings["compile"] = time.perf_counter() - began
         began = time.perf_counter()
-        worlds, starts, extra = _gradient(fitter, options)
-        problem, gradient, exact = worlds.best.trials, worlds.best.fit, worlds.exact
-        if gradient.code is Code.FAILED:
-            raise InputError(f"{clips[0].path}: {gradient.code}")
-        make = laplace_posterior if options.method == "mh" else fit_posterior
-        posterior = make(problem, gradient, options.seed)
-        if worlds.other is not None and options.method != "mh":
-            other = fit_posterior(worlds.other.trials, worlds.other.fit, options.seed)
-            posterior = posterior.mixed_with(other, worlds.share)
-        z_best = gradient.z
-        extra = {"status": gradient.code.value} | extra
+        worlds, starts, notes = _gradient(fitter, options)
+        if worlds.best.fit.code is Code.FAILED:
+            raise InputError(f"{clips[0].path}: {worlds.best.fit.code}")
+        found = _of_worlds(worlds, options, notes)
         if options.method == "mh":
-            progress.report("fitted by gradient", FITTED, finish(posterior, z_best, notes | extra))
-            posterior = _by_chains(problem, gradient, starts, measured, options, checkpoint)
-            extra |= {
-                "status": _status_of_chains(posterior, gradient),
-                "sampler": options.sampler,
-                "sampling": dict(posterior.stats),
-            }
+            progress.report("fitted by gradient", FITTED, made(found, {}))
+            found = _by_chains(found, starts, measured, options, checkpoint)
     timings["fit"] = time.perf_counter() - began
-    notes |= extra | _notes(options, clips, problem, posterior, gradient)
-    made = finish(posterior, z_best, notes)
-    progress.report("fitted", 1.0, made)
-    return made
+    result = made(found, _notes(options, clips, found))
+    progress.report("fitted", 1.0, result)
+    return result
 
 
-def _notes(
-    options: FitOptions,
-    clips: Sequence[Clip],
-    problem: JointProblem,
-    posterior: Posterior,
-    gradient: GradientFit | None,
-) -> dict[str, Any]:
+def _notes(options: FitOptions, clips: Sequence[Clip], found: _Found) -> dict[str, Any]:
     """What result.json says beside the numbers: doubts, imperfections, what was asked for."""
+    problem, posterior, gradient = found.problem, found.posterior, found.gradient
     notes: dict[str, Any] = {"motion": options.motion}
     said: list[str | None] = []
     if gradient is not None and options.method != "mh":
@@ -342,6 +331,18 @@ def _gradient(
     return Worlds(World(fitter.trials, exact), exact), None, {}
 
 
+def _of_worlds(worlds: Worlds, options: FitOptions, notes: Mapping[str, Any]) -> _Found:
+    """The posterior round the best fit, of method "grad" with its other world mixed in."""
+    problem, gradient = worlds.best.trials, worlds.best.fit
+    make = laplace_posterior if options.method == "mh" else fit_posterior
+    posterior = make(problem, gradient, options.seed)
+    if worlds.other is not None and options.method != "mh":
+        other = fit_posterior(worlds.other.trials, worlds.other.fit, options.seed)
+        posterior = posterior.mixed_with(other, worlds.share)
+    notes = {"status": gradient.code.value, **notes}
+    return _Found(problem, posterior, gradient.z, notes, gradient, worlds.exact)
+
+
 def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:
     """Theirs, and the fit's that they began from where it leaves a misfit."""
     if gradient.code is not Code.MISFIT:
@@ -350,14 +351,13 @@ def _status_of_chains(posterior: Posterior, gradient: GradientFit) -> str:
 
 
 def _by_chains(
-    problem: JointProblem,
-    gradient: GradientFit,
+    found: _Found,
     starts: np.ndarray | None,
     measured: Sequence[Measurement],
     options: FitOptions,
     checkpoint: Path | None,
-) -> Posterior:
-    """Samples; resumes what an interruption left in the checkpoint."""
+) -> _Found:
+    """Samples from the gradient fit on; resumes what an interruption left in the checkpoint."""
     from galileo_jax.inference.metropolis import NUM_CHAINS, metropolis_posterior
     from galileo_jax.inference.samplers.driver import Progress, Settings
 
@@ -372,18 +372,26 @@ def _by_chains(
     progress.report("sampling", FITTED)
     if checkpoint is not None:
         checkpoint.parent.mkdir(parents=True, exist_ok=True)
-    return metropolis_posterior(
-        problem,
-        gradient,
+    assert found.gradient is not None
+    posterior = metropolis_posterior(
+        found.problem,
+        found.gradient,
         options.seed,
         sampler=options.sampler,
         settings=settings,
         num_chains=options.chains or NUM_CHAINS,
         starts=starts,
         checkpoint=checkpoint,
-        identity=checkpoint_identity(measured, problem, options),
+        identity=checkpoint_identity(measured, found.problem, options),
         on_block=on_block,
     )
+    notes = {
+        **found.notes,
+        "status": _status_of_chains(posterior, found.gradient),
+        "sampler": options.sampler,
+        "sampling": dict(posterior.stats),
+    }
+    return replace(found, posterior=posterior, notes=notes)
 
 
 def checkpoint_identity(
@@ -393,24 +401,18 @@ def checkpoint_identity(
     from galileo_jax.inference.metropolis import NUM_CHAINS
 
     chains = options.chains or NUM_CHAINS
-    chosen = (
-        *(options.sampler, options.seed, options.effects, options.free, options.init, chains),
-    )
+    chosen = (options.sampler, options.seed, options.effects, options.free, options.init, chains)
     return identity_of(measured, problem, effects_from=options.effects_from, options=chosen)
 
 
-def _by_network(
-    problem: JointProblem, options: FitOptions
-) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
+def _by_network(problem: JointProblem, options: FitOptions) -> _Found:
     """The trained network's answer."""
     from galileo_jax.neural.estimate import cnn_posterior
 
-    return cnn_posterior(problem, options.seed)
+    return _Found(problem, *cnn_posterior(problem, options.seed))
 
 
-def _by_thesis(
-    problem: JointProblem, options: FitOptions
-) -> tuple[Posterior, np.ndarray, dict[str, Any]]:
+def _by_thesis(problem: JointProblem, options: FitOptions) -> _Found:
     """The thesis's sampler on our rollouts: a point, and draws that are no posterior."""
     from galileo_jax.model.parameters import inverse
     from galileo_jax.thesis.estimate import thesis_posterior
@@ -423,4 +425,4 @@ def _by_thesis(
     theta = [best.get(name, rest) for name, rest in zip(problem.names, middle, strict=True)]
     z_best = inverse(problem.parameters, np.asarray(theta))
     notes = {"status": posterior.status.value, "preset": options.preset, **chosen, "best": best}
-    return posterior, z_best, notes
+    return _Found(problem, posterior, z_best, notes)

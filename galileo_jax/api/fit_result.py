@@ -125,21 +125,14 @@ class Fit:
         """
         import pandas as pd
 
-        theta = self.problem.theta(self._z())
         parts = []
-        for c, problem in enumerate(self.problem.problems):
-            seen = problem.observation
-            predicted = problem.simulate(self.problem.of_clip(theta, c))
-            white = problem.tracking_errors(predicted).reshape(predicted.shape)
-            fitted = predicted + seen.offset_m(predicted)[..., None]
-            for k, name in enumerate(seen.names):
-                is_seen = seen.mask[k]
-                left = np.where(is_seen, seen.position_m[k] - fitted[k], np.nan)
-                columns: dict[str, Any] = {"clip": problem.name, "object": name}
-                columns["time_s"] = seen.times_s
-                columns |= {f"{axis}_m": left[i] for i, axis in enumerate("xy")}
-                for i, axis in enumerate("xy"):
-                    columns[f"{axis}_white"] = np.where(is_seen, white[k, i], np.nan)
+        for motion in self.motions():
+            left = motion.measured_m - motion.predicted_m
+            for k, name in enumerate(motion.objects):
+                columns: dict[str, Any] = {"clip": motion.clip, "object": name}
+                columns["time_s"] = motion.times_s
+                columns |= {f"{axis}_m": left[k, i] for i, axis in enumerate("xy")}
+                columns |= {f"{axis}_white": motion.residuals[k, i] for i, axis in enumerate("xy")}
                 parts.append(pd.DataFrame(columns))
         return pd.concat(parts, ignore_index=True)
 
@@ -275,11 +268,7 @@ def write_pages(
 ) -> tuple[Path, ...]:
     """Writes the page of each run; of several NAME.html becomes NAME_CLIP.html.
 
-    Args:
-      runs: of the fit's clips.
-      path: the page.
-      lead: the result in words, for its top.
-      beside: titles of other pages to their places, for links.
+    `lead` and `beside`: as for `write_report`.
     """
     from galileo_jax.report.fit_page import write_report
 
@@ -305,17 +294,8 @@ def make_fit(
 ) -> Fit:
     """A `Fit` with its result.json.
 
-    Args:
-      measurements: the clips.
-      problem: the model of them.
-      posterior: draws in the parameters' units.
-      z_best: `[parameter]`, the best fit.
-      gradient: where it came from, if it is a gradient fit.
-      exact: the gradient fit in an exact world, if there is one.
-      method: of the fit.
-      seed: of everything random.
-      timings: by stage, s.
-      notes: what else the method has to say, for result.json.
+    `gradient`: where it came from, if it is a gradient fit; `exact`: that in an exact world, if
+    there is one; `notes`: what else the method has to say.
     """
     if doubts := [doubt for one in measurements for doubt in one.doubts]:
         notes = {**notes, "warnings": [*doubts, *notes.get("warnings", [])]}

@@ -18,10 +18,8 @@ Options = TypeVar("Options")
 def options_of(kind: type[Options], arguments: Mapping[str, Any], **checked: Any) -> Options:
     """The options of a call, `kind` being a dataclass with fields of the arguments' names.
 
-    Args:
-      kind: of the options.
-      arguments: of the call by name, its `locals()`; None: as the field's default.
-      **checked: what is not taken as it was given.
+    `arguments`: of the call by name, its `locals()`; None: as the field's default. `checked`:
+    what is not taken as it was given.
     """
     names = [one.name for one in fields(kind)]  # pyright: ignore[reportArgumentType]
     given = {name: arguments[name] for name in names if arguments[name] is not None}
@@ -45,7 +43,7 @@ class FitOptions:
     effects_from: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
     discrepancy: Discrepancy = "auto"
-    motion: str = "planar"
+    motion: Literal["planar", "free"] = "planar"
     engine: str = "auto"
     noise: Literal["camera", "bodies", "tracker"] | None = None
     seed: int = 0
@@ -55,8 +53,8 @@ class FitOptions:
     init: Literal["grad", "cnn"] = "grad"
     preset: Literal["galileo", "thesis"] = "galileo"
     similarity: str = "thesis_gaussian"
-    acceptance: str = "coin"
-    selection: str = "best"
+    acceptance: Literal["coin", "metropolis"] = "coin"
+    selection: Literal["best", "least_variance"] = "best"
 
 
 @dataclass(frozen=True)

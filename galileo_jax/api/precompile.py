@@ -27,10 +27,8 @@ Compile = Callable[[Sequence[Clip], Sequence[Observation]], None]
 def precompile(clips: Sequence[Clip], compile_for: Compile | None) -> threading.Thread:
     """Starts to import and to compile in a thread, to be joined before anything is fitted.
 
-    Args:
-      clips: of the call.
-      compile_for: compiles what will fit clips and observations of these shapes; None: nothing
-        is compiled.
+    `compile_for` compiles what will fit clips and observations of these shapes; None: nothing
+    is compiled.
     """
 
     def work() -> None:

@@ -22,10 +22,8 @@ FOOT_SD_PX = 3.0  # of a foot that was found, not marked
 def clip_of(known: Understood, answers: Answers, source: str | None = None) -> Clip:
     """The checked clip.
 
-    Args:
-      known: what the file shows and its yaml declares.
-      answers: what a person said; it goes before what the yaml declares.
-      source: what the clip is called in results; None: its file.
+    What a person said goes before what the yaml declares. `source`: what the clip is called in
+    results; None: its file.
 
     Raises:
       InputError: something that only a person can know is missing (one line names all of it), or

@@ -113,11 +113,7 @@ def check_answered(known: Understood, answers: Answers) -> None:
 def parsed(question: Question, text: str, known: Understood, answers: Answers) -> dict[str, Any]:
     """An answer as a person types it, by keys of the yaml.
 
-    Args:
-      question: that is answered.
-      text: as typed; empty: the default.
-      known: what it is asked about.
-      answers: that were given before.
+    Empty `text`: the default.
 
     Raises:
       InputError: it is none; says what would be right.

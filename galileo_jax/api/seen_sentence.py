@@ -18,12 +18,7 @@ HOW = {"a ": "along", "one coordinate": "in", "turns": "and", "an angle": "as"}
 
 
 def sentence_of(known: Clip | Understood, answers: Answers) -> str:
-    """What moves, how far and how, what it looks like, and how often it is seen.
-
-    Args:
-      known: what was understood, or the clip whose yaml leaves nothing open.
-      answers: of a film, which things are meant.
-    """
+    """What moves, how far and how, what it looks like, and how often it is seen."""
     if isinstance(known, Clip):
         return _of_clip(known)
     if known.look.seen is not None:

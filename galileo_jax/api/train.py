@@ -28,7 +28,7 @@ class Trained:
     """A finished training.
 
     Attributes:
-      folder: with network.npz, loss.svg, training.json, and checkpoints to go on from.
+      folder: with network.npz, loss.svg, training.json, and a checkpoint to go on from.
       losses: (training, validation) of every epoch.
       best_validation_loss: of the network that was saved.
       seconds: of the call, s.
@@ -65,7 +65,7 @@ def train(
     """Trains a network on simulated samples, or goes on where an earlier call stopped.
 
     Args:
-      out: folder for the network, its samples and its checkpoints.
+      out: folder for the network, its samples and its checkpoint.
       preset: which network, data and loss: "thesis" or "galileo".
       config: a YAML file; None: the preset's own.
       data: folder of the samples; None: OUT/data.
@@ -80,7 +80,7 @@ def train(
       cancel: a flag with `is_set`, such as `threading.Event`.
 
     Raises:
-      InputError: the config is wrong, or the folder holds samples or checkpoints of another.
+      InputError: the config is wrong, or the folder holds samples or a checkpoint of another.
       Cancelled: `cancel` was set; the last whole epoch is saved.
     """
     check_known("--preset", "preset", preset, PRESETS)

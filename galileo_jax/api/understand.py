@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from galileo_jax.api.look import Look, look
-from galileo_jax.clip.load import YAML_SUFFIXES, check_clip, has_yaml
+from galileo_jax.clip.load import check_clip, yaml_of
 from galileo_jax.clip.look import Likely, likely_in_plane, usual_shape
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.scenarios.scenario import Scenario
@@ -138,12 +138,10 @@ def understand(file: str | Path) -> Understood:
     Raises:
       InputError: there is no such file, or it cannot be read.
     """
-    path = Path(file)
-    is_yaml = path.suffix.lower() in YAML_SUFFIXES
-    yaml_path = path if is_yaml else _beside(path)
+    source = path = Path(file)
+    yaml_path = yaml_of(path)
     declared = read_mapping(yaml_path) if yaml_path.is_file() else {}
-    source = path
-    if is_yaml and path.is_file():
+    if path == yaml_path and path.is_file():
         named = declared.get("video") or declared.get("track")
         if named is None:
             raise InputError(f"{path}: video, track: missing; one of them expected")
@@ -164,9 +162,7 @@ def is_declared(file: str | Path) -> bool:
 
     What is wrong with it is for `load` to say.
     """
-    path = Path(file)
-    is_yaml = path.suffix.lower() in YAML_SUFFIXES
-    yaml_path = path if is_yaml else _beside(path)
+    yaml_path = yaml_of(Path(file))
     if not yaml_path.is_file():
         return False
     declared = read_mapping(yaml_path)
@@ -209,12 +205,6 @@ def _check_clock(found: Look) -> None:
         f"places less than {MAX_STEP_S:g} s apart expected (if its times are milliseconds or "
         "frame numbers, divide them by 1000 or by the frame rate)"
     )
-
-
-def _beside(path: Path) -> Path:
-    if not has_yaml(path):
-        return path.with_suffix(YAML_SUFFIXES[0])
-    return next(p for s in YAML_SUFFIXES if (p := path.with_suffix(s)).is_file())
 
 
 def _with_things(known: Understood) -> Understood:

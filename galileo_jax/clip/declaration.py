@@ -29,37 +29,7 @@ POINTS = {"origin": "origin_px", "track_origin": "track_origin"}
 
 @dataclass(frozen=True)
 class Declaration:
-    """One call of `label`; None and empty mappings say nothing.
-
-    Attributes:
-      scenario: one of `SCENARIOS`.
-      fps: true frames per second.
-      point: object to its centre in its first frame, (x, y), px.
-      size: object to its size, m.
-      shape: object to its shape.
-      first_frame: object to the first frame in which it moves by itself, from 0; None: to be
-        found.
-      last_frame: object to the last frame that is used; None: that of the clip.
-      correct: object to (frame, x, y): where it is, px, in a frame in which it was lost; (frame,)
-        takes that back.
-      pixels_per_metre: of the picture.
-      pixels_per_metre_sd: how well that is known; None: of a `scale`, by its two pixels.
-      scale: (x1, y1, x2, y2, metres): two pixels and the distance between them.
-      rectangle: (x, y) of four corners, from the bottom left one counter-clockwise, px, and its
-        width and height, m.
-      lens: k1, and how well it is known.
-      ramp_angle: of the ramp, degrees.
-      ramp_angle_sd: how well that is known; None: of a `ramp`, by its two pixels.
-      ramp: (x1, y1, x2, y2): two pixels on the ramp.
-      track_units: of a track file.
-      track_y: of a track file: whether y points up or down.
-      track_origin: of a track file: the foot of the ramp, (x, y), in its unit.
-      direction: of the travel: right or left.
-      origin: the foot of the ramp, (x, y), px.
-      origin_sd: how well either coordinate is known; None: of an `origin`, as a pixel is.
-      gravity: m/s^2.
-      level: Physics 101: the folder about which all this is declared.
-    """
+    """One call of `label`: its arguments of the same names; None and empty mappings say nothing."""
 
     scenario: str | None = None
     fps: float | None = None

@@ -112,9 +112,17 @@ def with_corrections(clip: Clip, correct: Mapping[str, Sequence[Sequence[float]]
     return found
 
 
+def yaml_of(path: Path) -> Path:
+    """The yaml beside a video or track, which need not be there; of a yaml the yaml itself."""
+    if path.suffix.lower() in YAML_SUFFIXES:
+        return path
+    names = [path.with_suffix(suffix) for suffix in YAML_SUFFIXES]
+    return next((name for name in names if name.is_file()), names[0])
+
+
 def has_yaml(path: Path) -> bool:
     """Whether a video or track has a yaml beside it."""
-    return any(path.with_suffix(suffix).is_file() for suffix in YAML_SUFFIXES)
+    return yaml_of(path).is_file()
 
 
 def check_belongs(clip: Clip, path: Path) -> None:
@@ -134,11 +142,8 @@ def find_yaml(path: Path) -> Path:
         raise InputError(f"{path}: no such file")
     if path.is_dir():
         raise InputError(f"{path}: a folder; a video, a yaml or a csv track expected")
-    if path.suffix.lower() in YAML_SUFFIXES:
-        return path
-    for suffix in YAML_SUFFIXES:
-        if path.with_suffix(suffix).is_file():
-            return path.with_suffix(suffix)
+    if (found := yaml_of(path)).is_file():
+        return found
     raise InputError(
         f"{path}: no {path.with_suffix('.yaml').name} beside it; "
         "describe the scene with galileo label (see galileo label --help) or galileo studio"

@@ -50,10 +50,7 @@ def whole_number(least: int) -> Callable[[str], int]:
 def refuse_ignored(argv: Sequence[str], options: Sequence[str], why: str) -> None:
     """Refuses options that this call would ignore.
 
-    Args:
-      argv: of the call.
-      options: as they are written, such as --angle.
-      why: where they belong, or why not here.
+    `why`: where they belong, or why not here.
 
     Raises:
       InputError: one of them is given; names it.

@@ -10,7 +10,6 @@ from galileo_jax.commands.fit_table import table
 from galileo_jax.commands.options import adder
 from galileo_jax.commands.progress_display import progress_display
 from galileo_jax.results.truth import true_parameters
-from galileo_jax.rollout.engine_names import MOTIONS
 from galileo_jax.runtime.registry import entry_names
 
 SAMPLERS = entry_names("galileo_jax.inference.samplers.library")
@@ -57,7 +56,7 @@ def _parser() -> command.Parser:
     add("free", metavar="A,B", help=f"declared quantities to infer: {FREE} (default: none)")
     add_clip_options(parser, "fit", out="folder of the run (default runs/CLIP)")
     add("discrepancy", choices=get_args(Discrepancy), metavar=None)
-    add("motion", choices=MOTIONS, metavar=None)
+    add("motion")
     add("noise", choices=("camera", "bodies", "tracker"), metavar=None)
     add = adder(parser.add_argument_group("--method mh"), "fit")
     add("sampler", choices=SAMPLERS, metavar=None)
@@ -65,8 +64,7 @@ def _parser() -> command.Parser:
     add("chains", type=command.whole_number(1))
     add("init", "preset")
     add("similarity", choices=SIMILARITIES, metavar=None)
-    add("acceptance", choices=("coin", "metropolis"), metavar=None)
-    add("selection", choices=("best", "least_variance"), metavar=None)
+    add("acceptance", "selection")
     parser.examples(
         "galileo fit clip.mp4                                  seconds",
         "galileo fit clip1.mp4 clip2.mp4 --method mh           trials of the same objects, sampled",

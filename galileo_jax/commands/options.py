@@ -38,7 +38,7 @@ class Argument(NamedTuple):
 @cache
 def arguments_of(name: str) -> Mapping[str, Argument]:
     """By name, of a public function (`fit`)."""
-    found = find_spec(galileo_jax.PLACE[name])
+    found = find_spec(galileo_jax.PLACES[name][0])
     assert found is not None and found.origin is not None
     body = ast.parse(Path(found.origin).read_text(encoding="utf-8")).body
     constants = {

@@ -20,10 +20,7 @@ def stoppable(last_words: Callable[[], str]) -> Iterator[threading.Event]:
 
     Where the interrupt falls into a callback of a library it is lost; the flag is what the work
     looks at between two batches (`runtime.progress`). A library that computes for long hears
-    neither: after `GRACE_S` the program ends without it.
-
-    Args:
-      last_words: what is printed then.
+    neither: after `GRACE_S` the program ends without it, with `last_words`.
     """
     flag, is_over = threading.Event(), threading.Event()
     if threading.current_thread() is not threading.main_thread():

@@ -1,7 +1,7 @@
-"""Checkpoints (orbax, the config inside), and finished networks as one small file.
+"""The checkpoint of a training and the finished network, each one file with its config.
 
-DIR/checkpoints/EPOCH   everything that training needs to go on
-DIR/network.npz         weights and config of the best epoch, read without orbax
+DIR/checkpoint.npz      everything that training needs to go on
+DIR/network.npz         weights and config of the best epoch
 """
 
 import json
@@ -17,8 +17,7 @@ from galileo_jax.neural.config import TrainConfig
 from galileo_jax.runtime.atomic_write import replacing
 from galileo_jax.runtime.errors import InputError
 
-CHECKPOINTS, NETWORK = "checkpoints", "network.npz"
-KEPT = 2
+CHECKPOINT, NETWORK = "checkpoint.npz", "network.npz"
 
 
 class Progress(NamedTuple):
@@ -48,62 +47,31 @@ class State(NamedTuple):
     moments: Any
 
 
-class Checkpoints:
-    """The checkpoints of one training."""
+def save_checkpoint(folder: Path, state: State, progress: Progress, config: TrainConfig) -> None:
+    """Writes the checkpoint of a training, in place of an earlier one."""
+    notes = {"config": config.model_dump(), "progress": progress._asdict()}
+    _save(folder / CHECKPOINT, flatten(state), {"notes": notes})
 
-    def __init__(self, folder: Path, config: TrainConfig):
-        import orbax.checkpoint as ocp
 
-        self._ocp = ocp
-        self._config = config
-        self._manager = ocp.CheckpointManager(
-            (folder / CHECKPOINTS).resolve(),
-            options=ocp.CheckpointManagerOptions(
-                max_to_keep=KEPT, create=True, enable_async_checkpointing=False
-            ),
-        )
+def load_checkpoint(
+    folder: Path, like: State, config: TrainConfig
+) -> tuple[State, Progress] | None:
+    """The checkpoint, in the shape of `like`; None where there is none.
 
-    def save(self, state: State, progress: Progress) -> None:
-        """Writes a checkpoint; one that is cut short does not count."""
-        notes = {"config": self._config.model_dump(), "progress": progress._asdict()}
-        self._manager.save(
-            progress.epoch,
-            args=self._ocp.args.Composite(
-                state=self._ocp.args.StandardSave(flatten(state)),
-                notes=self._ocp.args.JsonSave(notes),
-            ),
-        )
-
-    def restore(self, like: State) -> tuple[State, Progress] | None:
-        """The latest checkpoint, in the shape of `like`; None where there is none.
-
-        Raises:
-          InputError: it is of another config.
-        """
-        latest = self._manager.latest_step()
-        if latest is None:
-            return None
-        stored: Any = self._manager.restore(
-            latest,
-            args=self._ocp.args.Composite(
-                state=self._ocp.args.StandardRestore(flatten(like)),
-                notes=self._ocp.args.JsonRestore(),
-            ),
-        )
-        config = TrainConfig(**stored.notes["config"])
-        if config != self._config:
-            changed = [k for k, v in config if getattr(self._config, k) != v]
-            raise InputError(
-                f"{self._manager.directory}: trained with another {', '.join(changed)}; "
-                "take another --out"
-            )
-        progress = stored.notes["progress"]
-        progress["losses"] = tuple(map(tuple, progress["losses"]))
-        return unflatten(like, stored.state), Progress(**progress)
-
-    def close(self) -> None:
-        """Ends orbax's threads."""
-        self._manager.close()
+    Raises:
+      InputError: it is of another config.
+    """
+    path = folder / CHECKPOINT
+    if not path.is_file():
+        return None
+    arrays = _arrays(path)
+    notes = json.loads(str(arrays.pop("notes")))
+    stored = TrainConfig(**notes["config"])
+    if stored != config:
+        changed = [key for key, value in stored if getattr(config, key) != value]
+        raise InputError(f"{path}: trained with another {', '.join(changed)}; take another --out")
+    progress = notes["progress"] | {"losses": tuple(map(tuple, notes["progress"]["losses"]))}
+    return unflatten(like, arrays), Progress(**progress)
 
 
 def flatten(tree: Any) -> dict[str, Any]:
@@ -121,10 +89,7 @@ def unflatten(like: Any, leaves: dict[str, Any]) -> Any:
 
 def save_network(path: Path, weights: Any, config: TrainConfig) -> None:
     """Writes a network's state and config."""
-    arrays = {name: np.asarray(leaf) for name, leaf in flatten(weights).items()}
-    with replacing(path) as temporary:
-        arrays["config"] = np.array(json.dumps(config.model_dump()))
-        np.savez(temporary, **arrays)  # pyright: ignore
+    _save(path, flatten(weights), {"config": config.model_dump()})
 
 
 def load_network(path: Path) -> tuple[Any, TrainConfig]:
@@ -136,8 +101,7 @@ def load_network(path: Path) -> tuple[Any, TrainConfig]:
     from galileo_jax.neural.task import make_task
 
     try:
-        with np.load(path) as file:
-            arrays = {name: file[name] for name in file.files}
+        arrays = _arrays(path)
         config = TrainConfig(**json.loads(str(arrays.pop("config"))))
         network = make_task(config).network(config.seed)
         like = nnx.state(network)
@@ -145,3 +109,16 @@ def load_network(path: Path) -> tuple[Any, TrainConfig]:
     except (OSError, ValueError, KeyError) as error:
         raise InputError(f"{path}: not a trained network of this version ({error})") from error
     return network, config
+
+
+def _save(path: Path, leaves: dict[str, Any], more: dict[str, Any]) -> None:
+    """Writes arrays and JSON documents, each by name; a file that is cut short does not count."""
+    arrays = {name: np.asarray(leaf) for name, leaf in leaves.items()}
+    documents = {name: np.array(json.dumps(document)) for name, document in more.items()}
+    with replacing(path) as temporary:
+        np.savez(temporary, **arrays, **documents)  # pyright: ignore
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    with np.load(path) as file:
+        return {name: file[name] for name in file.files}

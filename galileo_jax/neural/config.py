@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from galileo_jax.clip.yaml_file import read_mapping
 from galileo_jax.neural.task import PRESETS
 from galileo_jax.runtime.errors import InputError
 
@@ -59,15 +59,9 @@ def load_config(path: Path, **overrides: object) -> TrainConfig:
     Raises:
       InputError: unreadable, or a key is unknown, missing or out of range.
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
-        raise InputError(f"{path}: not a readable YAML file ({error})") from error
     given = {key: value for key, value in overrides.items() if value is not None}
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: a table of keys and values expected")
     try:
-        return TrainConfig.model_validate(content | given)
+        return TrainConfig.model_validate(read_mapping(path) | given)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))

@@ -29,9 +29,6 @@ class Evaluation(NamedTuple):
 def evaluate_network(path: Path) -> Evaluation:
     """Tests a network on `NUM_TEST` new samples; in a training's folder it writes test.json.
 
-    Args:
-      path: the folder of a training, or a network's file.
-
     Raises:
       InputError: there is no network of this version.
     """

@@ -71,11 +71,7 @@ def completed(
 ) -> np.ndarray:
     """Draws of what is not `known`, given what is: N(mode, covariance) of the fit, conditional.
 
-    Args:
-      z: `[chain, parameter]`, right where known.
-      known: `[parameter]`.
-      fit: of all parameters.
-      generator: of the draws.
+    `z`: `[chain, parameter]`, right where `known`.
     """
     covariance, rest = fit.covariance, ~known
     slope = np.linalg.solve(covariance[np.ix_(known, known)], covariance[np.ix_(known, rest)])

@@ -15,7 +15,14 @@ import jax.numpy as jnp
 import optax
 from flax import nnx
 
-from galileo_jax.neural.checkpoint import NETWORK, Checkpoints, Progress, State, save_network
+from galileo_jax.neural.checkpoint import (
+    NETWORK,
+    Progress,
+    State,
+    load_checkpoint,
+    save_checkpoint,
+    save_network,
+)
 from galileo_jax.neural.config import TrainConfig
 from galileo_jax.neural.task import Arrays, Trainable
 from galileo_jax.runtime.progress import report
@@ -36,8 +43,7 @@ def train(task: Trainable, config: TrainConfig, data: Arrays, folder: Path) -> P
     run_epoch, validate = _compile(task, structure, constant, adam, config)
     state = State(learned, learned, adam.init(learned))
     progress = Progress(0, config.learning_rate, float("inf"), 0, 0, ())
-    checkpoints = Checkpoints(folder, config)
-    if restored := checkpoints.restore(state):
+    if restored := load_checkpoint(folder, state, config):
         state, progress = restored
     fresh_on_device = {name: jnp.asarray(values) for name, values in fresh.items()}
     held_on_device = {name: jnp.asarray(values) for name, values in held_out.items()}
@@ -59,12 +65,11 @@ def train(task: Trainable, config: TrainConfig, data: Arrays, folder: Path) -> P
             )
             report("training", progress.epoch / config.max_epochs, progress)
             if time.monotonic() - saved_s > SAVE_EVERY_S:
-                checkpoints.save(state, progress)
+                save_checkpoint(folder, state, progress, config)
                 saved, saved_s = progress.epoch, time.monotonic()
     finally:
         if progress.epoch != saved:
-            checkpoints.save(state, progress)
-        checkpoints.close()
+            save_checkpoint(folder, state, progress, config)
     best = nnx.state(nnx.merge(structure, state.best_weights, constant))
     save_network(folder / NETWORK, best, config)
     return progress

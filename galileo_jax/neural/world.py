@@ -59,19 +59,26 @@ class Truth(NamedTuple):
     mass_ratio: jax.Array
 
 
+class _Random:
+    """Random numbers of a shape; new ones with each call."""
+
+    def __init__(self, key: jax.Array):
+        self.keys = iter(jax.random.split(key, 60))
+
+    def uniform(self, low, high, shape=()) -> jax.Array:
+        return jax.random.uniform(next(self.keys), shape, minval=low, maxval=high)
+
+    def log_uniform(self, low, high, shape=()) -> jax.Array:
+        return jnp.exp(self.uniform(jnp.log(low), jnp.log(high), shape))
+
+    def normal(self, shape=()) -> jax.Array:
+        return jax.random.normal(next(self.keys), shape)
+
+
 def draw(key: jax.Array) -> tuple[Seen, Truth]:
     """One experiment and its truth; to be vmapped over keys."""
-    keys = iter(jax.random.split(key, 60))
-
-    def uniform(low, high, shape=()):
-        return jax.random.uniform(next(keys), shape, minval=low, maxval=high)
-
-    def log_uniform(low, high, shape=()):
-        return jnp.exp(uniform(jnp.log(low), jnp.log(high), shape))
-
-    def normal(shape=()):
-        return jax.random.normal(next(keys), shape)
-
+    random = _Random(key)
+    uniform, log_uniform, normal = random.uniform, random.log_uniform, random.normal
     is_ideal = uniform(0, 1) < IDEAL_SHARE
     imperfect = 1.0 - is_ideal
     is_filmed = imperfect * (uniform(0, 1) < FILMED_SHARE)
@@ -81,16 +88,9 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     corner = half_height * jnp.tan(angle / 2)
     release = uniform(*RELEASE_M) + corner[0] + half_length[0]
     object2 = corner[0] + half_length.sum() + uniform(0.02, OBJECT2_M[1] - OBJECT2_M[0])
-    steepest = jnp.tan(angle)
-    m1, m2 = jnp.where(is_ideal, uniform(0, 1, (2,)), MASS_PRIOR.forward(normal((2,))))
-    k1, k2 = jnp.where(
-        is_ideal,
-        uniform(*IDEAL_FRICTION, (2,))
-        * jnp.stack([jnp.minimum(1, steepest / IDEAL_FRICTION[1]), 1.0]),
-        uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high, (2,)) * jnp.stack([steepest, 1.0]),
-    )
+    (m1, m2), (k1, k2) = _masses_and_frictions(random, is_ideal, jnp.tan(angle))
     fps = jnp.where(uniform(0, 1) < 0.4, 30.0, log_uniform(*FPS))
-    num_frames = jax.random.randint(next(keys), (), FRAMES[0], FRAMES[1] + 1)
+    num_frames = jax.random.randint(next(random.keys), (), FRAMES[0], FRAMES[1] + 1)
     instant = normal() / (3 * fps)
     late = uniform(0, LATEST_S)
     instant = imperfect * jnp.where(uniform(0, 1) < LATE_SHARE, late, instant)
@@ -99,20 +99,7 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     zero = jnp.zeros(())
     overlap = imperfect * contact_gap.PRIOR.forward(normal())
     theta = jnp.stack([m1, k1, m2, k2, zero, zero, foot, rebound, overlap, instant])
-    cos, sin = jnp.cos(angle), jnp.sin(angle)
-    start1 = (half_height[0] * sin - release * cos, half_height[0] * cos + release * sin)
-    scene = Surroundings(
-        names=("object1", "object2"),
-        angle_rad=angle,  # pyright: ignore
-        gravity=9.81,
-        half_length_m=tuple(half_length),
-        half_height_m=tuple(half_height),
-        corner_m=tuple(corner),
-        start_m=(start1, (object2, half_height[1])),  # pyright: ignore
-        start_path_m=(corner[0] - release, object2 - corner[1]),  # pyright: ignore
-        has_table=True,
-        comes_down=(True, False),
-    )
+    scene = _scene(angle, half_length, half_height, release, object2)
     position, velocity = roll_out(NUISANCES, NAMES, NUM_RECORDS, RECORD_DT_S, theta, scene)
     records = jnp.arange(NUM_RECORDS) * RECORD_DT_S
     times = jnp.arange(NUM_FRAMES) / fps
@@ -127,13 +114,8 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
     is_coded = is_filmed * uniform(0, 1) > 1 - CODED_SHARE
     scatter = jnp.where(is_coded, uniform(LEAST_SCALE, 1.0), 1.0)
     seen = noisy(clean, seen, times, truly, scatter, normal)
-    frames = jnp.arange(NUM_FRAMES)
     # Rollouts end: beyond, the bodies would stand still.
-    mask = jnp.tile((frames < num_frames) & (times < records[-1]), (2, 1))
-    for _ in range(2):
-        first = uniform(0.05, 0.95, (2, 1)) * num_frames
-        length = jnp.where(uniform(0, 1, (2, 1)) < GAP_SHARE, uniform(0, LONGEST_GAP, (2, 1)), 0)
-        mask = mask & ~((frames >= first) & (frames < first + length * num_frames))
+    mask = _with_gaps(random, times < records[-1], num_frames)
     return (
         Seen(
             times_s=times,
@@ -150,6 +132,57 @@ def draw(key: jax.Array) -> tuple[Seen, Truth]:
         ),
         Truth(k1, k2, m1 / m2),
     )
+
+
+def _masses_and_frictions(
+    random: _Random, is_ideal: jax.Array, steepest: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """`[object]` of each; `steepest`: tan of the ramp's angle."""
+    uniform = random.uniform
+    masses = jnp.where(is_ideal, uniform(0, 1, (2,)), MASS_PRIOR.forward(random.normal((2,))))
+    shares = jnp.stack([jnp.minimum(1, steepest / IDEAL_FRICTION[1]), 1.0])
+    return masses, jnp.where(
+        is_ideal,
+        uniform(*IDEAL_FRICTION, (2,)) * shares,
+        uniform(FRICTION_PRIOR.low, FRICTION_PRIOR.high, (2,)) * jnp.stack([steepest, 1.0]),
+    )
+
+
+def _scene(
+    angle: jax.Array,
+    half_length: jax.Array,
+    half_height: jax.Array,
+    release: jax.Array,
+    object2: jax.Array,
+) -> Surroundings:
+    """Object 1 so far up the ramp, object 2 so far from its foot."""
+    corner = half_height * jnp.tan(angle / 2)
+    cos, sin = jnp.cos(angle), jnp.sin(angle)
+    start1 = (half_height[0] * sin - release * cos, half_height[0] * cos + release * sin)
+    return Surroundings(
+        names=("object1", "object2"),
+        angle_rad=angle,  # pyright: ignore
+        gravity=9.81,
+        half_length_m=tuple(half_length),
+        half_height_m=tuple(half_height),
+        corner_m=tuple(corner),
+        start_m=(start1, (object2, half_height[1])),  # pyright: ignore
+        start_path_m=(corner[0] - release, object2 - corner[1]),  # pyright: ignore
+        has_table=True,
+        comes_down=(True, False),
+    )
+
+
+def _with_gaps(random: _Random, is_there: jax.Array, num_frames: jax.Array) -> jax.Array:
+    """Which frames each object is seen in, `[object, frame]`: two gaps at most."""
+    frames = jnp.arange(NUM_FRAMES)
+    mask = jnp.tile((frames < num_frames) & is_there, (2, 1))
+    for _ in range(2):
+        first = random.uniform(0.05, 0.95, (2, 1)) * num_frames
+        is_gap = random.uniform(0, 1, (2, 1)) < GAP_SHARE
+        length = jnp.where(is_gap, random.uniform(0, LONGEST_GAP, (2, 1)), 0)
+        mask = mask & ~((frames >= first) & (frames < first + length * num_frames))
+    return mask
 
 
 def targets(truth: Truth) -> jax.Array:

@@ -191,10 +191,7 @@ def _mapping(path: Path, key: str, value: Any) -> dict[str, Any]:
 def check_place(place: Place, labels: Labels, given: dict[str, Any] | None = None) -> Clip:
     """Checks a clip of Physics 101, which its folders and its labels declare.
 
-    Args:
-      place: where it is.
-      labels: of the data set.
-      given: values that win over both.
+    `given` wins over both.
 
     Raises:
       InputError: one line, which names the labels, for whatever is wrong.

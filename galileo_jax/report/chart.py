@@ -71,19 +71,14 @@ class Bars:
 class Boxes:
     """Box plots of the `y` in each category of `x`, with all values as points.
 
-    Attributes:
-      x: of each value.
-      y: values.
-      colour, name: of the series.
-      offset, width: in categories, of series that stand side by side.
+    They stand beside those of other series, or over them.
     """
 
     x: Sequence[str]
     y: Sequence[float]
     colour: str
     name: str
-    offset: float = 0.0
-    width: float = 0.6
+    is_beside: bool = False
 
 
 Mark = Line | Band | Points | Bars | Boxes

@@ -1,7 +1,7 @@
 """The page of a comparison: is the model adequate, and where does it fail?"""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
@@ -11,7 +11,8 @@ import numpy as np
 from galileo_jax.clip.schema import Clip
 from galileo_jax.comparison.compare import Comparison
 from galileo_jax.comparison.document import pulled
-from galileo_jax.comparison.path_residuals import PathResiduals
+from galileo_jax.comparison.path_residuals import PathResiduals, path_residuals
+from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.animation import animation
@@ -30,53 +31,41 @@ FAILURES = (
 )
 
 
-@dataclass(frozen=True)
-class ComparisonReport:
-    """A comparison and what was compared.
-
-    Attributes:
-      comparison: the result.
-      trials: the model of the clips.
-      theta: the fit, `[parameter]`.
-      clips: what was fitted.
-      effects: of the model.
-      paths: the residuals of every object along its path.
-      command: that makes the page again.
-      seed: of everything random.
-    """
-
-    comparison: Comparison
-    trials: JointProblem
-    theta: np.ndarray
-    clips: tuple[Clip, ...]
-    effects: tuple[str, ...]
-    paths: tuple[PathResiduals, ...]
-    command: str
-    seed: int
-
-
-def write_comparison_page(path: Path, title: str, report: ComparisonReport) -> None:
-    """Writes the page of a fitted model with these effects."""
-    comparison, error = report.comparison, report.comparison.error
+def write_comparison_page(
+    path: Path,
+    title: str,
+    comparison: Comparison,
+    trials: JointProblem,
+    fit: GradientFit,
+    clips: Sequence[Clip],
+    effects: Sequence[str],
+    *,
+    command: str,
+    seed: int,
+) -> None:
+    """Writes the page of a fitted model with these effects; `command` makes it again."""
+    error = comparison.error
+    paths = path_residuals(trials, fit, comparison, seed)
     more = (
         f"<p>chi2 per degree of freedom {error['chi2_per_dof']:.2f}, velocity error "
         f"{error['rmse']:.4f} m/s (tracking noise {error['noise']:.4f}).</p>\n"
         f"{items(pull_text(asdict(pull)) for pull in pulled(comparison))}\n"
-        f'<p class="soft">The model: {escape(diagnosis_text.effects_text(report.effects))}.</p>'
+        f'<p class="soft">The model: {escape(diagnosis_text.effects_text(effects))}.</p>'
     )
-    lead = diagnosis_text.adequacy(comparison, report.effects)
+    lead = diagnosis_text.adequacy(comparison, effects)
     sections = [
         header("comparison", title, lead, more, comparison.is_adequate),
-        failures("Residuals" if comparison.is_adequate else "Where the model fails", report.paths),
-        motion(report.clips, report.trials, {"fitted": report.theta}),
-        cells(comparison, several=len(report.clips) > 1),
-        provenance(
-            report.command,
-            report.clips,
-            {"engine": report.trials.problems[0].engine.name, "seed": str(report.seed)},
-        ),
+        failures("Residuals" if comparison.is_adequate else "Where the model fails", paths),
+        motion(clips, trials, {"fitted": trials.theta(fit.z, fit.free)}),
+        cells(comparison, several=len(clips) > 1),
+        provenance(command, clips, engine_and_seed(trials, seed)),
     ]
     write_text(path, document(f"{title}: comparison", sections))
+
+
+def engine_and_seed(trials: JointProblem, seed: int) -> dict[str, str]:
+    """What a page's provenance says of how it was computed."""
+    return {"engine": trials.problems[0].engine.name, "seed": str(seed)}
 
 
 def motion(
@@ -87,11 +76,7 @@ def motion(
 ) -> str:
     """Every clip with the motion of each of `theta` `[parameter]`, by its name.
 
-    Args:
-      clips: as declared.
-      trials: of these.
-      theta: by the name of what moves so.
-      others: the trials of those that have another model.
+    `others`: the trials of those that have another model.
     """
     found = []
     for i, (clip, problem) in enumerate(zip(clips, trials.problems, strict=True)):

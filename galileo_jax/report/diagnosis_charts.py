@@ -61,9 +61,7 @@ def known_objects(missing: MissingForce, names: Sequence[str]) -> dict[int, str]
 def missing_force_chart(missing: MissingForce, names: Mapping[int, str]) -> Chart:
     """The acceleration that the model lacks, with its 95 % band, against time, speed and place.
 
-    Args:
-      missing: of all objects.
-      names: of the objects that are drawn, by their index.
+    `names`: of the objects that are drawn, by their index.
     """
     objects = list(names)
     value, sd = missing.acceleration_m_s2[objects], missing.sd_m_s2[objects]

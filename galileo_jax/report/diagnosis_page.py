@@ -1,7 +1,6 @@
 """The page of a diagnosis: verdict, rounds, candidates, and where the model fails."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
 from pathlib import Path
@@ -14,7 +13,7 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.report import diagnosis_text
 from galileo_jax.report.chart import Chart
 from galileo_jax.report.comparison_charts import before_after_chart
-from galileo_jax.report.comparison_page import cells, failures, motion
+from galileo_jax.report.comparison_page import cells, engine_and_seed, failures, motion
 from galileo_jax.report.diagnosis_charts import (
     friction_chart,
     known_objects,
@@ -32,42 +31,38 @@ WRAPPED = '<div class="wrapped">{}</div>'
 BAR = '<div class="bar"><div style="width:{:.1f}%"></div></div>'
 
 
-@dataclass(frozen=True)
-class DiagnosisReport:
-    """A diagnosis and what its page says beside it.
-
-    Attributes:
-      diagnosis: the result.
-      record: diagnosis.json.
-      next_command: the command to run next.
-      truth: the effect hidden in a synthetic clip, None where that is not known.
-      clips: what was diagnosed.
-      command: that makes the page again.
-      seed: of the draws in charts.
-    """
-
-    diagnosis: Diagnosis
-    record: Mapping[str, Any]
-    next_command: str
-    truth: str | None
-    clips: tuple[Clip, ...]
-    command: str
-    seed: int
-
-
 def write_diagnosis_page(
-    path: Path, title: str, trials: JointProblem, report: DiagnosisReport
+    path: Path,
+    title: str,
+    trials: JointProblem,
+    diagnosis: Diagnosis,
+    record: Mapping[str, Any],
+    clips: Sequence[Clip],
+    *,
+    truth: str | None,
+    command: str,
+    next_command: str,
+    seed: int,
 ) -> None:
-    """Writes the page; each figure in it can be saved as SVG."""
-    diagnosis = report.diagnosis
-    shown = _residuals(trials, diagnosis, report.seed)
+    """Writes the page; each figure in it can be saved as SVG.
+
+    `record`: diagnosis.json. `truth`: the effect hidden in a synthetic clip, None where that is not
+    known. `command` makes the page again, `next_command` is to be run next.
+    """
+    shown = _residuals(trials, diagnosis, seed)
+    is_good = diagnosis.verdict.status != "unknown"
+    hidden = "" if truth is None else f"<p>Truth: {escape(truth)}.</p>\n"
+    more = (
+        f"{hidden}{items(diagnosis.verdict.advice)}\n"
+        f'<p class="soft">Next: <code>{escape(next_command)}</code></p>'
+    )
     sections = [
-        _verdict(title, report),
+        header("diagnosis", title, diagnosis_text.verdict(diagnosis), more, is_good),
         _reasons(diagnosis.verdict.reasons),
-        _rounds(diagnosis.rounds, report.record["history"]),
-        _candidates(diagnosis, report.record["candidates"]),
+        _rounds(diagnosis.rounds, record["history"]),
+        _candidates(diagnosis, record["candidates"]),
         motion(
-            report.clips,
+            clips,
             trials,
             _fitted(trials, diagnosis),
             {_title(one): one.hypothesis.of(trials) for one in diagnosis.rounds},
@@ -78,16 +73,12 @@ def write_diagnosis_page(
             shown[0],
         ),
         *(_added(name, charts) for name, charts in _before_after(diagnosis, shown)),
-        _missing(report, trials.problems[0].observation.names),
-        _friction(report.record.get("friction_along_way", [])),
+        _missing(diagnosis, record, trials.problems[0].observation.names),
+        _friction(record.get("friction_along_way", [])),
         cells(diagnosis.base, several=len(trials.problems) > 1),
-        _each_clip(report.record.get("each_clip")),
-        _left_one_out(report.record.get("left_one_out", [])),
-        provenance(
-            report.command,
-            report.clips,
-            {"engine": trials.problems[0].engine.name, "seed": str(report.seed)},
-        ),
+        _each_clip(record.get("each_clip")),
+        _left_one_out(record.get("left_one_out", [])),
+        provenance(command, clips, engine_and_seed(trials, seed)),
     ]
     write_text(path, document(f"{title}: diagnosis", [part for part in sections if part]))
 
@@ -108,17 +99,6 @@ def _fitted(trials: JointProblem, diagnosis: Diagnosis) -> dict[str, Any]:
 
 def _title(one: Round) -> str:
     return diagnosis_text.effects_text(one.effects)
-
-
-def _verdict(title: str, report: DiagnosisReport) -> str:
-    diagnosis = report.diagnosis
-    truth = "" if report.truth is None else f"<p>Truth: {escape(report.truth)}.</p>\n"
-    more = (
-        f"{truth}{items(diagnosis.verdict.advice)}\n"
-        f'<p class="soft">Next: <code>{escape(report.next_command)}</code></p>'
-    )
-    is_good = diagnosis.verdict.status != "unknown"
-    return header("diagnosis", title, diagnosis_text.verdict(diagnosis), more, is_good)
 
 
 def _reasons(reasons: Sequence[Reason]) -> str:
@@ -216,13 +196,13 @@ def _candidates(diagnosis: Diagnosis, candidates: Sequence[Mapping[str, Any]]) -
     return f"<h2>Candidates</h2>\n{table(head, rows, ONLY_WIDE)}\n{note if rest > 0 else ''}"
 
 
-def _missing(report: DiagnosisReport, names: Sequence[str]) -> str:
-    missing = report.diagnosis.missing
+def _missing(diagnosis: Diagnosis, record: Mapping[str, Any], names: Sequence[str]) -> str:
+    missing = diagnosis.missing
     if missing is None:
         return ""
     known = known_objects(missing, names)
     charts = [missing_force_chart(missing, {i: name}) for i, name in known.items()]
-    found = diagnosis_text.formula_text(report.record)
+    found = diagnosis_text.formula_text(record)
     return chart_section(
         "The missing force",
         "The acceleration along the path that the model lacks, in m/s², with its 95 % band, "

@@ -10,7 +10,6 @@ from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.diagnosis.reasons import p_text as p_text
 from galileo_jax.diagnosis.verdict import UNEVEN
-from galileo_jax.inference.joint_problem import NOISE_SCALE_RANGE
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.report.phrases import listed
 from galileo_jax.results.command_line import command_line
@@ -44,15 +43,12 @@ def adequacy(comparison: Comparison, effects: Sequence[str]) -> str:
     if not comparison.is_adequate:
         return f"The model {model}is not adequate: the data contradict it ({equals})."
     text = f"The model {model}is adequate: its residuals look like noise ({equals})."
-    return f"{text} {misstated}" if (misstated := noise_text(comparison)) else text
+    return f"{text} {noise_text(comparison.noise_scale)}" if comparison.is_noise_misstated else text
 
 
-def noise_text(comparison: Comparison) -> str:
-    """How wrong the stated noise is, in a sentence; empty where it is about right."""
-    low, high = NOISE_SCALE_RANGE
-    if all(low <= scale <= high for scale in comparison.noise_scale):
-        return ""
-    size = " and ".join(f"{scale:.1f}" for scale in comparison.noise_scale)
+def noise_text(noise_scale: Sequence[float]) -> str:
+    """How wrong the stated noise is, in a sentence."""
+    size = " and ".join(f"{scale:.1f}" for scale in noise_scale)
     return f"The tracking errors are {size} times as large as stated."
 
 
@@ -117,8 +113,7 @@ def roughness(hypothesis: Hypothesis) -> float:
 def ambiguity(rivals: Sequence[str]) -> str:
     """What a clip cannot tell, in one sentence; what all have in common is told first.
 
-    Args:
-      rivals: hypotheses, the effects of each joined by +.
+    `rivals`: hypotheses, the effects of each joined by +.
     """
     hypotheses = [rival.split("+") for rival in rivals]
     common = [name for name in hypotheses[0] if all(name in own for own in hypotheses)]
@@ -161,9 +156,6 @@ def formula_text(record: Mapping[str, Any]) -> str:
     """What the best formula says of the missing force, in one sentence.
 
     Empty where no force is missing, and for a file from before formulas were fitted in the model.
-
-    Args:
-      record: diagnosis.json.
     """
     missing = record.get("missing_force") or {}
     if "best_formula" not in missing:

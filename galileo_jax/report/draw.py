@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from galileo_jax.report.chart import Band, Bars, Boxes, Chart, Line, Mark, Panel, Points
-from galileo_jax.report.layout import CELL_PX, RIGHT_PX, SLANT_DEG, layout_of
+from galileo_jax.report.layout import CELL_PX, RIGHT_PX, layout_of
 from galileo_jax.report.plotly_figure import figure
 from galileo_jax.report.style import matplotlib_style, palette, save_svg
 from galileo_jax.runtime.atomic_write import replacing, write_text
@@ -29,16 +29,11 @@ MOST_NAMES = 6  # in a legend over the marks
 MANY = 300  # points; an SVG has so many as a picture
 
 
-def to_plotly(chart: Chart, has_legend: bool = True) -> "go.Figure":
-    """The chart as an interactive figure, as wide as what shows it.
-
-    Args:
-      chart: what is drawn.
-      has_legend: whether the figure itself says what the marks mean.
-    """
+def to_plotly(chart: Chart) -> "go.Figure":
+    """The chart as an interactive figure with its legend, as wide as what shows it."""
     import plotly.graph_objects as go
 
-    return go.Figure(figure(chart, has_legend))
+    return go.Figure(figure(chart))
 
 
 def to_svg(chart: Chart) -> str:
@@ -120,8 +115,7 @@ def _draw_mark(axes: "Axes", mark: Mark) -> None:
     colour = palette()[mark.colour]
     look: dict[str, Any] = {"color": colour, "label": mark.name}
     if isinstance(mark, Boxes):
-        _draw_boxes(axes, mark, colour)
-        return
+        raise TypeError("box plots are drawn on pages alone, whose figures can be saved there")
     look["alpha"] = mark.opacity
     match mark:
         case Band():
@@ -145,18 +139,3 @@ def _draw_mark(axes: "Axes", mark: Mark) -> None:
                 axes.bar_label(bars, mark.texts, fontsize=8)
             if mark.is_horizontal:
                 axes.yaxis.set_inverted(True)
-
-
-def _draw_boxes(axes: "Axes", mark: Boxes, colour: str) -> None:
-    names = list(dict.fromkeys(mark.x))
-    axes.plot(names, np.full(len(names), np.nan))  # puts the categories on the axis
-    places = np.asarray(axes.convert_xunits(names)) + mark.offset
-    values = [[y for x, y in zip(mark.x, mark.y, strict=True) if x == name] for name in names]
-    axes.boxplot(
-        values, positions=places, widths=0.8 * mark.width, manage_ticks=False, patch_artist=True,
-        flierprops={"marker": ""}, medianprops={"color": colour}, label=mark.name,
-        boxprops={"facecolor": colour, "alpha": 0.3},
-    )  # fmt: skip
-    for place, some in zip(places, values, strict=True):
-        axes.plot([place] * len(some), some, "o", color=colour, markersize=3, markeredgewidth=0)
-    axes.tick_params(axis="x", rotation=SLANT_DEG)

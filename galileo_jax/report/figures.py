@@ -23,12 +23,7 @@ NUM_CANDIDATES = 8
 
 
 def track_figure(observation: Observation, name: str) -> "go.Figure":
-    """Measured x and y of every object against time, m and s, with 95 % intervals.
-
-    Args:
-      observation: the track.
-      name: of the clip.
-    """
+    """Measured x and y of every object against time, m and s, with 95 % intervals."""
     charts = [track_chart(observation, axis) for axis in (0, 1)]
     return to_plotly(side_by_side("track", f"{name}: measured positions", charts))
 

@@ -10,6 +10,7 @@ from galileo_jax.inference.confounded import confounded_with_gravity
 from galileo_jax.inference.per_mass import SUFFIX
 from galileo_jax.prediction.posterior_predictive import PosteriorPredictive
 from galileo_jax.report.phrases import sentence
+from galileo_jax.results.command_line import command_line
 from galileo_jax.results.run import CLIP, Run
 from galileo_jax.results.shown_digits import unit_text
 from galileo_jax.results.shown_parameters import shown_parameters
@@ -149,11 +150,16 @@ def _struck(name: str) -> int | None:
     return struck if struck > 1 else None
 
 
-def distance(error: Mapping[str, Any]) -> str:
-    """How near the fit comes to what was seen, and in how many frames; empty where unknown."""
+def nearness(error: Mapping[str, Any]) -> list[str]:
+    """How near the fit comes to what was seen: in mm, and as a share of the way, where known."""
     units = {"rms_mm": "mm", "rms_percent_of_way": "% of the way"}
     known = {unit: error.get(key) for key, unit in units.items()}  # None in a file, NaN before
-    sizes = [f"{size:.2g} {unit}" for unit, size in known.items() if size and size == size]
+    return [f"{size:.2g} {unit}" for unit, size in known.items() if size and size == size]
+
+
+def distance(error: Mapping[str, Any]) -> str:
+    """How near the fit comes to what was seen, and in how many frames; empty where unknown."""
+    sizes = nearness(error)
     frames = f"{error['frames_used']} of {error['frames']} frames" if error.get("frames") else ""
     said = f"{' or '.join(sizes)} off (root mean square)" if sizes else ""
     return ", in ".join(filter(None, [said, frames]))
@@ -181,11 +187,7 @@ def fit_quality(result: Mapping[str, Any]) -> list[str]:
 
 
 def imperfection_text(found: Mapping[str, Any]) -> list[str]:
-    """What of imperfections shows, and whether it is usual: a sentence for each.
-
-    Args:
-      found: `imperfections` of result.json.
-    """
+    """What of imperfections shows, and whether it is usual: a sentence for each."""
     said = []
     for entry in found.values():
         shows = entry["q975"] < TOLD_FACTOR * entry["q025"]
@@ -263,16 +265,17 @@ def caution(result: dict[str, Any]) -> str | None:
 
 def fit_command(run: Run) -> str:
     """The command that makes this run again, from the clip as it was fitted."""
-    result = run.result
-    words = ["python -m galileo_jax.fit", shlex.quote(str(run.folder / CLIP))]
-    words.append(f"--method {result['method']}")
-    if result["effects"]:
-        words.append(f"--effects {','.join(result['effects'])}")
-    if result.get("free"):
-        words.append(f"--free {','.join(result['free'])}")
-    words += [f"--{key} {result[key]}" for key in ("preset", "sampler") if result.get(key)]
-    if result.get("discrepancy_asked", "auto") != "auto":
-        words.append(f"--discrepancy {result['discrepancy_asked']}")
-    if run.problem.model.motion != "planar":
-        words.append(f"--motion {run.problem.model.motion}")
-    return " ".join([*words, f"--engine {run.problem.engine.name}", f"--seed {result['seed']}"])
+    result, motion = run.result, run.problem.model.motion
+    return command_line(
+        "fit",
+        [run.folder / CLIP],
+        method=result["method"],
+        effects=",".join(result["effects"]),
+        free=",".join(result.get("free", ())),
+        preset=result.get("preset"),
+        sampler=result.get("sampler"),
+        discrepancy=result.get("discrepancy_asked"),
+        motion=None if motion == "planar" else motion,
+        engine=run.problem.engine.name,
+        seed=result["seed"],
+    )

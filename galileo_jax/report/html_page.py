@@ -51,12 +51,7 @@ def with_plotly(page: str) -> str:
 def header(kind: str, title: str, lead: str, more: str = "", is_good: bool = True) -> str:
     """The top of a page: what it is, of which clips, and the result in one sentence.
 
-    Args:
-      kind: "fit", "diagnosis", ...
-      title: the clips.
-      lead: the sentence.
-      more: HTML below it.
-      is_good: whether the sentence is good news.
+    `more`: HTML below the sentence. `is_good`: whether that is good news.
     """
     warn = "" if is_good else " warn"
     return (
@@ -86,12 +81,7 @@ def chart_section(
 ) -> str:
     """A heading, a caption and charts.
 
-    Args:
-      heading: of the section.
-      caption: plain text.
-      charts: in their order.
-      arrangement: "grid": side by side where there is room; "stack": one below the other.
-      legend: HTML, see `legend`.
+    `arrangement`: "grid", side by side where there is room, or "stack", one below the other.
     """
     drawn = "".join(map(chart_element, charts))
     return (

@@ -6,7 +6,8 @@ from typing import Any
 
 from galileo_jax.diagnosis.reasons import p_equals
 from galileo_jax.inference.per_mass import SUFFIX
-from galileo_jax.report.fit_text import imperfection_text, meaning
+from galileo_jax.report.diagnosis_text import noise_text
+from galileo_jax.report.fit_text import imperfection_text, meaning, nearness
 from galileo_jax.report.phrases import listed, sentence
 from galileo_jax.results.shown_digits import shown
 from galileo_jax.results.shown_parameters import shown_parameters
@@ -25,11 +26,8 @@ def paragraph(
 ) -> str:
     """What was measured, how well the model follows it, what is missing, what could not be seen.
 
-    Args:
-      result: result.json of the fit that is told.
-      check: compare.json of the model without what was found missing.
-      diagnosis: diagnosis.json; None where nothing is missing.
-      shapes: of the objects, as they are declared.
+    Of result.json, of compare.json of the model without what was found missing, and, where
+    something is, of diagnosis.json; `shapes`: of the objects, as declared.
     """
     entries = {
         name: entry for name, entry in shown_parameters(result).items() if name != SAME_AS_RATIO
@@ -137,14 +135,8 @@ def _model(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> st
 
 def _nearness(error: Mapping[str, Any], model: str) -> str:
     """How near the model comes to what was seen."""
-    millimetres, share = error.get("rms_mm"), error.get("rms_percent_of_way")
-    sizes = [f"{millimetres:.2g} mm"] if _is_size(millimetres) else []
-    sizes += [f"{share:.2g} % of the way"] if _is_size(share) else []
+    sizes = nearness(error)
     return f"{model} follows the motion to {', '.join(sizes)}." if sizes else ""
-
-
-def _is_size(value: Any) -> bool:
-    return isinstance(value, int | float) and value == value and value > 0
 
 
 def _imperfections(result: Mapping[str, Any]) -> list[str]:
@@ -164,10 +156,7 @@ def _verdict(
     if not check["adequate"]:
         return f"The data contradict the model ({p})."
     text = f"What it leaves looks like noise: nothing is missing ({p})."
-    if check.get("noise_misstated"):
-        sizes = " and ".join(f"{size:.1f}" for size in check["noise_scale"])
-        text += f" The tracking errors are {sizes} times as large as stated."
-    return text
+    return f"{text} {noise_text(check['noise_scale'])}" if check.get("noise_misstated") else text
 
 
 def _only_if(result: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> str:

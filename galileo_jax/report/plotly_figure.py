@@ -21,9 +21,7 @@ LEGEND_PX, LEGEND_WIDTH_PX = 40, 800  # of one line
 def figure(chart: Chart, has_legend: bool = True) -> dict[str, Any]:
     """`data` and `layout`, with NumPy arrays in them, as wide as what shows it.
 
-    Args:
-      chart: what is drawn.
-      has_legend: whether the figure itself says what the marks mean.
+    `has_legend`: whether the figure itself says what the marks mean.
     """
     size, data = layout_of(chart), []
     layout: dict[str, Any] = {"shapes": [], "annotations": []}
@@ -53,7 +51,7 @@ def figure(chart: Chart, has_legend: bool = True) -> dict[str, Any]:
             _furnish(layout, panel, end)
     letters_px = sum(LETTER_PX * len(group) for group in named)
     legend_px = LEGEND_PX * (1 + letters_px // LEGEND_WIDTH_PX) if has_legend else 0
-    is_grouped = any(isinstance(mark, Boxes) and mark.offset for mark in chart.marks)
+    is_grouped = any(isinstance(mark, Boxes) and mark.is_beside for mark in chart.marks)
     layout |= {
         "template": _template(),
         "height": round(size.height + legend_px),

@@ -90,11 +90,7 @@ def _interval(entry: Mapping[str, float], unit: str) -> str:
 def write_prediction(folder: Path, run: Run, found: Mapping[str, Any], chart: Chart) -> Path:
     """Puts the prediction's section into the folder's report, in place of an earlier one.
 
-    Args:
-      folder: with first_and_last.png in it; without a report the section is a page of its own.
-      run: the fit that was extrapolated.
-      found: prediction.json.
-      chart: of the predicted motion.
+    Without a report the section is a page of its own. first_and_last.png lies in the folder.
 
     Returns:
       the page that has it.

@@ -20,10 +20,7 @@ PACKAGES = ("jax", "jaxlib", "mujoco", "numpy", "scipy", "opencv-python-headless
 def provenance(command: str, clips: Iterable[Clip], facts: Mapping[str, str]) -> str:
     """The last section of a page.
 
-    Args:
-      command: that makes the page again.
-      clips: what it was made from.
-      facts: more, plain text: engine, seed, timings, ...
+    `facts`: more, plain text: engine, seed, timings, ...
     """
     clips = tuple(clips)
     entries = {

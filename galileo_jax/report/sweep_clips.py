@@ -15,7 +15,7 @@ import numpy as np
 
 from galileo_jax.clip.schema import Clip
 from galileo_jax.observation.observation import Observation
-from galileo_jax.report.fit_text import fits, meaning
+from galileo_jax.report.fit_text import fits, meaning, nearness
 from galileo_jax.report.style import object_colour
 from galileo_jax.report.video_frames import jpeg
 from galileo_jax.results.shown_digits import interval_text, number, shown, unit_text
@@ -67,9 +67,7 @@ class ClipRow:
 def thumbnail(clip: Clip, observation: Observation) -> bytes | None:
     """A small JPEG from the middle of a clip's motion; None where it has no video.
 
-    Args:
-      clip: with a video that is still there.
-      observation: its track, frame by frame as in the video.
+    `observation`: its track, frame by frame as in the video.
     """
     if clip.video is None:
         return None
@@ -194,11 +192,8 @@ def _value(entry: Mapping[str, Any]) -> str:
 
 def _off(row: ClipRow) -> str:
     """How near the fit comes; empty where that is not known."""
-    error = row.fit["error"] if row.fit is not None else {}
-    units = {"rms_mm": " mm", "rms_percent_of_way": " % of the way"}
-    sizes = [f"{error[key]:.2g}{unit}" for key, unit in units.items() if error.get(key)]
-    first, rest = sizes[:1], sizes[1:]
-    return "".join([*first, *(f' <span class="soft">{size}</span>' for size in rest)])
+    first, *rest = (nearness(row.fit["error"]) if row.fit is not None else []) or [""]
+    return "".join([first, *(f' <span class="soft">{size}</span>' for size in rest)])
 
 
 def _model(row: ClipRow) -> str:

@@ -32,13 +32,8 @@ def write_sweep_page(
 ) -> None:
     """Writes the page.
 
-    Args:
-      path: of the HTML file.
-      title: of the sweep.
-      rows: as `sweeping.summary.make_rows` gives them.
-      command: that makes it again.
-      clips: a row for each, in the order in which they are shown.
-      found: what they find together.
+    `rows`: as `sweeping.summary.make_rows` gives them; `clips` in the order in which they are
+    shown.
     """
     done = [row for row in rows if row["status"] == "done"]
     failed = [row for row in rows if row["status"] == "failed"]
@@ -142,21 +137,13 @@ def _boxes(
     label: Callable[[Row], str],
 ) -> Chart:
     names = sorted({label(row) for row in rows})
-    is_overlaid = category is label or len(names) == 1
-    width = 0.6 if is_overlaid else 0.8 / len(names)
+    is_beside = category is not label and len(names) > 1
     marks = []
     for i, name in enumerate(names):
         own = [j for j, row in enumerate(rows) if label(row) == name]
-        marks.append(
-            Boxes(
-                x=[category(rows[j]) or "unknown" for j in own],
-                y=[values[j] for j in own],
-                colour=COLOURS[i % len(COLOURS)],
-                name=name,
-                offset=0.0 if is_overlaid else width * (i - (len(names) - 1) / 2),
-                width=width,
-            )
-        )
+        places = [category(rows[j]) or "unknown" for j in own]
+        colour = COLOURS[i % len(COLOURS)]
+        marks.append(Boxes(places, [values[j] for j in own], colour, name, is_beside))
     panel = Panel(title, tuple(marks), ylim=(0.0, 1.05 * max(values) or 1.0))
     return Chart(title, f"{title}, box plots", (panel,), panel_px=BOXES_PX)
 

@@ -27,12 +27,6 @@ MEASURED = ("x_m", "y_m", "sd_x_m", "sd_y_m", "correlation")
 def export_run(folder: Path, out: Path, to: str, with_fitted: bool) -> list[Path]:
     """Writes the tracks, the parameters' summaries and the draws of a run.
 
-    Args:
-      folder: the run, of one clip or several.
-      out: folder to write to.
-      to: one of `FORMATS`.
-      with_fitted: whether also to write where the fitted model has the objects.
-
     Returns:
       the files.
 

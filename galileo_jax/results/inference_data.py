@@ -58,11 +58,6 @@ def inference_data(trials: JointProblem, posterior: Posterior, seed: int = 0) ->
     `NUM_PREDICTIVE_DRAWS` for `posterior_predictive`, `NUM_LIKELIHOOD_DRAWS` for
     `log_likelihood`; their coordinate `draw` says which (it only counts draws drawn again).
 
-    Args:
-      trials: what was fitted.
-      posterior: of `trials.parameters`, in their units.
-      seed: of the prior's draws and of the predictive noise.
-
     Returns:
       groups as in the module. Every variable has the attribute `units`. Written by `to_netcdf` and
       read by `Posterior.from_netcdf` it is the same posterior.

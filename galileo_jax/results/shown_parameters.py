@@ -16,9 +16,6 @@ def shown_parameters(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     The mass of a single object cancels out of its motion unless something in the model is a
     force or a force's constant (its unit has a kg or N in it). result.json keeps it all the same.
 
-    Args:
-      result: result.json.
-
     Returns:
       entries by name, in the order of result.json.
     """
@@ -33,9 +30,6 @@ def shown_parameters(result: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 def headlines(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
     """Frictions, ratios of masses and g; of a motion that has none of them what it determines.
 
-    Args:
-      entries: of parameters and what is derived from them, by name.
-
     Returns:
       entries by name: those of `HEADLINES` in their alphabet, ratios last.
     """
@@ -46,10 +40,6 @@ def headlines(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str
 
 
 def point_estimate(result: Mapping[str, Any]) -> dict[str, float]:
-    """The estimate of a method whose draws are no posterior, by name; else empty.
-
-    Args:
-      result: result.json.
-    """
+    """The estimate of a method whose draws are no posterior, by name; else empty."""
     best = dict(result.get("best") or {})
     return best | {"mass_ratio": best["m1"] / best["m2"]} if {"m1", "m2"} <= set(best) else best

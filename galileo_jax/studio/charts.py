@@ -67,11 +67,7 @@ def residual_figure(
 ) -> dict[str, Any]:
     """Residuals in units of the noise; x filled, y hollow; where the model fails is shaded.
 
-    Args:
-      motion: of the clip.
-      stretches: that are shaded.
-      is_dark: the colours.
-      extra: another model's name, and the residuals that it leaves.
+    `extra`: another model's name, and the residuals that it leaves.
     """
     times, two = motion["times"], np.full(2, 2.0)
     ends = time_limits(times)

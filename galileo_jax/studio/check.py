@@ -23,10 +23,7 @@ class Remark:
 def remarks_on(marks: Marks, container_fps: float, problem: str | None) -> tuple[Remark, ...]:
     """What to say of marks.
 
-    Args:
-      marks: as drawn.
-      container_fps: what the video's file says.
-      problem: why the yaml could not be written, if it could not.
+    `problem`: why the yaml could not be written, if it could not.
     """
     found = []
     if not marks.objects:

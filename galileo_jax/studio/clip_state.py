@@ -43,12 +43,7 @@ STORED = TypeAdapter(Step)
 
 @dataclass(frozen=True)
 class Opened:
-    """A clip that was opened.
-
-    Attributes:
-      root: the folder that was opened.
-      source: the film or table.
-    """
+    """A clip that was opened."""
 
     root: Path
     source: Path

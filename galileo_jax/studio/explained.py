@@ -1,6 +1,7 @@
-"""What `explain` has left: its answers in a yaml, its paragraph, its page."""
+"""What commands have left to be shown: answers in a yaml, the paragraph, page and picture."""
 
 from collections.abc import Collection, Mapping
+from pathlib import Path
 from typing import Any
 
 from galileo_jax.studio.clip_state import Sheet, Table
@@ -58,6 +59,14 @@ def told(trials: Trials, entry: Mapping[str, Any]) -> dict[str, Any]:
 def report(trials: Trials, name: str) -> str | None:
     """A clip's page, as one file; None: there is none."""
     path = trials.run / ("report.html" if len(trials.sheets) == 1 else f"report_{name}.html")
-    if not path.is_file() or not path.resolve().is_relative_to(trials.root):
-        return None
-    return alone(path.read_text(encoding="utf-8"))
+    return alone(path.read_text(encoding="utf-8")) if _is_inside(path, trials) else None
+
+
+def still(trials: Trials, name: str) -> bytes | None:
+    """The first and the last frame of a clip's prediction, PNG; None: there is none."""
+    path = trials.run / ("" if len(trials.sheets) == 1 else name) / "first_and_last.png"
+    return path.read_bytes() if _is_inside(path, trials) else None
+
+
+def _is_inside(path: Path, trials: Trials) -> bool:
+    return path.is_file() and path.resolve().is_relative_to(trials.root)

@@ -12,11 +12,7 @@ QUALITY = 85
 
 
 class Frames:
-    """One video's frames as JPEGs on disk, in a folder that ends with the server.
-
-    Args:
-      video: that is decoded in a thread, beginning now.
-    """
+    """One video's frames as JPEGs on disk, in a folder that ends with the server."""
 
     def __init__(self, video: Path):
         self._video = video

@@ -41,12 +41,7 @@ class _TooLarge(Exception):  # noqa: N818 - an answer, raised through the app th
 class Guard:
     """Wraps an ASGI application.
 
-    Args:
-      app: that is guarded.
-      port: that it is served at.
-      token: of the address that was printed.
-      upload_path: where larger bodies are let through.
-      largest_upload: bytes.
+    Larger bodies are let through, up to `largest_upload` bytes, at `upload_path`.
     """
 
     def __init__(

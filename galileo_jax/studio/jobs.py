@@ -47,9 +47,7 @@ OnMessage = Callable[[Message], None]
 class Worker:
     """The process, started when it is first needed and again if it ends.
 
-    Args:
-      folder: its working folder.
-      on_message: called in a thread of this process.
+    `on_message` is called in a thread of this process.
     """
 
     def __init__(self, folder: str, on_message: OnMessage):

@@ -15,9 +15,7 @@ STICK_SHARE = 0.3  # of the frame's width, that a stick is drawn over at first
 def proposed(found: Mapping[str, Any], size_px: tuple[int, int]) -> Marks:
     """What the program found in a video, as marks; a stick to be laid on a known length.
 
-    Args:
-      found: the fields of a `Proposal`.
-      size_px: of the video.
+    `found`: the fields of a `Proposal`.
     """
     ramp = found["ramp"]
     upper, foot = ((ramp[0], ramp[1]), (ramp[2], ramp[3])) if ramp is not None else (None, None)
@@ -38,10 +36,7 @@ def blank(fps: float, size_px: tuple[int, int]) -> Marks:
 def declared(content: Mapping[str, Any], size_px: tuple[int, int], fps: float) -> Marks:
     """The marks that a clip's yaml stands for.
 
-    Args:
-      content: the yaml's keys, valid.
-      size_px: of the video.
-      fps: of the container, where the yaml says nothing.
+    `fps`: of the container, where the yaml says nothing.
     """
     listed = [one for one in content.get("objects") or () if isinstance(one, Mapping)]
     objects = tuple(

@@ -116,11 +116,7 @@ def build_page(session: Session) -> None:
 
 
 class _Page:
-    """The elements of a tab's page, and what they show by now.
-
-    Args:
-      tab: what is shown.
-    """
+    """The elements of a tab's page, and what they show by now."""
 
     def __init__(self, tab: Tab):
         self._tab, self._session = tab, tab.session

@@ -23,10 +23,7 @@ def program_of(run: Path) -> str | None:
 def check_run(root: Path, run: Path, may_run: bool = False) -> None:
     """Refuses to open a run that leads out of the folder, or would run a file of effects.
 
-    Args:
-      root: the folder that was opened.
-      run: of the run.
-      may_run: somebody has pressed the button for its effects, which lie in the folder.
+    `may_run`: somebody has pressed the button for its effects, which lie in the folder.
 
     Raises:
       InputError: says why.

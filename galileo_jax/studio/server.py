@@ -6,9 +6,8 @@ import secrets
 import signal
 import socket
 import webbrowser
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote
 
 from galileo_jax.clip.load import FILM_SUFFIXES, YAML_SUFFIXES
@@ -96,39 +95,32 @@ def make_app(
     session = Session(root, clip)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
+    def answer(what: str, content: bytes | str | None, kind: str, **headers: str) -> Response:
+        named = {key.replace("_", "-"): value for key, value in headers.items()}
+        if content is None:
+            return PlainTextResponse(f"no such {what}", 404)
+        return Response(content, media_type=kind, headers=named)
+
     @app.get("/frame/{name}/{index}")
     def frame(name: str, index: int) -> Response:
         picture = session.picture(name, index)
-        if picture is None:
-            return PlainTextResponse("no such frame", 404)
-        caching = {"cache-control": "private, max-age=3600"}
-        return Response(picture, media_type="image/jpeg", headers=caching)
+        return answer("frame", picture, "image/jpeg", cache_control="private, max-age=3600")
 
     @app.get("/still/{name}")
     def still(name: str) -> Response:
         """The first and the last frame of a clip's prediction."""
-        path = (
-            session.trials.run / ("" if len(session.chosen) == 1 else name) / "first_and_last.png"
-        )
-        is_inside = path.is_file() and path.resolve().is_relative_to(session.root)
-        if name not in session.chosen or not is_inside:
-            return PlainTextResponse("no such picture", 404)
-        caching = {"cache-control": "no-store"}
-        return Response(path.read_bytes(), media_type="image/png", headers=caching)
+        return answer("picture", session.still(name), "image/png", cache_control="no-store")
 
     @app.get("/report/{name}")
     def report(name: str) -> Response:
         """A clip's page, to be kept."""
-        page = session.report(name)
-        if page is None:
-            return PlainTextResponse("no such report", 404)
-        kept = {"content-disposition": f"attachment; filename*=utf-8''{quote(name)}.html"}
-        return Response(page, media_type="text/html", headers=kept)
+        kept = f"attachment; filename*=utf-8''{quote(name)}.html"
+        return answer("report", session.report(name), "text/html", content_disposition=kept)
 
     @app.put(UPLOAD + "{name}")
     async def upload(name: str, request: Request) -> Response:
         try:
-            path = await receive(session.root, name, _chunks(request), largest_upload)
+            path = await receive(session.root, name, request.stream(), largest_upload)
         except InputError as error:
             return PlainTextResponse(f"{error}\n", 422)
         session.add(path)
@@ -141,11 +133,6 @@ def make_app(
     )  # fmt: skip
     guard = Guard(app, port=port, token=token, upload_path=UPLOAD, largest_upload=largest_upload)
     return guard, session
-
-
-async def _chunks(request: Any) -> AsyncIterator[bytes]:
-    async for chunk in request.stream():
-        yield chunk
 
 
 def _source(path: Path) -> tuple[Path, str | None]:

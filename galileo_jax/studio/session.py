@@ -39,9 +39,7 @@ MOST_FRAMES = 4  # clips whose frames are held
 class Session:
     """State of the studio; all of it is changed in the server's loop.
 
-    Args:
-      root: the folder that was opened.
-      clip: which of its clips is shown first, a table with its suffix; None: the first.
+    `clip`: which of its clips is shown first, a table with its suffix; None: the first.
     """
 
     def __init__(self, root: Path, clip: str | None = None):
@@ -245,6 +243,10 @@ class Session:
         """The page of a chosen clip's run, to be kept as one file; None: there is none."""
         return explained.report(self.trials, name) if name in self.chosen else None
 
+    def still(self, name: str) -> bytes | None:
+        """The picture of a chosen clip's prediction, PNG; None: there is none."""
+        return explained.still(self.trials, name) if name in self.chosen else None
+
     def _read_again(self, name: str) -> None:
         """A clip's yaml as somebody else has left it."""
         if isinstance(sheet := self.sheets.get(name), Sheet):
@@ -280,9 +282,8 @@ class Session:
     def fit(self, effects: tuple[str, ...] = (), is_law: bool = False) -> None:
         """Fits a model with these effects, then compares it with the data.
 
-        Args:
-          effects: names.
-          is_law: whether one is the formula that the diagnosis proposes, in a file of its own.
+        `is_law`: whether one is the formula that the diagnosis proposes, in a file of its
+        own.
         """
         trials, files = self.trials, self.files if effects else ()
         if is_law:

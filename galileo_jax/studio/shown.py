@@ -23,12 +23,7 @@ class Results:
 
 
 def with_partial(shown: Results, content: Mapping[str, Any]) -> Results:
-    """What is shown when a job has said more.
-
-    Args:
-      shown: until now.
-      content: of a message of kind `partial`.
-    """
+    """What is shown when a job has said more."""
     ((kind, new), *_) = content.items()
     match kind:
         case "tracking":

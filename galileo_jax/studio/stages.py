@@ -26,12 +26,7 @@ FILES = {"fit": RESULT, **DOCUMENTS, "predict": PREDICTION}
 
 @dataclass(frozen=True)
 class Trials:
-    """The clips that are fitted together, and where their results lie.
-
-    Attributes:
-      root: the folder that was opened.
-      sheets: of the clips, in their order.
-    """
+    """The clips that are fitted together, and where their results lie."""
 
     root: Path
     sheets: tuple[Sheet | Table, ...]
@@ -71,11 +66,8 @@ def track_files(sheet: Sheet | Table) -> Path:
 def states(trials: Trials, store: Store, effects: tuple[str, ...]) -> dict[str, State]:
     """The state of every stage, from the files that are there.
 
-    Args:
-      trials: the clips.
-      store: which marks results were made of; a result without an entry, of a command, is up to
-        date where it is younger than the yaml.
-      effects: of the fitted model.
+    A result without an entry in the store, of a command, is up to date where it is younger than
+    the yaml.
     """
     found: dict[str, State] = {"explain": "open", "video": "done" if trials.sheets else "open"}
     complete = bool(trials.sheets) and all(sheet.is_complete for sheet in trials.sheets)

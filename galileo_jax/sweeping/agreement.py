@@ -28,10 +28,6 @@ def agreements(rows: Sequence[Row], names: Sequence[str]) -> tuple[Agreement, ..
     """Of each quantity that most groups determined what they find together.
 
     Where truths are known to differ there is no such thing.
-
-    Args:
-      rows: of the cells, as `summary.make_rows` gives them.
-      names: that each cell's group is shown by.
     """
     done = [i for i in _first(rows) if rows[i]["status"] == "done"]
     suffix = "_identified"
@@ -43,14 +39,7 @@ def agreements(rows: Sequence[Row], names: Sequence[str]) -> tuple[Agreement, ..
 def with_remarks(
     rows: Sequence[Row], names: Sequence[str], cells: Sequence[Cell], found: Sequence[Agreement]
 ) -> list[Row]:
-    """The rows with what is `outside` and why a group stands apart, as far as that is known.
-
-    Args:
-      rows: as for `agreements`.
-      names: as for `agreements`.
-      cells: of the rows.
-      found: what `agreements` gave.
-    """
+    """The rows with what is `outside` and why a group stands apart, as far as that is known."""
     first = _first(rows)
     declared = {i: _declared(cells[i]) for i in first}
     verdicts = Counter(rows[i]["verdict"] for i in first)

@@ -14,12 +14,7 @@ NAME_LENGTH = 40  # of the part that is there to be read
 
 @dataclass(frozen=True)
 class Cell:
-    """Clips that are fitted together, and how.
-
-    Attributes:
-      clips: one or more.
-      settings: method and options.
-    """
+    """Clips that are fitted together, and how."""
 
     clips: tuple[ClipFiles, ...]
     settings: Settings

@@ -20,13 +20,7 @@ MOST_PICTURES = 200  # a page with more clips has none: each is some 7 KB
 
 
 def make_clip_rows(cells: Sequence[Cell], store: Store, rows: Sequence[Row]) -> list[ClipRow]:
-    """One row for each clip of a sweep, sorted by name (clip2 before clip10).
-
-    Args:
-      cells: of the sweep.
-      store: with what came of them.
-      rows: of the cells, as `summary.make_rows` gives them.
-    """
+    """One row for each clip of a sweep, sorted by name (clip2 before clip10)."""
     clips: dict[str, ClipFiles] = {}
     of_clip: dict[str, list[tuple[Cell, Row]]] = {}
     for cell, row in zip(cells, rows, strict=True):

@@ -14,6 +14,7 @@ A folder of films and tables stands for `clips: [all of them]`, `common: {method
 
 import glob
 import itertools
+import os
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
@@ -23,6 +24,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from galileo_jax.clip.yaml_file import read_mapping
+from galileo_jax.files.package_data import config_path
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.sweeping.settings import Settings, make_settings
 
@@ -104,44 +106,48 @@ class SweepConfig(BaseModel):
         return tuple(groups)
 
 
-def load_config(
-    path: Path, changes: Sequence[str] = (), runs: Sequence[str] = ()
-) -> tuple[SweepConfig, ...]:
-    """Reads a config and applies overrides.
+def read_config(config: str | Path | Mapping[str, Any]) -> tuple[str, str, dict[str, Any]]:
+    """What a config is called in messages, what its sweep is called, and its keys.
 
     Args:
-      path: a YAML file.
-      changes: "key=value" each, the key with dots (`common.seed=3`), the value YAML.
-      runs: "key=a,b" each: one config for every combination.
+      config: a YAML file, the name of a ready one, its keys, or a folder: each film and table in it
+        is explained alone.
 
     Raises:
-      InputError: unreadable, or a key is unknown or its value is wrong.
+      InputError: unreadable, or a folder without a film and a table, or with a result.
     """
-    return make_configs(str(path), read_mapping(path), changes, runs)
+    if isinstance(config, Mapping):
+        return "config", "sweep", _plain(config)
+    path = Path(config)
+    if path.is_dir():
+        from galileo_jax.api.explain import sources_of
+
+        files = [glob.escape(str(file)) for file in sources_of([path])]
+        return str(config), path.resolve().name, {"clips": files, "common": {"method": "explain"}}
+    if not path.is_file():
+        path = config_path(path.name if path.suffix else f"{path.name}.yaml")
+    return str(path), path.stem, read_mapping(path)
 
 
-def of_folder(folder: Path) -> dict[str, Any]:
-    """The config of a folder: each film and table in it is explained alone.
-
-    Raises:
-      InputError: there is none, or the folder is a result.
-    """
-    from galileo_jax.api.explain import sources_of
-
-    files = sources_of([folder])
-    return {"clips": [glob.escape(str(file)) for file in files], "common": {"method": "explain"}}
+def _plain(value: Any) -> Any:
+    """A config that can be written: paths are text, sequences are lists."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return os.fspath(value) if isinstance(value, os.PathLike) else value
 
 
 def make_configs(
     name: str, content: Mapping[str, Any], changes: Sequence[str] = (), runs: Sequence[str] = ()
 ) -> tuple[SweepConfig, ...]:
-    """`load_config` for what has been read.
+    """The configs that a config and the command line make together.
 
     Args:
       name: of the config, for messages.
       content: its keys.
-      changes: as for `load_config`.
-      runs: as for `load_config`.
+      changes: "key=value" each, the key with dots (`common.seed=3`), the value YAML.
+      runs: "key=a,b" each: one config for every combination.
 
     Raises:
       InputError: a key is unknown or its value is wrong.

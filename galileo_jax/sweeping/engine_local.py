@@ -38,12 +38,7 @@ class EngineHere:
 
 
 class EngineLocal:
-    """Carries out tasks in processes of this machine.
-
-    Attributes:
-      num_workers: how many.
-      each: what one of them may use.
-    """
+    """Carries out tasks in processes of this machine."""
 
     def __init__(self, num_workers: int, each: Resources = Resources()):  # noqa: B008
         self.num_workers, self.each = num_workers, each

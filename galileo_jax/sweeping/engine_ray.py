@@ -21,11 +21,7 @@ LOOK_S = 5.0  # between looks at how large the cluster is
 
 
 class EngineRay:
-    """Carries out tasks on a Ray cluster.
-
-    Attributes:
-      each: what one worker may use.
-    """
+    """Carries out tasks on a Ray cluster."""
 
     def __init__(self, address: str | None, each: Resources = Resources()):  # noqa: B008
         """Joins the cluster at `address`; without one, starts a cluster on this machine.

@@ -14,11 +14,7 @@ from galileo_jax.sweeping.task import Outcome, Task, attempt
 
 
 class EngineTogether:
-    """Carries out tasks in threads of this process.
-
-    Attributes:
-      num_together: how many at a time.
-    """
+    """Carries out tasks in threads of this process."""
 
     def __init__(self, num_together: int):
         self.num_together = num_together

@@ -26,13 +26,9 @@ def carry_out(
 ) -> None:
     """Computes the cells that have neither a result nor a failure.
 
-    Args:
-      cells: of the sweep.
-      store: where results are and go; each is written before the next is waited for.
-      engine: carries out the tasks.
-      report: is told how far it is.
-      with_page: names of the cells that get a page of their own.
-      computed_again: names of cells that are computed though they have a result.
+    Those of `computed_again` although they have a result; those of `with_page` get a page of
+    their own. Each is written into the store before the next is waited for, and `report` is
+    told how far it is.
 
     Raises:
       Cancelled: the caller asked for it; what is done is in the store.
@@ -97,12 +93,8 @@ def _carry_out(
 ) -> None:
     """Keeps every outcome as it comes, until the caller asks to stop.
 
-    Args:
-      tasks: to be carried out.
-      engine: that does it.
-      keep: writes an outcome; what it returns is reported.
-      report: is told how far it is.
-      stage: its name, how many tasks it has, the shares of the sweep at its begin and end.
+    What `keep` returns of an outcome is reported. `stage`: its name, how many tasks it has, the
+    shares of the sweep at its begin and end.
     """
     name, count, start, end = stage
 

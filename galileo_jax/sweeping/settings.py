@@ -38,12 +38,7 @@ Similarity = Annotated[Name, _entry_of("galileo_jax.thesis.similarities")]
 
 
 class _Settings(BaseModel):
-    """Common to all methods.
-
-    Attributes:
-      seed: of everything random.
-      engine: that rolls out.
-    """
+    """Common to all methods; an option means what `fit` or `diagnose` means by its name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -52,14 +47,7 @@ class _Settings(BaseModel):
 
 
 class Grad(_Settings):
-    """The gradient fit.
-
-    Attributes:
-      effects: in the model.
-      noise: "camera": the tracker's errors and what a camera is known to do to a picture;
-        "bodies": those and what bodies do that are no points; "tracker": the tracker's errors
-        alone, of displacements; None: as the clip was measured.
-    """
+    """The gradient fit."""
 
     method: Literal["grad"] = "grad"
     effects: tuple[Name, ...] = ()
@@ -67,14 +55,7 @@ class Grad(_Settings):
 
 
 class Mh(_Settings):
-    """Metropolis-Hastings, started from the gradient fit.
-
-    Attributes:
-      effects, noise: as for `Grad`.
-      sampler: a name in the samplers' registry.
-      chains: how many.
-      max_steps: of every chain, after the warm-up.
-    """
+    """Metropolis-Hastings, started from the gradient fit."""
 
     method: Literal["mh"]
     effects: tuple[Name, ...] = ()
@@ -91,14 +72,7 @@ class Cnn(_Settings):
 
 
 class Thesis(_Settings):
-    """The thesis's sampler on our rollouts.
-
-    Attributes:
-      similarity: of velocity profiles.
-      acceptance: of a proposal that is worse.
-      selection: how the answer is taken from the chains.
-      chains: how many, of 75 steps.
-    """
+    """The thesis's sampler on our rollouts; chains of 75 steps."""
 
     method: Literal["thesis"]
     similarity: Similarity = "thesis_gaussian"
@@ -108,11 +82,7 @@ class Thesis(_Settings):
 
 
 class Diagnose(_Settings):
-    """Which effect is missing?
-
-    Attributes:
-      add: "auto", "none", or the effect to add.
-    """
+    """Which effect is missing?"""
 
     method: Literal["diagnose"]
     add: Name = "auto"

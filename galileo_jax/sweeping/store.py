@@ -2,7 +2,7 @@
 
     DIR/cells/NAME/result.json    one cell's numbers
     DIR/cells/NAME/failure.json   or why there are none
-    DIR/clips/DIGEST.npz          a clip as it was tracked
+    DIR/clips/DIGEST.track.npz    a clip as it was tracked
     DIR/summary.csv ...           all cells in one table
 
 Every file is written under another name first, and only the sweep's own process writes: at a
@@ -14,18 +14,18 @@ import json
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from galileo_jax import __version__
 from galileo_jax.clip.schema import Clip
 from galileo_jax.measurement.measure import Measurement
 from galileo_jax.measurement.path_direction import OtherWay
-from galileo_jax.measurement.segments.segments import Cut, Segments
-from galileo_jax.measurement.segments.track_failure import Astray
+from galileo_jax.measurement.segments.segments import Segments
 from galileo_jax.observation.observation import Observation
 from galileo_jax.runtime.atomic_write import check_folder, replacing, write_json
 from galileo_jax.runtime.errors import InputError
@@ -33,17 +33,12 @@ from galileo_jax.sweeping.task import Failure
 from galileo_jax.sweeping.work import PAGE, CellResult, MeasuredClip
 
 RESULT, FAILURE = "result.json", "failure.json"
-ARRAYS = ("times_s", "position_m", "covariance_m2", "mask")
-COUNTS = ("frames_used", "frames", "frames_of_scene")  # of a measurement
-FLAGS = ("is_squared", "is_turning")
+APART = ("clip", "observation", "whole", "pixels")  # fields of a measurement that stand elsewhere
+SEGMENTS, WAY = TypeAdapter(Segments), TypeAdapter(OtherWay | None)
 
 
 class Store:
-    """Results by name.
-
-    Attributes:
-      folder: of the sweep.
-    """
+    """Results by name."""
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -123,59 +118,38 @@ class Store:
     def clip(self, key: str) -> MeasuredClip:
         """A tracked clip, to the last digit."""
         with np.load(self._clip(key)) as file:
-            arrays = {name: file[name] for name in ARRAYS}
-            names = tuple(str(name) for name in file["names"])
-            clip = Clip.model_validate(json.loads(str(file["clip"])))
-            notes = json.loads(str(file["notes"]))
-            picture = file["thumbnail"].tobytes()
-            modes, turned = file.get("modes_m"), file.get("turned_rad")
-        seen = replace(
-            Observation(names=names, **arrays),
-            modes_m=modes,
-            turned_rad=turned,
-            **{name: bool(notes.get(name, False)) for name in FLAGS},
-            num_errors=int(notes.get("num_errors", 0)),
-            wander_m=notes.get("wander_m"),
-            noise_known_to=notes.get("noise_known_to", 0.0),
-        )
-        own: dict[str, Any] = {key: tuple(notes[key]) for key in ("doubts", "remarks")}
-        own |= {key: notes.get(key, 0) for key in COUNTS}
-        own["way"] = OtherWay(**notes["way"]) if notes.get("way") else None
-        astray = tuple(Astray(**entry) for entry in notes.get("astray", []))
-        cuts = tuple(Cut(**entry) for entry in notes.get("cuts", []))
-        segments = Segments(cuts, astray)
-        measured = Measurement(clip, seen, seen, None, notes["inferred"], segments, **own)
+            arrays = {name: file[name] for name in file.files}
+        notes, picture = json.loads(str(arrays.pop("notes"))), arrays.pop("thumbnail").tobytes()
+        names = tuple(notes["seen"].pop("names"))
+        seen = Observation(names=names, **notes["seen"], **arrays)
+        own = notes["own"]
+        own |= {name: tuple(own[name]) for name in ("doubts", "remarks")}
+        own["segments"] = SEGMENTS.validate_python(own["segments"])
+        own["way"] = WAY.validate_python(own["way"])
+        measured = Measurement(Clip.model_validate(notes["clip"]), seen, seen, None, **own)
         return MeasuredClip(measured, picture or None)
 
     def save_clip(self, key: str, measured: MeasuredClip) -> None:
         """Keeps a tracked clip."""
-        one = measured.measurement
-        seen = one.observation
-        notes = {name: getattr(one, name) for name in ("inferred", "doubts", "remarks")}
-        notes["cuts"] = [vars(entry) for entry in one.cuts]
-        notes["astray"] = [vars(entry) for entry in one.astray]
-        notes |= {name: getattr(one, name) for name in COUNTS}
-        notes["way"] = one.way and vars(one.way)
-        notes |= {name: getattr(seen, name) for name in FLAGS}
-        notes |= {"num_errors": seen.num_errors, "wander_m": seen.wander_m}
-        notes |= {"noise_known_to": seen.noise_known_to}
-        arrays = {name: getattr(seen, name) for name in ARRAYS}
-        if seen.modes_m is not None:
-            arrays["modes_m"] = seen.modes_m
-        if seen.turned_rad is not None:
-            arrays["turned_rad"] = seen.turned_rad
+        one, seen = measured.measurement, _fields(measured.measurement.observation)
+        arrays = {name: value for name, value in seen.items() if isinstance(value, np.ndarray)}
+        notes = {
+            "clip": one.clip.model_dump(mode="json"),
+            "seen": {name: value for name, value in seen.items() if name not in arrays},
+            "own": {name: value for name, value in _fields(one).items() if name not in APART},
+        }
+        picture = np.frombuffer(measured.thumbnail or b"", np.uint8)
         with replacing(self._clip(key)) as path:
-            np.savez_compressed(
-                path,
-                names=np.array(seen.names),
-                clip=np.array(one.clip.model_dump_json()),
-                notes=np.array(json.dumps(notes)),
-                thumbnail=np.frombuffer(measured.thumbnail or b"", np.uint8),
-                **arrays,
-            )
+            text = np.array(json.dumps(notes, default=asdict))
+            np.savez_compressed(path, notes=text, thumbnail=picture, **arrays)  # pyright: ignore
 
     def _cell(self, name: str, file: str) -> Path:
         return self.cell_folder(name) / file
 
     def _clip(self, key: str) -> Path:
-        return self.folder / "clips" / f"{key[:32]}-{__version__}.npz"
+        return self.folder / "clips" / f"{key[:32]}-{__version__}.track.npz"
+
+
+def _fields(one: Any) -> dict[str, Any]:
+    """Of a dataclass, by name, as they are."""
+    return {field.name: getattr(one, field.name) for field in fields(one)}

@@ -1,6 +1,5 @@
 """`sweep`: evaluate many clips, with several methods; can be stopped and resumed."""
 
-import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,7 +11,6 @@ import yaml
 
 from galileo_jax import __version__
 from galileo_jax.api.options import options_of
-from galileo_jax.files.package_data import config_path
 from galileo_jax.report.class_chart import Agreement
 from galileo_jax.report.sweep_page import write_sweep_page
 from galileo_jax.results.command_line import command_line
@@ -24,7 +22,7 @@ from galileo_jax.sweeping.agreement import agreements, with_remarks
 from galileo_jax.sweeping.cell import Cell, make_cells
 from galileo_jax.sweeping.clip_files import ClipFiles
 from galileo_jax.sweeping.clip_rows import make_clip_rows, names_of
-from galileo_jax.sweeping.config import SweepConfig, load_config, make_configs, of_folder
+from galileo_jax.sweeping.config import SweepConfig, make_configs, read_config
 from galileo_jax.sweeping.engine_local import EngineHere, EngineLocal
 from galileo_jax.sweeping.resources import Computing, num_workers
 from galileo_jax.sweeping.run_cells import COMPUTED, Report, carry_out
@@ -159,34 +157,27 @@ def sweep(
     _check_not_imported_by_worker()
     computing = options_of(Computing, locals())
     computing.check()
-    plain = None
-    if isinstance(config, Mapping):
-        name, plain = Path(out).name if out is not None else "sweep", _plain(config)
-        configs = make_configs("config", plain, set, multirun)
-    elif Path(config).is_dir():
-        name = Path(config).resolve().name
-        configs = make_configs(str(config), of_folder(Path(config)), set, multirun)
-    else:
-        path = _config_file(str(config))
-        name = path.stem
-        configs = load_config(path, set, multirun)
+    called, name, content = read_config(config)
+    configs = make_configs(called, content, set, multirun)
     _check_effects(configs)
     groups = [one.clip_groups() for one in configs]
+    is_file = not isinstance(config, Mapping)
+    name = name if is_file or out is None else Path(out).name
     store = Store(Path(out) if out is not None else Path("sweeps") / name)
 
     # What one cell reports is not the sweep's progress; its cancellation is.
     with progress.scope(lambda *_: None, cancel), store.locked():
         report = _reporter(on_progress)
-        if plain is not None:
-            write_text(store.folder / CONFIG, yaml.safe_dump(plain, sort_keys=False))
+        if not is_file:
+            write_text(store.folder / CONFIG, yaml.safe_dump(content, sort_keys=False))
         report("simulating", 0.0, None)
         cells, with_page, again = _cells(configs, groups, store)
         command = command_line(
             "sweep",
-            [str(config) if plain is None else store.folder / CONFIG],
+            [str(config) if is_file else store.folder / CONFIG],
             set=tuple(set),
             multirun=tuple(multirun),
-            out=None if out is None and plain is None else store.folder,
+            out=None if out is None and is_file else store.folder,
             engine=None if engine == "local" else engine,
             address=address,
         )
@@ -197,9 +188,8 @@ def sweep(
             "version": __version__,
         }
         write_json(store.folder / "sweep.json", document)
-        if retry:
-            for cell in cells:
-                store.forget_failure(cell.name)
+        for cell in cells if retry else ():
+            store.forget_failure(cell.name)
         done = sum(store.has_result(cell.name) and cell.name not in again for cell in cells)
         report("starting", 0.0, {"cells": len(cells), "done": done, "folder": store.folder})
         with _engine(computing) as worker:
@@ -207,7 +197,7 @@ def sweep(
         report("writing the page", COMPUTED, None)
         made = _written(name, cells, store, command)
         report("done", 1.0, made)
-    return made
+        return made
 
 
 def _written(name: str, cells: Sequence[Cell], store: Store, command: str) -> Sweep:
@@ -233,15 +223,6 @@ def _check_not_imported_by_worker() -> None:
         )
 
 
-def _plain(value: Any) -> Any:
-    """A config that can be written: paths are text, sequences are lists."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return os.fspath(value) if isinstance(value, os.PathLike) else value
-
-
 def _reporter(on_progress: OnProgress | None) -> Report:
     def report(stage: str, share: float, partial: Any = None) -> None:
         progress.check_cancelled()
@@ -249,14 +230,6 @@ def _reporter(on_progress: OnProgress | None) -> Report:
             on_progress(stage, share, partial)
 
     return report
-
-
-def _config_file(name: str) -> Path:
-    """A config by its path; a ready one also by its name, wherever the call is made."""
-    path = Path(name)
-    if path.is_file():
-        return path
-    return config_path(path.name if path.suffix else f"{path.name}.yaml")
 
 
 def _check_effects(configs: Sequence[SweepConfig]) -> None:

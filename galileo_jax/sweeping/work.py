@@ -78,11 +78,8 @@ def run_cell(
 ) -> CellResult:
     """A cell's numbers, and its page where it is to have one.
 
-    Args:
-      settings: method and options.
-      measured: the clips.
-      page_folder: the cell's folder, which its page names in commands; nothing is written there.
-        None: no page.
+    `page_folder`: the cell's, which its page names in commands; nothing is written there. None:
+    no page.
 
     Raises:
       InputError: the clips do not go with each other or with the method.
@@ -136,12 +133,7 @@ def _write_run(
 ) -> None:
     """Writes the run and its pages, which name the folder that it will lie in.
 
-    Args:
-      fitted: the fit.
-      folder: that is written to.
-      final: where it will lie.
-      lead: the result in words, for the top of the pages.
-      beside: titles of other pages to their places, for links.
+    `final`: where `folder` will lie; `lead` and `beside` as for `write_report`.
     """
     from galileo_jax.report.fit_page import write_report
     from galileo_jax.results.run import RESULT

@@ -1,6 +1,6 @@
 """The thesis's sampler: short chains of uniform proposals, and the best sample wins."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar, NamedTuple
@@ -12,7 +12,7 @@ import numpy as np
 
 from galileo_jax.inference.posterior import Posterior
 from galileo_jax.inference.samplers.blackjax_kernel import metropolis_hastings
-from galileo_jax.inference.samplers.driver import Progress, Settings, sample
+from galileo_jax.inference.samplers.driver import Settings, sample
 from galileo_jax.inference.samplers.sampler import (
     AbstractSampler,
     Info,
@@ -140,22 +140,11 @@ def infer(
     acceptance: Acceptance = Acceptance.COIN,
     selection: Selection = Selection.BEST,
     num_chains: int = NUM_CHAINS,
-    num_steps: int = NUM_STEPS,
-    on_block: Callable[[Progress], None] | None = None,
 ) -> ThesisResult:
     """Runs 16 chains of 75 steps from uniform starts and selects an answer.
 
     Costs 16 x 76 = 1216 evaluations, whatever happens, where nothing else is asked for.
-
-    Arguments:
-      key: same key, same answer.
-      log_similarity: `[dim] -> []` of the parameters themselves, each in (0, 1).
-      names: of the parameters.
-      acceptance: the thesis's coin, or a true Metropolis-Hastings step.
-      selection: how the answer is taken from the chains.
-      num_chains: the thesis has 16.
-      num_steps: of each, a multiple of 25; the thesis has 75.
-      on_block: called after every 25 steps.
+    `log_similarity`: `[dim] -> []` of the parameters themselves, each in (0, 1).
     """
     start_key, key = jax.random.split(key)
     posterior = sample(
@@ -164,8 +153,7 @@ def infer(
         log_similarity,
         jax.random.uniform(start_key, (num_chains, len(names)), minval=1e-6),
         names,
-        settings=Settings(warmup_steps=0, block_steps=25, max_steps=num_steps, stops_early=False),
-        on_block=on_block,
+        settings=Settings(warmup_steps=0, block_steps=25, max_steps=NUM_STEPS, stops_early=False),
     )
     return ThesisResult(estimate=select(posterior, selection), posterior=posterior)
 

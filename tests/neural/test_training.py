@@ -105,7 +105,7 @@ def test_configs_errors_name_file_key_and_value(tmp_path):
     path.write_text("preset: thesis\nsampels: 3\n")
     with pytest.raises(InputError, match=r"c\.yaml"):
         load_config(path)
-    with pytest.raises(InputError, match="not a readable"):
+    with pytest.raises(InputError, match="cannot be read"):
         load_config(tmp_path / "none.yaml")
 
 

@@ -14,9 +14,8 @@ from galileo_jax.comparison.phases import PHASES
 from galileo_jax.diagnosis.diagnosis import Law, Reason, Verdict
 from galileo_jax.diagnosis.document import diagnosis_document
 from galileo_jax.report import diagnosis_text
-from galileo_jax.report.comparison_page import ComparisonReport, write_comparison_page
+from galileo_jax.report.comparison_page import write_comparison_page
 from galileo_jax.report.diagnosis_page import (
-    DiagnosisReport,
     before_after_charts,
     write_diagnosis_page,
 )
@@ -71,8 +70,8 @@ def clip(trials, folder):
 def write(trials, clip, status: str, page: Path) -> str:
     diagnosis = diagnosis_of(trials, status)
     record = diagnosis_document(trials, diagnosis, 0)
-    told = DiagnosisReport(diagnosis, record, GO_ON, "air_drag", (clip,), AGAIN, 0)
-    write_diagnosis_page(page, HOSTILE, trials, told)
+    told = {"truth": "air_drag", "command": AGAIN, "next_command": GO_ON, "seed": 0}
+    write_diagnosis_page(page, HOSTILE, trials, diagnosis, record, [clip], **told)
     return page.read_text(encoding="utf-8")
 
 
@@ -113,11 +112,8 @@ def test_opens_in_a_browser(trials, clip, tmp_path, browser):
 
 def test_a_comparison_opens_in_a_browser(trials, clip, tmp_path, browser):
     comparison, fit = comparison_of(trials, 1e-9), fit_of(trials, ())
-    shown = path_residuals(trials, fit, comparison, 0)
-    theta = trials.theta(fit.z, fit.free)
-    told = ComparisonReport(comparison, trials, theta, (clip,), (), shown, AGAIN, 0)
-    path = tmp_path / "report.html"
-    write_comparison_page(path, HOSTILE, told)
+    path, told = tmp_path / "report.html", {"command": AGAIN, "seed": 0}
+    write_comparison_page(path, HOSTILE, comparison, trials, fit, [clip], (), **told)
     with opened(browser, path) as (page, complaints):
         assert page.locator(".chart").count() == 2
         document = page.content()
@@ -174,8 +170,8 @@ def test_a_formula_that_does_as_well_is_shown(trials, clip, tmp_path):
     assert said in diagnosis_text.verdict(found)
     record = diagnosis_document(trials, found, 0)
     page = tmp_path / "report.html"
-    report = DiagnosisReport(found, record, GO_ON, None, (clip,), AGAIN, 0)
-    write_diagnosis_page(page, "clip", trials, report)
+    told = {"truth": None, "command": AGAIN, "next_command": GO_ON, "seed": 0}
+    write_diagnosis_page(page, "clip", trials, found, record, [clip], **told)
     assert page.read_text(encoding="utf-8").count(escape(law.text)) >= 2  # verdict, candidates
 
 

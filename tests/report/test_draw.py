@@ -12,6 +12,7 @@ from galileo_jax.comparison.phases import Phase
 from galileo_jax.report.chart import Band, Bars, Boxes, Chart, Line, Panel, Points, side_by_side
 from galileo_jax.report.draw import to_plotly, to_svg
 from galileo_jax.report.html_page import chart_element
+from galileo_jax.report.plotly_figure import figure as drawn
 from galileo_jax.report.style import palette
 
 X = np.linspace(0.0, 2.0, 5)
@@ -27,8 +28,8 @@ def panel(**more) -> Panel:
     return Panel("v, m/s", marks, **({"xlabel": "time, s", "xlim": (0.0, 2.0)} | more))
 
 
-def plotly_of(chart: Chart, has_legend: bool = True) -> Any:
-    return to_plotly(chart, has_legend)
+def plotly_of(chart: Chart) -> Any:
+    return to_plotly(chart)
 
 
 def chart(*panels: Panel) -> Chart:
@@ -66,7 +67,7 @@ def test_names_from_outside_are_escaped():
 def test_a_legend_names_each_kind_of_mark_once():
     figure = plotly_of(chart(panel(xlabel=""), panel()))
     assert [t.name for t in figure.data if t.showlegend] == ["95 %", "fitted", "measured"]
-    assert figure.layout.showlegend and not plotly_of(chart(), False).layout.showlegend
+    assert figure.layout.showlegend and not drawn(chart(), False)["layout"]["showlegend"]
 
 
 def test_panels_share_x_where_only_the_last_has_a_label():
@@ -92,11 +93,12 @@ def test_bars_and_boxes_have_categories():
     svg = to_svg(chart(Panel("", (bars,), xlabel="p")))
     assert position_of(svg, "a") < position_of(svg, "b")
     boxes = tuple(
-        Boxes(["air", "none"] * 3, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "object1", name, offset, 0.4)
-        for name, offset in (("grad", -0.2), ("mh", 0.2))
+        Boxes(["air", "none"] * 3, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], "object1", name, is_beside=True)
+        for name in ("grad", "mh")
     )
     assert plotly_of(chart(Panel("error", boxes))).layout.boxmode == "group"
-    assert ">none</text>" in to_svg(chart(Panel("error", boxes)))
+    with pytest.raises(TypeError, match="on pages alone"):
+        to_svg(chart(Panel("error", boxes)))
 
 
 def position_of(svg: str, text: str) -> float:

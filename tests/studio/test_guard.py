@@ -130,6 +130,23 @@ def test_frames_come_from_the_folders_own_clips(studio, cookie, name):
     assert ask(studio, "/frame/slide/0", Cookie=cookie)[0] == 200
 
 
+@pytest.mark.parametrize(
+    ("kind", "file"), [("still", "first_and_last.png"), ("report", "report.html")]
+)
+def test_a_runs_picture_and_page_are_the_folders_own(studio, cookie, folder, tmp_path, kind, file):
+    path, secret = folder / "runs" / "slide" / file, tmp_path / "secret"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    assert ask(studio, f"/{kind}/slide", Cookie=cookie)[0] == 404
+    path.write_text("mine")
+    assert ask(studio, f"/{kind}/slide", Cookie=cookie)[:2] == (200, b"mine")
+    assert ask(studio, f"/{kind}/link", Cookie=cookie)[0] == 404
+    secret.write_text("not mine")
+    path.unlink()
+    path.symlink_to(secret)
+    assert ask(studio, f"/{kind}/slide", Cookie=cookie)[0] == 404
+    path.unlink()
+
+
 @pytest.mark.parametrize("index", ["-1", "99999999", "x", "0.5"])
 def test_a_frame_that_there_is_not(studio, cookie, index):
     assert ask(studio, f"/frame/slide/{index}", Cookie=cookie)[0] in (404, 422)

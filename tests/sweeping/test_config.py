@@ -6,7 +6,7 @@ import pytest
 
 from galileo_jax.files.package_data import config_path
 from galileo_jax.runtime.errors import InputError
-from galileo_jax.sweeping.config import load_config
+from galileo_jax.sweeping.config import make_configs, read_config
 from galileo_jax.sweeping.settings import Grad, Mh
 
 READY = ("thesis_ablation", "samplers", "hidden_effects", "physics101")
@@ -16,6 +16,11 @@ def write(folder: Path, text: str) -> Path:
     path = folder / "sweep.yaml"
     path.write_text(text)
     return path
+
+
+def load_config(path: Path, changes=(), runs=()):
+    called, _, content = read_config(path)
+    return make_configs(called, content, changes, runs)
 
 
 def load_one(folder: Path, text: str, changes=()):

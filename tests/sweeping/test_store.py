@@ -1,11 +1,12 @@
 """A sweep's folder and a clip's files."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 import yaml
 
+from galileo_jax.measurement.path_direction import OtherWay
 from galileo_jax.measurement.segments.segments import Segments
 from galileo_jax.measurement.segments.track_failure import Astray
 from galileo_jax.runtime.atomic_write import write_text
@@ -34,17 +35,25 @@ def test_a_clip_comes_back_to_the_last_digit(clip, tmp_path):
     store = Store(tmp_path / "out")
     assert not store.has_clip(files.key)
     measured = replace(
-        measured, segments=Segments(astray=(Astray("object1", 0.1 + 0.2, "nothing is there"),))
+        measured,
+        segments=Segments(astray=(Astray("object1", 0.1 + 0.2, "nothing is there"),)),
+        way=OtherWay(20.0, 0.1 + 0.2, 0.7, True),
+        remarks=("one", "two"),
+        pixels=None,
     )
+    turned = np.full(measured.observation.mask.shape, 1 / 3)
+    measured = replace(measured, observation=replace(measured.observation, turned_rad=turned))
     store.save_clip(files.key, replace(tracked, measurement=measured, thumbnail=b"picture"))
     assert store.clip(files.key).thumbnail == b"picture"
     again = store.clip(files.key).measurement
     assert again.clip == measured.clip
-    assert again.astray == measured.astray
-    for name in ("times_s", "position_m", "covariance_m2", "mask"):
-        np.testing.assert_array_equal(
-            getattr(again.observation, name), getattr(measured.observation, name)
-        )
+    for field in fields(measured):
+        if field.name not in ("observation", "whole"):
+            assert getattr(again, field.name) == getattr(measured, field.name), field.name
+    for field in fields(measured.observation):
+        kept, was = (getattr(one.observation, field.name) for one in (again, measured))
+        np.testing.assert_array_equal(kept, was)
+        assert type(kept) is type(was), field.name
 
 
 def test_a_cell_is_named_by_content(clip):
