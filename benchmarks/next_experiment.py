@@ -24,7 +24,6 @@ from galileo_jax.api.diagnose import with_library
 from galileo_jax.clip.load import load_clip
 from galileo_jax.comparison.compare import compare
 from galileo_jax.diagnosis.candidates import candidates_of
-from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Diagnosis, Round, Verdict
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import ranked
@@ -33,9 +32,11 @@ from galileo_jax.experiment.hypothesis_probabilities import beliefs_of
 from galileo_jax.experiment.measured import write_clip
 from galileo_jax.experiment.plan import middle
 from galileo_jax.experiment.settings import Can, Range, grid
+from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.measurement.measure import measure
 from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.precision import in_float64
+from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
 from galileo_jax.search.table import Table
@@ -138,8 +139,8 @@ def _of_two(
     """The verdict on no effect, the hidden one and its rival; and where to measure next."""
     declared = [load_clip(clip.with_suffix(".yaml")) for clip in clips]
     trials = with_library(declared, [measure(clip).observation for clip in declared], "auto")
-    fitter = fitter_of(trials)
-    base = Hypothesis((), fitter.fit(lab.seed, effects=()))
+    fitter = GradientFitter(trials)
+    base = Hypothesis((), best_fit(fitter, lab.seed, effects=()))
     first = Round(base, compare(trials, base.fit, lab.seed))
     stakes = VerdictStakes(trials, first.comparison.is_adequate)
     table = search(Table.of(fitter, stakes, lab.seed, base), 1)

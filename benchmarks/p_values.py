@@ -22,6 +22,7 @@ from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem, with_shared_parameters
 from galileo_jax.runtime.precision import in_float64
+from galileo_jax.search.fit import best_fit
 from galileo_jax.similarity.discrepancy import crossings, modes
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
@@ -62,7 +63,7 @@ def one(noise: NoiseModel, is_drawn: bool, num_clips: int, seed: list[int]) -> t
     case = make_case(int(rng.integers(1 << 30)), "exact", NOISE_M)
     clips = tuple(made(case.problem, case.values, noise, is_drawn, rng) for _ in range(num_clips))
     trials = JointProblem(with_shared_parameters(clips))
-    fit = GradientFitter(trials).fit(int(rng.integers(1 << 30)))
+    fit = best_fit(GradientFitter(trials), int(rng.integers(1 << 30)))
     found = compare(trials, fit, int(rng.integers(1 << 30)))
     return found.p_value, found.error["chi2_per_dof"], found.noise_scale[0]
 

@@ -40,6 +40,7 @@ from galileo_jax.model.effects.registry import effect_names, make_effects
 from galileo_jax.model.parameters import inverse
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
+from galileo_jax.search.fit import best_fit
 
 KINDS = ("outside", "one", "outside", "two")
 EDGES = np.linspace(0.0, 1.0, 11)
@@ -159,7 +160,7 @@ def traces(yaml: Path, kind: str) -> tuple[dict[str, float], float]:
     def evidence_of(effects: tuple[str, ...]) -> float:
         free = trials.free(effects)[: len(parameters)]
         (beside,) = fitter.fit_from(np.where(free, truth, 0.0)[None], free[None], np.zeros(1, int))
-        return max(fitter.fit(0, effects=effects).log_evidence, beside.log_evidence)
+        return max(best_fit(fitter, 0, effects=effects).log_evidence, beside.log_evidence)
 
     whole = evidence_of(hidden)
     without = {name: tuple(other for other in hidden if other != name) for name in hidden}

@@ -51,6 +51,7 @@ from galileo_jax.inference.result import make_result
 from galileo_jax.neural.estimate import cnn_posterior
 from galileo_jax.neural.start import start_from_network
 from galileo_jax.runtime.precision import in_float64
+from galileo_jax.search.fit import best_fit
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 from galileo_jax.simulation.truth import Truth
 from galileo_jax.thesis.estimate import thesis_posterior
@@ -169,13 +170,13 @@ def drawn_from_the_prior(seed: int, count: int, noise: NoiseModel) -> list[Case]
 
 
 def fit_grad(case: Case, seed: int) -> Answer:
-    fit = GradientFitter(case.trials).fit(seed)
+    fit = best_fit(GradientFitter(case.trials), seed)
     posterior = fit_posterior(case.trials, fit, seed)
     return _of_draws(case.trials, posterior, fit.z, posterior.stats["num_rollouts"])
 
 
 def fit_mh(case: Case, seed: int) -> Answer:
-    return _chains(case.trials, GradientFitter(case.trials).fit(seed), None, seed)
+    return _chains(case.trials, best_fit(GradientFitter(case.trials), seed), None, seed)
 
 
 def fit_mh_cnn(case: Case, seed: int) -> Answer:

@@ -32,6 +32,7 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import NOMINAL_SCALE_PX_PER_M, Observation
 from galileo_jax.results.truth import true_parameters
 from galileo_jax.runtime.precision import in_float64
+from galileo_jax.search.fit import best_fit
 from galileo_jax.simulation.free import FreeTruth, draw_free, solve_free
 from galileo_jax.simulation.free_clip import declared_content, noisy_track, sampled_motion
 
@@ -126,7 +127,7 @@ def _fitted(
 ) -> tuple[dict[str, Score], Mapping[str, Any]]:
     """The scores of a fit, and its result."""
     trials = make_joint_problem([clip], [seen])
-    fit = GradientFitter(trials).fit(seed)
+    fit = best_fit(GradientFitter(trials), seed)
     posterior = fit_posterior(trials, fit, seed)
     result = make_result(
         trials, posterior, fit.z, clips=[], method="grad", seed=seed, timings_s={}, notes={}

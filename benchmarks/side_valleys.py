@@ -34,6 +34,7 @@ from galileo_jax.model.effects.nuisances.impact_restitution import ImpactRestitu
 from galileo_jax.model.effects.nuisances.release_instant import ReleaseInstant
 from galileo_jax.model.parameters import inverse
 from galileo_jax.runtime.precision import in_float64
+from galileo_jax.search.fit import best_fit
 from galileo_jax.simulation.motion import roll_out
 from galileo_jax.simulation.truth import Truth, extents
 
@@ -110,7 +111,7 @@ def fitted(scene_seed: int, seed: int) -> dict[str, Any]:
     fitter = GradientFitter(scene.trials)
     fitter.compile()
     began = time.process_time()
-    fit = fitter.fit(seed)
+    fit = best_fit(fitter, seed)
     cpu_s = time.process_time() - began
     behind = from_truth(scene, fitter).log_evidence - fit.log_evidence
     found = dict(zip(scene.trials.names, scene.trials.theta(fit.z), strict=True))

@@ -24,6 +24,7 @@ from galileo_jax.runtime.atomic_write import write_json
 from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.search.fit import best_fit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -214,7 +215,7 @@ def _compared(fit: Fit, seed: int, command: str, began: float) -> Comparison:
     gradient = fit.gradient
     if gradient is None or seed != int(fit.result["seed"]):
         progress.report("fitting", 0.0)
-        gradient = GradientFitter(fit.problem).fit(seed)
+        gradient = best_fit(GradientFitter(fit.problem), seed)
         if gradient.code is Code.FAILED:
             raise InputError(f"{fit.result['clips'][0]}: {gradient.code}")
     progress.report("comparing with replicates of the fitted model", 0.3)

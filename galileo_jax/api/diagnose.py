@@ -17,19 +17,17 @@ from galileo_jax.api.track import TrackLike, as_measurements
 from galileo_jax.clip.scenarios import SCENARIOS
 from galileo_jax.clip.schema import Clip
 from galileo_jax.diagnosis.diagnose import diagnose as run_loop
-from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.diagnosis import Candidate, Round, Verdict
 from galileo_jax.diagnosis.diagnosis import Diagnosis as Found
 from galileo_jax.diagnosis.document import diagnosis_document, history_row
 from galileo_jax.diagnosis.law_verdict import proposed_formula
 from galileo_jax.diagnosis.laws.source import proposed_file
-from galileo_jax.diagnosis.restricted_fit import extended_fit, restricted_fit
+from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.experiment.choose import with_next
 from galileo_jax.experiment.hypothesis_probabilities import FILE, beliefs_of, write_beliefs
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fit_posterior import fit_posterior
-from galileo_jax.inference.fits.gradient import Code
-from galileo_jax.inference.fits.imperfect import with_imperfections
+from galileo_jax.inference.fits.gradient import Code, GradientFitter
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import Measurement, inferred
@@ -47,6 +45,7 @@ from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
 from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.imperfect import with_imperfections
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -188,7 +187,7 @@ class Diagnosis:
             tuple(effect for effect in effects if effect.name in chosen.effects),
         )
         part = part.with_sizes(whole.sizes)
-        gradient = restricted_fit(chosen.fit, whole, part)
+        gradient = fit_among(chosen.fit, whole, part)
         notes: dict[str, Any] = {"engine": part.problems[0].engine.name}
         notes["status"] = gradient.code.value
         if self.effects_from:
@@ -370,7 +369,7 @@ def diagnose_fitted(fit: Fit, *, engine: str = "auto", seed: int = 0) -> Diagnos
 
 def _compile_beside(clips: Sequence[Clip], engine: str) -> Any:
     def compile_for(some: Sequence[Clip], seen: Sequence[Observation]) -> None:
-        fitter_of(with_library(some, seen, engine)).compile(with_races=True)
+        GradientFitter(with_library(some, seen, engine)).compile(with_races=True)
 
     return precompile(clips, compile_for).join
 
@@ -420,7 +419,7 @@ def _diagnosed(
     told = _Told(problem, clips, seed)
     base = None
     if before is not None and before.exact is not None:
-        base = extended_fit(before.exact, before.problem, problem)
+        base = fit_among(before.exact, before.problem, problem)
     found = run_loop(
         problem,
         seed=seed,

@@ -21,7 +21,7 @@ from galileo_jax.clip.schema import Clip
 from galileo_jax.clip.sources import source_of
 from galileo_jax.clip.track_file import is_track
 from galileo_jax.diagnosis.could_not_see import could_not_see
-from galileo_jax.diagnosis.restricted_fit import extended_fit
+from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.measurement.track_cache import is_tracked
 from galileo_jax.model.effects.forms import FORM_NAMES
@@ -359,7 +359,7 @@ def _could_not_see(check: Comparison, engine: str, seed: int) -> dict[str, dict[
     measured, part = check.fit.measurements, check.fit.problem
     whole = with_library([one.clip for one in measured], [o.observation for o in measured], engine)
     whole = whole.with_sizes(part.sizes)
-    fit = extended_fit(check.gradient, part, whole)
+    fit = fit_among(check.gradient, part, whole)
     stakes = VerdictStakes(whole, is_adequate=True)
     library = [name for name in whole.all_effects if name not in FORM_NAMES]
     log_priors = {name: stakes.log_prior(Hypothesis((name,), fit)) for name in library}

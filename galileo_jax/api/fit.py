@@ -26,7 +26,6 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.checkpoint_identity import identity_of
 from galileo_jax.inference.fit_posterior import fit_posterior, uncertain_width
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
-from galileo_jax.inference.fits.imperfect import World, Worlds, fit_worlds
 from galileo_jax.inference.imperfections import imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior, two_solutions
@@ -39,6 +38,8 @@ from galileo_jax.runtime.errors import InputError
 from galileo_jax.runtime.known_names import check_known
 from galileo_jax.runtime.precision import in_float64
 from galileo_jax.runtime.progress import CancelFlag, OnProgress
+from galileo_jax.search.fit import best_fit
+from galileo_jax.search.imperfect import World, Worlds, fit_worlds
 from galileo_jax.similarity.gaussian_likelihood import NoiseModel
 
 WARMUP_STEPS = 200  # of every chain; with 100 the proposals are poor
@@ -327,7 +328,7 @@ def _gradient(
         worlds = fit_worlds(fitter.trials, options.seed, on_stage, may_be_exact=is_open)
         share = worlds.share if worlds.best.fit.sizes is None else 1 - worlds.share
         return worlds, None, {"probability_imperfect": share} if is_open else {}
-    exact = fitter.fit(options.seed, on_stage)
+    exact = best_fit(fitter, options.seed, on_stage)
     return Worlds(World(fitter.trials, exact), exact), None, {}
 
 

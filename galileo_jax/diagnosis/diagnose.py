@@ -26,10 +26,16 @@ from galileo_jax.diagnosis import reasons
 from galileo_jax.diagnosis.advice import advice
 from galileo_jax.diagnosis.candidates import candidate_so_far, candidates_of
 from galileo_jax.diagnosis.constants_with_names import with_known_constants
-from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, Reason, Round, Verdict
+from galileo_jax.diagnosis.diagnosis import (
+    Candidate,
+    Diagnosis,
+    MissingForce,
+    Reason,
+    Round,
+    Verdict,
+)
 from galileo_jax.diagnosis.each_clip import EachClip, each_clip
 from galileo_jax.diagnosis.expected_evidence import expected_leads
-from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay
 from galileo_jax.diagnosis.imperfect_world import ImperfectWorld, imperfect_world
 from galileo_jax.diagnosis.law_candidates import law_candidates, law_or
 from galileo_jax.diagnosis.law_verdict import (
@@ -68,6 +74,7 @@ from galileo_jax.diagnosis.verdict import (
 )
 from galileo_jax.inference.fits.gradient import Code, GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis, reduced
 from galileo_jax.search.loop import search
 from galileo_jax.search.starts import beside_a_formula
@@ -104,11 +111,10 @@ def diagnose(
     Raises:
       ValueError: `add` names no effect of the trials' models.
     """
-    is_given = add not in ("auto", "none")
-    if is_given:
+    if is_given := add not in ("auto", "none"):
         trials.free([add])  # raises for unknown names
     listener = _Listener(on_stage, on_round, on_candidate)
-    fitter = fitter_of(trials)
+    fitter = GradientFitter(trials)
     none, first = _without_effects(fitter, base, seed, listener)
     if not is_given and not is_any_moving(trials):
         still = Verdict("none", (), reasons=(reasons.nothing_moves(),))
@@ -132,23 +138,13 @@ def diagnose(
         on_round(rounds[0])
     verdict = with_known_constants(trials, verdict, candidates, seed)
     verdict = replace(verdict, reasons=(*why, *verdict.reasons))
-    friction: tuple[FrictionAlongWay, ...] = ()
-    if rough is not None and verdict.effects in UNEVEN:
-        rounds.append(rough.round_called(verdict.effects))
-        on_round(rounds[-1])
-        friction = rough.friction
     chosen = to_add(verdict, candidates) if add == "auto" else None
-    if chosen is not None:
-        known = compared if rough is None else {}
-        rounds.append(_round_of(trials, chosen, seed, known, listener))
+    rounds += _added(table, verdict, rough, chosen, compared, listener)
     scene = trials.problems[0].model.scene.surroundings
     verdict = replace(verdict, advice=advice(verdict, scene, len(trials.problems)))
-    missing = None
-    if verdict.status in ("unknown", "law"):
-        formula = best_formula(candidates)
-        around = formula.hypothesis if formula is not None and explains(formula) else table.base
-        missing = infer_missing_force(trials, around, seed, found.views)
+    missing = _missing_of(table, verdict, candidates, found.views)
     left_out, each = _clip_by_clip(trials, table.base, rounds, listener)
+    friction = rough.friction if rough is not None and verdict.effects in UNEVEN else ()
     return Diagnosis(tuple(rounds), candidates, verdict, missing, left_out, each, friction)
 
 
@@ -165,13 +161,45 @@ class _Listener:
         self.on_candidate(candidate_so_far(table, entry))
 
 
+def _added(
+    table: Table,
+    verdict: Verdict,
+    rough: ImperfectWorld | None,
+    chosen: Candidate | None,
+    compared: Comparisons,
+    listener: _Listener,
+) -> list[Round]:
+    """The rounds that a verdict adds: imperfections under their name, and what is chosen."""
+    rounds: list[Round] = []
+    if rough is not None and verdict.effects in UNEVEN:
+        rounds.append(rough.round_called(verdict.effects))
+        listener.on_round(rounds[-1])
+    if chosen is not None:
+        known = compared if rough is None else {}
+        rounds.append(_round_of(table.trials, chosen, table.seed, known, listener))
+    return rounds
+
+
+def _missing_of(
+    table: Table, verdict: Verdict, candidates: Sequence[Candidate], views: Sequence[View]
+) -> MissingForce | None:
+    """The force without a form, where the verdict names nothing that stands for it."""
+    if verdict.status not in ("unknown", "law"):
+        return None
+    formula = best_formula(candidates)
+    around = formula.hypothesis if formula is not None and explains(formula) else table.base
+    return infer_missing_force(table.trials, around, table.seed, views)
+
+
 def _without_effects(
     fitter: GradientFitter, known: GradientFit | None, seed: int, listener: _Listener
 ) -> tuple[Hypothesis, Round]:
     """The model without effects, and its comparison with the data; `known`: see `diagnose`."""
     if known is None or not (known.code is Code.MISFIT or fitter.is_explained(known)):
         listener.on_stage("fitting the model without effects")
-        known = fitter.fit(seed, listener.on_stage, effects=())  # all valleys were not looked for
+        known = best_fit(
+            fitter, seed, listener.on_stage, effects=()
+        )  # all valleys were not looked for
     base = Hypothesis((), known)
     listener.on_stage("comparing it with the data")
     first = Round(base, compare(fitter.trials, base.fit, seed))
@@ -456,11 +484,6 @@ def is_any_moving(trials: JointProblem) -> bool:
         for problem in trials.problems
         for index in range(len(problem.observation.names))
     )
-
-
-def fitter_of(trials: JointProblem) -> GradientFitter:
-    """What fits all hypotheses."""
-    return GradientFitter(trials)
 
 
 def _judged(

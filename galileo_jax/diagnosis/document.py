@@ -11,7 +11,7 @@ import numpy as np
 from galileo_jax.comparison.document import comparison_document
 from galileo_jax.diagnosis.could_not_see import could_not_see
 from galileo_jax.diagnosis.diagnosis import Candidate, Diagnosis, MissingForce, Round
-from galileo_jax.diagnosis.each_clip import kind_of
+from galileo_jax.diagnosis.each_clip import EachClip, kind_of
 from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay
 from galileo_jax.diagnosis.law_verdict import best_formula
 from galileo_jax.diagnosis.verdict import explains
@@ -83,22 +83,21 @@ def diagnosis_document(trials: JointProblem, diagnosis: Diagnosis, seed: int) ->
             for clip, before, after in diagnosis.left_one_out
         ]
     if diagnosis.each_clip:
-        document["each_clip"] = {
-            "kind": kind_of(diagnosis.each_clip),
-            "clips": [
-                {
-                    "clip": one.clip,
-                    "chi2_together": one.chi2_together,
-                    "chi2_alone": one.chi2_alone,
-                    "p_alone": one.p_alone,
-                    "way_m": one.way_m.tolist(),
-                    "extra_acceleration_m_s2": one.extra_m_s2.tolist(),
-                    "sd_m_s2": one.sd_m_s2.tolist(),
-                }
-                for one in diagnosis.each_clip
-            ],
-        }
+        rows = [_clip_by_itself(one) for one in diagnosis.each_clip]
+        document["each_clip"] = {"kind": kind_of(diagnosis.each_clip), "clips": rows}
     return document
+
+
+def _clip_by_itself(one: EachClip) -> dict[str, Any]:
+    return {
+        "clip": one.clip,
+        "chi2_together": one.chi2_together,
+        "chi2_alone": one.chi2_alone,
+        "p_alone": one.p_alone,
+        "way_m": one.way_m.tolist(),
+        "extra_acceleration_m_s2": one.extra_m_s2.tolist(),
+        "sd_m_s2": one.sd_m_s2.tolist(),
+    }
 
 
 def _could_not_see(trials: JointProblem, diagnosis: Diagnosis, seed: int) -> dict[str, Any]:

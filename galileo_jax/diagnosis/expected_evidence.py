@@ -14,6 +14,7 @@ from dataclasses import replace
 from galileo_jax.diagnosis.diagnosis import Candidate
 from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.search.fit import refit
 
 
 def expected_leads(
@@ -30,14 +31,14 @@ def expected_leads(
         return []
     turned = turned_round(candidate.hypothesis.of(trials), candidate.hypothesis.fit)
     fitter = GradientFitter(turned)
-    own = fitter.refit(candidate.hypothesis.fit).log_evidence
+    own = refit(fitter, candidate.hypothesis.fit).log_evidence
     fitters = {id(candidate.hypothesis.of(trials)): fitter}
     found = []
     for rival in rivals:
         its = rival.hypothesis.of(trials)
         if id(its) not in fitters:
             fitters[id(its)] = GradientFitter(_with_observations_of(its, turned))
-        lead = own - fitters[id(its)].refit(rival.hypothesis.fit).log_evidence
+        lead = own - refit(fitters[id(its)], rival.hypothesis.fit).log_evidence
         lead += candidate.log_prior - rival.log_prior
         found.append(0.5 * (lead + candidate.log_odds - rival.log_odds))
     return found

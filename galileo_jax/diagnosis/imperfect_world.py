@@ -13,10 +13,10 @@ from galileo_jax.diagnosis.diagnosis import Candidate, Round
 from galileo_jax.diagnosis.friction_along_way import FrictionAlongWay, Stretch, friction_along_way
 from galileo_jax.diagnosis.verdict import CONVINCING, explains, ranked, rivals, to_compare
 from galileo_jax.inference.fits.gradient import Code
-from galileo_jax.inference.fits.imperfect import with_imperfections
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.result import error_of
 from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.imperfect import with_imperfections
 from galileo_jax.statespace.terms.friction_roughness import NAME
 
 # Beside none: so many of the most probable of each kind in the exact world.

@@ -20,9 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from galileo_jax.diagnosis.diagnosis import MissingForce
-from galileo_jax.inference.free_force.along_path import along_path
-from galileo_jax.inference.free_force.free_fit import FreeFit, free_fit
-from galileo_jax.inference.free_force.spans import MOVES_M_S
+from galileo_jax.diagnosis.free_force.along_path import along_path
+from galileo_jax.diagnosis.free_force.free_fit import free_fit
+from galileo_jax.diagnosis.free_force.spans import MOVES_M_S
+from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.free_acceleration import FreeAcceleration
@@ -47,7 +48,7 @@ def views_of(trials: JointProblem, *starts: Hypothesis) -> list["View"]:
     return [
         max(
             (view_of(trials, hypothesis, clip) for hypothesis in starts),
-            key=lambda view: view.fit.gradient.log_evidence,
+            key=lambda view: view.fit.log_evidence,
         )
         for clip in range(len(trials.problems))
     ]
@@ -89,6 +90,7 @@ class View:
     Attributes:
       trials: the clip alone, its model with the free acceleration.
       fit: with the free acceleration.
+      residual: `[value]`, whitened at the fitted noise scales.
       effect: the free acceleration.
       time_s: `[time]`.
       path_m, speed_m_s: `[object, time]`, of the fit.
@@ -96,7 +98,8 @@ class View:
     """
 
     trials: JointProblem
-    fit: FreeFit
+    fit: GradientFit
+    residual: np.ndarray
     effect: FreeAcceleration
     time_s: np.ndarray
     path_m: np.ndarray
@@ -130,9 +133,7 @@ class View:
     def target(self) -> np.ndarray:
         """The residuals, linear in all parameters, where these are all in their middle."""
         jacobian = self.fit.jacobian
-        return self.fit.residual - jacobian @ np.where(
-            self.free, self.fit.z[: jacobian.shape[1]], 0
-        )
+        return self.residual - jacobian @ np.where(self.free, self.fit.z[: jacobian.shape[1]], 0)
 
     def shows(self, index: int) -> np.ndarray:
         """How an object's acceleration shows in the target, `[value, time]`."""
@@ -149,9 +150,8 @@ def view_of(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> View:
     problem = replace(trials.problems[clip], noise="camera")
     column = trials.columns_of(clip)
     z, free = hypothesis.fit.z[column], hypothesis.fit.free[column]
-    fit = free_fit(JointProblem((problem,)), z, free)
-    extended = fit.trials
-    (effect,) = fit.effects
+    found = free_fit(JointProblem((problem,)), z, free)
+    extended, fit, (effect,) = found.trials, found.fit, found.effects
     theta = extended.theta(fit.z, fit.free)
     time_s, path, speed = _motion(
         extended.problems[0], theta[:-1], max(own[-1][1] for own in effect.spans_s)
@@ -159,7 +159,7 @@ def view_of(trials: JointProblem, hypothesis: Hypothesis, clip: int) -> View:
     moves = _seen(problem, time_s) & (np.abs(speed) > MOVES_M_S)
     for i, own in enumerate(effect.spans_s):
         moves[i] &= (time_s >= own[0][0]) & (time_s <= own[-1][1])
-    return View(extended, fit, effect, time_s, path, speed, moves)
+    return View(extended, fit, found.residual, effect, time_s, path, speed, moves)
 
 
 def _motion(

@@ -11,55 +11,34 @@ from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.joint_problem import JointProblem
 
 
-def restricted_fit(fit: GradientFit, whole: JointProblem, part: JointProblem) -> GradientFit:
-    """The same fit in the parameters of fewer effects; those left out are pinned in it.
+def fit_among(fit: GradientFit, own: JointProblem, other: JointProblem) -> GradientFit:
+    """The same fit in the parameters of other effects, of which those that it has not are pinned.
 
     Args:
-      fit: of `whole`.
-      whole: trials with the whole library.
-      part: of the same clips with the fit's own effects.
+      fit: of `own`.
+      own: trials.
+      other: of the same clips.
 
     Raises:
-      ValueError: the fit has an effect that `part` has not.
+      ValueError: the fit has a parameter that `other` has not.
     """
-    columns = np.array([whole.names.index(name) for name in part.names])
-    if np.delete(fit.free, columns).any():
-        raise ValueError("the fit has parameters that the smaller model has not")
-    model = columns[: len(part.model_parameters)]
+    at = np.array([own.names.index(n) if n in own.names else -1 for n in other.names])
+    if np.delete(fit.free, at[at >= 0]).any():
+        raise ValueError("the fit has parameters that the other model has not")
+
+    def taken(values: np.ndarray, axis: int = 0) -> np.ndarray:
+        """Values along an axis of parameters, 0 of those that the fit has not."""
+        is_of_model = values.shape[axis] < len(own.names)
+        where = at[: len(other.model_parameters)] if is_of_model else at
+        shape = [-1 if i == axis else 1 for i in range(values.ndim)]
+        return np.take(values, where, axis) * (where >= 0).reshape(shape)
+
     return replace(
         fit,
-        z=fit.z[columns],
-        free=fit.free[columns],
-        covariance=fit.covariance[np.ix_(columns, columns)],
-        steps=fit.steps[model],
-        jacobian=fit.jacobian[:, model],
-        beside=tuple(restricted_fit(one, whole, part) for one in fit.beside),
-    )
-
-
-def extended_fit(fit: GradientFit, part: JointProblem, whole: JointProblem) -> GradientFit:
-    """The same fit in the parameters of more effects, which are pinned in it.
-
-    Args:
-      fit: of `part`.
-      part: trials with the fit's own effects.
-      whole: of the same clips with more.
-    """
-    columns = np.array([whole.names.index(name) for name in part.names])
-    model, count = columns[: len(part.model_parameters)], len(whole.names)
-    steps = np.zeros(len(whole.model_parameters))
-    z, free = np.zeros(count), np.zeros(count, bool)
-    covariance = np.zeros((count, count))
-    jacobian = np.zeros((len(fit.jacobian), len(steps)))
-    z[columns], free[columns], steps[model] = fit.z, fit.free, fit.steps
-    covariance[np.ix_(columns, columns)] = fit.covariance
-    jacobian[:, model] = fit.jacobian
-    return replace(
-        fit,
-        z=z,
-        free=free,
-        covariance=covariance,
-        steps=steps,
-        jacobian=jacobian,
-        beside=tuple(extended_fit(one, part, whole) for one in fit.beside),
+        z=taken(fit.z),
+        free=taken(fit.free),
+        covariance=taken(taken(fit.covariance), 1),
+        steps=taken(fit.steps),
+        jacobian=taken(fit.jacobian, 1),
+        beside=tuple(fit_among(one, own, other) for one in fit.beside),
     )

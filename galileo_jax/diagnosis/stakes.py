@@ -15,10 +15,11 @@ from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.effect import Effect
 from galileo_jax.model.effects.forms import FORM_NAMES
 from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.table import Stakes
 
 
 @dataclass(frozen=True)
-class VerdictStakes:
+class VerdictStakes(Stakes):
     """The rules of the verdict, for a search.
 
     Attributes:

@@ -80,23 +80,9 @@ def metropolis_posterior(
         begin = scattered(valley, fit, residuals, seed, num_chains)
     else:
         begin = valley.straight(starts)
-    sd = np.sqrt(np.diag(fit.covariance))
-    watched = [
-        (i, parameter.name)
-        for i, parameter in enumerate(trials.parameters)
-        if parameter.role != "nuisance" and sd[i] < IDENTIFIED_SD_Z
-    ]
-
-    def monitor(valley: Valley, u: np.ndarray) -> dict[str, np.ndarray]:
-        draws = valley(u)
-        found = {name: draws[..., i] for i, name in watched}
-        masses = [i for i, name in enumerate(trials.names) if re.fullmatch(r"m\d+", name)]
-        for i, (one, other) in enumerate(pairwise(masses), 1):
-            found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]
-        return found or {"log_noise": draws[..., -1]}
-
-    kernel, density = sampler_class(sampler), density_of(trials, fit)
-    dim, key = valley.root.shape[1], jax.random.key(seed)
+    kernel, key = sampler_class(sampler), jax.random.key(seed)
+    density, watch = density_of(trials, fit), _watch(trials, fit)
+    dim = valley.root.shape[1]
     first, second = _parts(settings)
     total = settings.warmup_steps + settings.max_steps
 
@@ -116,7 +102,7 @@ def metropolis_posterior(
             jnp.asarray(begin),
             trials.names,
             settings=part,
-            monitor=partial(monitor, at.valley),
+            monitor=partial(watch, at.valley),
             on_block=report if on_block else None,
             checkpoint=beside if is_second else checkpoint,
             identity=identity,
@@ -134,6 +120,28 @@ def metropolis_posterior(
         count += posterior.stats["num_evaluations"]
     posterior = replace(posterior, stats={**posterior.stats, "num_evaluations": count})
     return posterior.mapped(lambda u: trials.theta(at.valley(u)), trials.names)
+
+
+def _watch(
+    trials: JointProblem, fit: GradientFit
+) -> Callable[[Valley, np.ndarray], dict[str, np.ndarray]]:
+    """Draws `[chain, draw, dim]` along a valley to what must converge: what the fit tells."""
+    sd = np.sqrt(np.diag(fit.covariance))
+    told = [
+        (i, parameter.name)
+        for i, parameter in enumerate(trials.parameters)
+        if parameter.role != "nuisance" and sd[i] < IDENTIFIED_SD_Z
+    ]
+    masses = [i for i, name in enumerate(trials.names) if re.fullmatch(r"m\d+", name)]
+
+    def watch(valley: Valley, u: np.ndarray) -> dict[str, np.ndarray]:
+        draws = valley(u)
+        found = {name: draws[..., i] for i, name in told}
+        for i, (one, other) in enumerate(pairwise(masses), 1):
+            found[f"mass_ratio_{i}_{i + 1}"] = draws[..., one] - draws[..., other]
+        return found or {"log_noise": draws[..., -1]}
+
+    return watch
 
 
 def _parts(settings: Settings) -> tuple[Settings, Settings | None]:

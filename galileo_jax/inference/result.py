@@ -162,14 +162,22 @@ def per_mass_entries(trials: JointProblem, posterior: Posterior) -> dict[str, di
     draws = posterior.flat()
     if not force_constants(trials) or is_mass_known(trials, draws):
         return {}
-    before = per_mass(trials, trials.prior_draws)
+    return _told(posterior, per_mass(trials, draws), per_mass(trials, trials.prior_draws))
+
+
+def _told(
+    posterior: Posterior,
+    after: Mapping[str, tuple[np.ndarray, str]],
+    before: Mapping[str, tuple[np.ndarray, str]],
+) -> dict[str, dict[str, Any]]:
+    """Entries of derived quantities by their draws and units, after the data and before."""
     return {
         name: {
             **summary_of(posterior, values),
             "unit": unit,
             "identified": _width(values) < IDENTIFIED_SD_Z * _width(before[name][0]),
         }
-        for name, (values, unit) in per_mass(trials, draws).items()
+        for name, (values, unit) in after.items()
     }
 
 
@@ -209,15 +217,7 @@ def _derived_by_laws(trials: JointProblem, posterior: Posterior) -> dict[str, di
                 found[name] = np.asarray(values), unit
         return found
 
-    before = by_name(trials.prior_draws)
-    return {
-        name: {
-            **summary_of(posterior, values),
-            "unit": unit,
-            "identified": _width(values) < IDENTIFIED_SD_Z * _width(before[name][0]),
-        }
-        for name, (values, unit) in by_name(posterior.flat()).items()
-    }
+    return _told(posterior, by_name(posterior.flat()), by_name(trials.prior_draws))
 
 
 def make_result(
@@ -262,11 +262,6 @@ def make_result(
     away = prior_deviations(trials.model_parameters, z_best[: len(is_fitted)])
     theta = trials.theta(z_best)
     num_fitted, pull = float(np.sum(share_from_data[is_fitted])), float(np.sum(away**2))
-    pulled = [
-        {"parameter": p.name, "value": float(theta[i]), "unit": p.unit, "z": float(away[i])}
-        for i, p in enumerate(trials.model_parameters)
-        if abs(away[i]) > PULLED_Z
-    ]
     status = {"converged": posterior.is_converged, **notes}
     return {
         "clips": clips,
@@ -275,12 +270,22 @@ def make_result(
         "effects": list(trials.all_effects),
         **table,
         "derived": derived,
-        "pulls": sorted(pulled, key=lambda pull: -abs(pull["z"])),
+        "pulls": _pulls(trials, theta, away),
         "error": error_of(trials, theta, num_fitted, pull),
         "timings_s": timings_s,
         "version": __version__,
         "seed": seed,
     }
+
+
+def _pulls(trials: JointProblem, theta: np.ndarray, away: np.ndarray) -> list[dict[str, Any]]:
+    """Nuisances that are far from what is expected, `away` prior sds, the farthest first."""
+    found = [
+        {"parameter": p.name, "value": float(theta[i]), "unit": p.unit, "z": float(away[i])}
+        for i, p in enumerate(trials.model_parameters)
+        if abs(away[i]) > PULLED_Z
+    ]
+    return sorted(found, key=lambda pull: -abs(pull["z"]))
 
 
 def _entries(

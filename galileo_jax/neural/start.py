@@ -21,6 +21,7 @@ from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
 from galileo_jax.neural.estimate import cnn_posterior
+from galileo_jax.search.fit import refit
 
 NUM_COMPLETIONS = 4
 
@@ -52,7 +53,7 @@ def start_from_network(trials: JointProblem, seed: int, num_chains: int) -> Star
     (fit,) = fitter.fit_from(middle[None, : len(free)], free[None], np.zeros(1, int))
     spent = fit.stats["num_rollouts"]
     # A small coefficient of restitution has a valley on either side; the network knows of neither.
-    fit = fitter.refit(fit)
+    fit = refit(fitter, fit)
     stats = {**fit.stats, "num_rollouts": fit.stats["num_rollouts"] + spent}
     fit = replace(fit, stats=stats)
     generator = np.random.default_rng([seed, 8])

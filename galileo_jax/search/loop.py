@@ -15,16 +15,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from galileo_jax.inference.fits.descent import SAME_VALLEY_NATS, Descended, ends_of
+from galileo_jax.inference.fits.descent import (
+    BEHIND_IN_SEARCH,
+    SAME_VALLEY_NATS,
+    Descended,
+    ends_of,
+    in_valley,
+    valleys,
+)
 from galileo_jax.inference.fits.distinct_modes import apart
 from galileo_jax.inference.fits.gradient import GradientFit
 from galileo_jax.inference.fits.importance_sampling import weighed
-from galileo_jax.inference.fits.search_results import BEHIND_IN_SEARCH, valleys
 from galileo_jax.search.hypothesis import Hypothesis
-from galileo_jax.search.moves import MOVES
+from galileo_jax.search.moves import MOVES, Move
 from galileo_jax.search.score_tests import score_tests
 from galileo_jax.search.start import Start
-from galileo_jax.search.table import BASE, CHANGED_NATS, Entry, Key, Table, ask
+from galileo_jax.search.table import BASE, CHANGED_NATS, LEAST_AGREEING, Entry, Key, Table, ask
 
 MOST_ROUNDS = 4
 NUM_AT_ONCE = 8  # refined in one batch: the sooner the first can be shown
@@ -39,9 +45,10 @@ class _End:
 
     effects: tuple[str, ...]
     z: np.ndarray
-    parent: Hypothesis
-    cost: float
-    promise: float  # the cost less what the width of the valley is worth, nats
+    parent: Hypothesis | None
+    cost: float = np.nan
+    promise: float = np.nan  # the cost less what the width of the valley is worth, nats
+    num_agreeing: int = LEAST_AGREEING  # starts that ended in its valley
 
     @property
     def key(self) -> Key:
@@ -53,20 +60,25 @@ def search(
     most: int,
     on_entry: Callable[[Table, Entry], None] = lambda *_: None,
     starts: Sequence[Start] = (),
+    moves: Sequence[Move] = tuple(MOVES.values()),
+    on_round: Callable[[Sequence[Start]], None] = lambda _: None,
 ) -> Table:
     """The table with all that the moves find, up to so many effects at once.
 
     Args:
       table: what is known.
-      most: effects of a hypothesis.
+      most: effects of a hypothesis; 0: the one model that is fitted.
       on_entry: called with a table and each of its rows that is new or better, as soon as that is.
       starts: where to look first, beside what the moves propose.
+      moves: that propose.
+      on_round: called before each round with what was proposed.
     """
     table = replace(table, most_effects=most)
     for _ in range(MOST_ROUNDS):
-        proposed = [*starts, *(one for move in MOVES.values() for one in move(table))]
+        proposed = [*starts, *(one for move in moves for one in move(table))]
         if not proposed:
             break
+        on_round(proposed)
         before = table
         asked = {ask(one.move, one.parent, one.key) for one in proposed}
         table = replace(table, asked=table.asked | asked, num_rounds=table.num_rounds + 1)
@@ -95,47 +107,55 @@ def _round(
     """The table after one round of the loop."""
     known = _known_costs(table)
     ends = _raced(table, [one for one in starts if not one.is_near], known)
-    first = _first_of_each(ends, min(known.values()))
+    first = _first_of_each(ends, min(known.values(), default=np.inf))
     scores = _scores(table, first)
 
-    def take(table: Table, effects: tuple[str, ...], fit: GradientFit) -> Table:
-        key = frozenset(effects)
+    def take(table: Table, end: _End, fit: GradientFit) -> Table:
+        key = end.key
         old = table.entries.get(key)
         if old is None:
-            entry = Entry(Hypothesis(effects, fit), (fit,), scores.get(key, 0.0))
+            hypothesis = Hypothesis(end.effects, fit)
+            entry = Entry(hypothesis, (fit,), scores.get(key, 0.0), end.num_agreeing)
         else:
-            entry = old.with_fits([fit], CHANGED_NATS if key == BASE else 0.0)
+            # What was compared with the data stays, unless another valley is found.
+            is_compared = key == BASE and table.most_effects > 0
+            entry = old.with_fits([fit], CHANGED_NATS if is_compared else 0.0)
         table = table.with_entry(entry)
         if old is None or entry.hypothesis.fit is fit:
             on_entry(table, entry)
         return table
 
-    for end, fit in _refined_in_turn(table, first):
-        table = take(table, end.effects, fit)
+    for end, fit in _refined_in_turn(table, [end for end in first if end.key != BASE]):
+        table = take(table, end, fit)
     deciding = {BASE, *table.deciding()[:MOST_WITH_CARE]}
-    near = [_End(one.effects, one.z, one.parent, np.nan, np.nan) for one in starts if one.is_near]
+    near = [_End(one.effects, one.z, one.parent) for one in starts if one.is_near]
     # What was refined in its turn was so roughly: it goes on.
     rough = [
         replace(end, z=table.entries[end.key].hypothesis.fit.z[: len(end.z)])
         for end in first
-        if end.key in deciding and end.key in table.entries
+        if end.key in deciding - {BASE} and end.key in table.entries
     ]
-    rest = [end for end in ends if end.key in table.entries and not any(end is o for o in first)]
+    rest = [
+        end
+        for end in ends
+        if end.key == BASE or (end.key in table.entries and not any(end is o for o in first))
+    ]
     for end, fit in _refined(table, [*rough, *(e for e in (*near, *rest) if e.key in deciding)]):
-        table = take(table, end.effects, fit)
+        table = take(table, end, fit)
     return _weighed(table, on_entry)
 
 
 def _scores(table: Table, ends: Sequence[_End]) -> dict[Key, float]:
     """How many standard deviations the slope of each new hypothesis' last effect explains."""
-    new: dict[int, list[_End]] = {}
+    new: dict[Hypothesis, list[_End]] = {}
     for end in ends:
-        is_added = set(end.effects[:-1]) == set(end.parent.effects)
-        if is_added and end.effects and end.key not in table.entries:
-            new.setdefault(id(end.parent), []).append(end)
+        if not end.effects or end.parent is None or end.key in table.entries:
+            continue
+        if set(end.effects[:-1]) == set(end.parent.effects):
+            new.setdefault(end.parent, []).append(end)
     scores: dict[Key, float] = {}
-    for own in new.values():
-        found = score_tests(table.trials, own[0].parent.fit, [one.effects for one in own])
+    for parent, own in new.items():
+        found = score_tests(table.trials, parent.fit, [one.effects for one in own])
         scores |= {one.key: float(score) for one, score in zip(own, found, strict=True)}
     return scores
 
@@ -149,31 +169,33 @@ def _raced(table: Table, starts: Sequence[Start], known: Mapping[Key, float]) ->
     if not starts:
         return []
     fitter = table.fitter
-    z, free = np.stack([one.z for one in starts]), table.free([one.effects for one in starts])
+    z, free = _points(table, starts)
     costs = fitter.search_costs(z, free)
     best: dict[tuple[Key, str, int], int] = {}
     for i in np.argsort(costs, kind="stable"):
         best.setdefault((starts[i].key, starts[i].move, starts[i].rivals), int(i))
     rows = np.array(sorted(best.values()))
-    keys = list(dict.fromkeys(starts[i].key for i in rows))
-    owner = np.array([keys.index(starts[i].key) for i in rows])
-    found = fitter.race(z[rows], free[rows], owner, min(known.values()))
-    volume = -0.5 * np.linalg.slogdet(found.best.normal)[1]
+    keys, owner = _owners([starts[i].key for i in rows])
+    found = fitter.race(z[rows], free[rows], owner, min(known.values(), default=np.inf))
+    volume, whose = -0.5 * np.linalg.slogdet(found.best.normal)[1], ends_of(found.joined)
     ends = []
     for number, key in enumerate(keys):
-        left = np.unique(ends_of(found.joined)[owner == number])
-        for row in valleys(found.best, left):
+        own = whose[owner == number]
+        tops = valleys(found.best, np.unique(own))
+        num_agreeing = int(in_valley(found.best, tops[0], own).sum())
+        for row in tops:
             start, cost = starts[rows[row]], float(found.best.cost[row])
             if key in known and _is_no_news(table.entries[key], known[key], found, row):
                 continue
-            ends.append(
-                _End(start.effects, found.best.z[row], start.parent, cost, cost - volume[row])
-            )
+            at, promise = found.best.z[row], cost - volume[row]
+            ends.append(_End(start.effects, at, start.parent, cost, promise, num_agreeing))
     return ends
 
 
 def _known_costs(table: Table) -> dict[Key, float]:
     """What the fits of the table cost in a race, nats."""
+    if not table.entries:
+        return {}
     count = len(table.trials.model_parameters)
     z = np.stack([entry.hypothesis.fit.z[:count] for entry in table.entries.values()])
     costs = table.fitter.search_costs(z, table.free(list(table.entries)))
@@ -212,8 +234,7 @@ def _refined_in_turn(table: Table, ends: Sequence[_End]) -> list[tuple[_End, Gra
     # A part takes as many steps as its slowest, so that many parts would take many.
     cuts = [NUM_AT_ONCE] if all(len(end.key) <= 1 for end in ends) else None
     parts = np.split(np.arange(len(ends)), cuts or range(NUM_AT_ONCE, len(ends), NUM_AT_ONCE))
-    z, free = np.stack([end.z for end in ends]), table.free([end.effects for end in ends])
-    fits = table.fitter.polish_in_turn(z, free, [part for part in parts if part.size])
+    fits = table.fitter.polish_in_turn(*_points(table, ends), [p for p in parts if p.size])
     return [(ends[row], fit) for row, fit in fits]
 
 
@@ -221,12 +242,22 @@ def _refined(table: Table, ends: Sequence[_End]) -> list[tuple[_End, GradientFit
     """Fits from ends, until they have settled; one for each valley."""
     if not ends:
         return []
-    keys = list(dict.fromkeys(end.key for end in ends))
-    ends = sorted(ends, key=lambda end: keys.index(end.key))
-    owner = np.array([keys.index(end.key) for end in ends])
-    z, free = np.stack([end.z for end in ends]), table.free([end.effects for end in ends])
-    fits = table.fitter.polish(z, free, owner)
+    _, owner = _owners([end.key for end in ends])
+    order = np.argsort(owner, kind="stable")
+    ends = [ends[i] for i in order]
+    fits = table.fitter.polish(*_points(table, ends), owner[order])
     return [(ends[row], fit) for row, fit in fits.items()]
+
+
+def _points(table: Table, rows: Sequence[Start] | Sequence[_End]) -> tuple[np.ndarray, np.ndarray]:
+    """Z of the model's parameters, and which are free, `[row, parameter]`."""
+    return np.stack([one.z for one in rows]), table.free([one.effects for one in rows])
+
+
+def _owners(keys: Sequence[Key]) -> tuple[list[Key], np.ndarray]:
+    """The hypotheses, each once, and which of them each key is of."""
+    every = list(dict.fromkeys(keys))
+    return every, np.array([every.index(key) for key in keys])
 
 
 def _weighed(table: Table, on_entry: Callable[[Table, Entry], None]) -> Table:

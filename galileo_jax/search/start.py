@@ -15,8 +15,8 @@ class Start:
     Attributes:
       effects: of the hypothesis.
       z: `[model parameter]`, each with a unit normal prior.
-      parent: what it was made from; with its last effect added, a score test says what that
-        effect explains.
+      parent: what it was made from, None where nothing was known; with its last effect added, a
+        score test says what that effect explains.
       move: name of the move that proposes it.
       rivals: of a move's starts of a hypothesis with the same label only the best is followed.
       is_near: whether it is refined at once: beside a fit a race, which assumes more noise, would
@@ -25,7 +25,7 @@ class Start:
 
     effects: tuple[str, ...]
     z: Float[np.ndarray, " parameter"]
-    parent: Hypothesis
+    parent: Hypothesis | None
     move: str
     rivals: int = 0
     is_near: bool = False

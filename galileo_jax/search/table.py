@@ -1,8 +1,7 @@
 """The table of all hypotheses that a search has fitted so far."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -15,16 +14,16 @@ from galileo_jax.search.hypothesis import Hypothesis
 BASE: frozenset[str] = frozenset()
 Key = frozenset[str]
 CHANGED_NATS = 1.0  # by which the evidence of what may decide has changed
+LEAST_AGREEING = 2  # starts that must end in the best valley, lest it be a chance find
 SAME_NATS = 3.0  # by which the evidence of a parent differs that is worth asking again
 
 
-@runtime_checkable
-class Stakes(Protocol):
-    """What hangs on a hypothesis: how probable it is beforehand, and when it may decide."""
+class Stakes:
+    """What hangs on a hypothesis; here, where a model is fitted that has no rivals, nothing."""
 
     def log_prior(self, hypothesis: Hypothesis) -> float:
         """Log of its probability before the data over that of the model without effects."""
-        ...
+        return 0.0
 
     def may_decide(
         self,
@@ -33,11 +32,11 @@ class Stakes(Protocol):
         num_effects: Int[np.ndarray, " row"],
     ) -> Bool[np.ndarray, " row"]:
         """On which hypotheses the conclusion may hang; these are searched for with care."""
-        ...
+        return np.zeros(len(log_odds), bool)
 
     def is_close_call(self, log_odds: Float[np.ndarray, " row"]) -> Bool[np.ndarray, " row"]:
         """Of which hypotheses Laplace's evidence will not do."""
-        ...
+        return np.zeros(len(log_odds), bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +47,13 @@ class Entry:
       hypothesis: with the best fit.
       fits: in every valley that was found.
       score_z: what its last effect's slope explained beside its parent, in standard deviations.
+      num_agreeing: starts of the race that found it which ended in its valley.
     """
 
     hypothesis: Hypothesis
     fits: tuple[GradientFit, ...]
-    score_z: float
+    score_z: float = 0.0
+    num_agreeing: int = LEAST_AGREEING
 
     def with_fits(self, fits: Sequence[GradientFit], by: float = 0.0) -> "Entry":
         """The same with more fits; one that is better `by` nats takes the place of the old one.
@@ -77,7 +78,9 @@ class Table:
       fitter: of trials whose models have the whole library.
       stakes: what hangs on each.
       seed: of the starts.
-      entries: by the effects, in no order; that without effects is always there.
+      entries: by the effects, in no order; that without effects is there after the first round.
+      is_explained: whether noise, or what is as usual as noise, explains what a fit leaves.
+      mask: `[model parameter]`, those that every hypothesis has.
       asked: what moves proposed already: name of the move, of what, from which evidence.
       num_rounds: of the loop, so far.
       most_effects: at once, of the hypotheses that are looked for.
@@ -87,6 +90,8 @@ class Table:
     stakes: Stakes
     seed: int
     entries: Mapping[Key, Entry]
+    is_explained: Callable[[Hypothesis], bool]
+    mask: Bool[np.ndarray, " parameter"]
     asked: frozenset[tuple[str, Key, Key, float]] = frozenset()
     num_rounds: int = 0
     most_effects: int = 1
@@ -94,7 +99,9 @@ class Table:
     @classmethod
     def of(cls, fitter: GradientFitter, stakes: Stakes, seed: int, base: Hypothesis) -> "Table":
         """The table that holds the model without effects alone."""
-        return cls(fitter, stakes, seed, {BASE: Entry(base, (base.fit, *base.fit.beside), 0.0)})
+        entries = {BASE: Entry(base, (base.fit, *base.fit.beside))}
+        mask = fitter.trials.free(())[: len(fitter.trials.model_parameters)]
+        return cls(fitter, stakes, seed, entries, lambda one: fitter.is_explained(one.fit), mask)
 
     @property
     def trials(self) -> JointProblem:
@@ -137,7 +144,7 @@ class Table:
     def free(self, sets: Sequence[Collection[str]]) -> Bool[np.ndarray, "row parameter"]:
         """Which of the model's parameters sets of effects leave open."""
         count = len(self.trials.model_parameters)
-        return np.stack([self.trials.free(tuple(effects))[:count] for effects in sets])
+        return np.stack([self.mask | self.trials.free(tuple(own))[:count] for own in sets])
 
     def deciding(self) -> list[Key]:
         """The hypotheses on which the conclusion may hang, the best evidence first."""
@@ -147,7 +154,7 @@ class Table:
         log_odds = np.array([self.log_odds(row.hypothesis) for row in rows])
         forms = np.array([is_form(row.hypothesis.key) for row in rows])
         every = (self.base, *(row.hypothesis for row in rows))
-        if any(self.fitter.is_explained(one.fit) for one in every):
+        if any(map(self.is_explained, every)):
             numbers = np.array([len(row.hypothesis.effects) for row in rows])
             decides = self.stakes.may_decide(log_odds, forms, numbers)
         else:  # any fit may yet be the one that does
@@ -155,6 +162,14 @@ class Table:
         found = [row for row, does in zip(rows, decides, strict=True) if does]
         by_evidence = sorted(found, key=lambda row: -row.hypothesis.fit.log_evidence)
         return [row.hypothesis.key for row in by_evidence]
+
+    @property
+    def is_in_doubt(self) -> bool:
+        """Whether a fit alone, with no rival, may be in a side valley."""
+        if self.most_effects or BASE not in self.entries:
+            return False
+        is_chance = self.entries[BASE].num_agreeing < LEAST_AGREEING and self.num_rounds == 1
+        return is_chance or not self.is_explained(self.base)
 
     def not_asked(
         self, move: str, wanted: Sequence[tuple[Hypothesis, tuple[str, ...]]]
@@ -176,8 +191,10 @@ class Table:
         return replace(self, entries={**self.entries, entry.hypothesis.key: entry})
 
 
-def ask(move: str, parent: Hypothesis, key: Key) -> tuple[str, Key, Key, float]:
+def ask(move: str, parent: Hypothesis | None, key: Key) -> tuple[str, Key, Key, float]:
     """What makes two proposals of a move one: what for, and from which fit."""
+    if parent is None:
+        return move, BASE, key, -np.inf
     return move, parent.key, key, parent.fit.log_evidence // SAME_NATS
 
 

@@ -11,7 +11,7 @@ from galileo_jax.api import diagnose as api
 from galileo_jax.api.simulate import simulate
 from galileo_jax.commands import command, diagnose
 from galileo_jax.diagnosis.document import diagnosis_document
-from galileo_jax.diagnosis.restricted_fit import extended_fit, restricted_fit
+from galileo_jax.diagnosis.restricted_fit import fit_among
 from galileo_jax.inference.build_problem import make_problem
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.laplace import laplace_posterior
@@ -93,19 +93,19 @@ def test_a_hypothesis_by_itself_moves_as_in_the_library(trials, tmp_path):
     run = make_run(tmp_path, HIT, 1.6)
     problem = make_problem(run.clip, run.problem.observation, "rigid", make_effects(["air_drag"]))
     part, fit = JointProblem((problem,)), fit_of(trials, ("air_drag",))
-    alone = restricted_fit(fit, trials, part)
+    alone = fit_among(fit, trials, part)
     assert alone.free.all()
     assert alone.jacobian.shape == (part.num_values, len(part.model_parameters))
     whole = trials.problems[0].simulate(trials.of_clip(trials.theta(fit.z, fit.free), 0))
     np.testing.assert_array_equal(problem.simulate(part.of_clip(part.theta(alone.z), 0)), whole)
-    two = restricted_fit(replace(fit, beside=(fit,)), trials, part)
+    two = fit_among(replace(fit, beside=(fit,)), trials, part)
     np.testing.assert_array_equal(two.beside[0].z, alone.z)
     assert laplace_posterior(part, two, seed=1).draws.shape[-1] == len(part.parameters)
-    again = extended_fit(alone, part, trials)
+    again = fit_among(alone, part, trials)
     for name in ("z", "free", "covariance", "jacobian"):
         np.testing.assert_array_equal(getattr(again, name), getattr(fit, name), name)
     with pytest.raises(ValueError, match="has not"):
-        restricted_fit(fit_of(trials, ("viscous_drag",)), trials, part)
+        fit_among(fit_of(trials, ("viscous_drag",)), trials, part)
 
 
 @pytest.mark.slow

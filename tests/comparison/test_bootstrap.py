@@ -8,6 +8,7 @@ import pytest
 from galileo_jax.comparison import bootstrap
 from galileo_jax.comparison.phases import phases
 from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.search.fit import best_fit
 from tests.oracle_trials import make_trials, observe
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -19,7 +20,7 @@ COUNT = 64
 def fitted():
     with in_64_bit():
         trials = make_trials([HIT])
-        return trials, GradientFitter(trials).fit(0)
+        return trials, best_fit(GradientFitter(trials), 0)
 
 
 def squares(trials, fit, num_steps=bootstrap.NUM_STEPS):

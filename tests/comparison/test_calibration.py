@@ -9,7 +9,7 @@ from scipy import stats
 
 from galileo_jax.comparison import compare as module
 from galileo_jax.comparison.compare import compare
-from galileo_jax.inference.fits.gradient import GradientFitter, Settings
+from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import inverse
 from galileo_jax.similarity.discrepancy import crossings, modes
@@ -35,8 +35,7 @@ def fit_near_truth(trials):
     parameters = trials.model_parameters
     theta = np.array([values.get(p.name, p.absent) for p in parameters])
     start = np.clip(np.asarray(inverse(parameters, jnp.asarray(theta))), -1.0, 1.0)[None]
-    fitter = GradientFitter(trials, Settings(max_steps=0))
-    return fitter.fit_from(start, np.ones(start.shape, bool), np.zeros(1, int))[0]
+    return GradientFitter(trials).polish(start, np.ones(start.shape, bool), np.zeros(1, int))[0]
 
 
 def disturbed(trials, away_m):

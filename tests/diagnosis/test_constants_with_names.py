@@ -15,6 +15,7 @@ from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import effect_names, make_effects
+from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
 from galileo_jax.search.table import Table
@@ -36,7 +37,7 @@ def judged(tmp_path, noise_m):
     trials = make_joint_problem([clip], [read_observation_csv(path)], effects=both)
     with in_64_bit():
         fitter = GradientFitter(trials)
-        base = Hypothesis((), fitter.fit(0, effects=()))
+        base = Hypothesis((), best_fit(fitter, 0, effects=()))
         stakes = VerdictStakes(trials, False)
         table = candidates_of(search(Table.of(fitter, stakes, 0, base), 1))
         evidence = {c.name: c.log_evidence for c in table}

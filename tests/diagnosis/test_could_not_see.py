@@ -17,6 +17,7 @@ from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.measurement.measure import measure
 from galileo_jax.model.parameters import LogNormal, Normal, Uniform
+from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from tests.found import candidate_of, comparison_of
 from tests.precision import in_64_bit
@@ -66,7 +67,7 @@ def made(folder: Path, noise: float) -> JointProblem:
 
 
 def seen_in(trials: JointProblem) -> dict:
-    base = Hypothesis((), GradientFitter(trials).fit(0, effects=()))
+    base = Hypothesis((), best_fit(GradientFitter(trials), 0, effects=()))
     return could_not_see(trials, base, dict.fromkeys(EFFECTS, -3.0), 0)
 
 
@@ -88,7 +89,7 @@ def test_nothing_is_said_where_the_last_model_does_not_describe_the_clip(
     tmp_path, p_value, is_said
 ):
     trials = made(tmp_path, 0.0003)
-    base = Hypothesis((), GradientFitter(trials).fit(0, effects=()))
+    base = Hypothesis((), best_fit(GradientFitter(trials), 0, effects=()))
     rounds = (Round(base, comparison_of(trials, p_value)),)
     candidates = tuple(replace(candidate_of(trials, name, 0.1), log_prior=-3.0) for name in EFFECTS)
     found = Diagnosis(rounds, candidates, Verdict("none", ()))

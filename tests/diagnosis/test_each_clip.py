@@ -10,6 +10,7 @@ from galileo_jax.diagnosis.each_clip import EachClip, each_clip, kind_of
 from galileo_jax.inference.build_problem import make_joint_problem
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.report.diagnosis_text import each_clip as told
+from galileo_jax.search.fit import best_fit
 from tests.precision import in_64_bit
 
 G, ANGLE, FPS, NOISE_M = 9.81, np.radians(22.0), 60, 3e-4
@@ -72,7 +73,7 @@ def test_the_clip_that_differs_is_told_and_how(tmp_path):
     ]
     clips = [load_clip(path) for path in paths]
     trials = make_joint_problem(clips, [read_observation_csv(path) for path in paths])
-    fit = GradientFitter(trials).fit(0, effects=())
+    fit = best_fit(GradientFitter(trials), 0, effects=())
     comparison = compare(trials, fit, 0)
     assert not comparison.is_adequate
     found = each_clip(trials, fit, comparison)

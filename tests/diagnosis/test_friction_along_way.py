@@ -6,7 +6,7 @@ import pytest
 import galileo_jax as gx
 from galileo_jax.diagnosis.friction_along_way import SHOWN, friction_along_way
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.fits.imperfect import fit_worlds
+from galileo_jax.search.imperfect import fit_worlds
 
 ANGLE, K, NOISE_M, FPS, G = np.radians(25.0), 0.2, 1e-4, 60.0, 9.81
 CENTRE_M, WIDTH_M = 0.4, 0.05

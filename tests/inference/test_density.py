@@ -9,11 +9,11 @@ import pytest
 
 from galileo_jax.inference.density import density_of
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.fits.imperfect import fit_worlds
 from galileo_jax.inference.fits.sized_density import LEAST_SIZES, SizedDensity
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.samplers.program import Program
 from galileo_jax.rollout.engines import make_engine
+from galileo_jax.search.imperfect import fit_worlds
 from tests.inference.test_joint_problem import BETWEEN_PROGRAMS, STEEPER, draw
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit

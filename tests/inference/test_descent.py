@@ -11,7 +11,8 @@ from galileo_jax.inference.fits.descent import FEW, Descent, GiveUp, ends_of, jo
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.inference.fits.kernels import Quadratic
 from galileo_jax.inference.fits.residuals import Batch, Slopes, cost
-from galileo_jax.inference.fits.starts import scattered_starts
+from galileo_jax.search.fit import best_fit
+from galileo_jax.search.starts import scattered_starts
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -159,7 +160,7 @@ def test_a_fit_comes_back_from_the_edge(edge):
     """Where a coefficient of friction no longer moves with z."""
     trials = make_trials([HIT])
     fitter = GradientFitter(trials)
-    best = fitter.fit(0)
+    best = best_fit(fitter, 0)
     count = len(trials.model_parameters)
     start = best.z[:count].copy()
     start[[p.name for p in trials.model_parameters].index("k1")] = edge

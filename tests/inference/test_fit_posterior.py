@@ -14,6 +14,7 @@ from galileo_jax.inference.fits.laplace import Code
 from galileo_jax.inference.fits.posterior_check import to_go_on_from
 from galileo_jax.inference.laplace import NUM_DRAWS, laplace_posterior
 from galileo_jax.inference.posterior import Status
+from galileo_jax.search.fit import best_fit
 from tests.inference.test_importance_sampling import BENT, TWO, Known, points
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -126,7 +127,7 @@ def test_it_says_where_too_few_draws_count(posterior, monkeypatch):
 def test_of_a_simulated_hit_both_agree():
     with in_64_bit():
         trials = make_trials([HIT])
-        fit = GradientFitter(trials).fit(0)
+        fit = best_fit(GradientFitter(trials), 0)
         found, normal = (make(trials, fit, 0).flat() for make in (fit_posterior, laplace_posterior))
     for name in ("k1", "k2"):
         i = trials.names.index(name)
@@ -150,23 +151,6 @@ def test_from_beside_the_best_it_goes_on_to_the_best():
     costs = known.costs(points(starts))
     assert costs.min() < known.costs(points(beside.z))[0]
     assert starts[np.argmin(costs), 0] > 0
-
-
-@pytest.mark.parametrize("is_smooth", [True, False], ids=["rigid", "rough"])
-def test_a_fit_that_is_beside_the_posterior_goes_on(is_smooth, monkeypatch):
-    """Where motion is rough no points are drawn, and it stays where it is."""
-    with in_64_bit():
-        fitter = GradientFitter(make_trials([HIT]))
-        best = fitter.fit(0)
-        beside = best.z + 4 * np.sqrt(np.diag(best.covariance)) * (np.arange(len(best.z)) == 1)
-        stuck = replace(best, z=beside, log_evidence=best.log_evidence - 8.0)
-        monkeypatch.setattr(fitter, "_descent", replace(fitter._descent, is_smooth=is_smooth))
-        found = fitter._looked_round([stuck], 0)
-    if is_smooth:
-        assert found.log_evidence == pytest.approx(best.log_evidence, abs=0.2)
-        assert found.stats["num_rollouts"] > best.stats["num_rollouts"]
-    else:
-        np.testing.assert_array_equal(found.z, stuck.z)
 
 
 def test_so_many_parameters_that_no_draw_weighs_anything_are_left(monkeypatch):

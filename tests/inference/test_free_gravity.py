@@ -24,6 +24,7 @@ from galileo_jax.observation.observation import Observation
 from galileo_jax.results.run import load_run, save_run
 from galileo_jax.rollout.engines import make_engine
 from galileo_jax.runtime.errors import InputError
+from galileo_jax.search.fit import best_fit
 from tests.precision import in_64_bit
 from tests.reference_ramp import Experiment, solve
 
@@ -93,7 +94,7 @@ def trials_of(path: Path, *effects: str, engine: str = "auto", free=("gravity",)
 
 
 def result_of(trials: JointProblem):
-    fit = GradientFitter(trials).fit(0)
+    fit = best_fit(GradientFitter(trials), 0)
     posterior = laplace_posterior(trials, fit, 0)
     result = make_result(
         trials, posterior, fit.z, clips=["clip.yaml"], method="grad", seed=0, timings_s={},

@@ -14,6 +14,7 @@ from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import inverse
 from galileo_jax.rollout.engines import make_engine
+from galileo_jax.search.fit import best_fit
 from galileo_jax.similarity.gaussian_likelihood import GaussianLikelihood
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
@@ -38,7 +39,7 @@ def precision():
 
 
 def fit(trials, effects=None):
-    return GradientFitter(trials).fit(0, effects=effects)
+    return best_fit(GradientFitter(trials), 0, effects=effects)
 
 
 def told(trials, found):
@@ -107,7 +108,7 @@ def test_same_seed_same_fit(alone):
 def test_other_starts_lead_to_the_same_mode(alone):
     """A fit stands still to far less than its sd: the way to it leaves no trace."""
     trials, found = alone
-    other = GradientFitter(trials).fit(1)
+    other = best_fit(GradientFitter(trials), 1)
     sd = np.sqrt(np.diag(found.covariance))
     np.testing.assert_allclose(other.z / sd, found.z / sd, atol=STANDS_STILL_SD)
     assert other.log_evidence == pytest.approx(found.log_evidence, abs=1e-4)

@@ -5,7 +5,6 @@ import pytest
 from scipy.special import logsumexp as scipy_logsumexp
 
 from galileo_jax.inference.fits.gradient import GradientFitter
-from galileo_jax.inference.fits.imperfect import fit_worlds
 from galileo_jax.inference.fits.importance_sampling import _log_densities
 from galileo_jax.inference.fits.laplace import GradientFit
 from galileo_jax.inference.fits.linear_clip import (
@@ -18,6 +17,8 @@ from galileo_jax.inference.fits.linear_clip import (
 from galileo_jax.inference.fits.sized_density import SizedDensity
 from galileo_jax.inference.joint_problem import NOISE_SD
 from galileo_jax.runtime.precision import in_float64
+from galileo_jax.search.fit import best_fit
+from galileo_jax.search.imperfect import fit_worlds
 from galileo_jax.statespace.term import Term
 from tests.oracle_trials import make_trials
 from tests.ramp_model import HIT
@@ -122,7 +123,7 @@ def test_the_density_over_one_size_is_that_of_the_fit():
 def test_many_rows_are_averaged_and_say_the_same_of_parameters():
     """The information on parameters of neighbours that were averaged is nearly that of all."""
     trials = make_trials([HIT])
-    fit = GradientFitter(trials).fit(0)
+    fit = best_fit(GradientFitter(trials), 0)
     [linear] = linear_clips(trials, fit)
     assert linear.slopes.shape == (len(linear.e), len(trials.model_parameters))
     cover = linear.covariance(trials.terms, np.full(len(trials.terms), -9.0), 0.0)

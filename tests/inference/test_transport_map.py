@@ -21,6 +21,7 @@ from galileo_jax.inference.fits.transport_map import (
 from galileo_jax.inference.metropolis import metropolis_posterior
 from galileo_jax.inference.samplers import Settings
 from galileo_jax.inference.samplers.program import Program
+from galileo_jax.search.fit import best_fit
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -41,7 +42,7 @@ def precision():
 def gentle():
     with in_64_bit():
         trials = make_trials([GENTLE], seed=1)
-        fit = GradientFitter(trials).fit(0)
+        fit = best_fit(GradientFitter(trials), 0)
         residuals = Residuals(trials)
         return trials, fit, residuals, valley_round(fit, residuals)
 
@@ -92,7 +93,7 @@ def test_it_follows_the_valley(gentle):
 def test_a_straight_valley_is_left_straight(gentle):
     trials, fit, residuals, valley = gentle
     near = make_trials([HIT], seed=1)
-    own = GradientFitter(near).fit(0)
+    own = best_fit(GradientFitter(near), 0)
     other = valley_round(own, Residuals(near))
     assert np.abs(other.quadratic).max() < 0.2 < 0.5 < np.abs(valley.quadratic).max()
     before = residuals.num_rollouts
@@ -160,7 +161,7 @@ def u_of(valley, straight):
 def test_chains_that_have_not_converged_set_off_anew(tmp_path):
     """The fit's widths are too small; what a first run drew mends them for the second."""
     trials = make_trials([HIT], seed=1)
-    fit = GradientFitter(trials).fit(0)
+    fit = best_fit(GradientFitter(trials), 0)
     narrow = replace(fit, covariance=fit.covariance / 6)
     seen, file, settings = [], tmp_path / "chains", Settings(max_steps=3000)
     posterior = metropolis_posterior(

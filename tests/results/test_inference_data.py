@@ -24,6 +24,7 @@ from galileo_jax.measurement.measure import measure
 from galileo_jax.observation.observation import Observation
 from galileo_jax.results import inference_data as module
 from galileo_jax.results.inference_data import inference_data
+from galileo_jax.search.fit import best_fit
 from tests.precision import in_64_bit
 
 FRAMES, HIDDEN, NOISE_M, K1 = 40, 7, 1e-3, 0.3
@@ -72,7 +73,7 @@ def trials(tmp_path_factory) -> JointProblem:
 
 @pytest.fixture(scope="module")
 def fit(trials) -> GradientFit:
-    return GradientFitter(trials).fit(0)
+    return best_fit(GradientFitter(trials), 0)
 
 
 @pytest.fixture(scope="module")

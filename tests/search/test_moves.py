@@ -1,6 +1,6 @@
 """What each move proposes: pure functions of the table."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,10 +11,11 @@ import pytest
 from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects import make_effects
 from galileo_jax.model.parameters import Normal, Parameter, Uniform
+from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
 from galileo_jax.search.moves import MOVES, add, copy_shape, drop, jolt, scatter, swap
-from galileo_jax.search.table import Entry, Table
+from galileo_jax.search.table import Entry, Stakes, Table
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -23,18 +24,11 @@ FOUND, BEHIND = 3.0, 30.0  # nats
 LIBRARY = ("restitution", "air_drag")
 
 
-@dataclass(frozen=True)
-class Even:
+class Even(Stakes):
     """Stakes by which all effects are as probable as none, and all hypotheses may decide."""
-
-    def log_prior(self, hypothesis):
-        return 0.0
 
     def may_decide(self, log_odds, is_form, num_effects):
         return log_odds > log_odds.max() - 20.0
-
-    def is_close_call(self, log_odds):
-        return np.zeros(len(log_odds), bool)
 
 
 @pytest.fixture(scope="module")
@@ -43,9 +37,9 @@ def table():
     with in_64_bit():
         trials = make_trials([HIT], effects=make_effects(list(LIBRARY)))
         fitter = GradientFitter(trials)
-        found = Table.of(fitter, Even(), 0, Hypothesis((), fitter.fit(0, effects=())))
+        found = Table.of(fitter, Even(), 0, Hypothesis((), best_fit(fitter, 0, effects=())))
         for effects in (LIBRARY[:1], LIBRARY[1:], LIBRARY):
-            fit = fitter.fit(0, effects=effects)
+            fit = best_fit(fitter, 0, effects=effects)
             found = found.with_entry(Entry(Hypothesis(effects, fit), (fit,), 0.0))
         yield found
 
@@ -69,7 +63,9 @@ def of_two(table: Table) -> Table:
 
 
 def test_every_file_of_the_folder_is_a_move():
-    assert set(MOVES) == {"add", "copy_shape", "drop", "jolt", "scatter", "swap"}
+    assert set(MOVES) == {
+        *("add", "copy_shape", "drop", "jolt", "nudge", "prefix", "scatter", "swap"),
+    }
 
 
 def test_every_effect_is_added_once_and_every_pair_to_the_better_of_its_effects(table):
@@ -83,7 +79,11 @@ def test_every_effect_is_added_once_and_every_pair_to_the_better_of_its_effects(
         }
         again = add.propose(replace(some, asked=frozenset(asked)))
     assert {start.effects for start in singles} == {(name,) for name in LIBRARY}
-    pairs = {(start.parent.effects, start.effects) for start in both if len(start.effects) == 2}
+    pairs = {
+        (start.parent and start.parent.effects, start.effects)
+        for start in both
+        if len(start.effects) == 2
+    }
     assert pairs == {(LIBRARY[1:], (LIBRARY[1], LIBRARY[0]))}
     assert again == []
     free = some.free([start.effects for start in singles])

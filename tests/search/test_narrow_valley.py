@@ -9,12 +9,13 @@ import pytest
 from galileo_jax.api.simulate import simulate
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
-from galileo_jax.diagnosis.diagnose import fitter_of
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import DECISIVE
 from galileo_jax.inference.build_problem import make_joint_problem
+from galileo_jax.inference.fits.gradient import GradientFitter
 from galileo_jax.model.effects.forms import FORMS
 from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
 from galileo_jax.search.table import Table
@@ -49,8 +50,8 @@ def slowly_released(tmp_path):
 def test_the_search_arrives_where_a_start_at_the_truth_does(slowly_released):
     trials, truth = slowly_released
     with in_64_bit():
-        fitter = fitter_of(trials)
-        base = Hypothesis((), fitter.fit(0, effects=()))
+        fitter = GradientFitter(trials)
+        base = Hypothesis((), best_fit(fitter, 0, effects=()))
         parameters = trials.model_parameters
         count = len(parameters)
         start = base.fit.z[:count].copy()

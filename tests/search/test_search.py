@@ -17,10 +17,11 @@ from galileo_jax.diagnosis.laws.source import class_source, name_of
 from galileo_jax.diagnosis.stakes import VerdictStakes
 from galileo_jax.diagnosis.verdict import DECISIVE, LAPLACE_NATS, log_prior
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.fits.gradient import GradientFitter, Settings
+from galileo_jax.inference.fits.gradient import SETTLED_IN_TURN_NATS, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.effects.registry import make_effects
 from galileo_jax.model.parameters import inverse
+from galileo_jax.search.fit import best_fit
 from galileo_jax.search.hypothesis import Hypothesis
 from galileo_jax.search.loop import search
 from galileo_jax.search.starts import beside, beside_a_formula
@@ -43,7 +44,7 @@ def trials_of(path: Path, library: tuple[str, ...], **recipe: Any) -> JointProbl
 def table_of(trials: JointProblem) -> Table:
     """The model without effects alone."""
     fitter = GradientFitter(trials)
-    base = Hypothesis((), fitter.fit(0, effects=()))
+    base = Hypothesis((), best_fit(fitter, 0, effects=()))
     return Table.of(fitter, VerdictStakes(trials, False), 0, base)
 
 
@@ -110,7 +111,7 @@ def test_what_does_the_same_as_one_of_a_pair_is_found_where_slopes_mean_nothing(
     with in_64_bit():
         trials = trials_of(tmp_path / "clip.csv", (*truth, *others), effects=effects, **recipe)
         table = table_of(trials)
-        fit = table.fitter.fit(0, effects=rival)
+        fit = best_fit(table.fitter, 0, effects=rival)
         table = table.with_entry(Entry(Hypothesis(rival, fit), (fit,), 0.0))
         kept = replace(
             table.entries[frozenset(rival)].hypothesis,
@@ -185,7 +186,7 @@ def test_an_effect_that_was_missed_is_found_from_a_pair_that_has_it(rubs_at_low_
 
 
 DECIDING_NATS = 12.8  # behind the best: what luck may make of 3 nats
-AGREES_NATS = Settings().settled_in_turn
+AGREES_NATS = SETTLED_IN_TURN_NATS
 SHAPED = ("air_drag", "friction_patch", "stribeck", "spring_tether", "viscous_drag")
 
 

@@ -33,7 +33,9 @@ def table() -> Table:
 
     stakes: Any = SimpleNamespace(log_prior=lambda one: -5.0 * len(one.effects), may_decide=decides)
     fitter: Any = SimpleNamespace(
-        trials=SimpleNamespace(all_effects=("a", "b", *FORM_NAMES[:1])),
+        trials=SimpleNamespace(
+            all_effects=("a", "b", *FORM_NAMES[:1]), model_parameters=(), free=lambda _: np.zeros(0)
+        ),
         is_explained=lambda fit: True,
     )
     found = Table.of(fitter, stakes, 0, Hypothesis((), FIT))

@@ -10,6 +10,7 @@ import numpy as np
 from galileo_jax.comparison.bootstrap import whitened
 from galileo_jax.diagnosis.laws.formula_interpreter import MOST_NUMBERS, ActingFormulas, Spare
 from galileo_jax.diagnosis.laws.grammar import Structure, without_one_factor
+from galileo_jax.diagnosis.laws.linearised_clip import accelerations, masses_and_frictions
 from galileo_jax.diagnosis.laws.rank_formulas import (
     NUM_LAWS,
     Shape,
@@ -24,6 +25,7 @@ from galileo_jax.inference.fits.importance_sampling import Weighed, weighed
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.rollout.engine_jax import EngineJax
 from galileo_jax.rollout.engines import make_engine
+from galileo_jax.search.fit import refit
 from galileo_jax.search.hypothesis import Hypothesis
 
 NUM_REFITTED = 3
@@ -181,7 +183,7 @@ def _fitted(
     best = np.argsort([-fit.log_evidence for fit in fits])[:NUM_REFITTED]
     by_rollouts: dict[int, Weighed] = {}
     for i in best:
-        fits[i] = max(fits[i], fitter.refit(fits[i]), key=lambda fit: fit.log_evidence)
+        fits[i] = max(fits[i], refit(fitter, fits[i]), key=lambda fit: fit.log_evidence)
         own = weighed([fits[i]], fitter.residuals, SEED) if is_weighed else None
         if own is not None and own.is_sure:
             by_rollouts[i] = own
@@ -250,10 +252,11 @@ def _with_formula(
     total, count = np.zeros(len(z)), np.zeros(len(z))
     for clip, view in enumerate(views):
         others = view.others()
-        curves = _accelerations(view, one.structure, constants, strength)
+        grid = {key: np.array([value]) for key, value in constants.items()}
+        curves = accelerations(view, one.structure, grid, masses_and_frictions(view)[0])
         left = view.target()
-        for i, curve in enumerate(curves):
-            left = left - view.shows(i)[:, view.moves[i]] @ curve[view.moves[i]]
+        for i, (curve,) in enumerate(curves):
+            left = left - view.shows(i)[:, view.moves[i]] @ (strength * curve[view.moves[i]])
         design = view.fit.jacobian[:, others]
         normal = design.T @ design + np.eye(len(others))
         solved = -np.linalg.solve(normal, design.T @ left)
@@ -266,26 +269,3 @@ def _with_formula(
                 total[where] += value
                 count[where] += 1
     return np.where(count > 0, total / np.maximum(count, 1), z)
-
-
-def _accelerations(
-    view: View, structure: Structure, constants: Mapping[str, float], strength: float
-) -> list[np.ndarray]:
-    """Of each object `[time]`, m/s^2."""
-    scene, found = view.model.scene.surroundings, []
-    theta = view.trials.theta(view.fit.z, view.fit.free)
-    named = view.model.by_name(view.trials.of_clip(theta, 0))
-    for i in range(len(view.path_m)):
-        q, v = view.path_m[i], view.speed_m_s[i]
-        f = strength * structure.value(view.time_s, q, v, constants) * np.ones_like(q)
-        if structure.nature == "friction":
-            begin = structure.value(0.0, view.start_path_m[i], 0.0, constants)
-            f = f - strength * begin
-        if structure.nature != "push":
-            f = -np.sign(v) * f
-        if structure.nature == "friction":
-            f = f * scene.gravity * np.where(q < 0, np.cos(scene.angle_rad), 1.0)
-        if structure.nature == "drag_force":
-            f = f * float(named["m1"]) / float(named[f"m{i + 1}"])
-        found.append(f if i == 0 or structure.is_on_all else np.zeros_like(f))
-    return found

@@ -33,6 +33,8 @@ SMALLEST_STEP, SMALLEST_ROUGH_STEP, LARGEST_STEP = 1e-3, 0.2, 4.0
 FEW = 4
 CATCHES_UP = 0.1  # what the next step must promise of what one is behind
 SAME_VALLEY_NATS = 1.0  # by which points differ that are of one valley
+BEHIND_IN_SEARCH = 20.0  # starts of one hypothesis, in nats of the search's coarse noise
+MOST_VALLEYS = 4  # that are polished
 
 
 class GiveUp(NamedTuple):
@@ -118,6 +120,16 @@ def ends_of(joined: np.ndarray) -> np.ndarray:
     while (ends != (further := joined[ends])).any():
         ends = further
     return ends
+
+
+def valleys(ends: Quadratic, rows: np.ndarray) -> list[int]:
+    """The best point of every valley among `rows` that is not far behind, best first."""
+    left, found = rows[np.argsort(ends.cost[rows], kind="stable")], []
+    left = left[ends.cost[left] < ends.cost[left[0]] + BEHIND_IN_SEARCH]
+    while left.size and len(found) < MOST_VALLEYS:
+        found.append(int(left[0]))
+        left = left[~in_valley(ends, found[-1], left)]
+    return found
 
 
 @dataclass(frozen=True)

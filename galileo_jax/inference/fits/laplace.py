@@ -43,7 +43,7 @@ class GradientFit:
       jacobian: `[value, model parameter]`, d(whitened residual)/dz at the fit, clip after clip;
         values as in `Problem.whiten`; 0 where pinned.
       code: how it ended.
-      stats: rollouts and steps it took.
+      stats: rollouts it took.
       pull: how far the nuisances are from what is expected: the sum of the squares of their
         `prior_deviations`.
       num_pulled: how many numbers' worth of the data the nuisances were fitted with.
@@ -78,25 +78,18 @@ class GradientFit:
         return float(np.sum(self.free[:count]) - np.trace(self.covariance[:count, :count]))
 
 
-def laplace_fits(
-    trials: JointProblem, residuals: Residuals, found: Polished, stats: dict[str, float]
-) -> list[GradientFit]:
+def laplace_fits(trials: JointProblem, residuals: Residuals, found: Polished) -> list[GradientFit]:
     """The normal approximations round modes.
 
     Args:
       trials: what was fitted.
       residuals: of the trials.
       found: the modes.
-      stats: as `GradientFit.stats`.
     """
     slopes = residuals.slopes(found.points, found.widths, is_central=True)
-    stats = stats | {"num_rollouts": residuals.num_rollouts}
     normal = quadratic(slopes, found.points.z).normal
     slopes = slopes._replace(jacobian=[slopes.among_all(j, axis=2) for j in slopes.jacobian])
-    return [
-        _laplace_fit(trials, residuals, found, slopes, own, stats, i)
-        for i, own in enumerate(normal)
-    ]
+    return [_laplace_fit(trials, residuals, found, slopes, own, i) for i, own in enumerate(normal)]
 
 
 def _laplace_fit(
@@ -105,7 +98,6 @@ def _laplace_fit(
     found: Polished,
     slopes: Slopes,
     normal: np.ndarray,
-    stats: dict[str, float],
     i: int,
 ) -> GradientFit:
     """That of mode i, whose J^T J + 1 is `normal`."""
@@ -132,7 +124,7 @@ def _laplace_fit(
         steps=found.widths[i],
         jacobian=np.concatenate(rows),
         code=Code.FAILED if failed else code,
-        stats=dict(stats),
+        stats={"num_rollouts": residuals.num_rollouts},
         pull=float(np.sum(prior_deviations(trials.model_parameters, z) ** 2)),
         num_pulled=float(np.sum(1 - np.diag(covariance)[: len(z)][pulled])),
     )

@@ -11,6 +11,8 @@ NAME = "add"
 
 def propose(table: Table) -> list[Start]:
     """Starts that match what the hypothesis without the effect leaves, and scattered ones."""
+    if not table.most_effects:
+        return []
     base = table.base
     wanted = [(base, (name,)) for name in table.trials.all_effects]
     if table.most_effects > 1:

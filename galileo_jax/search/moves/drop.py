@@ -13,16 +13,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from galileo_jax.inference.fits.gradient import GradientFit
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.model.parameters import in_units
 from galileo_jax.search.hypothesis import Hypothesis, reduced
 from galileo_jax.search.start import Start
+from galileo_jax.search.starts import positive_nuisances
 from galileo_jax.search.table import Table
 
 NAME = "drop"
 NUM_LEADERS = 3
+ALONG_Z = np.linspace(-2.0, 2.5, 19)  # of a positive nuisance: where another valley may begin
 LEAD_NATS = 3.0  # by which the evidence without it is behind: less needs no better fit
 STEP_Z = 1e-4
 
@@ -38,11 +40,26 @@ def propose(table: Table) -> list[Start]:
             if known is None or known.hypothesis.fit.log_evidence > behind:
                 continue
             made_up = without_effects(table.trials, leader, kept)
-            points = table.fitter.along_nuisances(made_up)
+            points = along_nuisances(table.fitter, made_up)
             if kept:
                 points = np.stack([reduced(table.trials, leader, kept).fit.z[: len(points[0])]])
             starts += [Start(kept, z, leader, NAME, i, not kept) for i, z in enumerate(points)]
     return starts
+
+
+def along_nuisances(fitter: GradientFitter, fit: GradientFit) -> np.ndarray:
+    """Where chi2 is least as one positive nuisance moves, all else as in a fit, `[start, z]`.
+
+    Every minimum of every line, the fit's own noise; the lines' ends, too.
+    """
+    z = fit.z[: len(fit.steps)]
+    own = positive_nuisances(fitter.trials, fit.free)
+    points = np.tile(z, (len(own), len(ALONG_Z), 1))
+    points[np.arange(len(own)), :, own] = ALONG_Z
+    costs = fitter.costs_beside(fit, points.reshape(-1, len(z))).reshape(points.shape[:2])
+    beside = np.pad(costs, ((0, 0), (1, 1)), constant_values=np.inf)
+    is_least = (costs <= beside[:, :-2]) & (costs <= beside[:, 2:])
+    return np.concatenate([z[None], points[is_least]])
 
 
 def without_effects(

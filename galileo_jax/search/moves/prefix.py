@@ -1,4 +1,4 @@
-"""Trials as seen before a hit: what one phase of the motion tells, without side valleys.
+"""Starts that suit what was seen before each further object moved, or a bounce.
 
 When a hit comes depends on all that happened before, and which frames compare with which depends on
 when it comes. Before it only the friction of what moves counts, and a search cannot miss it; what
@@ -14,12 +14,51 @@ from itertools import combinations, product
 import numpy as np
 
 from galileo_jax.clip.walls import bounces
+from galileo_jax.inference.fits.descent import ends_of, valleys
+from galileo_jax.inference.fits.gradient import GradientFitter
+from galileo_jax.inference.fits.normal_matrix import inverse
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.laws.pucks import START
+from galileo_jax.search.start import Start
+from galileo_jax.search.starts import absent_z, scattered_round
+from galileo_jax.search.table import Table
 
+NAME = "prefix"
+NUM_STARTS, NUM_FOLLOWED = 128, 8
+NUM_OF_PHASE, NUM_OF_PHASE_FOLLOWED = 64, 4
+OPEN_SD_Z = 0.5  # of the prior's 1: what a phase leaves so open is scattered in the next one
 MOST_BOUNCES = 4  # off walls, before which a search stops on its way
 LEAST_FRAMES = 4  # before it moves: from fewer nothing is fitted
+
+
+def propose(table: Table) -> list[Start]:
+    """Starts of a fit without rivals that is in doubt."""
+    if not table.is_in_doubt:
+        return []
+    return [
+        Start((), z, parent, NAME, number % NUM_FOLLOWED)
+        for parent, _ in table.not_asked(NAME, [(table.base, ())])
+        for number, z in enumerate(by_phases(table))
+    ]
+
+
+def by_phases(table: Table) -> np.ndarray:
+    """Starts in which each phase knows what those before it told, `[start, z]`."""
+    trials, seed, free = table.trials, table.seed, table.free([()])[0]
+    is_main = free & np.array([p.role != "nuisance" for p in trials.model_parameters])
+    centres, is_open = absent_z(trials)[None], is_main[None]
+    for short in phases(trials):
+        fitter = GradientFitter(short)
+        starts = scattered_round(short, centres, is_open, NUM_OF_PHASE, seed)
+        every = np.tile(free, (len(starts), 1))
+        best = np.argsort(fitter.search_costs(starts, every))[:NUM_OF_PHASE_FOLLOWED]
+        found = fitter.race(starts[best], every[best], np.zeros(len(best), int))
+        rows = valleys(found.best, np.unique(ends_of(found.joined)))
+        variance = np.diagonal(inverse(found.best.normal[rows]), axis1=1, axis2=2)
+        centres, is_open = found.best.z[rows], is_main & (variance > OPEN_SD_Z**2)
+        table.fitter.residuals.num_rollouts += fitter.residuals.num_rollouts
+    return scattered_round(trials, centres, is_open, NUM_STARTS, seed)
 
 
 def phases(trials: JointProblem) -> Iterator[JointProblem]:

@@ -8,8 +8,8 @@ import pytest
 import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.fits.incremental_shooting import phases
 from galileo_jax.measurement.measure import measure
+from galileo_jax.search.moves.prefix import phases
 
 FPS, G, K, RATIO, RESTITUTION, NOISE_M = 50, 9.81, 0.03, 0.6, 0.9, 5e-4
 RADIUS_M, FRAMES = 0.03, 80

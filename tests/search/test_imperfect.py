@@ -6,20 +6,28 @@ import numpy as np
 import pytest
 
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
-from galileo_jax.inference.fits.imperfect import fit_worlds
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
+from galileo_jax.search.fit import best_fit
+from galileo_jax.search.imperfect import fit_worlds
 from galileo_jax.statespace.term import TERMS
 from tests.oracle_trials import make_trials
+from tests.precision import in_64_bit
 from tests.ramp_model import HIT
 
 LASTS_S, SIZE_M = 0.25, 1e-3
 
 
+@pytest.fixture(scope="module", autouse=True)
+def precision():
+    with in_64_bit():
+        yield
+
+
 @pytest.fixture(scope="module")
-def smooth():
+def smooth(precision):
     trials = make_trials([HIT])
-    return trials, GradientFitter(trials).fit(0)
+    return trials, best_fit(GradientFitter(trials), 0)
 
 
 def sd_of(trials, fit, name):
@@ -56,7 +64,7 @@ def with_errors(trials: JointProblem) -> JointProblem:
 def test_errors_that_last_are_found_and_widen_intervals(smooth):
     """Their size within its interval; without them the fit is contradicted and far too sure."""
     trials = with_errors(smooth[0])
-    plain = GradientFitter(trials).fit(0)
+    plain = best_fit(GradientFitter(trials), 0)
     world = fit_worlds(trials, 0, may_be_exact=False).best
     rough, fit = world.trials, world.fit
     assert plain.code is Code.MISFIT

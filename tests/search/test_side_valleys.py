@@ -1,5 +1,7 @@
 """Fits that once ended in a side valley, and what is said where noise does not explain a fit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.special import ndtr
@@ -8,15 +10,17 @@ import galileo_jax as gx
 from galileo_jax.clip.load import load_clip
 from galileo_jax.clip.track_csv import read_observation_csv
 from galileo_jax.inference.build_problem import make_joint_problem
-from galileo_jax.inference.fits.descent import Descended
+from galileo_jax.inference.fits.descent import ends_of, in_valley, valleys
 from galileo_jax.inference.fits.gradient import Code, GradientFitter
-from galileo_jax.inference.fits.incremental_shooting import before_moving
 from galileo_jax.inference.fits.kernels import Quadratic
-from galileo_jax.inference.fits.search_results import Ends
-from galileo_jax.inference.fits.starts import absent_z, scattered_round, scattered_starts
 from galileo_jax.inference.laplace import laplace_posterior
 from galileo_jax.inference.posterior import Status
 from galileo_jax.model.effects.registry import make_effects
+from galileo_jax.search.fit import best_fit, looked_round
+from galileo_jax.search.hypothesis import Hypothesis
+from galileo_jax.search.moves.prefix import before_moving
+from galileo_jax.search.starts import absent_z, scattered_round, scattered_starts
+from galileo_jax.search.table import Stakes, Table
 from tests.oracle_trials import make_trials
 from tests.precision import in_64_bit
 from tests.ramp_model import HIT
@@ -50,7 +54,7 @@ def simulated(folder, **settings):
 def test_a_fit_leaves_a_side_valley(tmp_path, settings, seed):
     """From these seeds all refined starts once ended in one, chi2 of 7 to 77 per value."""
     trials, truth = simulated(tmp_path, **settings)
-    found = GradientFitter(trials).fit(seed)
+    found = best_fit(GradientFitter(trials), seed)
     value = dict(zip(trials.names, trials.theta(found.z), strict=True))
     assert found.code is Code.CONVERGED
     assert value["k1"] == pytest.approx(truth["k1"], abs=FRICTION_OFF)
@@ -66,7 +70,7 @@ def test_a_fit_looks_at_hits_that_hardly_rebound(tmp_path):
     clip = load_clip(made.clips[0].with_suffix(".yaml"))
     observation = read_observation_csv(made.clips[0])
     trials = make_joint_problem([clip], [observation], effects=make_effects(["air_drag"]))
-    found = GradientFitter(trials).fit(0)
+    found = best_fit(GradientFitter(trials), 0)
     value = dict(zip(trials.names, trials.theta(found.z), strict=True))
     assert value["impact_restitution"] < 0.011
 
@@ -76,7 +80,7 @@ def test_a_misfit_is_no_plain_convergence(tmp_path):
     trials, _ = simulated(
         tmp_path, seed=5, k1=0.1, effects=("air_drag",), strength=1.0, track_noise=0.0001
     )
-    found = GradientFitter(trials).fit(0)
+    found = best_fit(GradientFitter(trials), 0)
     assert found.code is Code.MISFIT
     assert "noise" in found.code.value
     assert laplace_posterior(trials, found, 0).status is Status.CONVERGED
@@ -84,7 +88,7 @@ def test_a_misfit_is_no_plain_convergence(tmp_path):
 
 def test_a_fit_of_a_right_model_needs_no_second_search():
     stages = []
-    found = GradientFitter(make_trials([HIT])).fit(0, on_stage=stages.append)
+    found = best_fit(GradientFitter(make_trials([HIT])), 0, on_stage=stages.append)
     assert found.code is Code.CONVERGED
     assert stages == ["searching", "refining"]
 
@@ -112,9 +116,10 @@ def test_ends_are_sorted_by_valleys():
     cost_nats, normal = np.array([15.0, 10.0, 10.1, 40.0, 12.0]), np.tile(4 * np.eye(2), (5, 1, 1))
     best = Quadratic(z, cost_nats, np.zeros((5, 2)), normal)
     joined = np.array([0, 1, 2, 3, 2])  # the last stopped where it had come near the third
-    ends = Ends.of(Descended(best, cost_nats, z, np.ones(5, bool), 7, joined))
-    np.testing.assert_array_equal(ends.best.z, z[[1, 0]])
-    assert (ends.num_agreeing, ends.num_steps) == (3, 7)
+    whose = ends_of(joined)
+    rows = valleys(best, np.unique(whose))
+    assert rows == [1, 0]
+    assert in_valley(best, rows[0], whose).sum() == 3
 
 
 def test_starts_keep_what_is_known():
@@ -135,3 +140,20 @@ def test_half_the_starts_of_what_rolls_slip(tmp_path):
     free = np.ones(len(trials.model_parameters), bool)
     k1 = ndtr(scattered_starts(trials, free, 64, seed=0)[:, trials.names.index("k1")])
     assert 0.4 < np.mean(k1 < slips + 0.01) < 0.6
+
+
+@pytest.mark.parametrize("is_smooth", [True, False], ids=["rigid", "rough"])
+def test_a_fit_that_is_beside_the_posterior_goes_on(is_smooth, monkeypatch):
+    """Where motion is rough no points are drawn, and it stays where it is."""
+    fitter = GradientFitter(make_trials([HIT]))
+    best = best_fit(fitter, 0)
+    beside = best.z + 4 * np.sqrt(np.diag(best.covariance)) * (np.arange(len(best.z)) == 1)
+    stuck = replace(best, z=beside, log_evidence=best.log_evidence - 8.0)
+    monkeypatch.setattr(fitter, "_descent", replace(fitter._descent, is_smooth=is_smooth))
+    table = Table.of(fitter, Stakes(), 0, Hypothesis((), stuck))
+    _, found = looked_round(table)
+    if is_smooth:
+        assert found.log_evidence == pytest.approx(best.log_evidence, abs=0.2)
+        assert fitter.residuals.num_rollouts > best.stats["num_rollouts"]
+    else:
+        np.testing.assert_array_equal(found.z, stuck.z)

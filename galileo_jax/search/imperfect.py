@@ -18,6 +18,7 @@ from galileo_jax.inference.fits.linear_clip import (
     most_probable,
 )
 from galileo_jax.inference.joint_problem import JointProblem
+from galileo_jax.search.fit import best_fit
 
 MOST_ROUNDS, SETTLED = 4, 0.02  # of sizes and fits by turns; of a log size
 HOPELESS = -4.0  # nats, by Laplace: then what more care would change leaves it excluded
@@ -72,7 +73,7 @@ def fit_worlds(
     def is_enough(fit: GradientFit) -> bool:
         return fitter.is_explained(fit) or is_usual(with_imperfections(trials, fit))
 
-    exact = World(trials, fitter.fit(seed, on_stage, is_enough=is_enough))
+    exact = World(trials, best_fit(fitter, seed, on_stage, is_enough=is_enough))
     on_stage("sizing imperfections")
     x = None
     if may_be_exact and trials.terms and exact.fit.code is Code.CONVERGED:

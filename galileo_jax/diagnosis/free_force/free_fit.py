@@ -5,15 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter, Settings
-from galileo_jax.inference.free_force.spans import spans_of
+from galileo_jax.diagnosis.free_force.spans import spans_of
+from galileo_jax.inference.fits.gradient import GradientFit, GradientFitter
 from galileo_jax.inference.joint_problem import JointProblem
 from galileo_jax.inference.problem import Problem
 from galileo_jax.model.effects.free_acceleration import FreeAcceleration, Span
 from galileo_jax.rollout.engines import make_engine
+from galileo_jax.search.fit import refit
 
 # What friction takes up of a constant force is a soft direction: it must be followed to its end.
-SETTINGS = Settings(settled=0.005)
+SETTLED_NATS = 0.005
 NUM_SPANS = 2  # pieces by the hypothesis, then by the fit with the acceleration
 
 
@@ -24,34 +25,14 @@ class FreeFit:
     Attributes:
       trials: with the free acceleration among what is always there.
       effects: the free acceleration of each clip.
-      gradient: the fit.
+      fit: of all parameters.
       residual: `[value]`, whitened at the fitted noise scales.
     """
 
     trials: JointProblem
     effects: tuple[FreeAcceleration, ...]
-    gradient: GradientFit
+    fit: GradientFit
     residual: np.ndarray
-
-    @property
-    def z(self) -> np.ndarray:
-        """`[parameter]`, noise scales last; 0 where pinned."""
-        return self.gradient.z
-
-    @property
-    def free(self) -> np.ndarray:
-        """`[parameter]`."""
-        return self.gradient.free
-
-    @property
-    def covariance(self) -> np.ndarray:
-        """`[parameter, parameter]`; 0 where pinned."""
-        return self.gradient.covariance
-
-    @property
-    def jacobian(self) -> np.ndarray:
-        """`[value, model parameter]`, of the whitened residuals; 0 where pinned."""
-        return self.gradient.jacobian
 
 
 def with_free_acceleration(problem: Problem, spans_s: Sequence[Sequence[Span]]) -> Problem:
@@ -88,7 +69,7 @@ def free_fit(
         extended = JointProblem(tuple(problems))
         is_last = again == num_spans - 1
         found = _fitted(extended, embedded(trials, extended, z, free), in_all_valleys=is_last)
-        theta = extended.theta(found.z, found.free)
+        theta = extended.theta(found.fit.z, found.fit.free)
     return found
 
 
@@ -103,11 +84,11 @@ def embedded(
 
 def _fitted(extended: JointProblem, start: np.ndarray, in_all_valleys: bool) -> FreeFit:
     """The fit from a start `[parameter]`, z; NaN where pinned."""
-    fitter, count = GradientFitter(extended, SETTINGS), len(extended.model_parameters)
+    fitter, count = GradientFitter(extended, SETTLED_NATS), len(extended.model_parameters)
     own = start[None, :count]
     [fit] = fitter.fit_from(np.nan_to_num(own), np.isfinite(own), np.zeros(1, int))
     if in_all_valleys:  # the start is of a wrong model, whose restitution may be in another one
-        fit = fitter.refit(fit)
+        fit = refit(fitter, fit)
     theta = extended.theta(fit.z, fit.free)
     residual = [
         problem.whiten(
